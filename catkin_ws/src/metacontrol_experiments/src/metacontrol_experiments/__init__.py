@@ -1,0 +1,1 @@
+"""Missions, metrics and reports."""

@@ -1,0 +1,1 @@
+"""PyBullet world, robot and drivers of the demonstrators."""

@@ -1,0 +1,1 @@
+"""Stand-in for the navigation stack's move_base."""

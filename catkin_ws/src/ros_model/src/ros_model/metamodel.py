@@ -1,0 +1,214 @@
+"""The RosModel metamodel: what a `.rossystem` file says, as plain frozen data."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+Value = bool | int | float | str | list["Value"] | dict[str, "Value"]
+
+
+@dataclass(frozen=True)
+class Position:
+    """Where an element stands: file, and line and column counted from 1."""
+
+    file: str = "<model>"
+    line: int = 0
+    column: int = 0
+
+    def __str__(self) -> str:
+        """Return file:line:column, the form that editors jump to."""
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+class PortKind(enum.Enum):
+    """The kinds of interface that a node has."""
+
+    PUBLISHER = "publisher"
+    SUBSCRIBER = "subscriber"
+    SERVICE_SERVER = "service server"
+    SERVICE_CLIENT = "service client"
+    ACTION_SERVER = "action server"
+    ACTION_CLIENT = "action client"
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A dotted reference `package.artifact.node.name`; the name may itself hold dots and slashes."""
+
+    package: str
+    artifact: str
+    node: str
+    name: str = ""
+
+    @classmethod
+    def parse(cls, text: str) -> Reference:
+        """Split from the left into package, artifact, node and the rest.
+
+        Raises:
+            ValueError: the text has fewer than three parts.
+        """
+        parts = text.split(".", 3)
+        if len(parts) < 3 or not all(parts[:3]):
+            raise ValueError(f"reference '{text}' is not package.artifact.node[.name]")
+        return cls(*parts)
+
+    def __str__(self) -> str:
+        """Return the dotted form."""
+        return ".".join(part for part in (self.package, self.artifact, self.node, self.name) if part)
+
+
+@dataclass(frozen=True)
+class Port:
+    """A port of a component and the interface of a node that it instantiates."""
+
+    name: str
+    kind: PortKind
+    reference: Reference | None = None
+    namespace: str | None = None
+    position: Position = field(default=Position(), compare=False)
+
+
+@dataclass(frozen=True)
+class RosParameter:
+    """A parameter of a component. Its identity is the reference; the name is a label."""
+
+    name: str
+    reference: Reference | None = None
+    value: Value | None = None
+    namespace: str | None = None
+    position: Position = field(default=Position(), compare=False)
+
+    @property
+    def key(self) -> str:
+        """Name relative to the node, as the parameter server has it: from the reference, else the label."""
+        return self.reference.name if self.reference and self.reference.name else self.name
+
+
+@dataclass(frozen=True)
+class Component:
+    """A running node: an instance of a node of a package."""
+
+    name: str
+    node: Reference | None = None
+    namespace: str | None = None
+    ports: tuple[Port, ...] = ()
+    parameters: tuple[RosParameter, ...] = ()
+    position: Position = field(default=Position(), compare=False)
+
+    @property
+    def executable(self) -> Reference | None:
+        """The node that the component runs: FromRosNode, else the first reference of a port or parameter."""
+        if self.node:
+            return self.node
+        for element in (*self.ports, *self.parameters):
+            if element.reference:
+                return element.reference
+        return None
+
+    @property
+    def graph_name(self) -> str:
+        """Name of the node in the graph, with its namespace and without a leading slash."""
+        return f"{(self.namespace or '').strip('/')}/{self.name}".strip("/")
+
+    def port(self, name: str) -> Port | None:
+        """Return the port of that name, or None."""
+        return next((port for port in self.ports if port.name == name), None)
+
+
+@dataclass(frozen=True)
+class PortPath:
+    """An end of a connection: `component.port`."""
+
+    component: str
+    port: str
+
+    @classmethod
+    def parse(cls, text: str) -> PortPath:
+        """Split at the first dot; without one, the whole text is the port of an unnamed component."""
+        component, dot, port = text.partition(".")
+        return cls(component, port) if dot else cls("", text)
+
+    def __str__(self) -> str:
+        """Return `component.port`."""
+        return f"{self.component}.{self.port}" if self.component else self.port
+
+
+class ConnectionKind(enum.Enum):
+    """What a connection carries."""
+
+    TOPIC = "topic"
+    SERVICE = "service"
+    ACTION = "action"
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A connection between ports. Sources are publishers or servers, targets subscribers or clients."""
+
+    name: str
+    kind: ConnectionKind
+    sources: tuple[PortPath, ...]
+    targets: tuple[PortPath, ...]
+    position: Position = field(default=Position(), compare=False)
+
+
+@dataclass(frozen=True)
+class SystemParameter:
+    """A global parameter of a system; `qa_<name>` holds the expected level of a quality attribute."""
+
+    name: str
+    type: str | None = None
+    value: Value | None = None
+    namespace: str | None = None
+    position: Position = field(default=Position(), compare=False)
+
+
+@dataclass(frozen=True)
+class RosSystem:
+    """A system: components, their wiring, global parameters."""
+
+    name: str
+    components: tuple[Component, ...] = ()
+    connections: tuple[Connection, ...] = ()
+    parameters: tuple[SystemParameter, ...] = ()
+    header: str = ""  # comments at the top of the file
+    position: Position = field(default=Position(), compare=False)
+
+    def component(self, name: str) -> Component | None:
+        """Return the component of that name, or None."""
+        return next((component for component in self.components if component.name == name), None)
+
+    @property
+    def expected_qas(self) -> dict[str, float]:
+        """Expected level of each quality attribute: the parameters `qa_<name>` without their prefix."""
+        return {
+            p.name.removeprefix("qa_"): float(p.value)
+            for p in self.parameters
+            if p.name.startswith("qa_") and isinstance(p.value, (int, float)) and not isinstance(p.value, bool)
+        }
+
+
+def compose(base: RosSystem, variant: RosSystem) -> RosSystem:
+    """Return the whole system: the base with the variant's components in place of those of the same name.
+
+    A replaced component's connections go with it: in the base's connections its ends are dropped, and those
+    that lose all sources or all targets vanish, before the variant's connections and parameters are added.
+    The result bears the variant's name.
+    """
+    replaced = {component.name for component in variant.components}
+    kept: list[Connection] = []
+    for connection in base.connections:
+        sources = tuple(end for end in connection.sources if end.component not in replaced)
+        targets = tuple(end for end in connection.targets if end.component not in replaced)
+        if sources and targets:
+            kept.append(Connection(connection.name, connection.kind, sources, targets, connection.position))
+    own = {parameter.name for parameter in variant.parameters}
+    return RosSystem(
+        name=variant.name,
+        components=(*(c for c in base.components if c.name not in replaced), *variant.components),
+        connections=(*kept, *variant.connections),
+        parameters=(*(p for p in base.parameters if p.name not in own), *variant.parameters),
+        header=variant.header,
+        position=variant.position,
+    )

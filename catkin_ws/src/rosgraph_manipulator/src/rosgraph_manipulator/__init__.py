@@ -1,0 +1,1 @@
+"""R4: deploys a configuration of the system."""

@@ -1,0 +1,1 @@
+"""R1: what runs, what should run, and how well."""
