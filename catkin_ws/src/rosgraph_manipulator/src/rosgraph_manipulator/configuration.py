@@ -1,0 +1,121 @@
+"""The manipulator's configuration file: which launch file deploys which configuration."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ros_model.errors import ModelError
+from ros_model.files import resolve
+
+DEFAULT_FUNCTION = "f_navigate"  # what the published configuration files, which name no function, are about
+ARGUMENT = re.compile(r"[A-Za-z_]\w*:=.*", re.DOTALL)
+
+
+class ConfigurationError(Exception):
+    """The configuration cannot be used; the message names the key and the remedy."""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """One way to deploy a function: a launch file with its arguments (`NAME:=VALUE`)."""
+
+    name: str
+    function: str
+    launch_file: str
+    args: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the manipulator is told once, at its start."""
+
+    configurations: Mapping[str, Configuration]
+    kill_nodes: tuple[str, ...] = ()
+    save_action: str | None = None
+    action_type: str | None = None  # e.g. move_base_msgs/MoveBaseAction
+    reconfiguration_action_name: str = "rosgraph_manipulator_action_server"
+
+
+def parse_settings(parameters: Mapping[str, Any]) -> Settings:
+    """Check the parameters, in the published form or in ours, and resolve the launch files.
+
+    Args:
+        parameters: keys configurations, kill_nodes, save_action, goal_msg_type, reconfiguration_action_name. A
+            configuration is `{launch: FILE or package://PKG/FILE, args: [...], function: NAME}` or the published
+            `{command: roslaunch PKG FILE [ARG:=VALUE ...]}`.
+
+    Raises:
+        ConfigurationError: a key is missing or has a value that cannot be used.
+    """
+    entries = parameters.get("configurations")
+    if not isinstance(entries, Mapping) or not entries:
+        raise ConfigurationError(
+            "parameter 'configurations' is missing or empty: "
+            "give a YAML file with 'configurations: {NAME: {launch: FILE}}'"
+        )
+    kill_nodes = parameters.get("kill_nodes") or []
+    if not isinstance(kill_nodes, list) or not all(isinstance(node, str) for node in kill_nodes):
+        raise ConfigurationError("parameter 'kill_nodes' must be a list of node names")
+    save_action = parameters.get("save_action") or None
+    if save_action is not None and not isinstance(save_action, str):
+        raise ConfigurationError("parameter 'save_action' must be the name of an action, e.g. move_base")
+    return Settings(
+        configurations={str(name): _configuration(str(name), entry) for name, entry in entries.items()},
+        kill_nodes=tuple(kill_nodes),
+        save_action=save_action.strip("/") if save_action else None,
+        action_type=_action_type(parameters.get("goal_msg_type")) if save_action else None,
+        reconfiguration_action_name=str(
+            parameters.get("reconfiguration_action_name") or Settings.reconfiguration_action_name
+        ),
+    )
+
+
+def _configuration(name: str, entry: object) -> Configuration:
+    where = f"configurations/{name}"
+    if not isinstance(entry, Mapping):
+        raise ConfigurationError(f"{where}: expected 'launch: FILE' or 'command: roslaunch PKG FILE', got {entry!r}")
+    function = str(entry.get("function", DEFAULT_FUNCTION))
+    if "launch" in entry:
+        uri, args = str(entry["launch"]), [str(arg) for arg in entry.get("args") or []]
+    elif "command" in entry:
+        uri, args = _parse_command(where, str(entry["command"]))
+    else:
+        raise ConfigurationError(f"{where}: neither 'launch' nor 'command' is given")
+    for arg in args:
+        if not ARGUMENT.fullmatch(arg):
+            raise ConfigurationError(f"{where}: launch argument '{arg}' is not NAME:=VALUE")
+    try:
+        launch_file = resolve(uri)
+    except ModelError as error:
+        raise ConfigurationError(f"{where}: {error}") from error
+    return Configuration(name, function, str(launch_file), tuple(args))
+
+
+def _parse_command(where: str, command: str) -> tuple[str, list[str]]:
+    """Read the published `roslaunch PKG FILE [ARG:=VALUE ...]`; it is never given to a shell."""
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise ConfigurationError(f"{where}: command '{command}': {error}") from error
+    if len(words) < 2 or words[0] != "roslaunch":
+        raise ConfigurationError(f"{where}: command '{command}' is not 'roslaunch PKG FILE [ARG:=VALUE ...]'")
+    if words[1].endswith(".launch"):
+        return words[1], words[2:]
+    if len(words) < 3:
+        raise ConfigurationError(f"{where}: command '{command}' names no launch file")
+    return f"package://{words[1]}/launch/{words[2]}", words[3:]
+
+
+def _action_type(text: object) -> str:
+    """Turn the published `PKG.msg.TYPEAction` (or `PKG/TYPEAction`) into `PKG/TYPEAction`."""
+    match = re.fullmatch(r"([a-z]\w*)(?:\.msg\.|/)([A-Z]\w*Action)", str(text))
+    if not match:
+        raise ConfigurationError(
+            f"parameter 'goal_msg_type' is '{text}': with save_action it must name the action's type, "
+            "e.g. move_base_msgs.msg.MoveBaseAction"
+        )
+    return f"{match[1]}/{match[2]}"

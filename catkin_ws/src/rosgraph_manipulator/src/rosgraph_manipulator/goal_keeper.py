@@ -1,0 +1,82 @@
+"""Keeps the pending goal of an action across a change of its server.
+
+Works on action messages of any type: it reads only the goal ids and states that actionlib defines.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+# States of actionlib_msgs/GoalStatus.
+PENDING, ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED, PREEMPTING, RECALLING, RECALLED, LOST = range(10)
+TERMINAL = frozenset({PREEMPTED, SUCCEEDED, ABORTED, REJECTED, RECALLED})
+# What a server says of a goal that it drops because it is being shut down.
+DROPPED_BY_SHUTDOWN = frozenset({PREEMPTED, ABORTED, RECALLED})
+
+
+class GoalKeeper:
+    """The newest goal of one action server that is neither finished nor cancelled."""
+
+    def __init__(self) -> None:
+        self._goal: Any = None
+        self._finished: set[str] = set()
+        self._changing = False
+
+    @property
+    def pending(self) -> Any:
+        """A copy of the pending action goal message, or None."""
+        return copy.deepcopy(self._goal)
+
+    @property
+    def pending_id(self) -> str | None:
+        """Id of the pending goal, or None."""
+        return self._goal.goal_id.id if self._goal is not None else None
+
+    def server_changes(self, changing: bool) -> None:
+        """Tell that the server is being replaced: that it drops the goal meanwhile does not end the goal."""
+        self._changing = changing
+
+    def on_goal(self, goal: Any) -> None:
+        """Take in a message of the topic `goal`; a newer goal replaces the pending one."""
+        if goal.goal_id.id and goal.goal_id.id in self._finished:
+            return
+        self._goal = copy.deepcopy(goal)
+
+    def on_status(self, status: Any) -> None:
+        """Take in a message of the topic `status`: it ends goals, and names those sent without an id."""
+        for entry in status.status_list:
+            goal_id, state = entry.goal_id.id, entry.status
+            if state in TERMINAL:
+                self._end(goal_id, state)
+            elif self._goal is not None and not self._goal.goal_id.id and state in (PENDING, ACTIVE):
+                # The server made up an id for a goal that came without one.
+                self._goal.goal_id.id, self._goal.goal_id.stamp = goal_id, entry.goal_id.stamp
+
+    def on_result(self, result: Any) -> None:
+        """Take in a message of the topic `result`."""
+        if result.status.status in TERMINAL:
+            self._end(result.status.goal_id.id, result.status.status)
+
+    def on_cancel(self, cancel: Any) -> None:
+        """Take in a message of the topic `cancel`, by actionlib's rules: by id, up to a time, or all."""
+        if self._goal is None:
+            return
+        goal_id = self._goal.goal_id
+        cancelled = cancel.id == goal_id.id if cancel.id else cancel.stamp.is_zero()
+        if not cancel.stamp.is_zero() and goal_id.stamp <= cancel.stamp:
+            cancelled = True
+        if cancelled:
+            self._finish(goal_id.id)
+
+    def _end(self, goal_id: str, state: int) -> None:
+        if self._changing and state in DROPPED_BY_SHUTDOWN:
+            return
+        if self._goal is not None and goal_id == self._goal.goal_id.id:
+            self._finish(goal_id)
+
+    def _finish(self, goal_id: str) -> None:
+        self._goal = None
+        self._finished.add(goal_id)
+        if len(self._finished) > 1000:
+            self._finished.pop()
