@@ -1,0 +1,310 @@
+"""A snapshot of a running ROS graph, taken in four calls to the master and held as plain frozen data.
+
+The calls are getSystemState, getTopicTypes, getParam of the whole tree, and one `system.multicall` of lookupNode for
+the nodes' addresses. Nothing here is asked of the nodes themselves: a node that the master lists may well be dead.
+"""
+
+from __future__ import annotations
+
+import http.client
+import xmlrpc.client
+from collections import defaultdict
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+from xml.parsers.expat import ExpatError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+_ACTION_SUFFIXES = ("goal", "cancel", "status", "feedback", "result")
+_FROM_CLIENT = frozenset({"goal", "cancel"})
+_GOAL_TYPE = "ActionGoal"
+_RPC_SUCCESS = 1
+
+ParameterTree = dict[str, Any]
+"""Parameters as the master keeps them: nested dicts by name part."""
+
+
+class SnapshotError(Exception):
+    """The master could not be asked, or answered something that is no answer; the message names it and why."""
+
+
+class MasterGoneError(SnapshotError):
+    """Nobody listens at the master's address: the master has ended."""
+
+
+@dataclass(frozen=True)
+class TopicState:
+    """A topic: its type ("" or "*" where nobody said) and the nodes at both ends, sorted."""
+
+    name: str
+    type: str
+    publishers: tuple[str, ...] = ()
+    subscribers: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ServiceState:
+    """A service and the nodes that offer it."""
+
+    name: str
+    servers: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ActionState:
+    """An action, folded from its five topics. The type is that of the action, e.g. `move_base_msgs/MoveBaseAction`."""
+
+    name: str
+    type: str
+    servers: tuple[str, ...] = ()
+    clients: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class NodeState:
+    """A node that the master lists, with the address of its own XML-RPC API. Names are resolved and sorted."""
+
+    name: str
+    uri: str
+    publications: tuple[str, ...] = ()
+    subscriptions: tuple[str, ...] = ()
+    services: tuple[str, ...] = ()
+    action_servers: tuple[str, ...] = ()
+    action_clients: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class GraphSnapshot:
+    """What the master lists. Topics that make up an action are folded into it and are not in `topics`."""
+
+    nodes: Mapping[str, NodeState] = field(default_factory=dict)
+    topics: Mapping[str, TopicState] = field(default_factory=dict)
+    services: Mapping[str, ServiceState] = field(default_factory=dict)
+    actions: Mapping[str, ActionState] = field(default_factory=dict)
+    parameters: ParameterTree = field(default_factory=dict)
+
+    def parameter(self, name: str) -> Any:
+        """Return the value (a dict for a whole namespace) of a parameter by its resolved name.
+
+        Raises:
+            KeyError: it is not set.
+        """
+        value: Any = self.parameters
+        for part in name.strip("/").split("/"):
+            if not isinstance(value, dict) or part not in value:
+                raise KeyError(name)
+            value = value[part]
+        return value
+
+
+class MasterClient:
+    """Asks the master over one kept connection, with a time-out per call. Not for use by several threads at once."""
+
+    def __init__(self, uri: str, caller_id: str = "/rosgraph_snapshot", timeout: float = 1.5) -> None:
+        """Prepare the client; nothing is connected yet.
+
+        Args:
+            uri: address of the master, e.g. `http://localhost:11311`.
+            caller_id: name under which the master is asked.
+            timeout: wall seconds in which each part of an answer must arrive.
+
+        Raises:
+            SnapshotError: the address is no http address.
+        """
+        self.uri = uri
+        self._caller_id = caller_id
+        try:
+            self._proxy = xmlrpc.client.ServerProxy(uri, transport=_Transport(timeout))
+        except (OSError, ValueError) as error:
+            raise SnapshotError(f"ROS master address {uri!r}: {error}: set ROS_MASTER_URI") from error
+
+    def close(self) -> None:
+        """Close the kept connection; the next call opens a new one."""
+        self._proxy("close")()
+
+    def snapshot(self) -> GraphSnapshot:
+        """Take a snapshot in four calls.
+
+        Raises:
+            MasterGoneError: nobody listens at the master's address.
+            SnapshotError: the master did not answer in time, or answered with garbage or an error.
+        """
+        state = self._call("getSystemState")
+        types = self._call("getTopicTypes")
+        parameters = self._call("getParam", "/")
+        names = _node_names(state, self.uri)
+        return build_snapshot(state, _topic_types(types, self.uri), parameters, self._addresses(names))
+
+    def _addresses(self, names: Sequence[str]) -> dict[str, str]:
+        """Look up all nodes in one request; nodes that have gone meanwhile are left out."""
+        if not names:
+            return {}
+        calls = [{"methodName": "lookupNode", "params": [self._caller_id, name]} for name in names]
+        answers = self._request(lambda: self._proxy.system.multicall(calls), "system.multicall")
+        if not isinstance(answers, list) or len(answers) != len(names):
+            raise SnapshotError(f"ROS master {self.uri}: no useful answer to system.multicall")
+        found = {}
+        for name, answer in zip(names, answers, strict=True):
+            if isinstance(answer, list) and len(answer) == 1:
+                match answer[0]:
+                    case [int(code), _, str(uri)] if code == _RPC_SUCCESS:
+                        found[name] = uri
+        return found
+
+    def _call(self, method: str, *arguments: str) -> Any:
+        answer = self._request(lambda: getattr(self._proxy, method)(self._caller_id, *arguments), method)
+        match answer:
+            case [int(code), str(text), value]:
+                if code != _RPC_SUCCESS:
+                    raise SnapshotError(f"ROS master {self.uri} refuses {method}: {text}")
+                return value
+        raise SnapshotError(f"ROS master {self.uri}: no useful answer to {method}")
+
+    def _request(self, request: Any, method: str) -> Any:
+        try:
+            return request()
+        except ConnectionRefusedError as error:
+            self.close()
+            raise MasterGoneError(f"ROS master {self.uri} is gone ({error.strerror})") from error
+        except (OSError, http.client.HTTPException) as error:
+            self.close()
+            raise SnapshotError(f"ROS master {self.uri} does not answer {method}: {error or 'timed out'}") from error
+        except (xmlrpc.client.Error, ExpatError, ValueError, TypeError, LookupError) as error:
+            self.close()
+            raise SnapshotError(f"ROS master {self.uri}: answer to {method} is garbage: {error}") from error
+
+
+def take_snapshot(uri: str, timeout: float = 1.5) -> GraphSnapshot:
+    """Take one snapshot of the graph of the master at that address (see `MasterClient` for the errors)."""
+    client = MasterClient(uri, timeout=timeout)
+    try:
+        return client.snapshot()
+    finally:
+        client.close()
+
+
+def build_snapshot(
+    state: Sequence[Any], types: Iterable[tuple[str, str]], parameters: object, addresses: Mapping[str, str]
+) -> GraphSnapshot:
+    """Make a snapshot of the master's answers.
+
+    Args:
+        state: answer to getSystemState: publishers, subscribers, services, each a list of [name, [node, ...]].
+        types: answer to getTopicTypes: [topic, type] pairs.
+        parameters: answer to getParam of `/`; anything but a tree counts as no parameters.
+        addresses: address of each node by name; a node without one has gone and is left out.
+    """
+    publishers, subscribers, services = (
+        {name: tuple(sorted(set(nodes) & addresses.keys())) for name, nodes in part} for part in state
+    )
+    type_of: dict[str, str] = dict(types)
+    topics = {
+        name: TopicState(name, type_of.get(name, ""), publishers.get(name, ()), subscribers.get(name, ()))
+        for name in sorted(publishers.keys() | subscribers.keys())
+    }
+    actions = _fold_actions(topics)
+    plain = {name: topic for name, topic in topics.items() if _action_of(name) not in actions}
+    offered = {name: ServiceState(name, servers) for name, servers in sorted(services.items())}
+    return GraphSnapshot(
+        nodes=_nodes(plain, offered, actions, addresses),
+        topics=plain,
+        services=offered,
+        actions=actions,
+        parameters=parameters if isinstance(parameters, dict) else {},
+    )
+
+
+def _action_of(topic: str) -> str | None:
+    base, _, suffix = topic.rpartition("/")
+    return base if base and suffix in _ACTION_SUFFIXES else None
+
+
+def _fold_actions(topics: Mapping[str, TopicState]) -> dict[str, ActionState]:
+    """Find the topics that together are an action: all five suffixes, and a goal of an action's goal type."""
+    actions = {}
+    for name, goal in topics.items():
+        base = _action_of(name)
+        if base is None or not name.endswith("/goal") or not goal.type.endswith(_GOAL_TYPE):
+            continue
+        parts = {suffix: topics.get(f"{base}/{suffix}") for suffix in _ACTION_SUFFIXES}
+        if not all(parts.values()):
+            continue
+        servers: set[str] = set()
+        clients: set[str] = set()
+        for suffix, part in parts.items():
+            # The status topic tells nothing about clients: anybody may watch it.
+            if part and suffix in _FROM_CLIENT:
+                servers.update(part.subscribers)
+                clients.update(part.publishers)
+            elif part:
+                servers.update(part.publishers)
+        actions[base] = ActionState(
+            base, goal.type.removesuffix("Goal"), tuple(sorted(servers)), tuple(sorted(clients - servers))
+        )
+    return actions
+
+
+def _nodes(
+    topics: Mapping[str, TopicState],
+    services: Mapping[str, ServiceState],
+    actions: Mapping[str, ActionState],
+    addresses: Mapping[str, str],
+) -> dict[str, NodeState]:
+    ends: dict[str, dict[str, list[str]]] = {name: defaultdict(list) for name in sorted(addresses)}
+    for topic in topics.values():
+        for node in topic.publishers:
+            ends[node]["publications"].append(topic.name)
+        for node in topic.subscribers:
+            ends[node]["subscriptions"].append(topic.name)
+    for service in services.values():
+        for node in service.servers:
+            ends[node]["services"].append(service.name)
+    for action in actions.values():
+        for node in action.servers:
+            ends[node]["action_servers"].append(action.name)
+        for node in action.clients:
+            ends[node]["action_clients"].append(action.name)
+    return {
+        name: NodeState(name, addresses[name], **{kind: tuple(names) for kind, names in kinds.items()})
+        for name, kinds in ends.items()
+    }
+
+
+def _node_names(state: object, uri: str) -> list[str]:
+    """Check the form of a system state, and return all nodes that it mentions."""
+    names: set[str] = set()
+    try:
+        parts = list(state)  # type: ignore[call-overload]
+        if len(parts) != 3:
+            raise ValueError(f"{len(parts)} parts where there should be publishers, subscribers and services")
+        for part in parts:
+            for name, nodes in part:
+                if not isinstance(name, str) or not all(isinstance(node, str) for node in nodes):
+                    raise TypeError("names must be strings")
+                names.update(nodes)
+    except (TypeError, ValueError) as error:
+        raise SnapshotError(f"ROS master {uri}: answer to getSystemState is garbage: {error}") from error
+    return sorted(names)
+
+
+def _topic_types(types: object, uri: str) -> list[tuple[str, str]]:
+    """Check the form of an answer to getTopicTypes."""
+    match types:
+        case [*pairs] if all(isinstance(pair, list) and [type(end) for end in pair] == [str, str] for pair in pairs):
+            return [(name, type_name) for name, type_name in pairs]
+    raise SnapshotError(f"ROS master {uri}: answer to getTopicTypes is garbage")
+
+
+class _Transport(xmlrpc.client.Transport):
+    """A transport whose socket operations end after a time."""
+
+    def __init__(self, timeout: float) -> None:
+        super().__init__()
+        self._timeout = timeout
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        """Return the kept connection, with the time-out set."""
+        connection = super().make_connection(host)
+        connection.timeout = self._timeout
+        return connection

@@ -1,0 +1,147 @@
+"""The snapshot of the graph, over a master that answers from a table."""
+
+import contextlib
+import socket
+import threading
+from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+
+import pytest
+from ros_model.snapshot import MasterClient, MasterGoneError, SnapshotError, build_snapshot, take_snapshot
+
+STATE = [
+    [
+        ["/scan", ["/laser"]],
+        ["/move/status", ["/move"]],
+        ["/move/feedback", ["/move"]],
+        ["/move/result", ["/move"]],
+        ["/move/goal", ["/mission"]],
+        ["/move/cancel", ["/mission"]],
+        ["/fake/goal", ["/laser"]],
+    ],
+    [
+        ["/scan", ["/move", "/ghost"]],
+        ["/move/goal", ["/move"]],
+        ["/move/cancel", ["/move"]],
+        ["/move/status", ["/mission", "/watcher"]],
+        ["/move/feedback", ["/mission"]],
+        ["/move/result", ["/mission"]],
+    ],
+    [["/move/clear", ["/move"]]],
+]
+TYPES = [["/scan", "sensor_msgs/LaserScan"], ["/move/goal", "move_base_msgs/MoveBaseActionGoal"]]
+ADDRESSES = {name: f"http://host:{i}/" for i, name in enumerate(("/laser", "/move", "/mission", "/watcher"))}
+PARAMETERS = {"move": {"speed": 0.5, "layers": {"scan": {"topic": "scan"}}}}
+
+
+@contextlib.contextmanager
+def master(**methods):
+    server = SimpleXMLRPCServer(
+        ("127.0.0.1", 0), requestHandler=SimpleXMLRPCRequestHandler, logRequests=False, allow_none=True
+    )
+    for name, function in methods.items():
+        server.register_function(function, name)
+    server.register_multicall_functions()
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}"
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+def answers(calls):
+    def lookup(_caller, name):
+        return [1, "", ADDRESSES[name]] if name in ADDRESSES else [-1, "unknown node", ""]
+
+    def counted(name, value):
+        calls.append(name)
+        return [1, "", value]
+
+    return {
+        "getSystemState": lambda _caller: counted("getSystemState", STATE),
+        "getTopicTypes": lambda _caller: counted("getTopicTypes", TYPES),
+        "getParam": lambda _caller, key: counted(f"getParam {key}", PARAMETERS),
+        "lookupNode": lookup,
+    }
+
+
+@pytest.fixture
+def graph():
+    return build_snapshot(STATE, TYPES, PARAMETERS, ADDRESSES)
+
+
+def test_action_is_folded_from_its_five_topics(graph):
+    action = graph.actions["/move"]
+    assert (action.type, action.servers, action.clients) == (
+        "move_base_msgs/MoveBaseAction",
+        ("/move",),
+        ("/mission",),
+    )
+    assert "/move/status" not in graph.topics
+    assert "/fake/goal" in graph.topics
+
+
+def test_node_knows_its_ends(graph):
+    node = graph.nodes["/move"]
+    assert node.subscriptions == ("/scan",)
+    assert node.services == ("/move/clear",)
+    assert node.action_servers == ("/move",)
+    assert node.uri == ADDRESSES["/move"]
+
+
+def test_topic_has_type_and_only_nodes_that_exist(graph):
+    assert graph.topics["/scan"].type == "sensor_msgs/LaserScan"
+    assert graph.topics["/scan"].subscribers == ("/move",)
+    assert "/ghost" not in graph.nodes
+
+
+def test_parameter_by_its_resolved_name(graph):
+    assert graph.parameter("/move/layers/scan/topic") == "scan"
+    with pytest.raises(KeyError):
+        graph.parameter("/move/speed/unit")
+
+
+def test_snapshot_takes_four_calls():
+    calls = []
+    with master(**answers(calls)) as uri:
+        graph = take_snapshot(uri)
+    assert calls == ["getSystemState", "getTopicTypes", "getParam /"]
+    assert set(graph.nodes) == set(ADDRESSES)
+
+
+def test_empty_graph():
+    assert build_snapshot([[], [], []], [], {}, {}).nodes == {}
+
+
+def test_master_that_is_gone_is_named():
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        uri = f"http://127.0.0.1:{free.getsockname()[1]}"
+    with pytest.raises(MasterGoneError, match=uri):
+        take_snapshot(uri)
+
+
+def test_silent_master_times_out():
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        uri = f"http://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(SnapshotError, match="does not answer getSystemState"):
+            take_snapshot(uri, timeout=0.1)
+
+
+@pytest.mark.parametrize("garbage", [1, "x", [1, "", "state"], [1, "", [[], []]], [1, "", [[["/t", [3]]], [], []]]])
+def test_garbage_is_refused(garbage):
+    table = answers([]) | {"getSystemState": lambda _caller: garbage}
+    with master(**table) as uri, pytest.raises(SnapshotError):
+        take_snapshot(uri)
+
+
+def test_error_of_the_master_is_passed_on():
+    table = answers([]) | {"getTopicTypes": lambda _caller: [-1, "not today", 0]}
+    with master(**table) as uri, pytest.raises(SnapshotError, match="not today"):
+        take_snapshot(uri)
+
+
+def test_address_that_is_no_address():
+    with pytest.raises(SnapshotError, match="ROS_MASTER_URI"):
+        MasterClient("localhost:11311")
