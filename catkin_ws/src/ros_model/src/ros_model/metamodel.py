@@ -154,11 +154,24 @@ class Connection:
 
 
 @dataclass(frozen=True)
+class ParameterType:
+    """A declared type: Integer, Double, String, Boolean, Base64, Date, Any, List, Array or Struct.
+
+    A List has the types of its elements, an Array one, a Struct its members' names and types.
+    """
+
+    kind: str
+    elements: tuple[ParameterType, ...] = ()
+    members: tuple[tuple[str, ParameterType], ...] = ()
+    default: Value | None = None
+
+
+@dataclass(frozen=True)
 class SystemParameter:
     """A global parameter of a system; `qa_<name>` holds the expected level of a quality attribute."""
 
     name: str
-    type: str | None = None
+    type: ParameterType | None = None
     value: Value | None = None
     namespace: str | None = None
     position: Position = field(default=Position(), compare=False)

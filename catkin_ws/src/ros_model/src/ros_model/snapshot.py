@@ -288,7 +288,7 @@ def _node_names(state: object, uri: str) -> list[str]:
     return sorted(names)
 
 
-def _topic_types(types: object, uri: str) -> list[tuple[str, str]]:
+def _topic_types(types: Any, uri: str) -> list[tuple[str, str]]:
     """Check the form of an answer to getTopicTypes."""
     match types:
         case [*pairs] if all(isinstance(pair, list) and [type(end) for end in pair] == [str, str] for pair in pairs):

@@ -1,0 +1,72 @@
+"""Names of files as models and configurations write them: plain paths and `package://PACKAGE/path`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import rospkg
+
+from ros_model.errors import ModelError
+
+_SCHEME = "package://"
+_FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
+
+
+def resolve(uri: str | Path) -> Path:
+    """Return the absolute path that a plain path or `package://PACKAGE/path` names; it need not exist.
+
+    Raises:
+        ModelError: the package is unknown, or the path leaves the package.
+    """
+    text = str(uri)
+    if not text or "\0" in text:
+        raise ModelError(f"{text!r} is no file name: give a path or package://PACKAGE/path")
+    if not text.startswith(_SCHEME):
+        if "://" in text:
+            raise ModelError(f"{text}: only plain paths and package://PACKAGE/path are known")
+        return Path(text).expanduser().resolve()
+    package, _, relative = text.removeprefix(_SCHEME).partition("/")
+    root = _package_folder(text, package)
+    path = (root / relative).resolve()
+    if not relative or relative.startswith("/") or not path.is_relative_to(root):
+        raise ModelError(f"{text}: must name a file inside the package {package} ({root})")
+    return path
+
+
+def safe_file_name(name: str, purpose: str) -> str:
+    """Return the name if it is fit to name a file in a folder, as names of systems do.
+
+    Raises:
+        ModelError: it is empty, or holds anything but letters, digits, `_`, `-` and `.` (not first).
+    """
+    if not _FILE_NAME.fullmatch(name):
+        raise ModelError(f"{purpose} {name!r} can't name a file: use letters, digits, '_', '-' and '.'")
+    return name
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a UTF-8 file.
+
+    Raises:
+        ModelError: the file is missing, unreadable or not UTF-8; with the position of the first bad byte.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ModelError(f"{path}: {error.strerror or error}: check the path") from error
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        good = data[: error.start]
+        line, column = good.count(b"\n") + 1, len(good) - (good.rfind(b"\n") + 1) + 1
+        raise ModelError(
+            f"{path}:{line}:{column}: byte 0x{data[error.start]:02x} is not UTF-8: save the file as UTF-8 text"
+        ) from error
+
+
+def _package_folder(uri: str, package: str) -> Path:
+    try:
+        return Path(rospkg.RosPack().get_path(package)).resolve()
+    except rospkg.ResourceNotFound as error:
+        raise ModelError(f"{uri}: no package {package!r}: source the workspace that holds it") from error
