@@ -1,0 +1,125 @@
+"""What a person sees of a mission: the way as a bar, the timeline as it happens, a table at the end."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from rich.console import Console
+
+    from metacontrol_experiments.timeline import Entry
+
+_STYLES = {"R1": "yellow", "R2": "cyan", "R3": "cyan", "R4": "green", "!": "bold red", "-": "bold"}
+
+
+class Display:
+    """Writes to a console: with a live bar on a terminal, else plain lines; silent if quiet."""
+
+    def __init__(self, console: Console, quiet: bool = False) -> None:
+        """Takes the console to write to."""
+        self._console = console
+        self._quiet = quiet
+        self._bar: Progress | None = None
+        self._start = 0.0
+        self._tenth = 0
+        if console.is_terminal and not quiet:
+            self._bar = Progress(
+                TextColumn("way"),
+                BarColumn(None),
+                TaskProgressColumn(),
+                TextColumn("{task.description}"),
+                console=console,
+            )
+            self._task = self._bar.add_task("starting", total=1.0)
+
+    def __enter__(self) -> Display:
+        """Shows the bar."""
+        if self._bar:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Takes the bar away."""
+        if self._bar:
+            self._bar.stop()
+
+    def say(self, text: str) -> None:
+        """A line of its own."""
+        if not self._quiet:
+            self._console.print(Text(text), soft_wrap=True)
+
+    def start(self, stamp: float) -> None:
+        """The mission starts: from here on, times count from this stamp."""
+        self._start = stamp
+
+    def entry(self, entry: Entry) -> None:
+        """A line of the timeline."""
+        line = Text(f"{entry.stamp - self._start:7.2f} s  ")
+        line.append(f"{entry.step:<2}", _STYLES.get(entry.step, ""))
+        line.append("  " + entry.text, "red" if entry.bad else "")
+        if not self._quiet:
+            self._console.print(line, soft_wrap=True)
+
+    def progress(self, share: float, stamp: float, left_m: float) -> None:
+        """How much of the way is done (0..1), and how many metres are left as the crow flies."""
+        if self._bar:
+            text = f"{stamp - self._start:5.1f} s, {left_m:4.1f} m left"
+            self._bar.update(self._task, completed=share, description=text)
+        elif int(share * 10) > self._tenth:
+            self._tenth = int(share * 10)
+            self.say(f"{stamp - self._start:7.2f} s  ..  {self._tenth * 10} % of the way")
+
+    def summary(self, summary: dict[str, Any]) -> None:
+        """The closing tables."""
+        if not self._quiet:
+            self._console.print(_figures(summary))
+            if summary["reconfigurations"]:
+                self._console.print(_reconfigurations(summary["reconfigurations"]))
+
+
+def _figures(summary: dict[str, Any]) -> Table:
+    table = Table(title=f"Mission {summary['mission']}, route {summary['route']}, seed {summary['seed']}")
+    table.add_column("")
+    table.add_column("", justify="right")
+    above, mean, goal = summary["time_above_threshold"], summary["mean_qa"], summary["goal_reached"]
+    rows: list[tuple[str, str]] = [
+        ("goal reached", "yes" if goal else f"no ({summary['outcome']})"),
+        ("success (paper's four conditions)", "yes" if summary["success"] else "no"),
+        ("duration", _with_unit(summary["duration_s"], "s")),
+        ("way driven", _with_unit(summary["path_length_m"], "m")),
+        ("collisions", "-" if summary["collisions"] is None else str(summary["collisions"])),
+        ("configuration", f"{summary['initial_configuration']} -> {summary['final_configuration']}"),
+    ]
+    rows += [(f"time above the {name} threshold", _percent(share)) for name, share in above.items()]
+    rows += [(f"mean {name}", _with_unit(level, "")) for name, level in mean.items()]
+    rows.append(("simulated / wall time", _with_unit(summary["real_time_factor"], "")))
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _reconfigurations(entries: list[dict[str, Any]]) -> Table:
+    table = Table(title="Reconfigurations")
+    for title in ("at", "trigger", "from", "to", "detect", "decide", "execute"):
+        table.add_column(title, justify="left" if title in ("trigger", "from", "to") else "right")
+    for entry in entries:
+        spans = (_with_unit(entry[key], "s") for key in ("detect_s", "decide_s", "execute_s"))
+        at = _with_unit(entry["stamp_s"], "s")
+        table.add_row(at, entry["trigger"], entry["from"], entry["to"], *spans)
+    return table
+
+
+def _with_unit(value: float | None, unit: str) -> str:
+    return "-" if value is None else f"{value:.2f} {unit}".strip()
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{share:.2%}"

@@ -1,0 +1,369 @@
+"""The ROS shell of a mission: waits for the system, sends the goal, strikes, and says on `mission/event` what it did.
+
+Callbacks only queue what they got; one thread, the caller's, feeds the state machine.
+"""
+
+from __future__ import annotations
+
+import http.client
+import math
+import os
+import queue
+import signal
+import time
+import xmlrpc.client
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import rosgraph
+import rospy
+from actionlib_msgs.msg import GoalID, GoalStatusArray
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from metacontrol_msgs.msg import ActiveConfiguration, Decision, MissionEvent
+from metacontrol_sim.srv import IncreaseConsumptionFactor
+from move_base_msgs.msg import MoveBaseActionGoal, MoveBaseActionResult
+
+from metacontrol_experiments import messages, mission
+from metacontrol_experiments.bag import TOPICS
+from metacontrol_experiments.mission import Action, GoalStatus
+from metacontrol_experiments.processes import wait_until
+from metacontrol_experiments.record import CostReport, Event
+from metacontrol_experiments.timeline import Timeline
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from metacontrol_experiments.display import Display
+    from metacontrol_experiments.mission import State
+    from metacontrol_experiments.processes import ProcessTree
+    from metacontrol_experiments.settings import Settings
+    from metacontrol_experiments.timeline import Report
+
+REASONER = "/reasoner"
+MANIPULATOR_TOPIC = "rosgraph_manipulator/active_configuration"
+DECISION_TOPIC = "mros1_reasoner/decision"
+
+START_S = 90.0
+"""Wall seconds that the whole system has to come up; on two busy cores it takes 10 to 20."""
+
+STANDSTILL_S = 20.0
+"""A clock that does not move for so many wall seconds means that the simulator is gone."""
+
+TAIL_S = 0.5
+"""Simulated seconds that are still recorded after the mission's end."""
+
+_CALL_S = 2.0
+"""Wall seconds for a call to a node's own API."""
+
+
+class StartError(RuntimeError):
+    """The system did not come up; the message says what was waited for."""
+
+
+class MissionNode:
+    """The node /mission: one mission, from a system that is starting to the event MISSION_END."""
+
+    def __init__(self, settings: Settings, tree: ProcessTree, display: Display, check: Callable[[], None]) -> None:
+        """Joins the graph.
+
+        Args:
+            settings: the mission.
+            tree: the processes of this run; only these may be struck.
+            display: where the timeline is shown.
+            check: raises an error when the launched system has ended.
+
+        Raises:
+            StartError: the master did not come up in time, or does not run on simulated time.
+        """
+        self._settings = settings
+        self._tree = tree
+        self._display = display
+        self._check = check
+        self._plan = settings.plan
+        self._state: State | None = None
+        self._timeline = Timeline(settings.thresholds)
+        self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._position: tuple[float, float] | None = None
+        self._stable = False
+        self._failed: str | None = None
+        self._server_seen = False
+        self._goal: MoveBaseActionGoal | None = None
+        self._began_wall = time.monotonic()
+        self._master = rosgraph.Master("/mission")
+        self._wait(self._simulated_time, "the ROS master with /use_sim_time")
+        rospy.init_node("mission", disable_signals=True)
+        self._events = rospy.Publisher("mission/event", MissionEvent, queue_size=10)
+        self._goals = rospy.Publisher("move_base/goal", MoveBaseActionGoal, queue_size=5)
+        self._cancels = rospy.Publisher("move_base/cancel", GoalID, queue_size=5)
+        self._subscribe("amcl_pose", PoseWithCovarianceStamped, self._on_pose)
+        self._subscribe(MANIPULATOR_TOPIC, ActiveConfiguration, self._on_configuration)
+        self._subscribe("move_base/status", GoalStatusArray, self._on_status)
+        self._subscribe("move_base/result", MoveBaseActionResult, self._on_result)
+        self._subscribe(DECISION_TOPIC, Decision, self._on_decision)
+        self._subscribe("/diagnostics", DiagnosticArray, self._on_diagnostics)
+
+    def wait_ready(self) -> None:
+        """Waits until the whole system is up.
+
+        Raises:
+            StartError: it is not, in time; or the manipulator gave up.
+        """
+        self._wait(lambda: rospy.get_time() > 0, "/clock, from the simulator")
+        self._wait(lambda: self._position is not None, "the robot's pose on amcl_pose")
+        self._wait(lambda: self._stable, f"a STABLE configuration on {MANIPULATOR_TOPIC}")
+        self._wait(self._server_ready, "the action server of move_base")
+        if self._settings.metacontrol:
+            self._wait(self._reasoner_ready, f"the node {REASONER} with its topic {DECISION_TOPIC}")
+
+    def wait_recorded(self, recorder: str) -> None:
+        """Waits until the node `recorder` has subscribed to everything that is to be recorded.
+
+        Raises:
+            StartError: it has not, in time.
+        """
+        self._wait(partial(self._recorded, recorder), f"the recorder {recorder}")
+
+    def drive(self) -> State:
+        """Sends the goal and sees the mission through; returns its last state.
+
+        Raises:
+            mission.MissionError: the goal is no goal from here.
+            KeyboardInterrupt: after the mission's end was told.
+        """
+        self._begin()
+        try:
+            self._loop()
+        except KeyboardInterrupt:
+            self._state = mission.interrupt(self._mission, rospy.get_time(), "interrupted")
+            self._cancels.publish(self._goal_id)
+            self._end()
+            raise
+        self._end()
+        return self._mission
+
+    def close(self) -> None:
+        """Leaves the graph."""
+        rospy.signal_shutdown("the mission is over")
+
+    @property
+    def _mission(self) -> State:
+        if self._state is None:
+            raise RuntimeError("the mission has not started")
+        return self._state
+
+    @property
+    def _goal_id(self) -> GoalID:
+        if self._goal is None:
+            raise RuntimeError("the mission has not started")
+        return self._goal.goal_id
+
+    # Waiting
+
+    def _wait(self, condition: Callable[[], bool], what: str) -> None:
+        def met() -> bool:
+            self._check()
+            self._drain()
+            if self._failed:
+                raise StartError(self._failed)
+            return condition()
+
+        if not wait_until(met, START_S):
+            raise StartError(f"waited {START_S:g} s in vain for {what}")
+
+    def _simulated_time(self) -> bool:
+        try:
+            return bool(self._master.getParam("/use_sim_time"))
+        except (OSError, rosgraph.MasterException):  # not up yet, or not set yet
+            return False
+
+    def _server_ready(self) -> bool:
+        return self._server_seen and self._goals.get_num_connections() > 0
+
+    def _reasoner_ready(self) -> bool:
+        publishers, _, _ = self._master.getSystemState()
+        return any(topic == rospy.resolve_name(DECISION_TOPIC) and REASONER in nodes for topic, nodes in publishers)
+
+    def _recorded(self, recorder: str) -> bool:
+        _, subscribers, _ = self._master.getSystemState()
+        taken = {topic for topic, nodes in subscribers if recorder in nodes}
+        return (
+            taken.issuperset(TOPICS)
+            and self._events.get_num_connections() > 0
+            and self._goals.get_num_connections() > 1  # move_base and the recorder
+        )
+
+    # The mission
+
+    def _begin(self) -> None:
+        if self._position is None:
+            raise RuntimeError("the robot's pose is not known yet")
+        now = rospy.Time.now()
+        self._state = mission.start(self._plan, now.to_sec(), *self._position)
+        self._goal = self._make_goal(now)
+        self._began_wall = time.monotonic()
+        self._display.start(now.to_sec())
+        values = self._settings.describe() | {"goal_id": self._goal.goal_id.id}
+        self._publish_event(now, MissionEvent.MISSION_START, self._settings.route.name, values)
+        self._goals.publish(self._goal)
+
+    def _loop(self) -> None:
+        clock, moved = rospy.get_time(), time.monotonic()
+        while not self._mission.over:
+            self._drain(0.05)
+            now = rospy.get_time()
+            if now != clock:
+                clock, moved = now, time.monotonic()
+            elif time.monotonic() - moved > STANDSTILL_S:
+                self._state = mission.abort(self._mission, now, "the simulated clock stands still")
+            self._take(mission.on_time(self._plan, self._mission, now))
+            try:
+                self._check()
+            except StartError as error:
+                self._state = mission.abort(self._mission, now, str(error))
+
+    def _end(self) -> None:
+        state = self._mission
+        stamp = rospy.Time.from_sec(state.ended_s if state.ended_s is not None else rospy.get_time())
+        values = {
+            "outcome": state.outcome.value if state.outcome else "unknown",
+            "reason": state.reason,
+            "share": f"{state.share:.4f}",
+            "distance_m": f"{state.distance_m:.3f}",
+            "wall_duration_s": f"{time.monotonic() - self._began_wall:.3f}",
+        }
+        self._publish_event(stamp, MissionEvent.MISSION_END, self._settings.route.name, values)
+        wait_until(lambda: rospy.get_time() > stamp.to_sec() + TAIL_S, 2.0)
+
+    def _take(self, step: mission.Step) -> None:
+        self._state, actions = step
+        for action in actions:
+            if action is Action.STRIKE:
+                self._strike()
+            elif action is Action.RESEND_GOAL:
+                self._goals.publish(self._goal)
+            elif action is Action.CANCEL_GOAL:
+                self._cancels.publish(self._goal_id)
+
+    def _strike(self) -> None:
+        """The perturbation: the component's node is killed, the power load rises."""
+        share = {"share": f"{self._mission.share:.4f}"}
+        settings = self._settings
+        try:
+            if settings.failure:
+                node = rospy.resolve_name(settings.failure_node)
+                pid = self._pid_of(node)
+                now = rospy.Time.now()
+                os.kill(pid, signal.SIGKILL)
+                name = f"component:{settings.failure}"
+                self._publish_event(now, MissionEvent.PERTURBATION, name, share | {"node": node, "pid": str(pid)})
+            if settings.power_factor != 1.0:
+                rospy.ServiceProxy("increase_power_consumption", IncreaseConsumptionFactor)(settings.power_factor)
+                name = f"power:{settings.power_factor:g}"
+                self._publish_event(rospy.Time.now(), MissionEvent.PERTURBATION, name, share)
+        except (OSError, xmlrpc.client.Error, rosgraph.MasterException, rospy.ServiceException, LookupError) as error:
+            self._state = mission.abort(self._mission, rospy.get_time(), f"the perturbation could not strike: {error}")
+
+    def _pid_of(self, node: str) -> int:
+        """The process of a node, as its own API tells.
+
+        Raises:
+            LookupError: the process is none of this run's.
+        """
+        uri = self._master.lookupNode(node)
+        with xmlrpc.client.ServerProxy(uri, transport=_ImpatientTransport()) as proxy:
+            answer: Any = proxy.getPid("/mission")
+        pid = int(answer[2])
+        if not self._tree.owns(pid):
+            raise LookupError(f"{node} (pid {pid}) is not a process of this run")
+        return pid
+
+    def _make_goal(self, now: rospy.Time) -> MoveBaseActionGoal:
+        pose = self._settings.route.goal
+        goal = MoveBaseActionGoal()
+        goal.header.stamp = now
+        goal.goal_id = GoalID(stamp=now, id=f"{rospy.get_name()}-1-{now.to_sec():.3f}")
+        target = goal.goal.target_pose
+        target.header.frame_id, target.header.stamp = "map", now
+        target.pose.position.x, target.pose.position.y = pose.x, pose.y
+        target.pose.orientation.z, target.pose.orientation.w = math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)
+        return goal
+
+    def _publish_event(self, stamp: rospy.Time, kind: str, name: str, values: dict[str, str]) -> None:
+        message = MissionEvent(kind=kind, name=name, values=[KeyValue(key, value) for key, value in values.items()])
+        message.header.stamp = stamp
+        self._events.publish(message)
+        self._tell(Event(stamp.to_sec(), kind, name, values))
+
+    def _tell(self, report: Report) -> None:
+        """Shows what is new in a report, once the mission runs; before, it is only taken note of."""
+        entries = self._timeline.tell(report)
+        if self._state is not None:
+            for entry in entries:
+                self._display.entry(entry)
+
+    # Callbacks: `_subscribe` queues them, `_drain` runs them in the mission's thread
+
+    def _subscribe(self, topic: str, kind: type, handler: Callable[[Any], None]) -> None:
+        rospy.Subscriber(topic, kind, lambda message: self._work.put(partial(handler, message)))
+
+    def _drain(self, wait_s: float = 0.0) -> None:
+        """Runs what callbacks have queued; waits for the first so many wall seconds."""
+        try:
+            self._work.get(timeout=wait_s)() if wait_s else self._work.get_nowait()()
+            while True:
+                self._work.get_nowait()()
+        except queue.Empty:
+            return
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        position = message.pose.pose.position
+        if not (math.isfinite(position.x) and math.isfinite(position.y)):
+            rospy.logwarn_throttle(5.0, "mission: a pose on amcl_pose is not finite; left out")
+            return
+        self._position = (position.x, position.y)
+        if self._state is not None:
+            self._take(mission.on_pose(self._plan, self._mission, *self._position))
+            if not self._mission.over:
+                self._display.progress(self._mission.share, rospy.get_time(), self._mission.distance_m)
+
+    def _on_configuration(self, message: ActiveConfiguration) -> None:
+        reports = messages.configurations(message, rospy.get_time())
+        self._stable = bool(reports) and all(report.state == "STABLE" for report in reports)
+        if self._state is None:
+            broken = [report for report in reports if report.state == "FAILED"]
+            self._failed = f"the manipulator could not deploy {broken[0].configuration}" if broken else None
+        else:
+            self._take(mission.on_configuration(self._mission, rospy.get_time(), self._stable))
+        for report in reports:
+            self._tell(report)
+
+    def _on_status(self, message: GoalStatusArray) -> None:
+        self._server_seen = True
+        if self._state is None:
+            return
+        listed = (GoalStatus.of(s.status) for s in message.status_list if s.goal_id.id == self._goal_id.id)
+        self._take(mission.on_goal_status(self._mission, rospy.get_time(), next(listed, None)))
+
+    def _on_result(self, message: MoveBaseActionResult) -> None:
+        report = messages.result(message, rospy.get_time())
+        if self._state is not None and report.id == self._goal_id.id:
+            status = GoalStatus.of(message.status.status)
+            self._take(mission.on_goal_result(self._mission, report.stamp, status, report.text))
+
+    def _on_decision(self, message: Decision) -> None:
+        self._tell(messages.decision(message, rospy.get_time()))
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for report in messages.diagnostics(message, rospy.get_time()):
+            if not isinstance(report, CostReport):
+                self._tell(report)
+
+
+class _ImpatientTransport(xmlrpc.client.Transport):
+    """Calls that end after a time, since a hung node would never answer."""
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        connection = super().make_connection(host)
+        connection.timeout = _CALL_S
+        return connection

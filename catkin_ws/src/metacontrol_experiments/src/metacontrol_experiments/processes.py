@@ -1,0 +1,108 @@
+"""The processes of one run: started apart from the terminal, found again wherever they went, ended without remains.
+
+Every process gets a mark in its environment, which its descendants inherit: roslaunch puts each node in a session of
+its own, and a node whose parent died belongs to nobody, but both still carry the mark.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import time
+import uuid
+from typing import TYPE_CHECKING
+
+import psutil
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+MARK = "METACONTROL_RUN"
+"""Name of the environment variable that marks a run's processes."""
+
+_POLL_S = 0.05
+
+
+def free_port() -> int:
+    """A TCP port that nobody listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])
+
+
+def wait_until(condition: Callable[[], bool], deadline_s: float) -> bool:
+    """Whether a condition came true within so many wall seconds."""
+    end = time.monotonic() + deadline_s
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(_POLL_S)
+    return True
+
+
+class ProcessTree:
+    """Processes of one run with all their descendants."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        """Takes what the environment of every process has beside that of this process."""
+        self.environment = {**environment, MARK: uuid.uuid4().hex}
+        self._started: list[subprocess.Popen[bytes]] = []
+
+    def start(self, command: Sequence[str], log: Path) -> subprocess.Popen[bytes]:
+        """Starts a command in a session of its own, so that Ctrl-C does not reach it; its output goes to a file.
+
+        Raises:
+            OSError: the command or the log cannot be opened.
+        """
+        with log.open("wb") as output:
+            process = subprocess.Popen(
+                list(command),
+                env={**os.environ, **self.environment},
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+        self._started.append(process)
+        return process
+
+    def owns(self, pid: int) -> bool:
+        """Whether a process belongs to this run and still runs."""
+        try:
+            process = psutil.Process(pid)
+            marked = process.environ().get(MARK) == self.environment[MARK]
+            return bool(marked and process.status() != psutil.STATUS_ZOMBIE)
+        except (psutil.Error, OSError):  # gone, or another user's: not ours
+            return False
+
+    def alive(self) -> list[psutil.Process]:
+        """Processes of this run that still run."""
+        return [process for process in psutil.process_iter() if self.owns(process.pid)]
+
+    def stop(self, process: subprocess.Popen[bytes], grace_s: float) -> bool:
+        """Asks a process to end by SIGINT and waits; whether it did in time."""
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        try:
+            process.wait(grace_s)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def close(self, grace_s: float = 12.0) -> None:
+        """Ends whatever still runs, latest first, by SIGINT, SIGTERM, SIGKILL."""
+        for started in reversed(self._started):
+            self.stop(started, grace_s)
+        for number in (signal.SIGTERM, signal.SIGKILL):
+            for process in self.alive():
+                try:
+                    process.send_signal(number)
+                except psutil.NoSuchProcess:
+                    continue
+            if wait_until(lambda: not self.alive(), 3.0):
+                break
+        for started in self._started:
+            started.poll()

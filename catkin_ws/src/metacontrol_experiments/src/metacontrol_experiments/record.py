@@ -1,0 +1,147 @@
+"""What is known of one mission: plain data, filled from a bag, from which the summary and the figure are made.
+
+Stamps are simulated seconds on the mission's own clock (`/clock`), as in the bag.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Samples = tuple[tuple[float, float], ...]
+"""Pairs (stamp in s, value), in the order of time."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """A `metacontrol_msgs/MissionEvent`."""
+
+    stamp: float
+    kind: str
+    name: str
+    values: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ComponentReport:
+    """A "Component status" diagnostic: TRUE, FALSE or RECOVERED."""
+
+    stamp: float
+    component: str
+    status: str
+
+
+@dataclass(frozen=True)
+class QualityReport:
+    """What an observer said of a quality attribute: its level, None where it is stale."""
+
+    stamp: float
+    name: str
+    level: float | None
+
+
+@dataclass(frozen=True)
+class CostReport:
+    """What a node costs: `figure` is "cpu" (per cent of a core) or "memory" (MB)."""
+
+    stamp: float
+    figure: str
+    node: str
+    value: float
+
+
+@dataclass(frozen=True)
+class ConfigurationReport:
+    """One function of a `metacontrol_msgs/ActiveConfiguration`."""
+
+    stamp: float
+    function: str
+    configuration: str
+    state: str
+
+
+@dataclass(frozen=True)
+class DecisionReport:
+    """A `metacontrol_msgs/Decision`; `stamp` is that of the message."""
+
+    stamp: float
+    id: str
+    state: str
+    objective: str
+    trigger: str
+    from_configuration: str
+    to_configuration: str
+    degraded: bool = False
+    explanation: str = ""
+    stamp_monitored: float = 0.0
+    stamp_planned: float = 0.0
+    stamp_executed: float = 0.0
+
+
+@dataclass(frozen=True)
+class GoalReport:
+    """A goal sent to move_base, or, with a status, its result."""
+
+    stamp: float
+    id: str
+    status: int | None = None
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class OccupancyMap:
+    """The static map: `occupied` is (rows, columns), row 0 at the origin's y; resolution and origin in m."""
+
+    resolution: float
+    origin_x: float
+    origin_y: float
+    occupied: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class MissionRecord:
+    """Everything that a bag tells of a mission.
+
+    Attributes:
+        poses: (n, 3) array of stamp, x, y: ground truth in the map frame.
+        true_quality: QA name -> samples of its ground truth.
+        contacts: samples of the running count of contact episodes.
+        first_stamp: of the first message in the bag.
+        last_stamp: of the last message in the bag.
+    """
+
+    events: tuple[Event, ...] = ()
+    poses: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    true_quality: dict[str, Samples] = field(default_factory=dict)
+    contacts: Samples = ()
+    components: tuple[ComponentReport, ...] = ()
+    observed: tuple[QualityReport, ...] = ()
+    configurations: tuple[ConfigurationReport, ...] = ()
+    decisions: tuple[DecisionReport, ...] = ()
+    goals: tuple[GoalReport, ...] = ()
+    results: tuple[GoalReport, ...] = ()
+    costs: tuple[CostReport, ...] = ()
+    map: OccupancyMap | None = None
+    first_stamp: float = 0.0
+    last_stamp: float = 0.0
+
+    def event(self, kind: str) -> Event | None:
+        """The first event of a kind, None where there is none."""
+        return next((event for event in self.events if event.kind == kind), None)
+
+    @property
+    def start_stamp(self) -> float:
+        """When the mission started; the first message where no event tells."""
+        event = self.event("MISSION_START")
+        return event.stamp if event else self.first_stamp
+
+    @property
+    def end_stamp(self) -> float:
+        """When the mission ended; the last message where no event tells."""
+        event = self.event("MISSION_END")
+        return event.stamp if event else self.last_stamp

@@ -1,0 +1,119 @@
+"""The state machine of a mission."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from metacontrol_experiments import mission
+from metacontrol_experiments.mission import Action, GoalStatus, MissionError, Outcome, Plan
+
+PLAN = Plan(goal_x=10.0, goal_y=0.0, strike_at=0.4)
+
+
+@pytest.fixture
+def driving():
+    state = mission.start(PLAN, 100.0, 0.0, 0.0)
+    return mission.on_goal_status(state, 100.2, GoalStatus.ACTIVE)[0]
+
+
+def test_perturbation_strikes_once_when_its_share_is_done(driving):
+    state, actions = mission.on_pose(PLAN, driving, 3.9, 0.0)
+    assert actions == () and state.share == pytest.approx(0.39)
+    state, actions = mission.on_pose(PLAN, state, 4.1, 0.0)
+    assert actions == (Action.STRIKE,)
+    assert mission.on_pose(PLAN, state, 4.2, 0.0)[1] == ()
+    back, _ = mission.on_pose(PLAN, state, 1.0, 0.0)
+    assert mission.on_pose(PLAN, back, 5.0, 0.0)[1] == ()
+
+
+def test_mission_without_perturbation_never_strikes(driving):
+    assert mission.on_pose(Plan(10.0, 0.0, strikes=False), driving, 9.0, 0.0)[1] == ()
+
+
+def test_pose_that_is_not_finite_changes_nothing(driving):
+    assert mission.on_pose(PLAN, driving, math.nan, 0.0) == (driving, ())
+
+
+def test_reached_goal_ends_the_mission(driving):
+    state, _ = mission.on_goal_result(driving, 120.0, GoalStatus.SUCCEEDED, "")
+    assert (state.outcome, state.ended_s) == (Outcome.REACHED, 120.0)
+
+
+def test_abort_while_nothing_is_reconfigured_ends_the_mission(driving):
+    state, _ = mission.on_goal_result(driving, 120.0, GoalStatus.ABORTED, "stuck")
+    assert state.outcome is Outcome.ABORTED
+    assert state.reason == "move_base: goal aborted: stuck"
+
+
+def test_goal_preempted_by_a_reconfiguration_goes_on_when_it_is_taken_over(driving):
+    state, _ = mission.on_configuration(driving, 110.0, False)
+    state, _ = mission.on_goal_result(state, 110.2, GoalStatus.PREEMPTED, "")
+    state, _ = mission.on_time(PLAN, state, 150.0)
+    assert not state.over
+    state, _ = mission.on_configuration(state, 151.0, True)
+    state, _ = mission.on_goal_status(state, 151.1, GoalStatus.ACTIVE)
+    state, _ = mission.on_time(PLAN, state, 160.0)
+    assert not state.over
+
+
+def test_goal_ended_by_a_reconfiguration_and_not_taken_up_again_fails(driving):
+    state, _ = mission.on_configuration(driving, 110.0, False)
+    state, _ = mission.on_goal_result(state, 110.2, GoalStatus.PREEMPTED, "")
+    state, _ = mission.on_configuration(state, 111.0, True)
+    state, _ = mission.on_time(PLAN, state, 111.0 + mission.SETTLE_S + 0.1)
+    assert state.outcome is Outcome.ABORTED
+
+
+def test_goal_missing_from_status_during_a_reconfiguration_is_no_end(driving):
+    state, _ = mission.on_configuration(driving, 110.0, False)
+    state, _ = mission.on_goal_status(state, 130.0, None)
+    assert not mission.on_time(PLAN, state, 140.0)[0].over
+
+
+def test_goal_that_the_server_forgot_is_given_up(driving):
+    state, actions = mission.on_time(PLAN, driving, 100.2 + mission.LOST_S + 0.1)
+    assert state.outcome is Outcome.ABORTED and actions == (Action.CANCEL_GOAL,)
+
+
+def test_goal_that_nobody_acknowledged_is_sent_again():
+    state = mission.start(PLAN, 100.0, 0.0, 0.0)
+    state, actions = mission.on_time(PLAN, state, 105.1)
+    assert actions == (Action.RESEND_GOAL,)
+    assert mission.on_time(PLAN, state, 105.2)[1] == ()
+
+
+def test_time_out_cancels_the_goal(driving):
+    state, _ = mission.on_goal_status(driving, 349.0, GoalStatus.ACTIVE)
+    assert not mission.on_time(PLAN, state, 350.0)[0].over
+    state, actions = mission.on_time(PLAN, state, 350.1)
+    assert state.outcome is Outcome.TIMEOUT and actions == (Action.CANCEL_GOAL,)
+
+
+def test_nothing_changes_a_mission_that_is_over(driving):
+    over = mission.abort(driving, 110.0, "simulator gone")
+    assert mission.interrupt(over, 111.0, "again") == over
+    assert mission.on_pose(PLAN, over, 5.0, 0.0) == (over, ())
+    assert mission.on_goal_result(over, 111.0, GoalStatus.SUCCEEDED, "") == (over, ())
+    assert mission.on_time(PLAN, over, 999.0) == (over, ())
+
+
+@pytest.mark.parametrize("x", [10.0, 9.7, math.inf])
+def test_goal_that_is_no_mission_is_refused(x):
+    with pytest.raises(MissionError):
+        mission.start(PLAN, 0.0, x, 0.0)
+
+
+def test_unknown_goal_state_is_lost():
+    assert GoalStatus.of(77) is GoalStatus.LOST
+
+
+@given(st.lists(st.tuples(st.floats(-20, 20), st.floats(-20, 20)), max_size=50))
+def test_whatever_the_way_the_perturbation_strikes_at_most_once(way):
+    state = mission.start(PLAN, 0.0, 0.0, 0.0)
+    strikes = 0
+    for x, y in way:
+        state, actions = mission.on_pose(PLAN, state, x, y)
+        strikes += actions.count(Action.STRIKE)
+        assert state.share >= 0.0
+    assert strikes == (1 if any(PLAN.distance(x, y) <= 6.0 for x, y in way) else 0)
