@@ -1,4 +1,10 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["ros_model"], package_dir={"": "src"}))
+setup(
+    **generate_distutils_setup(
+        packages=["ros_model", "ros_model.generators"],
+        package_dir={"": "src"},
+        package_data={"ros_model": ["grammar/*.lark"]},
+    )
+)

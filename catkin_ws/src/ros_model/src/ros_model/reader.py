@@ -321,11 +321,11 @@ class _Builder(Transformer):  # type: ignore[type-arg]
         return kind.value, connections, items[0]
 
     def _reference(self, token: Token) -> Reference:
-        text = _text(token)
-        try:
-            return Reference.parse(text)
-        except ValueError as error:
-            raise ModelError(str(error), self._at(token)) from None
+        """Split a reference; one with parts missing at its end is for the checker, as its spelling is not wrong."""
+        parts = _text(token).split(".", 3)
+        if "" in parts[:3]:
+            raise ModelError(f"reference '{_short(_text(token))}' is not package.artifact.node[.name]", self._at(token))
+        return Reference(*parts, *[""] * (3 - len(parts)))
 
     def _plain(self, item: Token | _Value) -> Value:
         if isinstance(item, _Value):
@@ -426,7 +426,7 @@ def _short(text: str) -> str:
 def _syntax_error(error: UnexpectedInput, text: str, file: str) -> ModelError:
     """Say what was expected and near what, in one line."""
     names: set[str] = set()
-    offset = error.pos_in_stream
+    offset = error.pos_in_stream or 0
     if isinstance(error, UnexpectedToken):
         names = set(error.accepts or error.expected)
         near = f"'{_short(str(error.token))}'"
@@ -434,9 +434,11 @@ def _syntax_error(error: UnexpectedInput, text: str, file: str) -> ModelError:
             offset, near = len(text.rstrip()), "the end of the file"
     elif isinstance(error, UnexpectedCharacters):
         names = set(error.allowed or ())
-        near = repr(_short(text[error.pos_in_stream :].split("\n", 1)[0]))
-        if text[error.pos_in_stream : error.pos_in_stream + 1] in {"'", '"'}:
+        near = repr(_short(text[offset:].split("\n", 1)[0]))
+        if text[offset : offset + 1] in {"'", '"'}:
             near = f"a string that is never closed, {near}"
+        elif text.startswith("/*", offset):
+            return ModelError("this comment is never closed: add '*/'", Position(file, *_line_and_column(text, offset)))
     else:
         near = "the end of the file"
     expected = sorted(
@@ -445,7 +447,7 @@ def _syntax_error(error: UnexpectedInput, text: str, file: str) -> ModelError:
     if "$END" in names:
         expected.append("the end of the file")
     wanted = " or ".join(expected) or "something else"
-    return ModelError(f"expected {wanted} near {near}", Position(file, *_line_and_column(text, offset or 0)))
+    return ModelError(f"expected {wanted} near {near}", Position(file, *_line_and_column(text, offset)))
 
 
 @functools.cache
