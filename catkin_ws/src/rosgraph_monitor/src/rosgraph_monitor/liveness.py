@@ -1,0 +1,103 @@
+"""Liveness of one node, decided from events on a connection to its own API. Pure; time is an argument.
+
+A connection is held open to each node. When a process dies, the kernel closes its end at once: measured with rospy,
+an idle connection stays open for minutes and closes 3 ms after a SIGKILL. A closed connection alone proves nothing,
+since a server may close it after an answer (HTTP/1.0): so the node is called again, and is dead when it refuses. A
+process that is stopped or stuck keeps its connection, but leaves getPid unanswered until a deadline.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, replace
+
+
+class Life(enum.Enum):
+    """What is known of a node."""
+
+    UNKNOWN = "not asked yet"
+    ALIVE = "alive"
+    DEAD = "dead: nobody answers at its address, though the master lists it"
+    HUNG = "hung: its process accepts connections but leaves getPid unanswered"
+    UNREACHABLE = "unreachable: its address can't be reached"
+
+
+class Action(enum.Enum):
+    """What the holder of the socket is to do now."""
+
+    NONE = "none"
+    CONNECT = "connect"
+    PROBE = "probe"
+    DROP = "drop the attempt"
+
+
+_FRUITLESS_LIMIT = 4
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Wall seconds: between probes, until a probe or a connection attempt counts as failed, between attempts."""
+
+    probe_period: float = 1.0
+    probe_deadline: float = 3.0
+    connect_deadline: float = 1.5
+    retry_period: float = 0.5
+
+
+@dataclass(frozen=True)
+class Liveness:
+    """State of one node: what is known, and what goes on on its connection since when."""
+
+    life: Life = Life.UNKNOWN
+    connecting_since: float | None = None
+    connected: bool = False
+    asked_at: float | None = None
+    next_at: float = 0.0
+    fruitless: int = 0  # connections in a row that were closed without an answer
+
+
+def due(state: Liveness, now: float, timing: Timing) -> tuple[Liveness, Action]:
+    """Say what is to be done at this time, and the state after it has been begun."""
+    if state.connecting_since is not None:
+        if now - state.connecting_since >= timing.connect_deadline:
+            return Liveness(life=Life.UNREACHABLE, next_at=now + timing.retry_period), Action.DROP
+    elif state.asked_at is not None:
+        if now - state.asked_at >= timing.probe_deadline:
+            # The connection is kept: a late answer shows that the node is back.
+            return replace(state, life=Life.HUNG), Action.NONE
+    elif now >= state.next_at:
+        if state.connected:
+            return replace(state, asked_at=now), Action.PROBE
+        return replace(state, connecting_since=now), Action.CONNECT
+    return state, Action.NONE
+
+
+def on_connected(state: Liveness, now: float) -> Liveness:
+    """The connection stands: ask at once. Being accepted is no sign of life yet, the kernel does that."""
+    return replace(state, connecting_since=None, connected=True, asked_at=None, next_at=now)
+
+
+def on_answer(state: Liveness, now: float, timing: Timing) -> Liveness:
+    """The node has answered a probe."""
+    return replace(state, life=Life.ALIVE, asked_at=None, next_at=now + timing.probe_period, fruitless=0)
+
+
+def on_closed(state: Liveness, now: float, timing: Timing) -> Liveness:
+    """The connection that stood was closed by the other end: try again before judging, at once if that helps.
+
+    A server that goes on closing without an answer is no better than one that hangs.
+    """
+    fruitless = state.fruitless + 1
+    if fruitless < _FRUITLESS_LIMIT:
+        return Liveness(life=state.life, next_at=now, fruitless=fruitless)
+    return Liveness(life=Life.HUNG, next_at=now + timing.retry_period, fruitless=fruitless)
+
+
+def on_refused(_state: Liveness, now: float, timing: Timing) -> Liveness:
+    """An attempt to connect was refused: nobody is there."""
+    return Liveness(life=Life.DEAD, next_at=now + timing.retry_period)
+
+
+def on_unreachable(_state: Liveness, now: float, timing: Timing) -> Liveness:
+    """An attempt to connect found no way to the host, or its name has no address."""
+    return Liveness(life=Life.UNREACHABLE, next_at=now + timing.retry_period)

@@ -1,0 +1,111 @@
+"""What runs against what should run."""
+
+import pytest
+from ros_model.metamodel import Component, Reference, RosParameter, RosSystem
+from ros_model.snapshot import GraphSnapshot, NodeState
+from rosgraph_monitor.comparison import (
+    AdditionalNode,
+    MissingNode,
+    WrongParameter,
+    compare,
+    finding_statuses,
+    is_ignored,
+    relative,
+    resolved,
+    same_value,
+)
+from rosgraph_monitor.status import Level, Status
+
+
+def graph(*nodes, **parameters):
+    return GraphSnapshot(nodes={n: NodeState(n, f"http://host{n}") for n in nodes}, parameters=parameters)
+
+
+def system(*components):
+    return RosSystem("s", components=components)
+
+
+def parameter(name, value):
+    return RosParameter("label", Reference("p", "a", "n", name), value)
+
+
+BASE = Component("base", parameters=(parameter("local/speed", 0.5), parameter("unset", None)))
+
+
+def test_graph_as_desired_has_no_findings():
+    assert compare(graph("/base", base={"local": {"speed": 0.5}}), system(BASE), dead={}) == ()
+
+
+def test_node_that_is_not_registered_is_missing():
+    assert compare(graph(), system(BASE), dead={}) == (MissingNode("base", "not registered with the master"),)
+
+
+def test_node_that_is_registered_but_dead_is_missing():
+    assert compare(graph("/base"), system(BASE), dead={"/base": "dead"}) == (MissingNode("base", "dead"),)
+
+
+def test_excused_node_raises_no_alarm():
+    assert compare(graph(), system(BASE), dead={}, excused={"base"}) == ()
+
+
+def test_wrong_parameter_has_expected_and_actual_value():
+    findings = compare(graph("/base", base={"local": {"speed": 0.3}}), system(BASE), dead={})
+    assert findings == (WrongParameter("base", "local/speed", 0.5, 0.3),)
+    (status,) = finding_statuses(findings)
+    assert status.message == "Wrong param configuration"
+    assert status.name == "base"
+    assert status.values == (("local/speed", "0.3"), ("expected/local/speed", "0.5"))
+
+
+def test_parameter_that_is_not_set_is_wrong():
+    (status,) = finding_statuses(compare(graph("/base"), system(BASE), dead={}))
+    assert status.values[0] == ("local/speed", "<not set>")
+
+
+def test_additional_node_is_a_warning():
+    findings = compare(graph("/base", "/stray", base={"local": {"speed": 0.5}}), system(BASE), dead={})
+    assert findings == (AdditionalNode("stray"),)
+    assert finding_statuses(findings) == [Status(Level.WARN, "stray", "Additional node")]
+
+
+def test_dead_node_is_not_additional():
+    assert compare(graph("/stray"), system(), dead={"/stray": "dead"}) == ()
+
+
+@pytest.mark.parametrize("name", ["rosout", "rosgraph_monitor", "rviz_1700000000123", "any_4711_1700000000123"])
+def test_tools_and_anonymous_nodes_are_ignored(name):
+    assert compare(graph(f"/{name}"), system(), dead={}) == ()
+
+
+def test_additional_patterns_are_a_setting():
+    assert is_ignored("tool_a", ("/tool_*",))
+    assert not is_ignored("driver_2", ("tool_*",))
+
+
+def test_system_in_a_namespace():
+    live = graph("/robot/base", "/other", robot={"base": {"local": {"speed": 0.5}}})
+    assert compare(live, system(BASE), dead={}, namespace="/robot") == ()
+    assert resolved("ns/base", "/robot") == "/robot/ns/base"
+    assert relative("/other", "/robot") is None
+
+
+@pytest.mark.parametrize(
+    ("expected", "actual", "same"),
+    [
+        (0.5, 0.5000000001, True),
+        (15, 15.0, True),
+        (0.5, 0.51, False),
+        (True, 1, False),
+        ("15", 15, True),
+        ("true", True, True),
+        ("scan", "scan", True),
+        ("scan", "point_cloud", False),
+        ([0.1, [1]], [0.1, [1]], True),
+        ([0.1], [0.1, 0.2], False),
+        ({"a": 1}, {"a": 1, "b": 2}, True),
+        ({"a": 1}, {"b": 2}, False),
+        ({"a": 1}, 1, False),
+    ],
+)
+def test_same_value(expected, actual, same):
+    assert same_value(expected, actual) is same

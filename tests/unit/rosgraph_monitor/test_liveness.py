@@ -1,0 +1,80 @@
+"""Decisions on the liveness of one node."""
+
+from rosgraph_monitor.liveness import (
+    Action,
+    Life,
+    Liveness,
+    Timing,
+    due,
+    on_answer,
+    on_closed,
+    on_connected,
+    on_refused,
+)
+
+TIMING = Timing(probe_period=1.0, probe_deadline=3.0, connect_deadline=1.5, retry_period=0.5)
+
+
+def alive(now=0.0):
+    state, action = due(Liveness(), now, TIMING)
+    assert action is Action.CONNECT
+    state, action = due(on_connected(state, now), now, TIMING)
+    assert action is Action.PROBE
+    return on_answer(state, now, TIMING)
+
+
+def test_node_that_answers_is_alive():
+    assert alive().life is Life.ALIVE
+
+
+def test_connection_alone_is_no_sign_of_life():
+    assert on_connected(due(Liveness(), 0.0, TIMING)[0], 0.0).life is Life.UNKNOWN
+
+
+def test_probe_comes_after_its_period():
+    assert due(alive(), 0.9, TIMING)[1] is Action.NONE
+    assert due(alive(), 1.0, TIMING)[1] is Action.PROBE
+
+
+def test_closed_connection_and_refused_call_mean_death():
+    state = on_closed(alive(), 0.5, TIMING)
+    assert state.life is Life.ALIVE
+    state, action = due(state, 0.5, TIMING)
+    assert action is Action.CONNECT
+    state = on_refused(state, 0.5, TIMING)
+    assert state.life is Life.DEAD
+    assert due(state, 0.9, TIMING)[1] is Action.NONE
+    assert due(state, 1.0, TIMING)[1] is Action.CONNECT
+
+
+def test_server_that_closes_after_each_answer_stays_alive():
+    state = alive()
+    for now in range(1, 10):
+        state, action = due(on_closed(state, now, TIMING), now, TIMING)
+        assert action is Action.CONNECT
+        state, _ = due(on_connected(state, now), now, TIMING)
+        state = on_answer(state, now, TIMING)
+        assert state.life is Life.ALIVE
+
+
+def test_server_that_only_closes_is_called_hung_and_not_called_in_a_spin():
+    state = Liveness()
+    for _ in range(4):
+        state = on_closed(state, 1.0, TIMING)
+    assert state.life is Life.HUNG
+    assert due(state, 1.0, TIMING)[1] is Action.NONE
+
+
+def test_probe_without_answer_means_hung_and_a_late_answer_revives():
+    state, _ = due(alive(), 1.0, TIMING)
+    assert due(state, 3.9, TIMING)[0].life is Life.ALIVE
+    state, action = due(state, 4.0, TIMING)
+    assert (state.life, action) == (Life.HUNG, Action.NONE)
+    assert on_answer(state, 9.0, TIMING).life is Life.ALIVE
+
+
+def test_connection_that_never_stands_means_unreachable():
+    state, _ = due(Liveness(), 0.0, TIMING)
+    assert due(state, 1.4, TIMING) == (state, Action.NONE)
+    state, action = due(state, 1.5, TIMING)
+    assert (state.life, action) == (Life.UNREACHABLE, Action.DROP)

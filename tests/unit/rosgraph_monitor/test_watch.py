@@ -1,0 +1,122 @@
+"""The watcher over real sockets of this process."""
+
+import contextlib
+import socket
+import threading
+import time
+from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+
+import pytest
+from rosgraph_monitor.liveness import Life, Timing
+from rosgraph_monitor.watch import Watcher
+
+TIMING = Timing(probe_period=0.05, probe_deadline=0.3, connect_deadline=0.3, retry_period=0.05)
+
+
+class KeepAlive(SimpleXMLRPCRequestHandler):
+    protocol_version = "HTTP/1.1"
+
+
+class CloseAfterAnswer(SimpleXMLRPCRequestHandler):
+    protocol_version = "HTTP/1.0"
+
+
+@contextlib.contextmanager
+def node(handler=KeepAlive, pid=4711):
+    server = SimpleXMLRPCServer(("127.0.0.1", 0), requestHandler=handler, logRequests=False)
+    server.register_function(lambda _caller: [1, "", pid], "getPid")
+    server.timeout = 0.02
+    ended = threading.Event()
+    connections = []
+    accept = server.get_request
+
+    def get_request():
+        connections.append(accept())
+        # One connection is served in this thread for as long as it lasts: let it end with the server.
+        connections[-1][0].settimeout(0.5)
+        return connections[-1]
+
+    server.get_request = get_request
+
+    def serve():
+        while not ended.is_set():
+            server.handle_request()
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+
+    def end():
+        ended.set()
+        server.socket.close()
+        for connection, _ in connections:
+            with contextlib.suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+        thread.join()
+
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}/", end
+    finally:
+        if not ended.is_set():
+            end()
+
+
+@pytest.fixture
+def watcher():
+    changed = threading.Event()
+    watcher = Watcher(changed.set, TIMING)
+    watcher.changed = changed
+    watcher.start()
+    yield watcher
+    watcher.close()
+
+
+def wait_for(condition, deadline=2.0):
+    end = time.monotonic() + deadline
+    while not condition():
+        assert time.monotonic() < end, "condition not met in time"
+        time.sleep(0.005)
+
+
+@pytest.mark.parametrize("handler", [KeepAlive, CloseAfterAnswer])
+def test_live_node_is_alive_with_its_pid(watcher, handler):
+    with node(handler) as (uri, _end):
+        watcher.watch({"/n": uri})
+        wait_for(lambda: watcher.lives() == {("/n", uri): Life.ALIVE})
+        assert watcher.pids() == {"/n": 4711}
+        end = time.monotonic() + 0.4
+        while time.monotonic() < end:
+            assert watcher.lives()[("/n", uri)] is Life.ALIVE
+            time.sleep(0.01)
+
+
+def test_death_is_told_at_once(watcher):
+    with node() as (uri, end):
+        watcher.watch({"/n": uri})
+        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE)
+        watcher.changed.clear()
+        end()
+        assert watcher.changed.wait(0.5)
+        wait_for(lambda: watcher.lives()[("/n", uri)] is Life.DEAD)
+
+
+def test_silent_node_is_hung_and_does_not_delay_others(watcher):
+    with socket.create_server(("127.0.0.1", 0)) as silent, node() as (uri, _end):
+        hung = f"http://127.0.0.1:{silent.getsockname()[1]}/"
+        watcher.watch({"/hung": hung, "/n": uri, "/odd": "nonsense", "/port": "http://h:99999/"})
+        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE, deadline=0.25)
+        wait_for(lambda: watcher.lives()[("/hung", hung)] is Life.HUNG)
+        assert watcher.lives()[("/odd", "nonsense")] is Life.UNREACHABLE
+        assert watcher.lives()[("/n", uri)] is Life.ALIVE
+
+
+def test_name_without_address_is_unreachable(watcher):
+    watcher.watch({"/n": "http://no-such-host.invalid:1234/"})
+    wait_for(lambda: list(watcher.lives().values()) == [Life.UNREACHABLE])
+
+
+def test_node_that_is_not_watched_any_more_is_forgotten(watcher):
+    with node() as (uri, _end):
+        watcher.watch({"/n": uri})
+        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE)
+        watcher.watch({})
+        wait_for(lambda: watcher.lives() == {})
