@@ -86,7 +86,9 @@ class Display:
 
 
 def _figures(summary: dict[str, Any]) -> Table:
-    table = Table(title=f"Mission {summary['mission']}, route {summary['route']}, seed {summary['seed']}")
+    table = Table(
+        show_header=False, title=f"Mission {summary['mission']}, route {summary['route']}, seed {summary['seed']}"
+    )
     table.add_column("")
     table.add_column("", justify="right")
     above, mean, goal = summary["time_above_threshold"], summary["mean_qa"], summary["goal_reached"]

@@ -83,7 +83,8 @@ def _draw_map(axis: Axes, record: MissionRecord, summary: dict[str, Any]) -> Non
     inside = (record.poses[:, 0] >= start) & (record.poses[:, 0] <= record.end_stamp)
     poses = record.poses[inside]
     for begin, until, name in configuration_spans(record):
-        span = poses[(poses[:, 0] >= begin) & (poses[:, 0] <= until), 1:]
+        first, last = np.searchsorted(poses[:, 0], (begin, until))
+        span = poses[first : last + 1, 1:]
         if len(span) > 1:
             segments = np.stack([span[:-1], span[1:]], axis=1)
             axis.add_collection(LineCollection(list(segments), colors=colours[name], linewidths=3.5, zorder=3))
@@ -108,7 +109,9 @@ def _draw_map(axis: Axes, record: MissionRecord, summary: dict[str, Any]) -> Non
     axis.set_aspect("equal")
     axis.set_xlabel("x (m)")
     axis.set_ylabel("y (m)")
-    axis.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9, frameon=False)
+    legend = axis.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9, frameon=False)
+    for handle in legend.get_lines():
+        handle.set_markersize(8)
 
 
 def _draw_obstacles(axis: Axes, record: MissionRecord) -> None:
@@ -150,17 +153,19 @@ def _draw_quality(axis: Axes, record: MissionRecord, summary: dict[str, Any], na
     limit = summary["thresholds"][name]
     observed = [(r.stamp - start, np.nan if r.level is None else r.level) for r in record.observed if r.name == name]
     truth = [(stamp - start, level) for stamp, level in record.true_quality.get(name, ())]
-    if observed:
-        axis.step(*zip(*observed, strict=True), where="post", color="#888888", linewidth=0.9, label="observed")
-    if truth:
-        axis.step(*zip(*truth, strict=True), where="post", color="#1f4e79", linewidth=1.4, label="ground truth")
+    series = ((observed, "#888888", 0.9, "observed"), (truth, "#1f4e79", 1.4, "ground truth"))
+    for samples, colour, width, label in series:
+        if samples:
+            held = [*samples, (end - start, samples[-1][1])] if samples[-1][0] < end - start else samples
+            axis.step(*zip(*held, strict=True), where="post", color=colour, linewidth=width, label=label)
     axis.axhline(limit, color=_FAILURE, linestyle="--", linewidth=1.2, label=f"threshold {limit:g}")
     strikes = [entry["stamp_s"] for entry in summary["perturbations"]]
     if strikes:
         axis.axvspan(min(strikes), end - start, color=_FAILURE, alpha=0.10, linewidth=0, label="contingency")
     for number, entry in enumerate(summary["reconfigurations"], start=1):
         done = entry["stamp_s"] + (entry["execute_s"] or 0.0)
-        axis.axvspan(entry["stamp_s"], done, color="#ffb000", alpha=0.9, linewidth=1.5)
+        label = "reconfiguration" if number == 1 else None
+        axis.axvspan(entry["stamp_s"], done, color="#ffb000", alpha=0.6, linewidth=1.5, zorder=0, label=label)
         axis.annotate(
             f"{number}: {entry['to']}", (done, 1.0), xytext=(4, -2), textcoords="offset points", fontsize=9, va="top"
         )

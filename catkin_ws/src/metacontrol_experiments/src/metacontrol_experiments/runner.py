@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -27,6 +28,9 @@ BAG_NAME = "mission.bag"
 _RECORDER_GRACE_S = 15.0
 _LAUNCH_GRACE_S = 12.0
 """Wall seconds after which a process that was asked to end is made to."""
+
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_COMPLAINT = re.compile(r"error|exception|fatal|has died|unused args", re.IGNORECASE)
 
 
 class RunError(RuntimeError):
@@ -114,11 +118,9 @@ def _record_command(bag: Path) -> list[str]:
 
 def _last_complaint(console: Path) -> str:
     """The last line of a log that tells of an error, else the last line."""
-    lines = [
-        line.strip() for line in console.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()
-    ]
-    errors = [line for line in lines if any(word in line.lower() for word in ("error", "exception", "fatal"))]
-    return (errors or lines or ["it said nothing"])[-1]
+    text = _COLOUR.sub("", console.read_text(encoding="utf-8", errors="replace"))
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return ([line for line in lines if _COMPLAINT.search(line)] or lines or ["it said nothing"])[-1]
 
 
 @contextmanager

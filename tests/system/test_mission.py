@@ -1,0 +1,105 @@
+"""Whole missions with the real command: a master, a simulator, everything."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from typing import TYPE_CHECKING
+
+import psutil
+import pytest
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FACTOR = ("--real-time-factor", "2")
+LIMIT_S = 240.0
+
+
+def left_behind(output: Path) -> list[str]:
+    """Command lines of processes that still run with the mission's log folder in their environment."""
+    found = []
+    for process in psutil.process_iter():
+        try:
+            if process.environ().get("ROS_LOG_DIR") == str(output / "log") and process.status() != psutil.STATUS_ZOMBIE:
+                found.append(" ".join(process.cmdline()))
+        except (psutil.Error, OSError):
+            continue
+    return found
+
+
+def metacontrol(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(["metacontrol", *arguments], capture_output=True, text=True, timeout=LIMIT_S, check=False)
+
+
+@pytest.fixture(scope="module")
+def adapted(tmp_path_factory):
+    output = tmp_path_factory.mktemp("adapted")
+    return metacontrol("run", "--output", str(output), "--failure-at", "0.4", *FACTOR), output
+
+
+@pytest.fixture(scope="module")
+def baseline(tmp_path_factory):
+    output = tmp_path_factory.mktemp("baseline")
+    arguments = ("--no-metacontrol", "--failure-at", "0.1", "--timeout", "60", *FACTOR)
+    return metacontrol("run", "--output", str(output), *arguments), output
+
+
+def test_killed_laser_is_replaced_by_the_camera_and_the_robot_arrives(adapted):
+    result, output = adapted
+    assert result.returncode == 0, result.stdout + result.stderr
+    summary = json.loads((output / "summary.json").read_text())
+    assert summary["goal_reached"] is True
+    assert summary["collisions"] == 0
+    assert summary["goals"] == {"sent": 1, "failed": 0}
+    changes = [entry for entry in summary["reconfigurations"] if entry["trigger"] == "component:front_laser"]
+    assert changes and changes[0]["to"].endswith("_k")
+    assert all(changes[0][key] is not None for key in ("detect_s", "decide_s", "execute_s"))
+    assert summary["final_configuration"].endswith("_k")
+
+
+def test_timeline_tells_all_four_steps(adapted):
+    result, _ = adapted
+    assert "component front_laser has failed" in result.stdout
+    for step in ("R1", "R2", "R3", "R4"):
+        assert f" {step} " in result.stdout
+
+
+def test_summary_follows_from_the_bag_alone(adapted):
+    _, output = adapted
+    again = metacontrol("summary", str(output / "mission.bag"))
+    assert json.loads(again.stdout) == json.loads((output / "summary.json").read_text())
+    assert (output / "mission.png").stat().st_size > 10_000
+
+
+def test_baseline_stops_for_want_of_a_sensor(baseline):
+    result, output = baseline
+    assert result.returncode == 1, result.stdout + result.stderr
+    summary = json.loads((output / "summary.json").read_text())
+    assert summary["goal_reached"] is False and summary["metacontrol"] is False
+    assert summary["reconfigurations"] == []
+    assert [entry["name"] for entry in summary["perturbations"]] == ["component:front_laser"]
+    assert (output / "mission.png").exists()
+
+
+@pytest.mark.parametrize("run", ["adapted", "baseline"])
+def test_nothing_is_left_behind(run, request):
+    _, output = request.getfixturevalue(run)
+    assert left_behind(output) == []
+
+
+def test_interrupted_mission_leaves_nothing_but_its_bag(tmp_path):
+    command = ["metacontrol", "run", "--output", str(tmp_path), "--quiet"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + LIMIT_S
+        while not (tmp_path / "mission.bag.active").exists() and process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.1)
+        assert left_behind(tmp_path)
+        os.kill(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=60.0)
+    assert process.returncode == 130, said
+    assert left_behind(tmp_path) == []
+    assert (tmp_path / "mission.bag").exists()
