@@ -30,8 +30,8 @@ from std_msgs.msg import String
 
 from rosgraph_manipulator.master import NodeApi
 
-# Kills the node when the launcher dies (PR_SET_PDEATHSIG); from util-linux, which every Debian has. The path is absolute,
-# since for cwd="node" roslaunch changes to the folder of the first word of the command.
+# Kills the node when the launcher dies (PR_SET_PDEATHSIG); from util-linux, which every Debian has. The path is
+# absolute, since for cwd="node" roslaunch changes to the folder of the command's first word.
 DIE_WITH_LAUNCHER = "/usr/bin/setpriv --pdeathsig KILL --"
 SHUTDOWN_TIMEOUT = 3.0  # s, wall, for a node to end after it was asked to over XML-RPC; rospy takes 0.5 s
 SIGINT_TIMEOUT = 2.0  # s, wall, then SIGTERM
