@@ -1,0 +1,142 @@
+"""The power load of the robot: the published model of D2, and the meter that feeds it once per second."""
+
+from __future__ import annotations
+
+import math
+
+SPEED_COEFFICIENT = 1.3
+"""Load per m/s of the largest forward speed (published node battery_load_control)."""
+ACCELERATION_COEFFICIENT = 0.1
+"""Load per m/s2 of the largest forward acceleration (as above)."""
+RATE_COEFFICIENT = 0.04
+"""Load per Hz of the rate of velocity commands (as above)."""
+MIN_LOAD, MAX_LOAD = 0.2, 5.0
+"""The load is clipped to this interval (as above)."""
+WATTS_PER_LOAD = 160.0
+"""W of one unit of load. Chosen so that the full load, 5.0, is 800 W: it empties the battery in three hours, which is
+the Ridgeback's rated run time at full use."""
+BATTERY_CAPACITY_WH = 2400.0
+"""Wh of the Ridgeback's battery, 24 V and 100 Ah."""
+
+
+class PowerError(ValueError):
+    """A value that the power model refuses."""
+
+
+def power_load(
+    speed: float, acceleration: float, rate: float, factor: float = 1.0, additional_consumption: float = 0.0
+) -> float:
+    """Return the load of the published energy model, clipped to [0.2, 5.0].
+
+    Args:
+        speed: largest forward speed since the last tick, m/s.
+        acceleration: largest forward acceleration since the last tick, m/s2.
+        rate: measured rate of velocity commands, Hz.
+        factor: multiplies the consumption; the power contingency raises it above 1.
+        additional_consumption: added to the load before the factor.
+
+    Raises:
+        PowerError: an argument is not finite, or the factor is negative.
+    """
+    check_factor(factor)
+    model = SPEED_COEFFICIENT * speed + ACCELERATION_COEFFICIENT * acceleration + RATE_COEFFICIENT * rate
+    load = (model + additional_consumption) * factor
+    if not math.isfinite(load):
+        raise PowerError(f"speed {speed}, acceleration {acceleration}, rate {rate}: every value must be finite")
+    return min(max(load, MIN_LOAD), MAX_LOAD)
+
+
+def check_factor(factor: float) -> float:
+    """Return the factor.
+
+    Raises:
+        PowerError: it is negative or not finite.
+    """
+    if not math.isfinite(factor) or factor < 0.0:
+        raise PowerError(f"consumption factor {factor} refused: it must be a finite number, 0 or more")
+    return factor
+
+
+class PowerMeter:
+    """Collects speed, acceleration and commands between two ticks, and turns them into a load at each."""
+
+    _since: float
+    _speed: float
+    _acceleration: float
+    _commands: int
+
+    def __init__(self, now: float) -> None:
+        """Start to measure.
+
+        Args:
+            now: ROS time in s.
+        """
+        self.factor = 1.0
+        self._start(now)
+
+    def add_speed(self, forward: float) -> None:
+        """Take a forward speed in m/s.
+
+        Raises:
+            PowerError: it is not finite.
+        """
+        if not math.isfinite(forward):
+            raise PowerError(f"forward speed {forward} is not finite")
+        self._speed = max(self._speed, forward)
+
+    def add_acceleration(self, forward: float) -> None:
+        """Take a forward acceleration in m/s2.
+
+        Raises:
+            PowerError: it is not finite.
+        """
+        if not math.isfinite(forward):
+            raise PowerError(f"forward acceleration {forward} is not finite")
+        self._acceleration = max(self._acceleration, forward)
+
+    def add_command(self) -> None:
+        """Count a velocity command."""
+        self._commands += 1
+
+    def tick(self, now: float) -> float | None:
+        """Return the load since the last tick and start anew; None where no time has passed (or it ran backwards)."""
+        elapsed = now - self._since
+        if elapsed <= 0.0:
+            self._start(now)
+            return None
+        load = power_load(self._speed, self._acceleration, self._commands / elapsed, self.factor)
+        self._start(now)
+        return load
+
+    def _start(self, now: float) -> None:
+        self._since = now
+        self._speed = 0.0
+        self._acceleration = 0.0
+        self._commands = 0
+
+
+class Battery:
+    """State of charge, drained by the load."""
+
+    def __init__(self, charge: float = 1.0) -> None:
+        """Start with a state of charge from 0 to 1.
+
+        Raises:
+            PowerError: the charge is not within 0 and 1.
+        """
+        if not 0.0 <= charge <= 1.0:
+            raise PowerError(f"state of charge {charge} must lie between 0 and 1")
+        self.charge = charge
+
+    def drain(self, load: float, duration: float) -> None:
+        """Take out what a load (model's scale) consumes in a time (s)."""
+        self.charge = max(self.charge - load * WATTS_PER_LOAD * duration / 3600.0 / BATTERY_CAPACITY_WH, 0.0)
+
+    @property
+    def voltage(self) -> float:
+        """Open-circuit voltage in V: 22 V empty to 26 V full, linear, as of a lead-acid pack of 24 V."""
+        return 22.0 + 4.0 * self.charge
+
+    def current(self, load: float) -> float:
+        """Return the current in A that a load draws; negative when discharging, as sensor_msgs/BatteryState has it."""
+        return -load * WATTS_PER_LOAD / self.voltage

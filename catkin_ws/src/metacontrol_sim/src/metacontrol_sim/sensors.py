@@ -1,0 +1,87 @@
+"""What the sensor drivers do with raw data: noise and range limits of a laser, points of a depth image."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+class SensorError(ValueError):
+    """Raw data that make no sense."""
+
+
+def measure_ranges(
+    ranges: ArrayLike, range_min: float, range_max: float, noise: float, rng: np.random.Generator
+) -> NDArray[np.float32]:
+    """Return what a laser reports for true ranges.
+
+    Args:
+        ranges: (n,) true distances in m; inf where a ray hits nothing.
+        range_min: m; what the noise brings below it is reported as range_min.
+        range_max: m; what lies at it or beyond is reported as inf.
+        noise: standard deviation in m.
+        rng: source of the noise; one value is drawn per ray, hit or not, so that a seed gives one sequence.
+
+    Raises:
+        SensorError: no ranges, a NaN or negative range, or limits out of order.
+    """
+    true = np.asarray(ranges, dtype=np.float32)
+    if true.ndim != 1 or true.size == 0:
+        raise SensorError(f"raw scan has shape {true.shape}; expected one row of ranges")
+    if not 0.0 <= range_min < range_max:
+        raise SensorError(f"raw scan has range_min {range_min} and range_max {range_max}")
+    if np.isnan(true).any() or (true < 0.0).any():
+        raise SensorError("raw scan holds a NaN or negative range")
+    noisy = true + noise * rng.standard_normal(true.size, dtype=np.float32)
+    noisy = np.maximum(noisy, np.float32(range_min))
+    return np.where(true < range_max, np.minimum(noisy, np.float32(range_max)), np.float32(np.inf))
+
+
+class DepthProjector:
+    """Turns depth images of one size and field of view into points; keeps the directions of the pixels."""
+
+    def __init__(self, width: int, height: int, field_of_view: float) -> None:
+        """Prepare for images of one size.
+
+        Args:
+            width: pixels.
+            height: pixels.
+            field_of_view: horizontal, rad.
+
+        Raises:
+            SensorError: a value is not positive, or the field of view is 180 degrees or more.
+        """
+        if width < 1 or height < 1 or not 0.0 < field_of_view < np.pi:
+            raise SensorError(f"depth image of {width} x {height} pixels over {field_of_view} rad")
+        self.shape = (height, width)
+        focal_length = width / 2.0 / np.tan(field_of_view / 2.0)
+        left = ((width - 1) / 2.0 - np.arange(width)) / focal_length
+        up = ((height - 1) / 2.0 - np.arange(height)) / focal_length
+        self._directions = np.empty((height, width, 3), dtype=np.float32)
+        self._directions[..., 0] = 1.0
+        self._directions[..., 1] = left[np.newaxis, :]
+        self._directions[..., 2] = up[:, np.newaxis]
+
+    def points(self, depth: NDArray[np.float32], range_min: float, range_max: float) -> NDArray[np.float32]:
+        """Return the points of a depth image in the camera's frame: x forward, y left, z up.
+
+        Args:
+            depth: (height, width), m along the optical axis; pixels that are not finite have no point.
+            range_min: m, closest depth that counts.
+            range_max: m, farthest depth that counts.
+
+        Returns:
+            (n, 3) points in m.
+
+        Raises:
+            SensorError: the image has another size than the projector was made for.
+        """
+        if depth.shape != self.shape:
+            raise SensorError(f"depth image of {depth.shape[::-1]} pixels, expected {self.shape[::-1]}")
+        with np.errstate(invalid="ignore"):
+            valid = (depth >= range_min) & (depth <= range_max)
+        return self._directions[valid] * depth[valid][:, np.newaxis]

@@ -1,0 +1,153 @@
+#!/usr/bin/env python3
+"""The simulated robot as other nodes see it."""
+
+import math
+import os
+import signal
+import threading
+import time
+import unittest
+import xmlrpc.client
+
+import rosgraph
+import rospy
+import rostest
+from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
+from metacontrol_sim.srv import IncreaseConsumptionFactor
+from nav_msgs.msg import OccupancyGrid, Odometry
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import BatteryState, Imu, LaserScan, PointCloud2
+from std_msgs.msg import Float32, Int32
+from tf2_msgs.msg import TFMessage
+
+TOPICS = {
+    "/clock": Clock,
+    "odom": Odometry,
+    "odometry/filtered": Odometry,
+    "imu/data": Imu,
+    "battery_state": BatteryState,
+    "map": OccupancyGrid,
+    "amcl_pose": PoseWithCovarianceStamped,
+    "/tf": TFMessage,
+    "/tf_static": TFMessage,
+    "front/scan": LaserScan,
+    "camera/depth/points": PointCloud2,
+    "ground_truth/state": Odometry,
+    "ground_truth/safety": Float32,
+    "ground_truth/energy": Float32,
+    "ground_truth/contacts": Int32,
+    "power_load": Float32,
+}
+
+
+class Latest:
+    """Keeps the latest message of a topic and counts them."""
+
+    def __init__(self, topic, kind):
+        self._condition = threading.Condition()
+        self.count = 0
+        self.message = None
+        self._subscriber = rospy.Subscriber(topic, kind, self._on_message)
+
+    def _on_message(self, message):
+        with self._condition:
+            self.message = message
+            self.count += 1
+            self._condition.notify_all()
+
+    def wait(self, accept=lambda _message: True, timeout=10.0):
+        """Returns the next message that is accepted, or None at the deadline (wall time)."""
+        deadline = time.monotonic() + timeout
+        with self._condition:
+            seen = self.count
+            while True:
+                if not self._condition.wait(max(deadline - time.monotonic(), 0.0)):
+                    return None
+                if self.count > seen and accept(self.message):
+                    return self.message
+
+    def close(self):
+        self._subscriber.unregister()
+
+
+class SimulatorTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("simulator_test")
+        cls.command = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+        cls.state = Latest("ground_truth/state", Odometry)
+        assert cls.state.wait() is not None, "the simulator publishes nothing"
+
+    def drive(self, forward, accept):
+        """Sends a command at 20 Hz until the state is accepted or 10 s have passed."""
+        twist = Twist()
+        twist.linear.x = forward
+        deadline = time.monotonic() + 10.0
+        while time.monotonic() < deadline:
+            self.command.publish(twist)
+            if self.state.wait(accept, 0.05):
+                return self.state.message
+        return None
+
+    def test_every_topic_speaks(self):
+        latest = {topic: Latest(topic, kind) for topic, kind in TOPICS.items()}
+        for topic, heard in latest.items():
+            with self.subTest(topic=topic):
+                self.assertTrue(heard.count or heard.wait())
+        scan, grid, cloud = (latest[topic].message for topic in ("front/scan", "map", "camera/depth/points"))
+        self.assertEqual(scan.header.frame_id, "front_laser")
+        self.assertGreaterEqual(len(scan.ranges), 360)
+        self.assertEqual((grid.info.width, grid.info.height), (420, 420))
+        self.assertEqual(cloud.header.frame_id, "camera_link")
+        self.assertGreater(cloud.width, 1000)
+        frames = {transform.child_frame_id for transform in latest["/tf_static"].message.transforms}
+        self.assertEqual(frames, {"front_laser", "rear_laser", "camera_link"})
+        for heard in latest.values():
+            heard.close()
+
+    def test_command_moves_the_robot_and_its_end_stops_it(self):
+        start = self.state.message.pose.pose.position
+        moved = self.drive(
+            0.4, lambda s: math.dist((s.pose.pose.position.x, s.pose.pose.position.y), (start.x, start.y)) > 0.3
+        )
+        self.assertIsNotNone(moved, "the robot does not move")
+        ended = moved.header.stamp
+        stopped = self.state.wait(lambda s: abs(s.twist.twist.linear.x) < 1e-3)
+        self.assertIsNotNone(stopped, "the robot does not stop")
+        self.assertLess((stopped.header.stamp - ended).to_sec(), 1.5)
+
+    def test_command_that_is_not_a_number_is_ignored(self):
+        self.assertIsNone(self.drive_nan())
+        self.assertIsNotNone(self.state.wait(), "the simulator died of it")
+
+    def drive_nan(self):
+        twist = Twist()
+        twist.linear.x = math.nan
+        self.command.publish(twist)
+        return self.state.wait(lambda s: not abs(s.twist.twist.linear.x) < 1e-3, 0.5)
+
+    def test_power_factor_raises_the_load_and_bad_ones_are_refused(self):
+        rospy.wait_for_service("increase_power_consumption", 10.0)
+        increase = rospy.ServiceProxy("increase_power_consumption", IncreaseConsumptionFactor)
+        self.assertFalse(increase(-1.0).success)
+        self.assertFalse(increase(math.nan).success)
+        self.assertTrue(increase(1.6).success)
+        factor = Latest("power_consumption_factor", Float32)
+        self.assertIsNotNone(factor.message or factor.wait())
+        self.assertAlmostEqual(factor.message.data, 1.6, places=5)
+        self.assertTrue(increase(1.0).success)
+
+    def test_zz_killed_laser_falls_silent_and_the_simulator_runs_on(self):
+        scan = Latest("front/scan", LaserScan)
+        self.assertIsNotNone(scan.wait())
+        uri = rosgraph.Master("/simulator_test").lookupNode("/front_laser")
+        _, _, pid = xmlrpc.client.ServerProxy(uri).getPid("/simulator_test")
+        os.kill(pid, signal.SIGKILL)
+        killed = self.state.wait().header.stamp
+        later = self.state.wait(lambda s: (s.header.stamp - killed).to_sec() > 1.0)
+        self.assertIsNotNone(later, "the simulator stopped too")
+        self.assertLess((scan.message.header.stamp - killed).to_sec(), 0.5)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "simulator_test", SimulatorTest)
