@@ -9,7 +9,6 @@ import matplotlib as mpl
 mpl.use("Agg")
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -85,9 +84,7 @@ def _draw_map(axis: Axes, record: MissionRecord, summary: dict[str, Any]) -> Non
     for begin, until, name in configuration_spans(record):
         first, last = np.searchsorted(poses[:, 0], (begin, until))
         span = poses[first : last + 1, 1:]
-        if len(span) > 1:
-            segments = np.stack([span[:-1], span[1:]], axis=1)
-            axis.add_collection(LineCollection(list(segments), colors=colours[name], linewidths=3.5, zorder=3))
+        axis.plot(span[:, 0], span[:, 1], color=colours[name], linewidth=3.5, solid_capstyle="round", zorder=3)
     handles = [Line2D([], [], color=colour, linewidth=3.5, label=name) for name, colour in colours.items()]
     if len(poses):
         handles.append(_mark(axis, (poses[0, 1], poses[0, 2]), "o", "black", "start"))
