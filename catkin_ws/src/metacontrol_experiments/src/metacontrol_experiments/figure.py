@@ -94,11 +94,11 @@ def _draw_map(axis: Axes, record: MissionRecord, summary: dict[str, Any]) -> Non
     for entry in summary["perturbations"]:
         place = _place(poses, start + entry["stamp_s"])
         if place:
-            handles.append(_mark(axis, place, "X", _FAILURE, f"{entry['name']} struck", size=15))
+            handles.append(_mark(axis, place, "X", _FAILURE, f"{entry['name']}\nstruck", size=15))
     for number, entry in enumerate(summary["reconfigurations"], start=1):
         place = _place(poses, start + entry["stamp_s"])
         if place:
-            label = f"{number}: {entry['from']} \N{RIGHTWARDS ARROW} {entry['to']}"
+            label = f"{number}: {entry['from']}\n\N{RIGHTWARDS ARROW} {entry['to']}"
             handles.append(_mark(axis, place, "D", "#ffd92f", label, size=7))
             axis.annotate(
                 str(number), place, xytext=(14, -16), textcoords="offset points", fontsize=12, fontweight="bold"
