@@ -1,0 +1,195 @@
+"""ROS shell of the observers: subscriptions, a thread at a fixed rate of ROS time for each, services."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from metacontrol_msgs.srv import (
+    ListObservers,
+    ListObserversResponse,
+    LoadObserver,
+    LoadObserverResponse,
+    UnloadObserver,
+    UnloadObserverResponse,
+)
+
+from rosgraph_monitor import plugins
+
+if TYPE_CHECKING:
+    from ros_model.metamodel import RosSystem
+
+    from rosgraph_monitor.observer import Observer
+
+_LARGEST_MESSAGE = 1 << 24
+_WARNING_PERIOD = 10.0
+_ALL_SUBSCRIBED = "Observer"
+
+
+class ObserverHost:
+    """Loads, runs and unloads observers; offers the four services. One that fails never stops another."""
+
+    def __init__(self, diagnostics: rospy.Publisher) -> None:
+        """Publish statuses with this publisher of DiagnosticArray."""
+        self._diagnostics = diagnostics
+        self._runners: dict[str, _Runner] = {}
+        self._system: RosSystem | None = None
+        self._lock = threading.RLock()
+        self._services = (
+            rospy.Service("load_observer", LoadObserver, lambda r: LoadObserverResponse(self.load(r.name))),
+            rospy.Service("unload_observer", UnloadObserver, lambda r: UnloadObserverResponse(self.unload(r.name))),
+            rospy.Service("active_observers", ListObservers, lambda _: self._active()),
+            rospy.Service("list_observers", ListObservers, lambda _: self._available()),
+        )
+
+    def load(self, name: str) -> bool:
+        """Start an observer; False, with a line that says why, if that fails or it runs already."""
+        with self._lock:
+            if name in self._runners:
+                rospy.logwarn("observer %s runs already", name)
+                return False
+            try:
+                observer = plugins.make(name)
+                observer.configure(rospy.get_param(f"~{observer.name}", {}))
+                observer.follow(self._system)
+                self._runners[name] = _Runner(observer, self._diagnostics)
+            except plugins.PluginError as error:
+                rospy.logerr("%s", error)
+                return False
+            except Exception as error:  # a plug-in is somebody else's code
+                rospy.logerr("observer %s can't start: %s: %s", name, type(error).__name__, error)
+                return False
+        rospy.loginfo("observer %s at %g Hz", name, observer.rate_hz)
+        return True
+
+    def unload(self, name: str) -> bool:
+        """Stop an observer; False if there is none of that name."""
+        with self._lock:
+            runner = self._runners.pop(name, None)
+        if runner is None:
+            rospy.logwarn("observer %s does not run", name)
+            return False
+        runner.stop()
+        rospy.loginfo("observer %s unloaded", name)
+        return True
+
+    def follow(self, system: RosSystem | None) -> None:
+        """Tell all observers which system is active."""
+        with self._lock:
+            self._system = system
+            runners = tuple(self._runners.values())
+        for runner in runners:
+            runner.follow(system)
+
+    def _active(self) -> ListObserversResponse:
+        with self._lock:
+            running = {name: type(runner.observer).__mro__[1].__name__ for name, runner in self._runners.items()}
+        return ListObserversResponse(types=list(running), base_classes=list(running.values()))
+
+    def _available(self) -> ListObserversResponse:
+        found = plugins.available()
+        return ListObserversResponse(types=list(found), base_classes=[_ALL_SUBSCRIBED] * len(found))
+
+
+class _Runner:
+    """Runs one observer until it is stopped."""
+
+    def __init__(self, observer: Observer, diagnostics: rospy.Publisher) -> None:
+        self.observer = observer
+        self._diagnostics = diagnostics
+        self._subscribers: dict[tuple[str, type], rospy.Subscriber] = {}
+        self._publishers = {
+            topic: rospy.Publisher(topic, message_class, queue_size=1) for topic, message_class in observer.outputs
+        }
+        self._lock = threading.Lock()
+        self._stopped = threading.Event()
+        self._subscribe()
+        threading.Thread(target=self._run, name=f"observer {observer.name}", daemon=True).start()
+
+    def stop(self) -> None:
+        """End the thread soon, and the subscriptions now."""
+        self._stopped.set()
+        with self._lock:
+            for end in (*self._subscribers.values(), *self._publishers.values()):
+                end.unregister()
+            self._subscribers.clear()
+
+    def follow(self, system: RosSystem | None) -> None:
+        """Tell the observer which system is active."""
+        with self._lock:
+            try:
+                self.observer.follow(system)
+            except Exception as error:  # a plug-in is somebody else's code
+                self._warn(error)
+
+    def _run(self) -> None:
+        rate = rospy.Rate(self.observer.rate_hz, reset=True)
+        while not self._stopped.is_set() and not rospy.is_shutdown():
+            try:
+                rate.sleep()
+            except rospy.exceptions.ROSTimeMovedBackwardsException:
+                with self._lock:
+                    self.observer.reset()
+                rate = rospy.Rate(self.observer.rate_hz, reset=True)
+                continue
+            except rospy.ROSInterruptException:
+                return
+            with self._lock:
+                if self._stopped.is_set():
+                    return
+                self._evaluate(rospy.Time.now())
+
+    def _evaluate(self, now: rospy.Time) -> None:
+        try:
+            self._subscribe()
+            statuses = self.observer.evaluate(now.to_sec())
+            outputs = self.observer.take_outputs()
+            self._publish(statuses, outputs, now)
+        except Exception as error:  # a plug-in is somebody else's code: it must not end the monitor
+            if rospy.is_shutdown():
+                return
+            self._warn(error)
+            self._publish([self.observer.stale(f"observer fails: {type(error).__name__}: {error}")], [], now)
+
+    def _publish(self, statuses: list[DiagnosticStatus], outputs: list[tuple[str, Any]], now: rospy.Time) -> None:
+        try:
+            for topic, msg in outputs:
+                self._publishers[topic].publish(msg)
+            if statuses:
+                array = DiagnosticArray(status=statuses)
+                array.header.stamp = now
+                self._diagnostics.publish(array)
+        except rospy.ROSException:
+            if not rospy.is_shutdown():
+                raise
+
+    def _subscribe(self) -> None:
+        """Listen to the topics that the observer wants now, and to no others."""
+        wanted = list(self.observer.topics)
+        for gone in self._subscribers.keys() - set(wanted):
+            self._subscribers.pop(gone).unregister()
+        for topic, message_class in wanted:
+            if (topic, message_class) not in self._subscribers:
+                self._subscribers[topic, message_class] = rospy.Subscriber(
+                    topic,
+                    message_class,
+                    self._receive,
+                    topic,
+                    queue_size=1,
+                    buff_size=_LARGEST_MESSAGE,
+                    tcp_nodelay=True,
+                )
+
+    def _receive(self, msg: Any, topic: str) -> None:
+        with self._lock:
+            try:
+                self.observer.receive(topic, msg, rospy.get_time())
+            except Exception as error:  # a plug-in is somebody else's code
+                self._warn(error)
+
+    def _warn(self, error: Exception) -> None:
+        rospy.logwarn_throttle_identical(
+            _WARNING_PERIOD, f"observer {self.observer.name} fails: {type(error).__name__}: {error}"
+        )

@@ -1,0 +1,241 @@
+"""Safety: the risk from the closest obstacle in the direction of motion, against the braking distance."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan, PointCloud2, PointField
+from std_msgs.msg import Float32
+from tf2_msgs.msg import TFMessage
+
+from rosgraph_monitor.frames import StaticFrames
+from rosgraph_monitor.observer import StaleInputError, TopicObserver, Topics
+from rosgraph_monitor.quality import (
+    BRAKING_GAIN,
+    braking_distance,
+    closest_in_direction,
+    physical_braking_distance,
+    safety_risk,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from diagnostic_msgs.msg import DiagnosticStatus
+    from numpy.typing import NDArray
+    from ros_model.metamodel import RosSystem
+
+ODOMETRY = "odometry/filtered"
+SCAN = "front/scan"
+CLOUD = "camera/depth/points"
+STATIC_FRAMES = "/tf_static"
+DISTANCE = "d_obstacle"
+
+AT_REST = 0.01
+"""m/s; slower than this the robot counts as standing, and there is no direction of motion."""
+
+_DEFAULTS: dict[str, Any] = {
+    "base_frame": "base_link",
+    "braking_gain": BRAKING_GAIN,  # 1/s
+    "max_deceleration": 0.0,  # m/s2; positive: the physical formula in place of the published one
+    "reaction_time": 0.0,  # s, of the physical formula
+    "half_angle": math.pi / 2,  # rad
+    "measured_from": "sensor",  # or centre
+    "min_height": 0.05,  # m above the base frame: points of a cloud below are floor
+    "max_height": 1.5,  # m: points above do not concern the robot
+    "max_distance": 10.0,  # m, published where nothing is seen
+}
+_DATA_TYPES = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
+
+Points = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
+
+
+class SafetyQualityObserver(TopicObserver):
+    """Publishes `safety` (a risk) and the distance of the closest obstacle at 10 Hz.
+
+    It reads the sensor that the active configuration navigates by: what a connection brings to a component, or what
+    `observation_sources` name. Where no configuration says so, the laser, and the point cloud when the laser is silent.
+    """
+
+    qa_name = "safety"
+    max_age = 0.5
+
+    def __init__(self, name: str = "SafetyQualityObserver") -> None:
+        super().__init__(name, 10.0, [(ODOMETRY, Odometry), (STATIC_FRAMES, TFMessage)])
+        self._settings = dict(_DEFAULTS)
+        self._frames = StaticFrames()
+        self._chosen: str | None = None
+        self._need_cloud = False
+        self._distance = math.inf
+
+    @property
+    def topics(self) -> Topics:
+        """Odometry, fixed frames, and the sensors in use: a camera may only work while somebody listens."""
+        sensors: Topics = []
+        if self._chosen in (None, SCAN):
+            sensors.append((SCAN, LaserScan))
+        if self._chosen == CLOUD or self._need_cloud:
+            sensors.append((CLOUD, PointCloud2))
+        return [*super().topics, *sensors]
+
+    @property
+    def outputs(self) -> Topics:
+        """Distance of the closest obstacle in the direction of motion in m."""
+        return [(DISTANCE, Float32)]
+
+    def configure(self, parameters: Mapping[str, Any]) -> None:
+        """Take settings; see the README for their names.
+
+        Raises:
+            ValueError: an unknown name, or a value of another type.
+        """
+        for key, value in parameters.items():
+            if key not in _DEFAULTS:
+                raise ValueError(f"{self.name}/{key}: no such setting; there are {', '.join(_DEFAULTS)}")
+            if isinstance(_DEFAULTS[key], str):
+                good = isinstance(value, str)
+            else:
+                good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+            if not good:
+                raise ValueError(f"{self.name}/{key}: {value!r} is no {type(_DEFAULTS[key]).__name__}")
+            self._settings[key] = value
+
+    def follow(self, system: RosSystem | None) -> None:
+        """Choose the sensor that the active system navigates by."""
+        self._chosen = None if system is None else navigation_sensor(system)
+        self._need_cloud = False
+
+    def receive(self, topic: str, msg: Any, now: float) -> None:
+        """Keep the message; fixed frames add up."""
+        if topic == STATIC_FRAMES:
+            self._frames.add(msg)
+        else:
+            super().receive(topic, msg, now)
+
+    def take_outputs(self) -> list[tuple[str, Any]]:
+        """Return the distance, the sensor's range where nothing is seen, nothing while it is not known."""
+        if math.isnan(self._distance):
+            return []
+        return [(DISTANCE, Float32(min(self._distance, self._settings["max_distance"])))]
+
+    def generate_diagnostics(self, now: float) -> list[DiagnosticStatus]:
+        """Return the risk."""
+        self._distance = math.nan
+        twist = self.latest(ODOMETRY, now).twist.twist.linear
+        if not (math.isfinite(twist.x) and math.isfinite(twist.y)):
+            raise StaleInputError(f"velocity on {ODOMETRY} is not finite")
+        speed = math.hypot(twist.x, twist.y)
+        moving = speed > AT_REST
+        direction = math.atan2(twist.y, twist.x) if moving else 0.0
+        x, y = self._obstacles(now)
+        self._distance = closest_in_direction(x, y, direction, self._settings["half_angle"])
+        return [self.qa_status(safety_risk(self._distance, self._braking(speed)) if moving else 0.0)]
+
+    def _braking(self, speed: float) -> float:
+        if self._settings["max_deceleration"] > 0.0:
+            return physical_braking_distance(speed, self._settings["max_deceleration"], self._settings["reaction_time"])
+        return braking_distance(speed, self._settings["braking_gain"])
+
+    def _obstacles(self, now: float) -> Points:
+        """Return obstacle points in the base's orientation, relative to the sensor or the centre."""
+        if self._chosen == CLOUD:
+            return self._from_cloud(self.latest(CLOUD, now))
+        try:
+            scan = self.latest(SCAN, now)
+        except StaleInputError as silent:
+            if self._chosen == SCAN:
+                raise
+            self._need_cloud = True
+            try:
+                return self._from_cloud(self.latest(CLOUD, now))
+            except StaleInputError as too:
+                raise StaleInputError(f"{silent}; {too}") from too
+        return self._from_scan(scan)
+
+    def _from_scan(self, scan: LaserScan) -> Points:
+        x, y = scan_points(scan)
+        matrix = self._frames.transform(scan.header.frame_id, self._settings["base_frame"])
+        if matrix is None:
+            return x, y  # as published: the laser looks along the base's x
+        px, py, _ = _moved(matrix, x, y, np.zeros_like(x))
+        return self._from_origin(matrix, px, py)
+
+    def _from_cloud(self, cloud: PointCloud2) -> Points:
+        matrix = self._frames.transform(cloud.header.frame_id, self._settings["base_frame"])
+        if matrix is None:
+            raise StaleInputError(f"no fixed transform from {cloud.header.frame_id} to {self._settings['base_frame']}")
+        x, y, z = _moved(matrix, *cloud_points(cloud))
+        kept = (z >= self._settings["min_height"]) & (z <= self._settings["max_height"])
+        return self._from_origin(matrix, x[kept], y[kept])
+
+    def _from_origin(self, matrix: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> Points:
+        if self._settings["measured_from"] == "centre":
+            return x, y
+        return x - matrix[0, 3], y - matrix[1, 3]
+
+
+def navigation_sensor(system: RosSystem) -> str | None:
+    """Return the topic of the obstacle sensor that a system navigates by, or None where the model does not say.
+
+    `observation_sources` decide, as they are what costmaps read; without them, a connection named like the topic.
+    """
+    sources = {
+        word
+        for component in system.components
+        for parameter in component.parameters
+        if parameter.key.rpartition("/")[2] == "observation_sources" and isinstance(parameter.value, str)
+        for word in parameter.value.split()
+    }
+    wired = {connection.name.strip("/") for connection in system.connections}
+    if "scan" in sources or (not sources and SCAN in wired):
+        return SCAN
+    if "point_cloud" in sources or (not sources and CLOUD in wired):
+        return CLOUD
+    return None
+
+
+def scan_points(scan: LaserScan) -> Points:
+    """Return the returns of a scan as x and y in m in the frame of the laser."""
+    ranges = np.asarray(scan.ranges, dtype=float)
+    with np.errstate(invalid="ignore"):
+        valid = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges < scan.range_max)
+    angles = scan.angle_min + scan.angle_increment * np.flatnonzero(valid)
+    return ranges[valid] * np.cos(angles), ranges[valid] * np.sin(angles)
+
+
+def cloud_points(cloud: PointCloud2) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the finite points of a cloud as x, y and z in m in the frame of the sensor.
+
+    Raises:
+        StaleInputError: the cloud lacks a coordinate, or its size does not fit its data.
+    """
+    formats = {}
+    for field in cloud.fields:
+        if field.name in ("x", "y", "z") and field.datatype in _DATA_TYPES:
+            formats[field.name] = (("<", ">")[bool(cloud.is_bigendian)] + _DATA_TYPES[field.datatype], field.offset)
+    count = cloud.width * cloud.height
+    try:
+        dtype = np.dtype(
+            {
+                "names": ["x", "y", "z"],
+                "formats": [formats[axis][0] for axis in "xyz"],
+                "offsets": [formats[axis][1] for axis in "xyz"],
+                "itemsize": cloud.point_step,
+            }
+        )
+        points = np.frombuffer(cloud.data, dtype=dtype, count=count)
+    except (KeyError, ValueError, TypeError) as error:
+        raise StaleInputError(f"point cloud is malformed: {error}") from error
+    x, y, z = (points[axis].astype(float) for axis in "xyz")
+    finite = np.isfinite(x) & np.isfinite(y) & np.isfinite(z)
+    return x[finite], y[finite], z[finite]
+
+
+def _moved(
+    matrix: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    moved = matrix[:3, :3] @ np.vstack((x, y, z)) + matrix[:3, 3:]
+    return moved[0], moved[1], moved[2]

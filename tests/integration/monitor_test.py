@@ -1,0 +1,256 @@
+#!/usr/bin/env python3
+"""The monitor against real nodes: each is a process of its own that this test starts and ends."""
+
+import math
+import signal
+import subprocess
+import sys
+import threading
+import time
+import unittest
+
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
+from metacontrol_msgs.srv import ListObservers, LoadObserver, UnloadObserver
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Float32
+
+NODE = "import rospy, sys; rospy.init_node(sys.argv[1]); rospy.spin()"
+
+
+class Diagnostics:
+    """Keeps what came on /diagnostics, with the wall time of its arrival."""
+
+    def __init__(self):
+        self._seen = []
+        self._changed = threading.Condition()
+        self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._receive, tcp_nodelay=True)
+
+    def _receive(self, msg):
+        with self._changed:
+            self._seen.extend((time.monotonic(), status) for status in msg.status)
+            self._changed.notify_all()
+
+    def forget(self):
+        with self._changed:
+            self._seen.clear()
+
+    def statuses(self, name, message):
+        with self._changed:
+            return [status for _, status in self._seen if (status.name, status.message) == (name, message)]
+
+    def wait(self, what, condition, timeout=8.0):
+        """Return arrival time and status of the first one that meets the condition since the last `forget`."""
+        end = time.monotonic() + timeout
+        with self._changed:
+            while True:
+                for at, status in self._seen:
+                    if condition(status):
+                        return at, status
+                if not self._changed.wait(end - time.monotonic()):
+                    seen = sorted({f"{s.name}: {s.message} {[v.value for v in s.values]}" for _, s in self._seen})
+                    raise AssertionError(f"no {what} within {timeout} s; seen: {seen}")
+
+    def wait_status(self, name, message, value=None, timeout=8.0):
+        def fits(status):
+            return (status.name, status.message) == (name, message) and (
+                value is None or value in [entry.value for entry in status.values]
+            )
+
+        return self.wait(f"{message} {value or ''} of {name!r}", fits, timeout)
+
+
+class MonitorTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("monitor_test")
+        cls.seen = Diagnostics()
+        cls.nodes = {}
+        for name in ("front_driver", "clean_driver", "navigation"):
+            cls.start(name)
+        cls.configuration = rospy.Publisher(
+            "rosgraph_manipulator/active_configuration", ActiveConfiguration, queue_size=5, latch=True
+        )
+        cls.seen.wait_status("ROS Graph", "running OK", timeout=15.0)
+        cls.seen.wait_status("laser_resender", "Component status", "TRUE")
+
+    @classmethod
+    def tearDownClass(cls):
+        for process in cls.nodes.values():
+            process.kill()
+            process.wait()
+
+    @classmethod
+    def start(cls, name):
+        cls.nodes[name] = subprocess.Popen([sys.executable, "-c", NODE, name])
+
+    def setUp(self):
+        self.seen.forget()
+
+    def end(self, name, how):
+        process = self.nodes.pop(name)
+        process.send_signal(how)
+        return process
+
+    def activate(self, configuration, state):
+        grounding = FunctionGrounding(function="f_navigate", configuration=configuration, state=state)
+        self.configuration.publish(ActiveConfiguration(functions=[grounding] if configuration else []))
+
+    def restart_and_expect_recovery(self, name, component):
+        self.start(name)
+        self.seen.wait_status(component, "Component status", "RECOVERED")
+        self.seen.forget()
+        self.seen.wait_status(component, "Component status", "TRUE")
+        self.assertNotIn("RECOVERED", [s.values[0].value for s in self.seen.statuses(component, "Component status")])
+
+    def test_killed_node_is_missing_and_its_component_false_at_once(self):
+        killed_at = time.monotonic()
+        self.end("front_driver", signal.SIGKILL).wait()
+        at, status = self.seen.wait_status("laser_resender", "Component status", "FALSE")
+        self.assertEqual(status.level, DiagnosticStatus.ERROR)
+        self.assertLess(at - killed_at, 0.5)
+        _, status = self.seen.wait_status("front_driver", "Missing node")
+        self.assertEqual(status.level, DiagnosticStatus.ERROR)
+        self.assertIn("dead", status.values[0].value)
+        self.seen.forget()
+        self.restart_and_expect_recovery("front_driver", "laser_resender")
+
+    def test_node_that_exits_cleanly_is_missing(self):
+        self.end("clean_driver", signal.SIGINT)
+        self.seen.wait_status("clean_driver", "Missing node")
+        self.seen.wait_status("clean_driver", "Component status", "FALSE")
+        self.restart_and_expect_recovery("clean_driver", "clean_driver")
+
+    def test_stopped_node_is_hung(self):
+        process = self.nodes["clean_driver"]
+        process.send_signal(signal.SIGSTOP)
+        try:
+            _, status = self.seen.wait_status("clean_driver", "Missing node")
+            self.assertIn("hung", status.values[0].value)
+        finally:
+            process.send_signal(signal.SIGCONT)
+        self.seen.wait_status("clean_driver", "Component status", "RECOVERED")
+
+    def test_parameter_that_drifts_is_wrong(self):
+        rospy.set_param("/navigation/planner/max_vel", 0.9)
+        try:
+            _, status = self.seen.wait_status("navigation", "Wrong param configuration", timeout=2.0)
+            self.assertEqual((status.values[0].key, status.values[0].value), ("planner/max_vel", "0.9"))
+            self.assertEqual(status.level, DiagnosticStatus.ERROR)
+        finally:
+            rospy.set_param("/navigation/planner/max_vel", 0.5)
+        self.seen.forget()
+        self.seen.wait_status("ROS Graph", "running OK")
+
+    def test_additional_node_is_a_warning_and_ignored_ones_are_not(self):
+        self.start("stray")
+        self.start("quiet_tool")
+        _, status = self.seen.wait_status("stray", "Additional node")
+        self.assertEqual(status.level, DiagnosticStatus.WARN)
+        self.assertEqual(self.seen.statuses("quiet_tool", "Additional node"), [])
+        self.end("stray", signal.SIGKILL).wait()
+        self.end("quiet_tool", signal.SIGKILL).wait()
+        self.seen.wait_status("ROS Graph", "running OK")
+
+    def test_node_under_reconfiguration_raises_no_alarm_and_the_variant_is_then_desired(self):
+        self.activate("slow", FunctionGrounding.RECONFIGURING)
+        self.seen.wait_status("ROS Graph", "running OK")
+        self.end("navigation", signal.SIGKILL).wait()
+        rospy.set_param("/navigation/planner/max_vel", 0.3)
+        self.start("navigation")
+        self.seen.forget()
+        rospy.wait_for_service("/navigation/get_loggers", timeout=5.0)
+        self.activate("slow", FunctionGrounding.STABLE)
+        self.seen.wait_status("navigation", "Component status", "TRUE")
+        self.assertEqual(self.seen.statuses("navigation", "Missing node"), [])
+        self.assertEqual(len({s.values[0].value for s in self.seen.statuses("navigation", "Component status")}), 1)
+        rospy.set_param("/navigation/planner/max_vel", 0.5)
+        self.seen.wait_status("navigation", "Wrong param configuration", "0.5")
+        self.activate("", "")
+        self.seen.forget()
+        self.seen.wait_status("ROS Graph", "running OK")
+
+    def test_unknown_variant_keeps_the_last_good_model(self):
+        self.activate("../evil", FunctionGrounding.STABLE)
+        self.seen.wait("desired model", lambda s: s.name == "ROS Graph" and "desired model" in s.message)
+        self.activate("", "")
+        self.seen.forget()
+        self.seen.wait_status("ROS Graph", "running OK")
+
+    def test_safety_and_energy_from_topics(self):
+        odometry = rospy.Publisher("odometry/filtered", Odometry, queue_size=1)
+        laser = rospy.Publisher("front/scan", LaserScan, queue_size=1)
+        load = rospy.Publisher("power_load", Float32, queue_size=1)
+        distances = []
+        rospy.Subscriber("d_obstacle", Float32, lambda m: distances.append(m.data))
+        moving = Odometry()
+        moving.twist.twist.linear.x = 0.4
+        scan = LaserScan(angle_min=-math.pi / 2, angle_max=math.pi / 2, angle_increment=math.pi / 180)
+        scan.range_min, scan.range_max = 0.05, 10.0
+        scan.ranges = [5.0] * 181
+        scan.ranges[90] = 0.25
+
+        stop = threading.Event()
+
+        def publish():
+            while not stop.wait(0.05):
+                odometry.publish(moving)
+                laser.publish(scan)
+                load.publish(Float32(2.6))
+
+        thread = threading.Thread(target=publish)
+        thread.start()
+        try:
+            self.seen.wait("safety 0.75", lambda s: value_of(s, "QA status", "safety", 0.75))
+            self.seen.wait("energy 0.5", lambda s: value_of(s, "QA status", "energy", 0.5))
+            self.assertAlmostEqual(distances[-1], 0.25)
+        finally:
+            stop.set()
+            thread.join()
+        self.seen.forget()
+        _, status = self.seen.wait_status("", "QA stale")
+        self.assertEqual((status.values[0].key, status.level), ("safety", DiagnosticStatus.STALE))
+
+    def test_observers_load_and_unload_and_one_that_raises_stops_no_other(self):
+        load = rospy.ServiceProxy("/load_observer", LoadObserver)
+        active = rospy.ServiceProxy("/active_observers", ListObservers)
+        available = rospy.ServiceProxy("/list_observers", ListObservers)
+        unload = rospy.ServiceProxy("/unload_observer", UnloadObserver)
+        self.assertIn("SafetyQualityObserver", available().types)
+        name = "monitor_observers:FailingObserver"
+        self.assertTrue(load(name).ok)
+        self.assertFalse(load(name).ok)
+        self.assertFalse(load("NoSuchObserver").ok)
+        self.assertFalse(load("monitor_observers:BrokenObserver").ok)
+        self.assertIn(name, active().types)
+        rate = rospy.Publisher("failing/input", Float32, queue_size=1, latch=True)
+        rate.publish(Float32(1.0))
+        self.seen.wait(
+            "failure told", lambda s: s.hardware_id == "FailingObserver" and "ValueError" in s.values[0].value
+        )
+        self.seen.forget()
+        self.seen.wait("others go on", lambda s: s.hardware_id == "EnergyQualityObserver")
+        self.assertTrue(unload(name).ok)
+        self.assertFalse(unload(name).ok)
+        self.assertNotIn(name, active().types)
+
+    def test_cost_of_the_monitor_is_measured(self):
+        _, status = self.seen.wait_status("rosgraph_monitor", "CPU Usage")
+        self.assertGreaterEqual(float(status.values[0].value), 0.0)
+        _, status = self.seen.wait_status("rosgraph_monitor", "Memory Usage")
+        self.assertGreater(float(status.values[0].value), 5.0)
+
+
+def value_of(status, message, key, level):
+    return (
+        status.message == message
+        and status.values[0].key == key
+        and math.isclose(float(status.values[0].value), level, abs_tol=1e-6)
+    )
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "monitor", MonitorTest)
