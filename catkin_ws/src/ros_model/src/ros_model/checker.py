@@ -107,11 +107,10 @@ def _fits(value: Value, declared: ParameterType) -> bool:
         return True
     if not isinstance(value, expected) or (isinstance(value, bool) and bool not in expected):
         return False
-    if declared.kind == "Array" and declared.elements:
-        return all(_fits(item, declared.elements[0]) for item in value)  # type: ignore[arg-type, union-attr]
-    if declared.kind == "List" and declared.elements:
-        items: list[Value] = value  # type: ignore[assignment]
-        return len(items) == len(declared.elements) and all(map(_fits, items, declared.elements))
+    if isinstance(value, list) and declared.elements:
+        if declared.kind == "Array":
+            return all(_fits(item, declared.elements[0]) for item in value)
+        return len(value) == len(declared.elements) and all(map(_fits, value, declared.elements))
     if isinstance(value, dict) and declared.members:
         members = dict(declared.members)
         return all(name in members and _fits(item, members[name]) for name, item in value.items())

@@ -101,10 +101,8 @@ class Component:
         """The node that the component runs: FromRosNode, else the first reference of a port or parameter."""
         if self.node:
             return self.node
-        for element in (*self.ports, *self.parameters):
-            if element.reference:
-                return element.reference
-        return None
+        references = [*(port.reference for port in self.ports), *(parameter.reference for parameter in self.parameters)]
+        return next((reference for reference in references if reference), None)
 
     @property
     def graph_name(self) -> str:
@@ -157,7 +155,8 @@ class Connection:
 class ParameterType:
     """A declared type: Integer, Double, String, Boolean, Base64, Date, Any, List, Array or Struct.
 
-    A List has the types of its elements, an Array one, a Struct its members' names and types.
+    A List has the types of its elements, an Array one, which has no default of its own, and a Struct its members'
+    names and types.
     """
 
     kind: str

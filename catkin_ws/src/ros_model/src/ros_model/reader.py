@@ -6,8 +6,9 @@ import functools
 import math
 import re
 import threading
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from lark import Lark, Transformer
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
@@ -90,7 +91,7 @@ def parse_system(text: str, file: str = "<text>") -> RosSystem:
     with _PARSING:
         builder.begin(file, _header(text))
         try:
-            return parser.parse(text)  # type: ignore[return-value]
+            return cast(RosSystem, parser.parse(text))
         except UnexpectedInput as error:
             raise _syntax_error(error, text, file) from None
 
@@ -115,7 +116,7 @@ def _parser() -> tuple[Lark, _Builder]:
 _Field = tuple[str, Any, "Token"]  # key, value, the keyword that opens it
 
 
-class _Builder(Transformer):  # type: ignore[type-arg]
+class _Builder(Transformer):
     """Builds the model bottom-up while the parser reduces: one method for each rule of the grammar."""
 
     def __init__(self) -> None:
@@ -251,8 +252,13 @@ class _Builder(Transformer):  # type: ignore[type-arg]
         return ParameterType("List", elements, default=_default(items))
 
     def array_type(self, items: list[Any]) -> ParameterType:
-        elements = tuple(item for item in items if isinstance(item, ParameterType))
-        return ParameterType("Array", elements, default=_default(items))
+        """Build an Array; a default within its braces is its own, though its element's type may have taken it."""
+        elements = [item for item in items if isinstance(item, ParameterType)]
+        default = _default(items)
+        if default is None and elements:
+            default = elements[0].default
+            elements[0] = replace(elements[0], default=None)
+        return ParameterType("Array", tuple(elements), default=default)
 
     def struct_type(self, items: list[Any]) -> ParameterType:
         members = tuple(item.member for item in items if isinstance(item, _MemberType))
@@ -441,13 +447,15 @@ def _syntax_error(error: UnexpectedInput, text: str, file: str) -> ModelError:
             return ModelError("this comment is never closed: add '*/'", Position(file, *_line_and_column(text, offset)))
     else:
         near = "the end of the file"
-    expected = sorted(
-        _described(name) for name in names if name not in {"COMMENT", "$END"} and not name.startswith("__")
-    )
+    expected = sorted((_described(name) for name in names - {"COMMENT", "$END"}), key=_words_first)
     if "$END" in names:
         expected.append("the end of the file")
     wanted = " or ".join(expected) or "something else"
     return ModelError(f"expected {wanted} near {near}", Position(file, *_line_and_column(text, offset)))
+
+
+def _words_first(described: str) -> tuple[bool, str]:
+    return not described[1].isalpha(), described
 
 
 @functools.cache

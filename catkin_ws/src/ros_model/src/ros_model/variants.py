@@ -107,7 +107,8 @@ def _vary(
 
 def _own_connections(base: RosSystem, name: str, options: set[PortPath]) -> tuple[list[Connection], set[str]]:
     """Return the base's connections of a component without the optional ones, and the ports these leave bare."""
-    connections, dropped = [], set()
+    connections: list[Connection] = []
+    dropped: set[str] = set()
     for connection in base.connections:
         sources = tuple(end for end in connection.sources if end not in options)
         inward = tuple(end for end in connection.targets if end.component == name)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _INDENT = "    "
 _BARE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _ESCAPES = {"\\": "\\\\", "'": "\\'", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
-_UNPRINTABLE = re.compile(r"[\\'\x00-\x1f\x7f]")
+_UNPRINTABLE = re.compile(r"[\\'\x00-\x1f\x7f\ud800-\udfff]")
 
 _PORT_WORDS = {
     PortKind.PUBLISHER: ("RosPublishers", "RosPublisher", "RefPublisher"),

@@ -1,7 +1,6 @@
 """Generators: functions (project, package folder) -> written files, found through `<export>` tags of package.xml.
 
-A package adds one with `<export><ros_model generator="NAME" function="module:function"/></export>` and a dependency
-on ros_model.
+A package adds one with `<export><ros_model generator="NAME" function="module:function"/></export>`.
 """
 
 from __future__ import annotations
@@ -24,25 +23,25 @@ _PACKAGE = "ros_model"
 
 
 def find_generators() -> dict[str, Generator]:
-    """Return the generators of all packages on ROS_PACKAGE_PATH that depend on this one, by name.
+    """Return the generators that packages on ROS_PACKAGE_PATH export, by name.
 
     Raises:
-        ModelError: an export tag is wrong, or two packages give one name.
+        ModelError: an export tag is incomplete, or two packages give one name.
     """
     packages = rospkg.RosPack()
-    try:
-        names = [_PACKAGE, *sorted(set(packages.get_depends_on(_PACKAGE, implicit=False)) - {_PACKAGE})]
-        manifests = {name: packages.get_manifest(name) for name in names}
-    except (rospkg.ResourceNotFound, rospkg.InvalidManifest) as error:
-        raise ModelError(f"can't look for generators: {error}: source the workspace that holds {_PACKAGE}") from error
     found: dict[str, Generator] = {}
-    for package, manifest in manifests.items():
-        exports = zip(
-            manifest.get_export(_PACKAGE, "generator"), manifest.get_export(_PACKAGE, "function"), strict=False
-        )
-        for name, function in exports:
-            if name in found:
-                raise ModelError(f"package {package}: a generator {name!r} exists already: rename the export")
+    for package in sorted(packages.list()):
+        try:
+            exports = packages.get_manifest(package).exports
+        except (rospkg.InvalidManifest, rospkg.ResourceNotFound):
+            continue  # somebody else's broken package is no reason to do nothing
+        for tag in exports:
+            if tag.tag != _PACKAGE or "generator" not in tag.attrs:
+                continue
+            name, function = tag.attrs["generator"], tag.attrs.get("function", "")
+            if name in found or not function:
+                problem = "exists already: rename it" if name in found else "names no function: add one"
+                raise ModelError(f"package {package}: package.xml: generator {name!r} {problem}")
             found[name] = _load(package, name, function)
     return found
 

@@ -1,0 +1,72 @@
+"""The checker: what is wrong in a model that reads well, and where."""
+
+import pytest
+from ros_model.checker import check_system
+from ros_model.reader import parse_system
+
+TALK = """RosSystem { Name talk RosComponents (
+    ComponentInterface { name talker RosPublishers { RosPublisher out { RefPublisher 'p.t.t.out' } } }
+    ComponentInterface { name listener RosSubscribers { RosSubscriber in { RefSubscriber 'p.l.l.in' } } } )
+    TopicConnections { TopicConnection chat { From ( 'talker.out' ) To ( 'listener.in' ) } } }"""
+
+
+def found(text):
+    return [str(finding) for finding in check_system(parse_system(text, "m"))]
+
+
+def component(inside):
+    return f"RosSystem {{ Name x RosComponents ( ComponentInterface {{ name a {inside} }} ) }}"
+
+
+def parameter(inside):
+    return f"RosSystem {{ Name x Parameters {{ Parameter {{ name p {inside} }} }} }}"
+
+
+def test_sound_model_has_no_findings():
+    assert found(TALK) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "finding"),
+    [
+        (TALK.replace("'talker.out'", "'listener.in'"), "m:4:24: error: connection 'chat': 'listener.in' is a sub"),
+        (TALK.replace("'talker.out'", "'nobody.out'"), "'nobody.out' names no component"),
+        (TALK.replace("'talker.out'", "'talker.loud'"), "'talker' has no port 'loud'"),
+        (TALK.replace("'talker.out'", ""), "connection 'chat' has no source"),
+        (
+            "RosSystem { Name x RosComponents ( ComponentInterface { name a }\n ComponentInterface { name a } ) }",
+            "m:2:2: error: component 'a' stands twice",
+        ),
+        (component("RosPublishers { RosPublisher b { } RosPublisher b { } }"), "publisher 'b' of 'a' stands twice"),
+        (
+            component("RosParameters { RosParameter b { RefParameter 'p.a.n.b' value 1 } "
+                      "RosParameter c { RefParameter 'p.a.n.b' value 2 } }"),
+            "parameter 'p.a.n.b' has two values",
+        ),
+        (component("FromRosNode 'p.a'"), "reference 'p.a' is not package.artifact.node"),
+        (component("RosPublishers { RosPublisher b { RefPublisher 'p.a.n' } }"), "is not package.artifact.node.name"),
+        (parameter("type Integer value 1.5"), "the value 1.5 of 'p' is no Integer"),
+        (parameter("type Integer value true"), "the value True of 'p' is no Integer"),
+        (parameter("type Double default fast"), "the value 'fast' of 'p' is no Double"),
+        (parameter("type List {Integer, String} value {1}"), "is no List"),
+        (parameter("type Array {type Integer} value {1, a}"), "is no Array"),
+        (parameter("type Struct {b Integer} value { {c {value 1}} }"), "is no Struct"),
+    ],
+)  # fmt: skip
+def test_fault_is_found(text, finding):
+    (message,) = found(text)
+    assert finding in message
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        "type Double value 1",
+        "type Array {type Integer} value {1, 2}",
+        "type List {Integer, String} value {1, a}",
+        "type Struct {b Integer} value { {b {value 1}} }",
+        "type Base64 value 'AAEC'",
+    ],
+)
+def test_value_of_its_type_is_no_fault(inside):
+    assert found(parameter(inside)) == []

@@ -1,0 +1,192 @@
+"""Projects: metacontrol.yaml, the base, the family of variants, and what each variant requires."""
+
+import pytest
+import yaml
+from ros_model.errors import ModelError
+from ros_model.metamodel import PortPath, compose
+from ros_model.project import load_project
+
+BASE = """RosSystem { Name base
+    RosComponents (
+        ComponentInterface { name robot FromRosNode 'p.robot.robot'
+            RosPublishers { RosPublisher odom { RefPublisher 'p.robot.robot.odom' }, RosPublisher rays { RefPublisher 'p.robot.robot.rays' } }
+            RosSubscribers { RosSubscriber cmd { RefSubscriber 'p.robot.robot.cmd' }, RosSubscriber load { RefSubscriber 'p.robot.robot.load' } } },
+        ComponentInterface { name laser FromRosNode 'p.laser.laser'
+            RosPublishers { RosPublisher scan { RefPublisher 'p.laser.laser.scan' } }
+            RosSubscribers { RosSubscriber rays { RefSubscriber 'p.laser.laser.rays' } } },
+        ComponentInterface { name camera FromRosNode 'p.camera.camera'
+            RosPublishers { RosPublisher points { RefPublisher 'p.camera.camera.points' } } },
+        ComponentInterface { name battery FromRosNode 'p.battery.battery'
+            RosPublishers { RosPublisher load { RefPublisher 'p.battery.battery.load' } } },
+        ComponentInterface { name nav FromRosNode 'n.nav.nav'
+            RosPublishers { RosPublisher cmd { RefPublisher 'n.nav.nav.cmd' } }
+            RosSubscribers { RosSubscriber odom { RefSubscriber 'n.nav.nav.odom' }, RosSubscriber scan { RefSubscriber 'n.nav.nav.scan' } }
+            RosParameters { RosParameter speed { RefParameter 'n.nav.nav.speed' value 1 }, RosParameter frame { RefParameter 'n.nav.nav.frame' value map } } }
+    )
+    TopicConnections {
+        TopicConnection odom { From ( 'robot.odom' ) To ( 'nav.odom' ) },
+        TopicConnection rays { From ( 'robot.rays' ) To ( 'laser.rays' ) },
+        TopicConnection load { From ( 'battery.load' ) To ( 'robot.load' ) },
+        TopicConnection scan { From ( 'laser.scan' ) To ( 'nav.scan' ) },
+        TopicConnection cmd { From ( 'nav.cmd' ) To ( 'robot.cmd' ) }
+    }
+}"""  # noqa: E501
+TABLE = "name,speed_mps,sensor\nslow,0.3,laser\nblind,0.7,camera\n"
+QA = "name,safety,source\nslow,0.2,measured\nblind,0.9,measured\n"
+
+
+@pytest.fixture
+def settings():
+    return {
+        "package": "robot_models",
+        "base": "base.rossystem",
+        "variants": {
+            "component": "nav",
+            "table": "variants.csv",
+            "qa": "qa.csv",
+            "parameters": {"speed_mps": [{"name": "speed"}, {"name": "acceleration", "factor": 12}]},
+            "connections": {"sensor": {"laser": ["laser.scan"], "camera": ["camera.points"]}},
+        },
+        "functions": {"f_move": {"designs": "all"}},
+        "quality_attributes": {"safety": {"direction": "lower_is_better", "range": [0, 1]}},
+        "utility": "safety",
+        "objectives": {"o_move": {"function": "f_move", "nfrs": {"safety": 0.5}}},
+        "components": {"laser": {"node": "laser"}},
+    }
+
+
+@pytest.fixture
+def load(tmp_path, settings):
+    def write_and_load(*, base=BASE, table=TABLE, qa=QA):
+        for name, text in (("base.rossystem", base), ("variants.csv", table), ("qa.csv", qa)):
+            (tmp_path / name).write_text(text)
+        (tmp_path / "metacontrol.yaml").write_text(yaml.safe_dump(settings))
+        return load_project(tmp_path)
+
+    return write_and_load
+
+
+def test_columns_set_parameters(load):
+    slow, _ = load().variants
+    (nav,) = slow.components
+    assert {p.key: p.value for p in nav.parameters} == {"frame": "map", "speed": 0.3, "acceleration": 3.6}
+
+
+def test_column_chooses_the_wiring(load):
+    slow, blind = load().variants
+    assert [port.name for port in slow.components[0].ports] == ["cmd", "odom", "scan"]
+    assert [port.name for port in blind.components[0].ports] == ["cmd", "odom", "points"]
+    assert blind.connections[-1].sources == (PortPath("camera", "points"),)
+    assert blind.connections[-1].targets == (PortPath("nav", "points"),)
+
+
+def test_expected_levels_are_parameters(load):
+    assert [variant.expected_qas for variant in load().variants] == [{"safety": 0.2}, {"safety": 0.9}]
+
+
+def test_composed_variant_is_the_whole_system(load):
+    project = load()
+    whole = compose(project.base, project.variants[1])
+    assert {component.name for component in whole.components} == {"robot", "laser", "camera", "battery", "nav"}
+    assert {connection.name for connection in whole.connections} == {"odom", "rays", "load", "points", "cmd"}
+
+
+def test_required_components_feed_the_variant_and_not_merely_the_plant(load):
+    assert load().required_components() == {"slow": {"laser", "robot"}, "blind": {"camera", "robot"}}
+
+
+def test_project_is_found_by_its_file_too(load, tmp_path):
+    assert load() == load_project(tmp_path / "metacontrol.yaml")
+
+
+def test_without_a_table_variants_are_files(load, settings, tmp_path):
+    (tmp_path / "variants").mkdir()
+    (tmp_path / "variants" / "one.rossystem").write_text("RosSystem { Name one }")
+    settings["variants"] = {"component": "nav"}
+    assert [variant.name for variant in load().variants] == ["one"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"package": None}, "package: is missing, must be a name"),
+        ({"colour": 1}, "colour: unknown key, allowed here: package, base"),
+        ({"functions": []}, "functions: is '[]', must be a mapping"),
+        ({"utility": "speed"}, "utility: 'speed' is none of quality_attributes: safety"),
+        (
+            {"quality_attributes": {"safety": {"direction": "down"}}},
+            "quality_attributes.safety.direction: is 'down', must be lower_is_better or higher_is_better",
+        ),
+        (
+            {"quality_attributes": {"safety": {"direction": "lower_is_better", "range": [1, 0]}}},
+            "quality_attributes.safety.range: is '[1, 0]', must be a list of two numbers, the lower one first",
+        ),
+        (
+            {"objectives": {"o": {"function": "f_move", "nfrs": {"safety": float("nan")}}}},
+            "objectives.o.nfrs.safety: is 'nan', must be a finite number",
+        ),
+        ({"objectives": {"o": {"function": "f"}}}, "objectives.o.function: 'f' is none of functions: f_move"),
+        (
+            {"functions": {"f_move": {"designs": ["fast"]}}},
+            "f_move.designs: 'fast' is none of the 2 variants",
+        ),
+        ({"components": {"laser": {}}}, "components.laser: is '{}', must be a mapping with either node or topic"),
+        ({"base": "../base.rossystem"}, "base: ../base.rossystem leaves the folder"),
+        ({"base": "none.rossystem"}, "No such file"),
+        ({"variants": {"component": "nav", "table": "variants.csv"}}, "nothing says what column 'sensor'"),
+        ({"variants": {"component": "arm", "table": "variants.csv"}}, "variants.component: 'arm' is no component"),
+    ],
+)
+def test_wrong_setting_is_refused_in_one_line(load, settings, change, message):
+    settings.update(change)
+    with pytest.raises(ModelError) as caught:
+        load()
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", r"metacontrol\.yaml:2:1: "),
+        ("a: b: c", r"metacontrol\.yaml:1:5: "),
+        ("", "the file: is missing, must be a mapping with package"),
+        ("!!python/object/apply:os.system [id]", "could not determine a constructor"),
+        ("[" * 10_000, "metacontrol.yaml"),
+    ],
+)
+def test_wrong_yaml_is_refused_in_one_line(tmp_path, text, message):
+    (tmp_path / "metacontrol.yaml").write_text(text + "\n")
+    with pytest.raises(ModelError, match=message) as caught:
+        load_project(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("files", "message"),
+    [
+        ({"table": ""}, "variants.csv:1:1: no column 'name'"),
+        ({"table": "name,speed_mps,sensor\n"}, "variants.csv:1:1: no rows"),
+        ({"table": "name,speed_mps\nslow,0.3\n"}, "column 'sensor' is missing"),
+        ({"table": "name,speed_mps,sensor\nslow,0.3\n"}, "variants.csv:2:1: must have 3 cells"),
+        ({"table": "name,speed_mps,sensor\nslow,quick,laser\n"}, "column 'speed_mps' is 'quick', must be a number"),
+        (
+            {"table": "name,speed_mps,sensor\nslow,1,sonar\n"},
+            "2:1: column 'sensor' is 'sonar', must be camera or laser",
+        ),
+        ({"table": TABLE + "slow,1,laser\n"}, "variants.csv:4:1: name 'slow' is empty or stands twice"),
+        ({"table": "name,speed_mps,sensor\n../slow,1,laser\n", "qa": "name,safety\n../slow,1\n"}, "can't name a file"),
+        ({"qa": "name,safety\nslow,0.2\n"}, "qa.csv: no row for blind"),
+        ({"qa": "name,safety\nslow,low\nblind,1\n"}, "qa.csv: slow: safety is 'low', must be a number"),
+    ],
+)
+def test_wrong_table_is_refused_with_its_line(load, files, message):
+    with pytest.raises(ModelError) as caught:
+        load(**files)
+    assert message in str(caught.value)
+
+
+def test_wiring_to_what_the_base_does_not_publish_is_refused(load, settings):
+    settings["variants"]["connections"]["sensor"]["camera"] = ["camera.image"]
+    with pytest.raises(ModelError, match=r"camera\.image is no RosPublisher"):
+        load()

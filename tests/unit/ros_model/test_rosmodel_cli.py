@@ -1,0 +1,132 @@
+"""The command rosmodel: exit status, and one line for every failure."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from ros_model.cli import main
+from ros_model.reader import read_system
+
+GOOD = "RosSystem { Name good }\n"
+FAULTY = "RosSystem { Name bad TopicConnections { TopicConnection t { From ( 'a.b' ) To ( 'c.d' ) } } }\n"
+
+
+@pytest.fixture
+def run(capsys):
+    def run_command(*arguments):
+        with pytest.raises(SystemExit) as done:
+            main([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        assert "Traceback" not in captured.err
+        return done.value.code, captured.out, captured.err
+
+    return run_command
+
+
+@pytest.fixture
+def model(tmp_path):
+    def write(text, name="m.rossystem"):
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def test_check_of_a_good_file_is_silent(run, model):
+    assert run("check", model(GOOD)) == (0, "", "")
+
+
+def test_check_of_a_faulty_file_names_the_place(run, model):
+    path = model(FAULTY)
+    status, out, _ = run("check", path)
+    assert status == 1
+    assert f"{path}:1:41: error: connection 't': 'a.b' names no component" in out
+
+
+def test_check_goes_on_after_a_file_that_can_not_be_read(run, model):
+    status, out, err = run("check", model("RosSystem", "broken"), model(FAULTY))
+    assert status == 2
+    assert "connection 't'" in out
+    assert err.count("\n") == 1
+    assert "broken:1:10: expected '{'" in err
+
+
+@pytest.mark.parametrize("text", ["", "\x00\xff", "{" * 100_000, "RosSystem { Name 'x"])
+def test_bad_file_ends_with_one_line_and_status_2(run, model, text):
+    for command in (["check"], ["format"], ["show"]):
+        status, _, err = run(*command, model(text))
+        assert status == 2
+        assert err.count("\n") == 1
+
+
+def test_format_writes_the_canonical_form_once(run, model):
+    path = model("// kept\nRosSystem{Name good}")
+    assert run("format", "--check", path)[0] == 1
+    assert run("format", path)[0] == 0
+    assert path.read_text() == "// kept\nRosSystem {\n    Name 'good'\n}\n"
+    assert run("format", "--check", path) == (0, "", "")
+
+
+def test_format_refuses_to_lose_a_comment(run, model):
+    path = model("RosSystem{Name good // important\n}")
+    status, _, err = run("format", path)
+    assert status == 2
+    assert f"{path}:1:21: this comment would be lost" in err
+    assert "important" in path.read_text()
+
+
+def test_show_names_components_and_parameters(run, model):
+    path = model(
+        "RosSystem { Name s RosComponents ( ComponentInterface { name arm FromRosNode 'p.a.n' RosParameters {"
+        " RosParameter r { RefParameter 'p.a.n.rate' value 5 } } } ) }"
+    )
+    _, out, _ = run("show", path)
+    assert "arm" in out
+    assert "rate = 5" in out
+
+
+def test_unknown_generator_is_refused(run, tmp_path):
+    models = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim/models"
+    status, _, err = run("generate", "poems", models, "-o", tmp_path)
+    assert status == 2
+    assert "no generator 'poems'" in err
+
+
+def test_folder_without_a_project_is_refused(run, tmp_path):
+    status, _, err = run("generate", "launch", tmp_path, "-o", tmp_path)
+    assert status == 2
+    assert "metacontrol.yaml: No such file" in err
+
+
+def test_missing_argument_is_refused(run):
+    assert run("generate", "launch")[0] == 2
+
+
+def test_package_outside_adds_a_generator(run, tmp_path, monkeypatch):
+    source = tmp_path / "src" / "poetry"
+    source.mkdir(parents=True)
+    (source / "package.xml").write_text(
+        "<package format='2'><name>poetry</name><version>0.0.1</version><description>x</description>"
+        "<maintainer email='a@b.example'>a</maintainer><license>x</license><exec_depend>ros_model</exec_depend>"
+        "<export><ros_model generator='poems' function='poetry_generator:write'/></export></package>"
+    )
+    (tmp_path / "poetry_generator.py").write_text(
+        "def write(project, output):\n"
+        "    path = output / 'poem.txt'\n"
+        "    path.write_text(project.base.name)\n"
+        "    return [path]\n"
+    )
+    package = Path(__file__).parents[3] / "catkin_ws" / "src"
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{source.parent}:{package}")
+    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
+    status, out, err = run("generate", "poems", package / "metacontrol_sim" / "models", "-o", tmp_path)
+    assert (status, err) == (0, "")
+    assert out.startswith("poems: 1 file")
+    assert (tmp_path / "poem.txt").read_text() == "d2"
+
+
+def test_generated_variant_reads_back(run, tmp_path):
+    models = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim/models"
+    assert run("generate", "variants", models, "-o", tmp_path)[0] == 0
+    assert read_system(tmp_path / "models/variants/f2_v2_r2.rossystem").name == "f2_v2_r2"
