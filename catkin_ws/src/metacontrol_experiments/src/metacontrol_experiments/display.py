@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rich.box import SIMPLE_HEAD
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 from rich.text import Text
@@ -109,13 +110,13 @@ def _figures(summary: dict[str, Any]) -> Table:
 
 
 def _reconfigurations(entries: list[dict[str, Any]]) -> Table:
-    table = Table(title="Reconfigurations")
+    """Narrow enough for 80 columns."""
+    table = Table(title="Reconfigurations (s)", box=SIMPLE_HEAD, show_edge=False)
     for title in ("at", "trigger", "from", "to", "detect", "decide", "execute"):
-        table.add_column(title, justify="left" if title in ("trigger", "from", "to") else "right")
+        table.add_column(title, justify="left" if title in ("trigger", "from", "to") else "right", no_wrap=True)
     for entry in entries:
-        spans = (_with_unit(entry[key], "s") for key in ("detect_s", "decide_s", "execute_s"))
-        at = _with_unit(entry["stamp_s"], "s")
-        table.add_row(at, entry["trigger"], entry["from"], entry["to"], *spans)
+        spans = (_with_unit(entry[key], "") for key in ("detect_s", "decide_s", "execute_s"))
+        table.add_row(_with_unit(entry["stamp_s"], ""), entry["trigger"], entry["from"], entry["to"], *spans)
     return table
 
 
