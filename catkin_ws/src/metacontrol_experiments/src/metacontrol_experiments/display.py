@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rich.box import SIMPLE_HEAD
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 from rich.text import Text
@@ -111,7 +110,7 @@ def _figures(summary: dict[str, Any]) -> Table:
 
 def _reconfigurations(entries: list[dict[str, Any]]) -> Table:
     """Narrow enough for 80 columns."""
-    table = Table(title="Reconfigurations (s)", box=SIMPLE_HEAD, show_edge=False)
+    table = Table(title="Reconfigurations (s)", box=None, padding=(0, 1))
     for title in ("at", "trigger", "from", "to", "detect", "decide", "execute"):
         table.add_column(title, justify="left" if title in ("trigger", "from", "to") else "right", no_wrap=True)
     for entry in entries:
