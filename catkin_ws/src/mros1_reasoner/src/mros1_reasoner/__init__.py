@@ -1,1 +1,1 @@
-"""R2 and R3: the knowledge base, reasoning and planning of the meta-controller."""
+"""R2 and R3 of the MAPE-K loop: the TOMASys knowledge base, reasoning, planning."""

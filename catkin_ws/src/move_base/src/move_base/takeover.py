@@ -1,0 +1,38 @@
+"""Taking over the goal that a former instance of the node was working on.
+
+Whoever restarts move_base sets the parameter `~resume_goal` to `{type: "move_base_msgs/MoveBaseActionGoal", data: BASE64}`, the
+serialised action goal. The new server then knows the goal before its first status message, and the client sees no gap.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+
+GOAL_TYPE = "move_base_msgs/MoveBaseActionGoal"
+
+MAX_LENGTH = 100_000
+"""Longest accepted text; a goal takes about 300 characters."""
+
+
+class TakeoverError(ValueError):
+    """The parameter does not hold a goal; the message says why."""
+
+
+def decode_parameter(value: object) -> bytes:
+    """Returns the serialised action goal in the parameter's value.
+
+    Raises:
+        TakeoverError: the value has another form.
+    """
+    if not isinstance(value, dict):
+        raise TakeoverError(f"must have type and data, is {type(value).__name__}")
+    if value.get("type") != GOAL_TYPE:
+        raise TakeoverError(f"type must be {GOAL_TYPE}, is {value.get('type')!r}")
+    data = value.get("data")
+    if not isinstance(data, str) or not data or len(data) > MAX_LENGTH:
+        raise TakeoverError("data must be a base64 text")
+    try:
+        return base64.b64decode(data, validate=True)
+    except (binascii.Error, ValueError) as error:
+        raise TakeoverError(f"data is not base64: {error}") from error

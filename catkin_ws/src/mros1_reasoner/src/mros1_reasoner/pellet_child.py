@@ -1,0 +1,162 @@
+"""A process of its own that keeps Pellet warm in a JVM and serves analyses over stdin and stdout.
+
+Pellet is AGPL-3: it stays on this side of the process boundary. A frame is a line with the count of bytes that follow,
+then JSON. Requests: {"op": "load", "ontology": N-Triples}, {"op": "infer", "facts": [...], "properties": [...]}.
+Answers: {"ok": true, ...} or {"ok": false, "inconsistent": bool, "message": text}. Run by `pellet.PelletReasoner`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+from typing import Any, BinaryIO
+
+PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
+MAX_FRAME = 256 * 1024 * 1024  # bytes; an ontology of 1,000 designs has about 1 MB
+# -Xrs: signals stay with Python. The heap limit keeps node and child together below 500 MB.
+JVM_OPTIONS = ("-Xrs", "-Xms64m", "-Xmx256m", "-XX:+UseSerialGC", "-XX:+ExitOnOutOfMemoryError", "-Xshare:auto")
+
+
+def read_frame(stream: BinaryIO) -> dict[str, Any] | None:
+    """Return the next message, or None at the end of the stream.
+
+    Raises:
+        ValueError: the stream does not hold a frame.
+    """
+    header = stream.readline(32)
+    if not header:
+        return None
+    size = int(header)
+    if not 0 <= size <= MAX_FRAME:
+        raise ValueError(f"frame of {size} bytes")
+    data = stream.read(size)
+    if len(data) < size:
+        return None
+    message = json.loads(data)
+    if not isinstance(message, dict):
+        raise ValueError("a frame must hold an object")  # noqa: TRY004
+    return message
+
+
+def write_frame(stream: BinaryIO, message: dict[str, Any]) -> None:
+    """Write a message and flush."""
+    data = json.dumps(message, ensure_ascii=True, separators=(",", ":")).encode("ascii")
+    stream.write(b"%d\n" % len(data) + data)
+    stream.flush()
+
+
+class Pellet:
+    """Pellet in this process's JVM: one ontology that stays, facts that are added to a copy for each analysis."""
+
+    def __init__(self, jvm: str, jars: list[str]) -> None:
+        import jpype
+
+        jpype.startJVM(jvm, *JVM_OPTIONS, classpath=jars, convertStrings=False)
+        self._knowledge_base = jpype.JClass("org.mindswap.pellet.KnowledgeBase")
+        self._loader = jpype.JClass("org.mindswap.pellet.jena.graph.loader.DefaultGraphLoader")
+        self._models = jpype.JClass("com.hp.hpl.jena.rdf.model.ModelFactory")
+        self._reader = jpype.JClass("java.io.StringReader")
+        self._singleton = jpype.JClass("java.util.Collections").singleton
+        self._terms = jpype.JClass("org.mindswap.pellet.utils.ATermUtils")
+        self._base: Any = None
+
+    def load(self, ontology: str) -> None:
+        """Take an ontology; raise Inconsistent when it contradicts itself."""
+        self._base = None
+        model = self._models.createDefaultModel()
+        model.read(self._reader(ontology), None, "N-TRIPLE")
+        base = self._knowledge_base()
+        loader = self._loader()
+        loader.setKB(base)
+        loader.load(self._singleton(model.getGraph()))
+        self._ensure_consistent(base)
+        self._base = base
+
+    def infer(self, facts: list[list[str]], properties: list[str]) -> list[list[str]]:
+        """Return the values of the properties, as [subject, property, value, datatype]."""
+        if self._base is None:
+            raise RuntimeError("no ontology is loaded")
+        base = self._base.copy()  # shares classes, properties and rules, copies what is said of individuals
+        for subject, predicate, value, datatype in facts:
+            individual = self._terms.makeTermAppl(subject)
+            if predicate == "http://www.w3.org/1999/02/22-rdf-syntax-ns#type":
+                base.addIndividual(individual)
+                base.addType(individual, self._terms.makeTermAppl(value))
+        for subject, predicate, value, datatype in facts:
+            if predicate == "http://www.w3.org/1999/02/22-rdf-syntax-ns#type":
+                continue
+            term = self._terms.makeTypedLiteral(value, datatype) if datatype else self._terms.makeTermAppl(value)
+            if not base.addPropertyValue(self._terms.makeTermAppl(predicate), self._terms.makeTermAppl(subject), term):
+                raise RuntimeError(f"{subject} can't take {predicate} {value}: the property or an individual is unknown")
+        self._ensure_consistent(base)
+        return [row for name in properties for row in self._values(base, name)]
+
+    def _values(self, base: Any, name: str) -> list[list[str]]:
+        rows = []
+        for entry in base.getPropertyValues(self._terms.makeTermAppl(name)).entrySet():
+            subject = str(entry.getKey().getName())
+            for value in entry.getValue():
+                if self._terms.isLiteral(value):
+                    rows.append([subject, name, str(self._terms.getLiteralValue(value)), _datatype(self._terms, value)])
+                else:
+                    rows.append([subject, name, str(value.getName()), ""])
+        return rows
+
+    def _ensure_consistent(self, base: Any) -> None:
+        if not base.isConsistent():
+            raise InconsistentOntologyError(" ".join(str(base.getExplanation()).split()))
+
+
+class InconsistentOntologyError(Exception):
+    """The ontology contradicts itself."""
+
+
+def _datatype(terms: Any, literal: Any) -> str:
+    """Return the datatype's IRI; plain text and xsd:string are one."""
+    name = str(terms.getLiteralDatatype(literal))
+    return "http://www.w3.org/2001/XMLSchema#string" if name.endswith(("PlainLiteral", "#string")) or not name else name
+
+
+def serve(pellet: Pellet, requests: BinaryIO, answers: BinaryIO) -> None:
+    """Answer requests until their stream ends."""
+    while (request := read_frame(requests)) is not None:
+        try:
+            if request["op"] == "load":
+                pellet.load(request["ontology"])
+                answer: dict[str, Any] = {"ok": True}
+            else:
+                answer = {"ok": True, "values": pellet.infer(request["facts"], request["properties"])}
+        except InconsistentOntologyError as error:
+            answer = {"ok": False, "inconsistent": True, "message": str(error)}
+        except Exception as error:  # noqa: BLE001 - Java's exceptions have no common Python class but this one
+            answer = {"ok": False, "inconsistent": False, "message": f"{type(error).__name__}: {error}"}
+        write_frame(answers, answer)
+
+
+def main() -> None:
+    """Serve the process that started this one; arguments: its pid, the JVM's library, the folder of the jars."""
+    parent, jvm, folder = int(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
+    ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        sys.exit(1)  # it died before the request above could hold
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in a terminal is for the parent, which ends this process
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what Java prints must not get between the frames
+    jars = [str(path) for path in sorted(folder.glob("*.jar"))]
+    try:
+        pellet = Pellet(jvm, jars)
+    except Exception as error:  # noqa: BLE001 - the parent tells its user
+        write_frame(answers, {"ok": False, "inconsistent": False, "message": f"the JVM does not start: {error}"})
+        sys.exit(1)
+    write_frame(answers, {"ok": True})
+    serve(pellet, sys.stdin.buffer, answers)
+    answers.close()
+    os._exit(0)  # a JVM that shuts down in order takes its time
+
+
+if __name__ == "__main__":
+    main()

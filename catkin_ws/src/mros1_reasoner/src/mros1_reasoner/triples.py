@@ -1,0 +1,105 @@
+"""Triples as text: terms in the notation of N-Triples, read from OWL files in any format that owlready2 reads."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import owlready2
+
+from mros1_reasoner.reasoner import Assertion
+
+Triple = tuple[str, str, str]
+
+_LINE = re.compile(r"(\S+)\s+(\S+)\s+(.*?)\s*\.\s*$")
+_LITERAL = re.compile(r'"((?:[^"\\]|\\.)*)"(?:\^\^<([^>]*)>|@\S+)?$', re.DOTALL)
+_ESCAPE = re.compile(r"\\(u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|.)", re.DOTALL)
+_ESCAPED = {"n": "\n", "r": "\r", "t": "\t", "b": "\b", "f": "\f"}
+
+
+class TripleError(Exception):
+    """A file holds no readable triples."""
+
+
+def read_triples(path: Path) -> list[Triple]:
+    """Return the triples of an OWL file (RDF/XML, OWL/XML or N-Triples), without following its imports.
+
+    Raises:
+        TripleError: the file is missing, unreadable, or not OWL; one line with the file and the reason.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise TripleError(f"{path}: {error.strerror or error}: check the path") from error
+    world = owlready2.World()
+    try:
+        graph = world.get_ontology("http://metacontrol.org/file#").graph
+        graph.parse(io.BytesIO(data), default_base=path.resolve().as_uri())
+        saved = io.BytesIO()
+        world.save(saved, format="ntriples")
+    except Exception as error:  # noqa: BLE001 - owlready2's parsers raise whatever their parts do
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise TripleError(f"{path}: is not an OWL file ({reason}): save it as RDF/XML") from error
+    finally:
+        world.close()
+    triples = list(parse_ntriples(saved.getvalue().decode()))
+    if len(triples) <= 1:
+        raise TripleError(f"{path}: is not an OWL file (it holds no statement): save it as RDF/XML")
+    return triples
+
+
+def parse_ntriples(text: str) -> Iterator[Triple]:
+    """Yield the triples of N-Triples text, a statement on each line.
+
+    Raises:
+        TripleError: a line is none.
+    """
+    for line in text.split("\n"):
+        if not line.strip() or line.startswith("#"):
+            continue
+        match = _LINE.match(line)
+        if match is None:
+            raise TripleError(f"not a triple: {line[:80]}")
+        subject, predicate, value = match.groups()
+        yield subject, predicate, value
+
+
+def write_ntriples(triples: Iterable[Triple]) -> str:
+    """Return the triples as N-Triples text."""
+    return "".join(f"{subject} {predicate} {value} .\n" for subject, predicate, value in triples)
+
+
+def assertion_triple(assertion: Assertion) -> Triple:
+    """Return an assertion as a triple."""
+    value = f"<{assertion.value}>"
+    if assertion.datatype:
+        text = assertion.value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\r", "\\r")
+        value = f'"{text}"^^<{assertion.datatype}>'
+    return f"<{assertion.subject}>", f"<{assertion.property}>", value
+
+
+def iri_of(term: str) -> str:
+    """Return the IRI of a term; a blank node's label stays as it is."""
+    return term[1:-1] if term.startswith("<") else term
+
+
+def literal_of(term: str) -> tuple[str, str] | None:
+    """Return value and datatype (empty for plain ones) of a literal, or None for another term."""
+    match = _LITERAL.match(term)
+    if match is None:
+        return None
+    return _ESCAPE.sub(_unescape, match.group(1)), match.group(2) or ""
+
+
+def local_name(iri: str) -> str:
+    """Return what follows the last `#`, or else the last `/`."""
+    return re.split(r"[#/]", iri.rstrip("#/"))[-1] if "#" not in iri else iri.rsplit("#", 1)[1]
+
+
+def _unescape(match: re.Match[str]) -> str:
+    code = match.group(1)
+    if code[0] in "uU" and len(code) > 1:
+        return chr(int(code[1:], 16))
+    return _ESCAPED.get(code, code)

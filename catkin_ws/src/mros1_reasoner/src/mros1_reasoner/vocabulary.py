@@ -1,0 +1,80 @@
+"""IRIs of the vocabulary, as owl/tomasys.owl and owl/mros.owl declare them."""
+
+from __future__ import annotations
+
+TOMASYS = "http://metacontrol.org/tomasys#"
+MROS = "http://ros/mros#"
+RUNTIME = "http://metacontrol.org/runtime#"  # individuals that exist at run time only
+
+RDF_TYPE = "http://www.w3.org/1999/02/22-rdf-syntax-ns#type"
+RDF_FIRST = "http://www.w3.org/1999/02/22-rdf-syntax-ns#first"
+RDFS_LABEL = "http://www.w3.org/2000/01/rdf-schema#label"
+OWL_ONTOLOGY = "http://www.w3.org/2002/07/owl#Ontology"
+OWL_IMPORTS = "http://www.w3.org/2002/07/owl#imports"
+OWL_NAMED_INDIVIDUAL = "http://www.w3.org/2002/07/owl#NamedIndividual"
+SWRL = "http://www.w3.org/2003/11/swrl#"
+XSD = "http://www.w3.org/2001/XMLSchema#"
+OWLREADY = "http://www.lesfleursdunormal.fr/static/_downloads/owlready_ontology.owl#"
+
+FUNCTION = TOMASYS + "Function"
+FUNCTION_DESIGN = TOMASYS + "FunctionDesign"
+OBJECTIVE = TOMASYS + "Objective"
+FUNCTION_GROUNDING = TOMASYS + "FunctionGrounding"
+QA_VALUE = TOMASYS + "QAvalue"
+QA_TYPE = TOMASYS + "QualityAttributeType"
+COMPONENT = TOMASYS + "Component"
+COMPONENT_STATE = TOMASYS + "ComponentState"
+COMPONENT_SPECIFICATION = TOMASYS + "ComponentSpecification"
+
+SOLVES_F = TOMASYS + "solvesF"
+TYPE_F = TOMASYS + "typeF"
+SOLVES_O = TOMASYS + "solvesO"
+TYPE_FD = TOMASYS + "typeFD"
+REQUIRES_F = TOMASYS + "requiresF"
+HAS_NFR = TOMASYS + "hasNFR"
+HAS_QA_ESTIMATION = TOMASYS + "hasQAestimation"
+HAS_QA_VALUE = TOMASYS + "hasQAvalue"
+IS_QA_TYPE = TOMASYS + "isQAtype"
+HAS_VALUE = TOMASYS + "hasValue"
+QA_SIGN = TOMASYS + "qa_sign"
+FD_ERROR_LOG = TOMASYS + "fd_error_log"
+REQUIRED_BY = MROS + "requiredBy"
+
+C_STATUS = TOMASYS + "c_status"
+O_STATUS = TOMASYS + "o_status"
+FG_STATUS = TOMASYS + "fg_status"
+FD_REALISABILITY = TOMASYS + "fd_realisability"
+B_STATUS = TOMASYS + "b_status"
+CC_AVAILABILITY = TOMASYS + "cc_availability"
+CSPEC_AVAILABILITY = TOMASYS + "cspec_availability"
+
+O_CAUSE = TOMASYS + "o_cause"
+O_VIOLATED_NFR = TOMASYS + "o_violated_nfr"
+FG_CAUSE = TOMASYS + "fg_cause"
+FD_UNREALISABLE_BY = TOMASYS + "fd_unrealisable_by"
+
+# What rules conclude, and an analysis asks for.
+CONCLUSIONS = (
+    O_CAUSE,
+    O_VIOLATED_NFR,
+    FG_CAUSE,
+    FD_UNREALISABLE_BY,
+    FD_ERROR_LOG,
+    B_STATUS,
+    CC_AVAILABILITY,
+    CSPEC_AVAILABILITY,
+)
+# Functional statuses that are derived after reasoning; a rule that concludes them is set aside.
+DERIVED_STATUSES = (O_STATUS, FG_STATUS, FD_REALISABILITY)
+
+UNGROUNDED = "UNGROUNDED"
+IN_PROGRESS = "IN_PROGRESS"
+IN_ERROR_NFR = "IN_ERROR_NFR"
+IN_ERROR_COMPONENT = "IN_ERROR_COMPONENT"
+UPDATABLE = "UPDATABLE"
+UNREACHABLE = "UNREACHABLE"
+
+WORKS = "TRUE"
+FAILED = "FALSE"
+RECOVERED = "RECOVERED"
+COMPONENT_STATUSES = (WORKS, FAILED, RECOVERED)
