@@ -30,7 +30,8 @@ _LAUNCH_GRACE_S = 12.0
 """Wall seconds after which a process that was asked to end is made to."""
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
-_COMPLAINT = re.compile(r"error|exception|fatal|has died|unused args", re.IGNORECASE)
+_POINTER = ("The traceback for the exception", "log file:")
+_COMPLAINT = re.compile(r"error|exception|fatal|has died|unused args|invalid|no such", re.IGNORECASE)
 
 
 class RunError(RuntimeError):
@@ -119,7 +120,7 @@ def _record_command(bag: Path) -> list[str]:
 def _last_complaint(console: Path) -> str:
     """The last line of a log that tells of an error, else the last line."""
     text = _COLOUR.sub("", console.read_text(encoding="utf-8", errors="replace"))
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith(_POINTER)]
     return ([line for line in lines if _COMPLAINT.search(line)] or lines or ["it said nothing"])[-1]
 
 
