@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from typing import Any
 
 import rospkg
 
@@ -44,7 +45,7 @@ def make(name: str) -> Observer:
     if not match:
         raise PluginError(f"observer {name!r}: no package exports it to {PACKAGE} (there are {', '.join(available())})")
     try:
-        observer_class = getattr(importlib.import_module(match["module"]), match["name"])
+        observer_class: Any = getattr(importlib.import_module(match["module"]), match["name"])
         if not (isinstance(observer_class, type) and issubclass(observer_class, Observer)):
             raise PluginError(f"observer {name!r}: {target} is no subclass of rosgraph_monitor.observer.Observer")
         observer = observer_class(match["name"])
