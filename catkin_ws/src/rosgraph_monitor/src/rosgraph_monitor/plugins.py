@@ -45,10 +45,11 @@ def make(name: str) -> Observer:
     if not match:
         raise PluginError(f"observer {name!r}: no package exports it to {PACKAGE} (there are {', '.join(available())})")
     try:
-        observer_class: Any = getattr(importlib.import_module(match["module"]), match["name"])
+        observer_class = getattr(importlib.import_module(match["module"]), match["name"])
         if not (isinstance(observer_class, type) and issubclass(observer_class, Observer)):
             raise PluginError(f"observer {name!r}: {target} is no subclass of rosgraph_monitor.observer.Observer")
-        observer = observer_class(match["name"])
+        constructor: Any = observer_class  # a subclass takes the name alone, as published
+        observer: Observer = constructor(match["name"])
     except PluginError:
         raise
     except Exception as error:  # a plug-in is somebody else's code: whatever it raises must not end the monitor
