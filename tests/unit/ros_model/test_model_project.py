@@ -95,6 +95,17 @@ def test_required_components_feed_the_variant_and_not_merely_the_plant(load):
     assert load().required_components() == {"slow": {"laser", "robot"}, "blind": {"camera", "robot"}}
 
 
+def test_parameter_values_tell_what_models_without_wiring_require(load, settings, tmp_path):
+    (tmp_path / "variants").mkdir()
+    (tmp_path / "variants" / "one.rossystem").write_text(
+        "RosSystem { Name one RosComponents ( ComponentInterface { name nav RosParameters {"
+        " RosParameter sources { RefParameter 'n.nav.nav.local/sources' value 'scan points' } } } ) }"
+    )
+    settings["variants"] = {"component": "nav"}
+    settings["requires"] = {"sources": {"scan": "laser", "points": "camera", "sonar": "sonar"}}
+    assert load().required_components()["one"] >= {"laser", "camera"}
+
+
 def test_project_is_found_by_its_file_too(load, tmp_path):
     assert load() == load_project(tmp_path / "metacontrol.yaml")
 

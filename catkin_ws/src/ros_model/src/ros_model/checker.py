@@ -38,7 +38,8 @@ class Finding:
 
     def __str__(self) -> str:
         """Return `file:line:column: error: message`."""
-        return f"{self.position}: error: {self.message}"
+        message = self.message.replace("\n", "\\n")  # names may span lines
+        return f"{self.position}: error: {message}"
 
 
 def check_system(system: RosSystem, whole: RosSystem | None = None) -> tuple[Finding, ...]:

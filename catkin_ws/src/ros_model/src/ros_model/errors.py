@@ -17,6 +17,7 @@ class ModelError(Exception):
     """
 
     def __init__(self, message: str, position: Position | None = None) -> None:
+        message = message.replace("\n", "\\n")  # what it quotes may span lines
         super().__init__(message if position is None else f"{position}: {message}")
         self.message = message
         self.position = position

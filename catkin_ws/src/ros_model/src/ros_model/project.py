@@ -61,8 +61,12 @@ class Project:
         raise ModelError(f"{self.folder / FILE_NAME}: no function has {variant} among its designs: add it to one")
 
     def required_components(self) -> dict[str, frozenset[str]]:
-        """Return, for each variant, the components of the base that it can't do without."""
-        return {variant.name: required_components(self.base, variant) for variant in self.variants}
+        """Return, for each variant, the components that it can't do without: by its wiring, and by `requires`."""
+        by_value = self.settings.get("requires", {})
+        return {
+            variant.name: required_components(self.base, variant) | required_by_parameters(variant, by_value)
+            for variant in self.variants
+        }
 
 
 def load_project(folder: str | Path) -> Project:
@@ -114,6 +118,22 @@ def required_components(base: RosSystem, variant: RosSystem) -> frozenset[str]:
                 if source not in driven:
                     waiting.append(source)
     return frozenset(required)
+
+
+def required_by_parameters(variant: RosSystem, requires: Mapping[str, Mapping[str, str]]) -> frozenset[str]:
+    """Return the components that a variant's parameter values ask for, for models that have no wiring.
+
+    Args:
+        variant: the system.
+        requires: parameter (its key, or the key's last part) -> value -> component. A value of the variant may be
+            several, separated by blanks, as in costmap_2d's observation_sources.
+    """
+    found = set()
+    for component in variant.components:
+        for parameter in component.parameters:
+            choices = requires.get(parameter.key) or requires.get(parameter.key.rsplit("/", 1)[-1]) or {}
+            found.update(choices[value] for value in str(parameter.value).split() if value in choices)
+    return frozenset(found)
 
 
 def _inside(folder: Path, relative: str, path: Path, key: str) -> Path:

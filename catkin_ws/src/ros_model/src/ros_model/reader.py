@@ -51,6 +51,7 @@ _DOUBLE = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|(.))", re.DOTALL)
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "'": "'", '"': '"', "\\": "\\"}
 _BOOLEANS = {"true": True, "True": True, "false": False, "False": False}
+_ENDS_OF_FILE = {"$END", "<END-OF-FILE>"}  # lark's parser and lexer each have a name for it
 _DESCRIBED = {
     "WORD": "a name or value",
     "STRING": "a string",
@@ -447,8 +448,8 @@ def _syntax_error(error: UnexpectedInput, text: str, file: str) -> ModelError:
             return ModelError("this comment is never closed: add '*/'", Position(file, *_line_and_column(text, offset)))
     else:
         near = "the end of the file"
-    expected = sorted((_described(name) for name in names - {"COMMENT", "$END"}), key=_words_first)
-    if "$END" in names:
+    expected = sorted((_described(name) for name in names - {"COMMENT"} - _ENDS_OF_FILE), key=_words_first)
+    if names & _ENDS_OF_FILE:
         expected.append("the end of the file")
     wanted = " or ".join(expected) or "something else"
     return ModelError(f"expected {wanted} near {near}", Position(file, *_line_and_column(text, offset)))
