@@ -128,7 +128,7 @@ def required_by_parameters(variant: RosSystem, requires: Mapping[str, Mapping[st
         requires: parameter (its key, or the key's last part) -> value -> component. A value of the variant may be
             several, separated by blanks, as in costmap_2d's observation_sources.
     """
-    found = set()
+    found: set[str] = set()
     for component in variant.components:
         for parameter in component.parameters:
             choices = requires.get(parameter.key) or requires.get(parameter.key.rsplit("/", 1)[-1]) or {}
