@@ -54,7 +54,9 @@ def main() -> None:
     table = Table("name", "ours", "unit", "peer", "its value", "ratio", "samples")
     for entry in entries:
         cells = (entry[key] for key in ("name", "value", "unit", "peer", "peer_value", "ratio", "samples"))
-        table.add_row(*("-" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells))
+        table.add_row(
+            *("-" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)
+        )
     console.print(table)
     results = Path(os.environ["MROS_ROOT"]) / "results"
     results.mkdir(exist_ok=True)

@@ -92,6 +92,8 @@ def _configuration(name: str, entry: object) -> Configuration:
         launch_file = resolve(uri)
     except ModelError as error:
         raise ConfigurationError(f"{where}: {error}") from error
+    if not launch_file.is_file():
+        raise ConfigurationError(f"{where}: there is no launch file {launch_file}: correct the name, or generate it")
     return Configuration(name, function, str(launch_file), tuple(args))
 
 
