@@ -1,4 +1,4 @@
-"""A kinematic simulation that closes the loop around the navigator: a holonomic base, rays cast on a grid, exact frames."""
+"""Closes the loop around the navigator by kinematic simulation: a holonomic base, rays cast on a grid, exact frames."""
 
 import copy
 import math
@@ -85,7 +85,9 @@ class Run:
 class Simulation:
     """Stepped by the test; also the navigator's access to the frames map -> odom -> base_link -> sensors."""
 
-    def __init__(self, boxes, hidden=(), start=(0.0, 0.0, 0.0), tree=None, size=14.0, acceleration=2.0, odom=(0.3, -0.2, 0.1)):
+    def __init__(
+        self, boxes, *, hidden=(), start=(0.0, 0.0, 0.0), tree=None, size=14.0, acceleration=2.0, odom=(0.3, -0.2, 0.1)
+    ):
         cells = round(size / RESOLUTION)
         self.geometry = Geometry(RESOLUTION, cells, cells, -size / 2, -size / 2)
         self.known = self._rasterise(boxes)

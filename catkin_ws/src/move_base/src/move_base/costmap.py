@@ -251,11 +251,8 @@ class Costmap:
         ranges = np.hypot(offsets[:, 0], offsets[:, 1])
         if source.clearing and len(points):
             angles = np.arctan2(offsets[:, 1], offsets[:, 0])
-            if observation.ordered:
-                profile = np.unwrap(angles), ranges
-            else:
-                profile = _nearest_by_sector(angles, ranges)
-            self._clear_seen(origin, *profile, source.raytrace_range)
+            profile = (np.unwrap(angles), ranges) if observation.ordered else _nearest_by_sector(angles, ranges)
+            self._clear_seen(origin, profile, source.raytrace_range)
         if source.marking:
             rows, columns = self.geometry.cells(points[hits & (ranges <= source.obstacle_range)])
             inside = (rows >= 0) & (rows < self.geometry.height) & (columns >= 0) & (columns < self.geometry.width)
@@ -264,8 +261,7 @@ class Costmap:
     def _clear_seen(
         self,
         origin: NDArray[np.float64],
-        angles: NDArray[np.floating],
-        ranges: NDArray[np.floating],
+        profile: tuple[NDArray[np.floating], NDArray[np.floating]],
         reach: float,
     ) -> None:
         """Frees the star-shaped area between the sensor and its returns.
@@ -273,6 +269,7 @@ class Costmap:
         Between two rays the nearer return bounds the area, so nothing behind an edge is cleared; the last cell before a
         return stays, since neighbouring rays fall into neighbouring cells.
         """
+        angles, ranges = profile
         if len(ranges) < 2:
             return
         bound = np.minimum(np.minimum(ranges[:-1], ranges[1:]) - self.geometry.resolution, reach)
@@ -287,7 +284,9 @@ class Costmap:
 
     def _fill(self, corners: NDArray[np.float64], cost: int) -> None:
         g = self.geometry
-        scaled = (corners - (g.origin_x, g.origin_y)) / g.resolution - 0.5  # cv2 counts from the centre of the first cell
+        scaled = (
+            corners - (g.origin_x, g.origin_y)
+        ) / g.resolution - 0.5  # cv2 counts from the centre of the first cell
         fixed = np.round(scaled * (1 << SUBPIXEL_BITS)).astype(np.int32)
         cv2.fillPoly(self._obstacles, [fixed], cost, shift=SUBPIXEL_BITS)
 
@@ -318,7 +317,8 @@ class Costmap:
         if not cells.size or float(cells.max()) > 1e6:  # no obstacle at all
             cells = np.full(costs.shape, limit / resolution, dtype=np.float32)
         if self._inflation is not None:
-            inflated = cv2.LUT(cv2.convertScaleAbs(cells, alpha=self._table_scale), self._cost_table)
+            steps = cv2.convertScaleAbs(cells, alpha=self._table_scale)
+            inflated = np.asarray(cv2.LUT(steps, self._cost_table), dtype=np.uint8)
             if unknown.any():
                 inflated[unknown & (inflated < INSCRIBED)] = UNKNOWN
             costs = inflated
@@ -390,7 +390,7 @@ def _bounding_geometry(static: StaticMap) -> Geometry:
 
 
 def _resample(static: StaticMap, layer: Layer, target: Geometry, map_pose: Pose) -> NDArray[np.uint8]:
-    """Returns the static map's costs on another grid; what the map does not cover is FREE when unknown is not tracked."""
+    """Returns the static map's costs on another grid; what the map does not cover is unknown (if tracked) or FREE."""
     outside = UNKNOWN if layer.track_unknown_space else FREE
     costs = np.where(static.occupancy >= layer.lethal_cost_threshold, LETHAL, FREE).astype(np.uint8)
     costs[static.occupancy < 0] = outside

@@ -1,7 +1,7 @@
 """Dynamic-window controller: samples velocities, rolls them out, checks the footprint, scores, takes the cheapest.
 
-As in base_local_planner the robot drives arcs and turns on the spot; sideways and backward samples are tried only where none of
-these is free, because the sensors look ahead.
+As in base_local_planner the robot drives arcs and turns on the spot; sideways and backward samples are tried only where
+none of these is free, because the sensors look ahead.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ EDGE_SPACING = 0.1
 """Distance between the points that stand for the footprint's edge, m."""
 
 HARD_PADDING = (0.5, 0.25, 0.0)
-"""Shares of the footprint's padding that a trajectory must keep free: the first, and what is tried where an obstacle is in it
-already. The planner keeps the whole padding, so its paths leave the controller some room to follow them."""
+"""Shares of the footprint's padding that a trajectory must keep free: the first, and what is tried where an obstacle is
+in it already. The planner keeps the whole padding, so its paths leave the controller some room to follow them."""
 
 SCORED_EVERY = 4
 """Every so many poses of a trajectory count for its distance to the path."""
@@ -69,6 +69,15 @@ class _Rollout:
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     yaw: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What trajectories are judged by: the path ahead (N, 2), the costmap, and the shape to keep free."""
+
+    path: NDArray[np.float64]
+    snapshot: Snapshot
+    shape: _Shape
 
 
 class DwaController:
@@ -113,15 +122,15 @@ class DwaController:
         """
         p = self.parameters
         horizon = min(p.sim_time, max(MIN_HORIZON, 2.0 * to_goal / p.max_vel_x))
-        shape = self._shape_for(robot, snapshot)
+        scene = _Scene(path, snapshot, self._shape_for(robot, snapshot))
         direction = _direction_of(path)
         error = abs(float(np.angle(np.exp(1j * (direction - robot.yaw)))))
         samples = self._turn_samples(velocity) if error > ALIGN_ANGLE else self._arc_samples(velocity)
-        best = self._best(samples, robot, horizon, path, snapshot, shape)
+        best = self._best(samples, robot, horizon, scene)
         if best is None and error > ALIGN_ANGLE:
-            best = self._best(self._arc_samples(velocity), robot, horizon, path, snapshot, shape)
+            best = self._best(self._arc_samples(velocity), robot, horizon, scene)
         if best is None:
-            best = self._best(self._escape_samples(), robot, MIN_HORIZON, path, snapshot, shape)
+            best = self._best(self._escape_samples(), robot, MIN_HORIZON, scene)
         if best is not None:
             self._last = best.velocity
         return best
@@ -180,23 +189,21 @@ class DwaController:
         samples: NDArray[np.float64],
         robot: Pose,
         horizon: float,
-        path: NDArray[np.float64],
-        snapshot: Snapshot,
-        shape: _Shape,
+        scene: _Scene,
     ) -> Trajectory | None:
         if len(samples) == 0:
             return None
         rollout = _roll_out(samples, robot, horizon)
-        free = self._free(rollout, snapshot, shape)
+        free = self._free(rollout, scene.snapshot, scene.shape)
         if not free.any():
             return None
         kept = _Rollout(samples[free], rollout.x[free], rollout.y[free], rollout.yaw[free])
-        costs = self._score(kept, path, snapshot)
+        costs = self._score(kept, scene.path, scene.snapshot)
         best = int(costs.argmin())
         return _trajectory(kept, best, float(costs[best]))
 
     def _free(self, rollout: _Rollout, snapshot: Snapshot, shape: _Shape) -> NDArray[np.bool_]:
-        """Whether each trajectory keeps the footprint off obstacles (C,); outside the costmap nothing is known to be free.
+        """Whether each trajectory keeps the footprint off obstacles (C,); outside the costmap nothing is free.
 
         The clearance of the robot's centre decides most poses; the edge is looked at only in between.
         """
@@ -207,7 +214,7 @@ class DwaController:
             inside, snapshot.clearance[rows.clip(0, g.height - 1), columns.clip(0, g.width - 1)], np.float32(0.0)
         )
         margin = shape.margin + 0.5 * g.resolution  # clearances end at the middle of an obstacle's cell
-        blocked = (clearance <= shape.inscribed + margin).any(axis=1)
+        blocked: NDArray[np.bool_] = np.any(clearance <= shape.inscribed + margin, axis=1)
         unsure = (clearance <= shape.circumscribed + margin) & ~blocked[:, None]
         if unsure.any():
             which, step = np.nonzero(unsure)

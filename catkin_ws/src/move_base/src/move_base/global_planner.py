@@ -1,7 +1,7 @@
 """Global planner: A* on an inflated costmap, then any-angle straightening.
 
-`pyastar2d` finds a path in a few milliseconds but counts a diagonal step like a straight one, so its paths wander. They only
-choose the way around the obstacles: dynamic programming over straight shortcuts then makes them taut.
+`pyastar2d` finds a path in a few milliseconds but counts a diagonal step like a straight one, so its paths wander. They
+only choose the way around the obstacles: dynamic programming over straight shortcuts then makes them taut.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ COST_FACTOR = 0.8 / 50.0
 """Weight per unit of cost over a free cell's weight of 1: NavFn's COST_FACTOR over its COST_NEUTRAL."""
 
 ESCAPE_WEIGHT, PUSH_WEIGHT = 30.0, 300.0
-"""Weights of inscribed and of obstacle cells around a start that lies among them; high, so that the way out is short."""
+"""Weights of inscribed and of obstacle cells around a start that lies among them; high, for a short way out."""
 
 STRAIGHT_BIAS = 0.02
 """Extra weight per metre from the line between start and goal: breaks the ties of pyastar2d's metric."""
 
 STRAIGHTEN_ROUNDS = ((0.5, 24), (0.35, 12), (0.25, 8))
-"""Distance between the nodes that shortcuts join (m) and the longest shortcut (nodes), per round. The first round finds the
-long lines, the others, whose nodes lie on the shortcuts of the one before, move the corners."""
+"""Distance between the nodes that shortcuts join (m) and the longest shortcut (nodes), per round. The first round finds
+the long lines, the others, whose nodes lie on the shortcuts of the one before, move the corners."""
 
 SAMPLE_CELLS = 2.0
 """Distance between the samples of a shortcut, cells: blocked areas are a robot's width wide at least."""
@@ -159,9 +159,7 @@ def _reachable_end(
     raise PlanningError(f"{where} is {snapshot.clearance[cell]:.2f} m from an obstacle, too close for the robot")
 
 
-def _open_start(
-    weights: NDArray[np.float32], snapshot: Snapshot, cell: tuple[int, int], escape_radius: float
-) -> None:
+def _open_start(weights: NDArray[np.float32], snapshot: Snapshot, cell: tuple[int, int], escape_radius: float) -> None:
     """Makes blocked cells around the start passable at a high weight, in place."""
     reach = int(escape_radius / snapshot.geometry.resolution)
     top, left = max(cell[0] - reach, 0), max(cell[1] - reach, 0)
@@ -192,7 +190,7 @@ def _biased(weights: NDArray[np.float32], start: tuple[int, int], end: tuple[int
 def _straighten(
     nodes: NDArray[np.float64], weights: NDArray[np.float32], geometry: Geometry, longest: int
 ) -> NDArray[np.float64]:
-    """Returns the cheapest chain of straight shortcuts, of at most `longest` steps, between the nodes (N, 2) of a path."""
+    """Returns the cheapest chain of straight shortcuts, of at most `longest` steps, between a path's nodes (N, 2)."""
     count = len(nodes)
     if count < 3:
         return nodes

@@ -1,9 +1,9 @@
 """The navigation state machine: goal in, velocity or outcome out. It knows no ROS and is told the time.
 
     IDLE -> PLANNING -> CONTROLLING -> IDLE (succeeded, aborted, cancelled)
-               ^  \\          |
-               |   v         v
-               +-- RECOVERING
+               ^ |           |
+               | v           v
+              RECOVERING <----
 
 Whatever the state, nothing moves on sensor data that are too old, nor without a map or a transform.
 """
@@ -11,7 +11,7 @@ Whatever the state, nothing moves on sensor data that are too old, nor without a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING, Protocol
 
@@ -125,6 +125,56 @@ class _Sensor:
         return None
 
 
+@dataclass
+class _Work:
+    """What is remembered for one goal; times in s.
+
+    Attributes:
+        planned_well: last time that a plan was found, or that waiting for one began.
+        controlled: the same for a free velocity.
+        anchored: when the robot was at `anchor`, which follows it by steps of the oscillation distance.
+        anchor: see above.
+        planned: when planning was last tried.
+        planning_error: why it failed.
+        progress: index of the plan's point nearest to the robot.
+        stale_since: since when sensor data are too old.
+        not_ready_since: since when map or transforms are missing.
+        reached_xy: whether the robot was within the goal's position tolerance.
+        recovery_index: the next recovery behaviour.
+        behaviour: the present one.
+        recovering_since: when it began.
+        recovered_at: where it began.
+        turned: how far a recovery's turn has come, rad.
+        last_yaw: the heading when that was last summed up, rad.
+    """
+
+    planned_well: float
+    controlled: float
+    anchored: float
+    anchor: Pose | None = None
+    planned: float = -math.inf
+    planning_error: str = ""
+    progress: int = 0
+    stale_since: float | None = None
+    not_ready_since: float | None = None
+    reached_xy: bool = False
+    recovery_index: int = 0
+    behaviour: str = ""
+    recovering_since: float = 0.0
+    recovered_at: Pose | None = None
+    turned: float = 0.0
+    last_yaw: float = 0.0
+
+    @classmethod
+    def begun(cls, now: float) -> _Work:
+        return cls(planned_well=now, controlled=now, anchored=now)
+
+    def restart_patience(self, now: float) -> None:
+        """Starts planner's, controller's and oscillation's patience anew; also while the robot has to stand still."""
+        self.planned_well = self.controlled = self.anchored = now
+        self.anchor = None
+
+
 class _MappedArea:
     """A costmap with its rate and the stamps of what it has used."""
 
@@ -158,7 +208,7 @@ class Navigator:
             1.0 / parameters.controller_frequency,
         )
         self._map_frame = ""
-        self._reset_clocks(0.0)
+        self._work = _Work.begun(0.0)
 
     # -- what comes in ---------------------------------------------------------------------------------------------
 
@@ -204,7 +254,7 @@ class Navigator:
         self.plan = None
         self.state = State.PLANNING
         self._controller.reset()
-        self._reset_clocks(now)
+        self._work = _Work.begun(now)
 
     def cancel(self) -> None:
         """Drops the goal; the caller stops the robot."""
@@ -223,7 +273,7 @@ class Navigator:
             sensor.recent, sensor.used = [], -math.inf
         for area in (self._global, self._local):
             area.updated, area.used = -math.inf, {}
-        self._reset_clocks(now)
+        self._work = _Work.begun(now)
 
     # -- the step --------------------------------------------------------------------------------------------------
 
@@ -242,7 +292,7 @@ class Navigator:
             return Result(robot=robot)
         if missing or robot is None or local_robot is None:
             return self._not_ready(now, robot, missing or self._missing_transform(robot))
-        self._not_ready_since = None
+        self._work.not_ready_since = None
         stale = self._stale_reason(now)
         if stale:
             return self._hold(now, robot, stale)
@@ -319,10 +369,10 @@ class Navigator:
         return f"no current transform from {p.robot_base_frame!r} to {p.global_frame!r}"
 
     def _not_ready(self, now: float, robot: Pose | None, reason: str) -> Result:
-        if self._not_ready_since is None:
-            self._not_ready_since = now
-        waited = now - self._not_ready_since
-        self._restart_patience(now)
+        if self._work.not_ready_since is None:
+            self._work.not_ready_since = now
+        waited = now - self._work.not_ready_since
+        self._work.restart_patience(now)
         if waited >= max(self.parameters.planner_patience, 5.0):
             return self._abort(robot, f"{reason} for {waited:.1f} s")
         return Result(velocity=STOP, robot=robot, warning=f"Waiting: {reason}")
@@ -339,28 +389,28 @@ class Navigator:
 
     def _hold(self, now: float, robot: Pose, reason: str) -> Result:
         """Stands still on old data: neither drives nor turns, and no other patience runs meanwhile."""
-        if self._stale_since is None:
-            self._stale_since = now
-        waited = now - self._stale_since
-        self._restart_patience(now)
+        if self._work.stale_since is None:
+            self._work.stale_since = now
+        waited = now - self._work.stale_since
+        self._work.restart_patience(now)
         if waited >= self.parameters.controller_patience:
             return self._abort(robot, f"{reason} for {waited:.1f} s")
         return Result(velocity=STOP, robot=robot, warning=f"Standing still: {reason}")
 
     def _fresh_again(self, now: float) -> None:
-        if self._stale_since is not None:
-            self._stale_since = None
-            self._planned = -math.inf
-            self._restart_patience(now)
+        if self._work.stale_since is not None:
+            self._work.stale_since = None
+            self._work.planned = -math.inf
+            self._work.restart_patience(now)
 
     def _at_goal(self, robot: Pose) -> bool:
         p = self.parameters.controller
         assert self.goal is not None  # noqa: S101
         target = self.plan.goal if self.plan is not None else self.goal
         if robot.distance(target) <= p.xy_goal_tolerance:
-            self._reached_xy = True
+            self._work.reached_xy = True
             return True
-        return self._reached_xy and p.latch_xy_goal_tolerance
+        return self._work.reached_xy and p.latch_xy_goal_tolerance
 
     def _turn_to_goal(self, now: float, robot: Pose, local_robot: Pose) -> Result:
         assert self.goal is not None  # noqa: S101
@@ -370,10 +420,10 @@ class Navigator:
         snapshot = self._local.snapshot
         turn = self._controller.turn(local_robot, error, snapshot) if snapshot is not None else None
         if turn is None:
-            if now - self._controlled >= self.parameters.controller_patience:
+            if now - self._work.controlled >= self.parameters.controller_patience:
                 return self._abort(robot, "there is no room to turn to the goal's heading")
             return Result(velocity=STOP, robot=robot, warning="No room to turn to the goal's heading")
-        self._controlled = now
+        self._work.controlled = now
         return Result(velocity=turn.velocity, robot=robot, trajectory=turn)
 
     def _drive(self, now: float, frames: Transformer, robot: Pose, local_robot: Pose, velocity: Velocity) -> Result:
@@ -383,26 +433,37 @@ class Navigator:
             hopeless = self._hopeless_goal()
             if hopeless:
                 return self._abort(robot, hopeless)
-            if now - self._planned_well >= p.planner_patience:
-                return self._start_recovery(now, robot, f"no plan for {p.planner_patience:g} s: {self._planning_error}")
-            return Result(velocity=STOP, robot=robot, warning=f"No plan: {self._planning_error}")
+            if now - self._work.planned_well >= p.planner_patience:
+                return self._start_recovery(
+                    now, robot, f"no plan for {p.planner_patience:g} s: {self._work.planning_error}"
+                )
+            return Result(velocity=STOP, robot=robot, warning=f"No plan: {self._work.planning_error}")
         self.state = State.CONTROLLING
         if self._oscillating(now, robot):
             return self._start_recovery(
                 now, robot, f"moved less than {p.oscillation_distance:g} m in {p.oscillation_timeout:g} s", new_plan
             )
+        return replace(self._control(now, frames, robot, local_robot, velocity), new_plan=new_plan)
+
+    def _control(
+        self,
+        now: float,
+        frames: Transformer,
+        robot: Pose,
+        local_robot: Pose,
+        velocity: Velocity,
+    ) -> Result:
         path, to_goal = self._path_ahead(robot, frames)
         if path is None or self._local.snapshot is None:
-            return Result(velocity=STOP, robot=robot, warning="No transform for the plan", new_plan=new_plan)
+            return Result(velocity=STOP, robot=robot, warning="No transform for the plan")
         trajectory = self._controller.follow(local_robot, velocity, path, to_goal, self._local.snapshot)
         if trajectory is not None:
-            self._controlled = now
-            return Result(
-                velocity=trajectory.velocity, robot=robot, new_plan=new_plan, path=path, trajectory=trajectory
-            )
-        if now - self._controlled >= p.controller_patience:
-            return self._start_recovery(now, robot, f"no free velocity for {p.controller_patience:g} s", new_plan)
-        return Result(velocity=STOP, robot=robot, warning="No free velocity", new_plan=new_plan, path=path)
+            self._work.controlled = now
+            return Result(velocity=trajectory.velocity, robot=robot, path=path, trajectory=trajectory)
+        patience = self.parameters.controller_patience
+        if now - self._work.controlled >= patience:
+            return self._start_recovery(now, robot, f"no free velocity for {patience:g} s")
+        return Result(velocity=STOP, robot=robot, warning="No free velocity", path=path)
 
     # -- planning --------------------------------------------------------------------------------------------------
 
@@ -410,23 +471,23 @@ class Navigator:
         """Plans at planner_frequency, and at once where there is no plan; returns a plan that was newly taken."""
         p = self.parameters
         period = 1.0 / p.planner_frequency if p.planner_frequency > 0.0 else math.inf
-        if self.plan is None or now - self._controlled > 1.0:  # the controller is stuck: look for another way
+        if self.plan is None or now - self._work.controlled > 1.0:  # the controller is stuck: look for another way
             period = min(period, 0.25)
-        if now - self._planned < period - 1e-3:
+        if now - self._work.planned < period - 1e-3:
             return None
-        self._planned = now
+        self._work.planned = now
         assert self.goal is not None  # noqa: S101
         try:
             plan = self.plan_between(robot, self.goal, p.controller.xy_goal_tolerance)
         except PlanningError as error:
-            self._planning_error = str(error)
+            self._work.planning_error = str(error)
             if not self._plan_is_free(robot):
                 self.plan = None
             return None
-        self._planned_well = now
+        self._work.planned_well = now
         if self._keeps_plan(robot, plan):
             return None
-        self.plan, self._progress = plan, 0
+        self.plan, self._work.progress = plan, 0
         return plan
 
     def _plan_is_free(self, robot: Pose) -> bool:
@@ -437,7 +498,7 @@ class Navigator:
         if self.plan is None or self._global.snapshot is None:
             return math.inf
         self._advance(robot)
-        points = self.plan.points[self._progress :]
+        points = self.plan.points[self._work.progress :]
         if math.hypot(points[0, 0] - robot.x, points[0, 1] - robot.y) > KEEP_DISTANCE:
             return math.inf
         return path_cost(points, self._global.snapshot, allow_unknown=self.parameters.allow_unknown)
@@ -452,15 +513,15 @@ class Navigator:
     def _advance(self, robot: Pose) -> None:
         """Moves the progress along the plan to its nearest point within the next few metres."""
         assert self.plan is not None  # noqa: S101
-        window = self.plan.points[self._progress : self._progress + 60]
+        window = self.plan.points[self._work.progress : self._work.progress + 60]
         squared = (window[:, 0] - robot.x) ** 2 + (window[:, 1] - robot.y) ** 2
-        self._progress += int(squared.argmin())
+        self._work.progress += int(squared.argmin())
 
     def _path_ahead(self, robot: Pose, frames: Transformer) -> tuple[NDArray[np.float64] | None, float]:
         """Returns the next metres of the plan in the local frame, and the length left to the goal (m)."""
         assert self.plan is not None  # noqa: S101
         self._advance(robot)
-        points = self.plan.points[self._progress :]
+        points = self.plan.points[self._work.progress :]
         to_goal = float(np.hypot(*np.diff(points, axis=0).T).sum())
         count = round(LOOKAHEAD / 0.05)
         ahead = points[: count + 1 : PATH_STEP]
@@ -489,14 +550,14 @@ class Navigator:
 
     def _oscillating(self, now: float, robot: Pose) -> bool:
         p = self.parameters
-        if self._anchor is None or robot.distance(self._anchor) >= p.oscillation_distance:
-            self._anchor, self._anchored = robot, now
+        if self._work.anchor is None or robot.distance(self._work.anchor) >= p.oscillation_distance:
+            self._work.anchor, self._work.anchored = robot, now
             if self._moved_since_recovery(robot):
-                self._recovery_index = 0
-        return p.oscillation_timeout > 0.0 and now - self._anchored > p.oscillation_timeout
+                self._work.recovery_index = 0
+        return p.oscillation_timeout > 0.0 and now - self._work.anchored > p.oscillation_timeout
 
     def _moved_since_recovery(self, robot: Pose) -> bool:
-        return self._recovered_at is None or robot.distance(self._recovered_at) > 1.0
+        return self._work.recovered_at is None or robot.distance(self._work.recovered_at) > 1.0
 
     def _start_recovery(self, now: float, robot: Pose, reason: str, new_plan: Plan | None = None) -> Result:
         """Begins the next recovery behaviour; aborts with the reason when all were tried."""
@@ -504,34 +565,34 @@ class Navigator:
         behaviours = ["conservative_reset", "rotate", "aggressive_reset", "rotate"]
         if not p.clearing_rotation_allowed:
             behaviours = [name for name in behaviours if name != "rotate"]
-        if not p.recovery_behavior_enabled or self._recovery_index >= len(behaviours):
+        if not p.recovery_behavior_enabled or self._work.recovery_index >= len(behaviours):
             tried = "after all recovery behaviours" if p.recovery_behavior_enabled else "recovery is disabled"
             return self._abort(robot, f"{reason} ({tried})")
-        self._behaviour = behaviours[self._recovery_index]
-        self._recovery_index += 1
-        self._recovered_at = robot
-        self._turned, self._last_yaw, self._recovering_since = 0.0, robot.yaw, now
+        self._work.behaviour = behaviours[self._work.recovery_index]
+        self._work.recovery_index += 1
+        self._work.recovered_at = robot
+        self._work.turned, self._work.last_yaw, self._work.recovering_since = 0.0, robot.yaw, now
         self.state = State.RECOVERING
-        warning = f"Recovery {self._behaviour}: {reason}"
+        warning = f"Recovery {self._work.behaviour}: {reason}"
         return Result(velocity=STOP, robot=robot, warning=warning, new_plan=new_plan)
 
     def _recover(self, now: float, robot: Pose, local_robot: Pose) -> Result:
-        if self._behaviour == "rotate":
-            self._turned += wrap_angle(robot.yaw - self._last_yaw)
-            self._last_yaw = robot.yaw
-            left = 2.0 * math.pi - self._turned
+        if self._work.behaviour == "rotate":
+            self._work.turned += wrap_angle(robot.yaw - self._work.last_yaw)
+            self._work.last_yaw = robot.yaw
+            left = 2.0 * math.pi - self._work.turned
             snapshot = self._local.snapshot
             turn = self._controller.turn(local_robot, min(left, 0.5 * ROTATE_SPEED), snapshot) if snapshot else None
-            if left > 0.1 and turn is not None and now - self._recovering_since < ROTATE_PATIENCE:
+            if left > 0.1 and turn is not None and now - self._work.recovering_since < ROTATE_PATIENCE:
                 return Result(velocity=turn.velocity, robot=robot, trajectory=turn)
         else:
-            keep = self.parameters.conservative_reset_dist if self._behaviour == "conservative_reset" else 0.0
+            keep = self.parameters.conservative_reset_dist if self._work.behaviour == "conservative_reset" else 0.0
             self._global.costmap.clear(robot, keep)
             self._local.costmap.clear(local_robot, keep)
         self.state = State.PLANNING
         self.plan = None
-        self._planned = -math.inf
-        self._restart_patience(now)
+        self._work.planned = -math.inf
+        self._work.restart_patience(now)
         return Result(velocity=STOP, robot=robot)
 
     # -- ends and clocks -------------------------------------------------------------------------------------------
@@ -542,26 +603,3 @@ class Navigator:
     def _end(self, robot: Pose | None, outcome: Outcome, text: str) -> Result:
         self.cancel()
         return Result(velocity=STOP, robot=robot, outcome=outcome, text=text)
-
-    def _reset_clocks(self, now: float) -> None:
-        """Everything that is counted for one goal, set back."""
-        self._stale_since: float | None = None
-        self._not_ready_since: float | None = None
-        self._planned = -math.inf
-        self._planning_error = ""
-        self._progress = 0
-        self._recovery_index = 0
-        self._behaviour = ""
-        self._recovered_at: Pose | None = None
-        self._turned = 0.0
-        self._last_yaw = 0.0
-        self._recovering_since = now
-        self._reached_xy = False
-        self._restart_patience(now)
-
-    def _restart_patience(self, now: float) -> None:
-        """Starts planner's, controller's and oscillation's patience anew; also while the robot has to stand still."""
-        self._planned_well = now
-        self._controlled = now
-        self._anchor: Pose | None = None
-        self._anchored = now

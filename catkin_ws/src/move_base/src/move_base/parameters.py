@@ -1,7 +1,7 @@
 """Typed parameters of move_base, read from the nested dictionary of its private namespace.
 
-Names and defaults are those of ROS Navigation's move_base, costmap_2d and base_local_planner, so that published launch files
-and YAML files load unchanged. Where this stand-in departs from a default, the field's comment says so.
+Names and defaults are those of ROS Navigation's move_base, costmap_2d and base_local_planner, so that published launch
+files and YAML files load unchanged; `DEFAULT_UPDATE_PERIOD` is the one departure.
 """
 
 from __future__ import annotations

@@ -48,8 +48,8 @@ class Observation:
 def scan_observation(message: Any, source: ObservationSource) -> Observation:
     """Converts a sensor_msgs/LaserScan.
 
-    Rays without a return (infinite, or beyond range_max) clear up to the source's raytrace_range if `inf_is_valid`; other
-    readings outside the scan's limits are dropped.
+    Rays without a return (infinite, or beyond range_max) clear up to the source's raytrace_range if `inf_is_valid`;
+    other readings outside the scan's limits are dropped.
 
     Raises:
         SensorError: empty, or limits that are not finite or make no sense.

@@ -15,9 +15,9 @@ from mros1_reasoner import vocabulary as v
 from mros1_reasoner.model import Analysis, Design, Direction, Facts, Objective, ObjectiveAnalysis
 from mros1_reasoner.reasoner import Assertion, Reasoner
 from mros1_reasoner.triples import (
-    assertion_triple,
     Triple,
     TripleError,
+    assertion_triple,
     iri_of,
     literal_of,
     local_name,
@@ -80,7 +80,7 @@ class KnowledgeBase:
         Args:
             models: OWL files of the application.
             vocabularies: further OWL files to load before them; the package's own are always loaded.
-            directions: direction of quality attributes by name; else as the models say (`qa_sign`), else lower is better.
+            directions: of quality attributes by name; else as the models say (`qa_sign`), else lower is better.
 
         Raises:
             KnowledgeBaseError: a file or an individual can't be used.
@@ -322,7 +322,9 @@ class KnowledgeBase:
 
     def _static(self, graph: _Graph) -> str:
         values = graph.instances(v.QA_VALUE) | {
-            value for predicate in (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION) for value in graph.objects(predicate)
+            value
+            for predicate in (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION)
+            for value in graph.objects(predicate)
         }
         dropped = set(_MOMENTARY) | set(_LEVELS) | {v.QA_SIGN}
 
@@ -533,4 +535,3 @@ def _number(text: str) -> float:
         return float(text)
     except ValueError:
         return math.nan
-

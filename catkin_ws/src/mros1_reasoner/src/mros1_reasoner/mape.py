@@ -113,6 +113,7 @@ class _Running:
     state: str = ""
     busy_since: float | None = None
     failed_stamp: float = 0.0
+    binding_error: bool = False
     calm_until: float = -math.inf  # no limit counts before
     not_before: float = -math.inf  # no request is made before
     attempts: int = 0
@@ -223,6 +224,19 @@ class Mape:
             status = v.WORKS  # it was never seen to fail, or its return has been heeded
         if known is None or status != before:
             self._components[component] = _Component(status, stamp or now)
+
+    def observe_binding(self, now: float, grounding: str, in_error: bool) -> None:
+        """Take in that a binding of a grounding is in error, or no longer is.
+
+        Raises:
+            MapeError: no objective is grounded so.
+        """
+        for name, running in self._running.items():
+            if running.design and self._kb.grounding(name, running.design) == grounding:
+                running.failed_stamp = running.failed_stamp if running.binding_error else now
+                running.binding_error = in_error
+                return
+        raise MapeError(f"binding error of {grounding}: no objective is grounded so: left out")
 
     def observe_active(self, now: float, function: str, configuration: str, state: str) -> None:
         """Take in what runs for a function, as the manipulator says (ActiveConfiguration).
@@ -350,7 +364,7 @@ class Mape:
         return replace(
             decision,
             state=EXECUTED if ok else FAILED,
-            explanation=decision.explanation if ok else f"{decision.explanation}; failed: {message or 'no reason given'}",
+            explanation=decision.explanation + ("" if ok else f"; failed: {message or 'no reason given'}"),
             stamp_executed=now,
             execute_wall_s=self._wall() - decision.wall_began,
         )
@@ -372,6 +386,7 @@ class Mape:
             running.calm_until = max(running.calm_until, now + self.settings.cool_down)
         running.design = design
         running.degraded = False
+        running.binding_error = False
         running.refusal = ()
         for key in [key for key in self._levels if key[0] == objective]:
             del self._levels[key]
@@ -385,10 +400,8 @@ class Mape:
         for (objective, quality), level in self._levels.items():
             if now - level.stamp > self.settings.level_timeout:
                 continue
-            since = level.passed_since
-            if since is None:
-                levels[objective, quality] = level.value
-            elif now - since >= self.settings.violation_window and now >= self._running[objective].calm_until:
+            since, calm_until = level.passed_since, self._running[objective].calm_until
+            if since is None or (now - since >= self.settings.violation_window and now >= calm_until):
                 levels[objective, quality] = level.value
             elif level.last_good is not None:
                 levels[objective, quality] = level.last_good
@@ -397,7 +410,7 @@ class Mape:
             groundings={name: running.design for name, running in self._running.items() if running.design},
             levels=levels,
             components={name: component.status for name, component in self._components.items()},
-            broken=frozenset(n for n, running in self._running.items() if running.design and running.state == FAILED),
+            broken=frozenset(n for n, running in self._running.items() if running.design and _is_broken(running)),
         )
 
     def _what_counts(self, facts: Facts, now: float) -> tuple[object, ...]:
@@ -409,9 +422,16 @@ class Mape:
         )
         waits = tuple((self._is_busy(running, now), now < running.not_before) for running in self._running.values())
         grace = self._started is not None and now - self._started < self.settings.start_grace
-        known = frozenset(facts.levels)
-        return facts.objectives, facts.groundings, facts.components, facts.broken, passed, known, waits, grace, frozenset(
-            self._error_log
+        return (
+            facts.objectives,
+            facts.groundings,
+            facts.components,
+            facts.broken,
+            frozenset(facts.levels),
+            passed,
+            waits,
+            grace,
+            frozenset(self._error_log),
         )
 
     def _heed_recoveries(self) -> None:
@@ -482,7 +502,7 @@ class Mape:
                 component = self._components.get(name)
                 words = f"component {name}, which {running.design} requires, does not work"
                 causes.append((component.stamp if component else now, f"component:{name}", words))
-            if running.state == FAILED or not causes:
+            if _is_broken(running) or not causes:
                 words = f"configuration {running.design} does not run"
                 causes.append((running.failed_stamp or now, f"component:{running.design}", words))
         if v.IN_ERROR_NFR in result.causes:
@@ -525,3 +545,7 @@ class Mape:
 
     def _is_logged(self, design: str, objective: str) -> bool:
         return (design, objective) in self._error_log
+
+
+def _is_broken(running: _Running) -> bool:
+    return running.state == FAILED or running.binding_error

@@ -38,7 +38,7 @@ def read_frame(stream: BinaryIO) -> dict[str, Any] | None:
         return None
     message = json.loads(data)
     if not isinstance(message, dict):
-        raise ValueError("a frame must hold an object")  # noqa: TRY004
+        raise ValueError("a frame must hold an object")
     return message
 
 
@@ -81,7 +81,7 @@ class Pellet:
         if self._base is None:
             raise RuntimeError("no ontology is loaded")
         base = self._base.copy()  # shares classes, properties and rules, copies what is said of individuals
-        for subject, predicate, value, datatype in facts:
+        for subject, predicate, value, _ in facts:
             individual = self._terms.makeTermAppl(subject)
             if predicate == "http://www.w3.org/1999/02/22-rdf-syntax-ns#type":
                 base.addIndividual(individual)
@@ -91,7 +91,9 @@ class Pellet:
                 continue
             term = self._terms.makeTypedLiteral(value, datatype) if datatype else self._terms.makeTermAppl(value)
             if not base.addPropertyValue(self._terms.makeTermAppl(predicate), self._terms.makeTermAppl(subject), term):
-                raise RuntimeError(f"{subject} can't take {predicate} {value}: the property or an individual is unknown")
+                raise RuntimeError(
+                    f"{subject} can't take {predicate} {value}: the property or an individual is unknown"
+                )
         self._ensure_consistent(base)
         return [row for name in properties for row in self._values(base, name)]
 
@@ -132,7 +134,7 @@ def serve(pellet: Pellet, requests: BinaryIO, answers: BinaryIO) -> None:
                 answer = {"ok": True, "values": pellet.infer(request["facts"], request["properties"])}
         except InconsistentOntologyError as error:
             answer = {"ok": False, "inconsistent": True, "message": str(error)}
-        except Exception as error:  # noqa: BLE001 - Java's exceptions have no common Python class but this one
+        except Exception as error:  # Java's exceptions have no other common class
             answer = {"ok": False, "inconsistent": False, "message": f"{type(error).__name__}: {error}"}
         write_frame(answers, answer)
 
@@ -149,7 +151,7 @@ def main() -> None:
     jars = [str(path) for path in sorted(folder.glob("*.jar"))]
     try:
         pellet = Pellet(jvm, jars)
-    except Exception as error:  # noqa: BLE001 - the parent tells its user
+    except Exception as error:  # the parent tells its user
         write_frame(answers, {"ok": False, "inconsistent": False, "message": f"the JVM does not start: {error}"})
         sys.exit(1)
     write_frame(answers, {"ok": True})

@@ -96,8 +96,8 @@ def plan(
     fresh = [c for c in deployable if c.design.name not in situation.tried or c.design.name == situation.current]
     if fit:
         degraded, best = False, fit[0]
-        reason = f"{best.design.name} has the highest utility ({best.utility:g}) of {_count(len(fit), 'design')}"
-        reason += " that can be deployed and keep every limit"
+        reason = f"{best.design.name} has the highest utility ({best.utility:g}) of the {len(fit)} (out of "
+        reason += f"{len(candidates)}) designs that can be deployed and keep every limit"
         if len(fit) > 1 and fit[1].utility == best.utility and running:
             reason += f", and is a smaller change than {fit[1].design.name}, which is as useful"
     elif deployable:
@@ -108,7 +108,7 @@ def plan(
             reason += ", and all were tried before"
     else:
         missing = sorted({c for components in situation.unrealisable.values() for c in components})
-        reason = f"no design can be deployed without {', '.join(missing)}" if missing else "no design solves the function"
+        reason = f"no design can be deployed without {', '.join(missing)}" if missing else "no design is known"
         return Plan(None, False, tuple(sorted(candidates, key=by_violation)), reason)
     chosen = replace(best, chosen=True, refused_because="")
     others = sorted((c for c in candidates if c is not best), key=lambda c: (bool(c.refused_because), *by_use(c)))
@@ -127,8 +127,8 @@ def utility_of(quality: str, direction: Direction = Direction.HIGHER_IS_BETTER) 
 def difference(first: Design, second: Design) -> float:
     """Return how big a change it is from one design to the other: components first, then expected levels."""
     components = len(first.components ^ second.components)
-    shared = set(first.expected) & set(second.expected)
-    return components + math.dist([first.expected[q] for q in sorted(shared)], [second.expected[q] for q in sorted(shared)])
+    shared = sorted(set(first.expected) & set(second.expected))
+    return components + math.dist([first.expected[q] for q in shared], [second.expected[q] for q in shared])
 
 
 def _judge(objective: Objective, design: Design, situation: Situation, utility: Utility) -> Candidate:

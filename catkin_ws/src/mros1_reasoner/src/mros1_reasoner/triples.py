@@ -39,7 +39,7 @@ def read_triples(path: Path) -> list[Triple]:
         graph.parse(io.BytesIO(data), default_base=path.resolve().as_uri())
         saved = io.BytesIO()
         world.save(saved, format="ntriples")
-    except Exception as error:  # noqa: BLE001 - owlready2's parsers raise whatever their parts do
+    except Exception as error:  # owlready2's parsers raise whatever their parts do
         reason = " ".join(str(error).split()) or type(error).__name__
         raise TripleError(f"{path}: is not an OWL file ({reason}): save it as RDF/XML") from error
     finally:

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import actionlib
@@ -135,7 +136,7 @@ class RosPlatform:
             name = rospy.resolve_name(node)
             if NodeApi.is_answering(name):
                 NodeApi.request_shutdown(name, "replaced by another configuration")
-                if not wait_until(lambda name=name: not NodeApi.is_answering(name), self._ready_timeout):
+                if not wait_until(partial(_is_gone, name), self._ready_timeout):
                     raise DeploymentError(f"node {name} does not end")
 
     def start(self, configuration: Configuration) -> None:
@@ -151,7 +152,7 @@ class RosPlatform:
             raise DeploymentError(answer.message)
         deadline = time.monotonic() + self._ready_timeout
         for node in answer.nodes:
-            if not wait_until(lambda node=node: NodeApi.is_answering(node), deadline - time.monotonic()):
+            if not wait_until(partial(NodeApi.is_answering, node), deadline - time.monotonic()):
                 raise DeploymentError(f"node {node} is not up within {self._ready_timeout:g} s; see its log")
         if self._goal:
             goal = self._goal
@@ -249,6 +250,10 @@ class Manipulator:
         if lost:
             rospy.logwarn("rosgraph_launcher came back without %s: deploying it again", lost.name)
             threading.Thread(target=self._deploy, args=(lost,), daemon=True).start()
+
+
+def _is_gone(node: str) -> bool:
+    return not NodeApi.is_answering(node)
 
 
 def _message_class(name: str) -> Any:

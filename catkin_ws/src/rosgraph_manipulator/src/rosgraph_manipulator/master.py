@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import socket
 import xmlrpc.client
+from typing import Any
 
 import rosgraph
 
@@ -31,8 +32,9 @@ class NodeApi:
         """Tell whether a node is registered at the master and answers."""
         try:
             uri = rosgraph.Master(cls.CALLER).lookupNode(name)
-            code, _, _ = xmlrpc.client.ServerProxy(uri, transport=_Transport()).getPid(cls.CALLER)
-        except (rosgraph.MasterException, OSError, xmlrpc.client.Error, http.client.HTTPException, ValueError):
+            answer: Any = xmlrpc.client.ServerProxy(uri, transport=_Transport()).getPid(cls.CALLER)
+            code = answer[0]
+        except (rosgraph.MasterException, OSError, xmlrpc.client.Error, http.client.HTTPException, LookupError):
             return False
         return bool(code == 1)
 
@@ -42,7 +44,7 @@ class NodeApi:
         try:
             uri = rosgraph.Master(cls.CALLER).lookupNode(name)
             xmlrpc.client.ServerProxy(uri, transport=_Transport()).shutdown(cls.CALLER, reason)
-        except (rosgraph.MasterException, xmlrpc.client.Error, socket.gaierror, ConnectionRefusedError, ValueError):
+        except (rosgraph.MasterException, xmlrpc.client.Error, socket.gaierror, ConnectionRefusedError):
             return False
         except (OSError, http.client.HTTPException):
             return True  # it may go down before it has answered

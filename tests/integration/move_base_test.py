@@ -1,0 +1,281 @@
+#!/usr/bin/env python3
+"""move_base as a node: goals and reasons, restarts with a goal at work, silent sensors. The test plays the robot."""
+
+import base64
+import io
+import math
+import signal
+import subprocess
+import threading
+import time
+import unittest
+import xmlrpc.client
+
+import actionlib
+import numpy as np
+import rosgraph
+import rospy
+import rostest
+import tf2_ros
+from actionlib_msgs.msg import GoalStatus
+from geometry_msgs.msg import PoseStamped, TransformStamped, Twist
+from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseGoal
+from nav_msgs.msg import OccupancyGrid, Odometry, Path
+from nav_msgs.srv import GetPlan
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import LaserScan
+
+DEADLINE_S = 20
+HALF_ROOM = 5.0
+PERIOD = 0.02
+
+
+def wait_for(condition, what, seconds=DEADLINE_S):
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.02)
+    raise AssertionError(f"not within {seconds} s: {what}")
+
+
+def pose(x, y, frame="map"):
+    stamped = PoseStamped()
+    stamped.header.frame_id = frame
+    stamped.pose.position.x, stamped.pose.position.y = x, y
+    stamped.pose.orientation.w = 1.0
+    return stamped
+
+
+class Robot:
+    """A base in an empty square room: integrates cmd_vel, publishes tf, odometry, map and scan."""
+
+    def __init__(self):
+        self.x = self.y = self.yaw = 0.0
+        self.command = Twist()
+        self.commands = []
+        self.silent = False
+        self._tf = tf2_ros.TransformBroadcaster()
+        self._odometry = rospy.Publisher("odometry/filtered", Odometry, queue_size=1)
+        self._scan = rospy.Publisher("front/scan", LaserScan, queue_size=1)
+        self._map = rospy.Publisher("map", OccupancyGrid, queue_size=1, latch=True)
+        self._map.publish(self._room())
+        rospy.Subscriber("cmd_vel", Twist, self._on_command)
+        threading.Thread(target=self._run, daemon=True).start()
+
+    @staticmethod
+    def _room():
+        grid = OccupancyGrid()
+        grid.header.frame_id = "map"
+        cells = np.zeros((220, 220), dtype=np.int8)
+        cells[:10] = cells[-10:] = cells[:, :10] = cells[:, -10:] = 100
+        grid.info.resolution, grid.info.width, grid.info.height = 0.05, 220, 220
+        grid.info.origin.position.x = grid.info.origin.position.y = -5.5
+        grid.info.origin.orientation.w = 1.0
+        grid.data = cells.ravel().tolist()
+        return grid
+
+    def _on_command(self, twist):
+        self.command = twist
+        self.commands.append((time.monotonic(), twist))
+
+    def _run(self):
+        count = 0
+        while not rospy.is_shutdown():
+            v = self.command
+            cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+            self.x += (cos * v.linear.x - sin * v.linear.y) * PERIOD
+            self.y += (sin * v.linear.x + cos * v.linear.y) * PERIOD
+            self.yaw += v.angular.z * PERIOD
+            now = rospy.Time.now()
+            self._tf.sendTransform(
+                [
+                    self._transform("map", "odom", now, (0.0, 0.0, 0.0)),
+                    self._transform("odom", "base_link", now, (self.x, self.y, self.yaw)),
+                    self._transform("base_link", "front_laser", now, (0.4, 0.0, 0.0)),
+                ]
+            )
+            odometry = Odometry(child_frame_id="base_link")
+            odometry.header.stamp, odometry.header.frame_id = now, "odom"
+            odometry.twist.twist = v
+            self._odometry.publish(odometry)
+            if count % 5 == 0 and not self.silent:
+                self._publish_scan(now)
+            count += 1
+            time.sleep(PERIOD)
+
+    def _publish_scan(self, now):
+        scan = LaserScan(angle_min=-2.35, angle_increment=0.01, range_min=0.05, range_max=10.0)
+        scan.header.stamp, scan.header.frame_id = now, "front_laser"
+        angles = self.yaw + scan.angle_min + scan.angle_increment * np.arange(471)
+        x, y = self.x + 0.4 * math.cos(self.yaw), self.y + 0.4 * math.sin(self.yaw)
+        with np.errstate(divide="ignore"):
+            to_x = (np.sign(np.cos(angles)) * HALF_ROOM - x) / np.cos(angles)
+            to_y = (np.sign(np.sin(angles)) * HALF_ROOM - y) / np.sin(angles)
+        scan.ranges = np.minimum(to_x, to_y).tolist()
+        self._scan.publish(scan)
+
+    @staticmethod
+    def _transform(parent, child, stamp, values):
+        transform = TransformStamped(child_frame_id=child)
+        transform.header.frame_id, transform.header.stamp = parent, stamp
+        transform.transform.translation.x, transform.transform.translation.y = values[:2]
+        transform.transform.rotation.z = math.sin(values[2] / 2)
+        transform.transform.rotation.w = math.cos(values[2] / 2)
+        return transform
+
+
+class MoveBaseTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("move_base_test")
+        cls.log = []
+        cls.goals = []
+        rospy.Subscriber("/rosout", Log, lambda message: cls.log.append(message.msg))
+        rospy.Subscriber("move_base/goal", MoveBaseActionGoal, cls.goals.append)
+        cls.robot = Robot()
+        cls.client = actionlib.SimpleActionClient("move_base", MoveBaseAction)
+        cls.process = None
+        cls.start()
+        assert cls.client.wait_for_server(rospy.Duration(DEADLINE_S))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.stop()
+
+    def setUp(self):
+        self.robot.x = self.robot.y = self.robot.yaw = 0.0
+        self.robot.silent = False
+
+    @classmethod
+    def start(cls):
+        cls.process = subprocess.Popen(["/usr/bin/rosrun", "move_base", "move_base", "__name:=move_base"])
+
+    @classmethod
+    def stop(cls, how=signal.SIGINT):
+        cls.process.send_signal(how)
+        cls.process.wait(timeout=DEADLINE_S)
+
+    def send(self, x, y, frame="map"):
+        self.client.send_goal(MoveBaseGoal(target_pose=pose(x, y, frame)))
+
+    def finish(self):
+        self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)), "the goal has no result")
+        return self.client.get_state(), self.client.get_goal_status_text()
+
+    def moving(self):
+        return wait_for(lambda: self.robot.command.linear.x > 0.2, "the robot moves")
+
+    def restart_with(self, parameter):
+        rospy.set_param("move_base/resume_goal", parameter)
+        self.start()
+        wait_for(lambda: not rospy.has_param("move_base/resume_goal"), "the parameter is deleted")
+
+    def test_goal_is_reached_and_the_base_stands(self):
+        self.send(1.5, 1.0)
+        self.assertEqual(self.finish(), (GoalStatus.SUCCEEDED, "Goal reached."))
+        self.assertLess(math.hypot(self.robot.x - 1.5, self.robot.y - 1.0), 0.3)
+        wait_for(lambda: self.robot.command == Twist(), "the last command is zero", 1.0)
+
+    def test_goal_survives_a_restart_unnoticed_by_its_client(self):
+        states = set()
+        goal = MoveBaseGoal(target_pose=pose(2.5, 0.0))
+        self.client.send_goal(goal, active_cb=lambda: states.add("active"))
+        self.moving()
+        sent = wait_for(lambda: self.goals and self.goals[-1], "the goal was seen")
+        uri = rosgraph.Master("/test").lookupNode("/move_base")
+        xmlrpc.client.ServerProxy(uri).shutdown("/test", "restart")
+        self.process.wait(timeout=DEADLINE_S)
+        self.assertEqual(self.robot.command, Twist(), "the last command of the old node is zero")
+        buffer = io.BytesIO()
+        sent.serialize(buffer)
+        data = base64.b64encode(buffer.getvalue()).decode()
+        self.restart_with({"type": "move_base_msgs/MoveBaseActionGoal", "data": data})
+        while not self.client.wait_for_result(rospy.Duration.from_sec(0.05)):
+            states.add(self.client.get_state())
+        self.assertEqual(self.finish()[0], GoalStatus.SUCCEEDED)
+        self.assertEqual(states, {"active", GoalStatus.ACTIVE})
+        self.assertGreater(self.robot.x, 2.2)
+
+    def test_malformed_goal_to_resume_is_ignored(self):
+        self.stop()
+        self.restart_with({"type": "move_base_msgs/MoveBaseActionGoal", "data": "?"})
+        wait_for(lambda: any("resume_goal ignored" in line for line in self.log), "a warning")
+        self.send(0.6, 0.0)
+        self.assertEqual(self.finish()[0], GoalStatus.SUCCEEDED)
+
+    def test_silent_laser_stops_the_base_and_ends_the_goal_with_the_reason(self):
+        self.send(3.0, 0.0)
+        self.moving()
+        self.robot.silent = True
+        state, text = self.finish()
+        self.assertEqual(state, GoalStatus.ABORTED)
+        self.assertEqual(text, "no current data from front/scan for 1.5 s")
+        self.assertLess(self.robot.x, 2.0)
+        stale_from = time.monotonic() - 1.2
+        self.assertFalse([twist for when, twist in self.robot.commands if when > stale_from and twist != Twist()])
+
+    def test_bad_goals_end_with_a_reason(self):
+        for x, frame, state, words in (
+            (math.nan, "map", GoalStatus.REJECTED, "not finite"),
+            (1.0, "", GoalStatus.REJECTED, "no frame_id"),
+            (1.0, "nowhere", GoalStatus.ABORTED, "'nowhere' has no transform"),
+            (50.0, "map", GoalStatus.ABORTED, "outside the map"),
+            (5.2, "map", GoalStatus.ABORTED, "in a wall"),
+        ):
+            with self.subTest(words):
+                self.send(x, 0.0, frame)
+                got, text = self.finish()
+                self.assertEqual(got, state, text)
+                self.assertIn(words, text)
+
+    def test_newer_goal_preempts_and_cancel_stops(self):
+        self.send(2.0, 0.0)
+        first = self.client.gh
+        self.moving()
+        other = actionlib.SimpleActionClient("move_base", MoveBaseAction)
+        other.wait_for_server(rospy.Duration(DEADLINE_S))
+        other.send_goal(MoveBaseGoal(target_pose=pose(0.0, 2.0)))
+        wait_for(lambda: first.get_goal_status() == GoalStatus.PREEMPTED, "the first goal is preempted")
+        self.assertEqual(first.get_goal_status_text(), "preempted by a newer goal")
+        other.cancel_goal()
+        self.assertTrue(other.wait_for_result(rospy.Duration(DEADLINE_S)))
+        self.assertEqual(other.get_state(), GoalStatus.PREEMPTED)
+        wait_for(lambda: self.robot.command == Twist(), "the base stands", 1.0)
+
+    def test_simple_goal_becomes_an_action_goal_and_a_plan(self):
+        plans = []
+        subscriber = rospy.Subscriber("move_base/NavfnROS/plan", Path, plans.append)
+        publisher = rospy.Publisher("move_base_simple/goal", PoseStamped, queue_size=1)
+        wait_for(lambda: publisher.get_num_connections() and subscriber.get_num_connections(), "connections")
+        count = len(self.goals)
+        publisher.publish(pose(1.0, 0.0))
+        wait_for(lambda: plans, "a plan")
+        self.assertEqual(plans[-1].header.frame_id, "map")
+        self.assertTrue(self.goals[count].goal_id.id)
+        self.client.cancel_all_goals()
+
+    def test_make_plan_answers(self):
+        rospy.wait_for_service("move_base/make_plan", DEADLINE_S)
+        make_plan = rospy.ServiceProxy("move_base/make_plan", GetPlan)
+        plan = wait_for(lambda: make_plan(pose(0.0, 0.0), pose(3.0, 2.0), 0.0).plan.poses, "a plan")
+        self.assertAlmostEqual(plan[-1].pose.position.x, 3.0)
+        self.assertFalse(make_plan(pose(0.0, 0.0), pose(30.0, 2.0), 0.0).plan.poses)
+
+    def test_bad_parameter_ends_the_node_with_its_name(self):
+        rospy.set_param("other/controller_frequency", "fast")
+        process = subprocess.run(
+            ["/usr/bin/rosrun", "move_base", "move_base", "__name:=other"],
+            capture_output=True,
+            text=True,
+            timeout=DEADLINE_S,
+            check=False,
+        )
+        self.assertEqual(process.returncode, 2)
+        self.assertIn("~controller_frequency: must be a number, is 'fast'", process.stdout + process.stderr)
+        self.assertNotIn("Traceback", process.stderr)
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "move_base", MoveBaseTest)
