@@ -161,8 +161,8 @@ def _draw_quality(axis: Axes, record: MissionRecord, summary: dict[str, Any], na
         axis.axvspan(min(strikes), end - start, color=_FAILURE, alpha=0.10, linewidth=0, label="contingency")
     for number, entry in enumerate(summary["reconfigurations"], start=1):
         done = entry["stamp_s"] + (entry["execute_s"] or 0.0)
-        label = "reconfiguration" if number == 1 else None
-        axis.axvspan(entry["stamp_s"], done, color="#ffb000", alpha=0.6, linewidth=1.5, zorder=0, label=label)
+        legend = "reconfiguration" if number == 1 else None
+        axis.axvspan(entry["stamp_s"], done, color="#ffb000", alpha=0.6, linewidth=1.5, zorder=0, label=legend)
         axis.annotate(
             f"{number}: {entry['to']}", (done, 1.0), xytext=(4, -2), textcoords="offset points", fontsize=9, va="top"
         )

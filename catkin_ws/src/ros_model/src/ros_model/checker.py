@@ -88,7 +88,8 @@ def _references(system: RosSystem) -> Iterator[Finding]:
     for component in system.components:
         if component.node and not component.node.node:
             yield Finding(f"reference '{component.node}' is not package.artifact.node", component.position)
-        for element in (*component.ports, *component.parameters):
+        elements: tuple[Port | RosParameter, ...] = (*component.ports, *component.parameters)
+        for element in elements:
             if element.reference and not element.reference.name:
                 yield Finding(f"reference '{element.reference}' is not package.artifact.node.name", element.position)
 
