@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING
 from ros_model.metamodel import ConnectionKind, PortKind
 
 if TYPE_CHECKING:
-    from ros_model.metamodel import Component, Connection, ParameterType, PortPath, Position, RosSystem, Value
+    from ros_model.metamodel import (
+        Component,
+        Connection,
+        ParameterType,
+        Port,
+        PortPath,
+        Position,
+        RosParameter,
+        RosSystem,
+        Value,
+    )
 
 _ENDS = {
     ConnectionKind.TOPIC: (PortKind.PUBLISHER, PortKind.SUBSCRIBER),
