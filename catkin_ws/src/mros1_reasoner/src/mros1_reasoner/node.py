@@ -203,7 +203,7 @@ class ReasonerNode:
         if self._client is None:
             self._report(decision.id, True)
             return
-        if not self._client.wait_for_server(rospy.Duration(nsecs=1)):
+        if not self._client.wait_for_server(rospy.Duration(-1)):  # one look, without waiting
             message = f"the manipulator's action server {self._client.ns} is not there"
             self._report(decision.id, False, message, blame=False)
             return

@@ -1,0 +1,47 @@
+"""Fixtures of the reasoner's tests: one warm Pellet for all of them."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from mros1_reasoner.knowledge_base import KnowledgeBase
+from mros1_reasoner.model import Direction
+from mros1_reasoner.pellet import PelletReasoner
+from reasoner_helpers import application
+
+DIRECTIONS = {"performance": Direction.HIGHER_IS_BETTER}
+
+
+@pytest.fixture(scope="session")
+def pellet():
+    reasoner = PelletReasoner()
+    yield reasoner
+    reasoner.close()
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Return a function that makes a knowledge base of the text of a model."""
+
+    def make(text=None, vocabularies=(), **files):
+        path = tmp_path / "app.owl"
+        path.write_text(text if text is not None else application())
+        for name, content in files.items():
+            (tmp_path / f"{name}.owl").write_text(content)
+        return KnowledgeBase([path], vocabularies, DIRECTIONS)
+
+    return make
+
+
+@pytest.fixture
+def knowledge_base(load):
+    return load()
+
+
+@pytest.fixture
+def reasoner(pellet, knowledge_base):
+    pellet.load(knowledge_base.ontology)
+    return pellet
