@@ -51,6 +51,9 @@ ROTATE_SPEED = 1.0
 """Speed of the recovery's turn, rad/s: rotate_recovery's default."""
 
 
+QUIET_WAIT = 0.5
+"""Waiting is worth a warning after this time, s: the first messages after a start take a few tenths."""
+
 ROTATE_PATIENCE = 15.0
 """The recovery's turn is given up after this time, s: over twice what it takes."""
 
@@ -375,7 +378,7 @@ class Navigator:
         self._work.restart_patience(now)
         if waited >= max(self.parameters.planner_patience, 5.0):
             return self._abort(robot, f"{reason} for {waited:.1f} s")
-        return Result(velocity=STOP, robot=robot, warning=f"Waiting: {reason}")
+        return Result(velocity=STOP, robot=robot, warning=f"Waiting: {reason}" if waited > QUIET_WAIT else "")
 
     def _stale_reason(self, now: float) -> str:
         """Names the source whose data are too old, or returns an empty text.
@@ -395,7 +398,7 @@ class Navigator:
         self._work.restart_patience(now)
         if waited >= self.parameters.controller_patience:
             return self._abort(robot, f"{reason} for {waited:.1f} s")
-        return Result(velocity=STOP, robot=robot, warning=f"Standing still: {reason}")
+        return Result(velocity=STOP, robot=robot, warning=f"Standing still: {reason}" if waited > QUIET_WAIT else "")
 
     def _fresh_again(self, now: float) -> None:
         if self._work.stale_since is not None:
