@@ -51,7 +51,9 @@ def test_design_without_function_is_named(load):
 
 
 def test_design_without_levels_is_named(load, caplog):
-    load(application(extra='<t:FunctionDesign rdf:about="#bare"><t:solvesF rdf:resource="#f_move"/></t:FunctionDesign>'))
+    load(
+        application(extra='<t:FunctionDesign rdf:about="#bare"><t:solvesF rdf:resource="#f_move"/></t:FunctionDesign>')
+    )
     assert "bare has no expected quality levels" in caplog.text
 
 
@@ -101,7 +103,8 @@ def test_other_rules_of_a_model_stay(load, pellet):
 
 def test_asserted_statuses_are_lifted(load, pellet):
     extra = (
-        '<t:Objective rdf:about="#o_move"><t:typeF rdf:resource="#f_move"/><t:o_status>UPDATABLE</t:o_status></t:Objective>'
+        '<t:Objective rdf:about="#o_move"><t:typeF rdf:resource="#f_move"/>'
+        "<t:o_status>UPDATABLE</t:o_status></t:Objective>"
         '<rdf:Description rdf:about="#laser"><t:c_status>FALSE</t:c_status></rdf:Description>'
         '<rdf:Description rdf:about="#scan_slow">'
         '<t:fd_realisability rdf:datatype="http://www.w3.org/2001/XMLSchema#boolean">true</t:fd_realisability>'

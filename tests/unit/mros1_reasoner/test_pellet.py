@@ -38,10 +38,13 @@ def wait_for(condition):
     statuses=st.dictionaries(st.sampled_from(["laser", "camera", "base"]), STATUSES, min_size=1),
     broken=st.booleans(),
 )
-def test_child_infers_what_owlready2_infers(load, pellet, designs, levels, statuses, broken):
+def test_child_infers_what_owlready2_infers(load, pellet, **drawn):
+    designs, levels, statuses = drawn["designs"], drawn["levels"], drawn["statuses"]
     extra = "".join(f'<t:Component rdf:about="#{name}"/>' for name in ("laser", "camera", "base"))
     knowledge_base = load(application(designs, extra))
-    facts = Facts((OBJECTIVE,), {"o_move": min(designs)}, levels, statuses, frozenset({"o_move"} if broken else ()))
+    facts = Facts(
+        (OBJECTIVE,), {"o_move": min(designs)}, levels, statuses, frozenset({"o_move"} if drawn["broken"] else ())
+    )
     pellet.load(knowledge_base.ontology)
     reference = OwlreadyReasoner()
     reference.load(knowledge_base.ontology)

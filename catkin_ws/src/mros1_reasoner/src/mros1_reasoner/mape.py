@@ -134,6 +134,7 @@ class Mape:
         utility: Utility | None = None,
         distance: Distance = difference,
         wall: Callable[[], float] = time.perf_counter,
+        clock: Callable[[], float] | None = None,
         name: str = "decision",
     ) -> None:
         """Start with no function deployed.
@@ -146,6 +147,7 @@ class Mape:
             utility: of a design; else the expected level of the quality that the settings name.
             distance: how big a change it is from one design to another.
             wall: wall clock that measures durations, s.
+            clock: ROS time, for the stamps of what takes time within a step; without it, they are the step's.
             name: beginning of the decisions' ids.
         """
         self._kb = knowledge_base
@@ -156,6 +158,7 @@ class Mape:
         self._utility = utility or utility_of(named, *([knowledge_base.qualities[named]] if self._knows(named) else []))
         self._distance = distance
         self._wall = wall
+        self._clock = clock
         self._name = name
         self._count = 0
         self._running = {objective: _Running() for objective in self.objectives}
@@ -287,11 +290,12 @@ class Mape:
         began = self._wall()
         analysis = self._kb.analyse(facts, self._reasoner)
         analyse_wall = self._wall() - began
+        analysed = self._stamp(now)
         self.facts, self.analysis = facts, analysis
         self._analysed, self._seen = facts, seen
         decisions = []
         for objective in self.objectives.values():
-            decision = self._decide(objective, now, analyse_wall)
+            decision = self._decide(objective, now, analysed, analyse_wall)
             if decision is None:
                 continue
             decisions.append(decision)
@@ -371,6 +375,9 @@ class Mape:
 
     # Parts
 
+    def _stamp(self, now: float) -> float:
+        return max(now, self._clock()) if self._clock else now
+
     def _knows(self, quality: str) -> bool:
         return quality in self._kb.qualities
 
@@ -440,7 +447,7 @@ class Mape:
             if component.status == v.RECOVERED:
                 self._components[name] = _Component(v.WORKS, component.stamp)
 
-    def _decide(self, objective: Objective, now: float, analyse_wall: float) -> Decision | None:
+    def _decide(self, objective: Objective, now: float, analysed: float, analyse_wall: float) -> Decision | None:
         running = self._running[objective.name]
         result = self.analysis.objectives[objective.name]
         if self._is_busy(running, now) or now < running.not_before:
@@ -453,12 +460,15 @@ class Mape:
             if name == objective.name:
                 reason = "did not keep a limit while deployed"
                 self._error_log[design, name] = now + self.settings.error_log_expiry, reason
+        broken = _is_broken(running)
+        if broken and running.design:
+            self._error_log[running.design, objective.name] = now + self.settings.error_log_expiry, "did not run"
         began = self._wall()
         outcome = self._plan(objective, running, now)
         plan_wall = self._wall() - began
         stamp, trigger, _ = min(causes)
         words = tuple(words for _, _, words in sorted(causes))
-        stays = outcome.choice is None or outcome.choice == running.design
+        stays = outcome.choice is None or (outcome.choice == running.design and not broken)
         if result.causes == {v.UPDATABLE} and (stays or not self._improves(running, outcome)):
             return None
         if stays:
@@ -482,8 +492,8 @@ class Mape:
             candidates=outcome.candidates,
             explanation=f"{objective.name}: {'; '.join(words)}: {change}: {outcome.reason}",
             stamp_monitored=stamp,
-            stamp_analysed=now,
-            stamp_planned=now,
+            stamp_analysed=analysed,
+            stamp_planned=self._stamp(now),
             analyse_wall_s=analyse_wall,
             plan_wall_s=plan_wall,
             wall_began=self._wall(),
@@ -538,7 +548,7 @@ class Mape:
             directions=self._kb.qualities,
             unrealisable=self.analysis.unrealisable,
             tried=tried,
-            current=running.design,
+            current=None if _is_broken(running) else running.design,
             observed={q: level.value for (name, q), level in self._levels.items() if name == objective.name},
         )
         return plan(objective, designs, situation, self._utility, self._distance)

@@ -69,6 +69,7 @@ class ReasonerNode:
             self._reasoner,
             objectives,
             settings,
+            clock=rospy.get_time,
             name=f"{rospy.get_name().strip('/')}-{int(time.time())}",
         )
         for objective in objectives:
@@ -276,9 +277,12 @@ class ReasonerNode:
 
 def main() -> None:
     """Run the node; exit status 2 when it can't start."""
-    logging.getLogger("mros1_reasoner").setLevel(logging.INFO)
     try:
         rospy.init_node("reasoner")
+        logger = logging.getLogger("mros1_reasoner")
+        logger.setLevel(logging.INFO)
+        logger.propagate = False
+        logger.addHandler(_RosLog())
         node = ReasonerNode()
     except (ParameterError, KnowledgeBaseError, ReasonerError, ModelError, rospy.ROSInitException) as error:
         sys.stderr.write(f"reasoner: {' '.join(str(error).split())}\n")
@@ -289,6 +293,15 @@ def main() -> None:
         node.run()
     finally:
         node.close()
+
+
+class _RosLog(logging.Handler):
+    """Takes what the core logs to rosout."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Log a record as the node's own."""
+        log = rospy.logwarn if record.levelno >= logging.WARNING else rospy.loginfo
+        log(_LOG, record.getMessage())
 
 
 def _candidate(candidate: Any) -> messages.Candidate:

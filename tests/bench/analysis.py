@@ -1,0 +1,95 @@
+"""One analysis (R2), from facts to statuses, beside owlready2's own call of Pellet on the same knowledge base."""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from mros1_reasoner.knowledge_base import KnowledgeBase
+from mros1_reasoner.model import Facts, Objective
+from mros1_reasoner.owlready_reasoner import run_pellet
+from mros1_reasoner.pellet import PelletReasoner
+
+SIZES = {30: 60, 300: 60, 1000: 60}  # number of FunctionDesigns -> samples
+WARM_UP = 40  # analyses; the JVM compiles what runs often
+PEER_SAMPLES = 3
+QUALITIES = ("safety", "energy", "performance")
+_HEAD = """<rdf:RDF xml:base="http://example.org/bench" xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+  xmlns:owl="http://www.w3.org/2002/07/owl#" xmlns:t="http://metacontrol.org/tomasys#" xmlns:m="http://ros/mros#">
+<owl:Ontology rdf:about="http://example.org/bench"/><t:Function rdf:about="#f"/>
+"""
+
+
+def run() -> list[dict]:
+    """Measure at every size; times in s."""
+    return [_measure(count, samples) for count, samples in SIZES.items()]
+
+
+def _measure(count: int, samples: int) -> dict:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bench.owl"
+        path.write_text(_model(count))
+        knowledge_base = KnowledgeBase([path])
+    reasoner = PelletReasoner()
+    try:
+        reasoner.load(knowledge_base.ontology)
+        for i in range(WARM_UP):
+            knowledge_base.analyse(_facts(i), reasoner)
+        ours = [_timed(lambda i=i: knowledge_base.analyse(_facts(i), reasoner)) for i in range(samples)]
+    finally:
+        reasoner.close()
+    peers = []
+    for i in range(PEER_SAMPLES):
+        world = knowledge_base.world(_facts(i))
+        peers.append(_timed(lambda world=world: run_pellet(world)))
+        world.close()
+    value, peer = statistics.median(ours), statistics.median(peers)
+    return {
+        "name": f"analysis_{count}",
+        "value": value,
+        "unit": "s",
+        "peer": "owlready2 sync_reasoner_pellet",
+        "peer_value": peer,
+        "ratio": peer / value,
+        "samples": samples,
+    }
+
+
+def _timed(action: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    action()
+    return time.perf_counter() - began
+
+
+def _facts(i: int) -> Facts:
+    """Return facts that change from one analysis to the next: a level, a component that fails and comes back."""
+    return Facts(
+        objectives=(Objective("o", "f", {"safety": 0.6, "energy": 0.62}),),
+        groundings={"o": "fd1"},
+        levels={("o", "safety"): 0.5 + i % 20 / 100, ("o", "energy"): 0.5},
+        components={"laser": "FALSE" if i % 2 else "TRUE", "camera": "TRUE"},
+    )
+
+
+def _model(count: int) -> str:
+    """Return a model like D2's: every fifth design by camera, the others by laser, all by the base."""
+    parts = [_HEAD, *(f'<t:QualityAttributeType rdf:about="#{quality}"/>' for quality in QUALITIES)]
+    for i in range(count):
+        levels = "".join(
+            f'<t:hasQAestimation><t:QAvalue rdf:about="#fd{i}_{quality}"><t:isQAtype rdf:resource="#{quality}"/>'
+            f'<t:hasValue rdf:datatype="http://www.w3.org/2001/XMLSchema#decimal">0.{i % 10}</t:hasValue></t:QAvalue>'
+            "</t:hasQAestimation>"
+            for quality in QUALITIES
+        )
+        parts.append(f'<t:FunctionDesign rdf:about="#fd{i}"><t:solvesF rdf:resource="#f"/>{levels}</t:FunctionDesign>')
+    for name, designs in (
+        ("laser", [i for i in range(count) if i % 5]),
+        ("camera", range(0, count, 5)),
+        ("base", range(count)),
+    ):
+        links = "".join(f'<m:requiredBy rdf:resource="#fd{i}"/>' for i in designs)
+        parts.append(f'<t:Component rdf:about="#{name}">{links}</t:Component>')
+    return "\n".join([*parts, "</rdf:RDF>"])
