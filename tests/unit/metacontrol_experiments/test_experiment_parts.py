@@ -1,5 +1,6 @@
 """Routes, commit, timeline, processes, the figure and the command's refusals."""
 
+import socket
 import struct
 import sys
 
@@ -206,3 +207,14 @@ def test_bad_input_is_refused_with_status_2(arguments, tmp_path):
     assert result.exit_code == 2
     assert result.exception is None or isinstance(result.exception, SystemExit)
     assert not (tmp_path / "out").exists()
+
+
+def test_port_in_use_is_refused_with_one_line(tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        result = CliRunner().invoke(cli.metacontrol, ["run", "--port", str(port), "--output", str(tmp_path)])
+    assert result.exit_code == 2
+    assert f"port {port} is in use" in result.output
+    assert len(result.output.strip().splitlines()) == 1

@@ -78,6 +78,7 @@ class _Number(click.FloatRange):
 @click.option(
     "--output", type=click.Path(file_okay=False, path_type=Path), default=Path("results/mission"), show_default=True
 )
+@click.option("--port", type=click.IntRange(1, 65535), help="Of the run's own ROS master; a free one by default.")
 @click.option("--gui", is_flag=True, help="Show the simulator's window.")
 @click.option("--rviz", is_flag=True, help="Show RViz.")
 @click.option("--quiet", is_flag=True, help="Say nothing but errors.")
@@ -89,6 +90,8 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
     console = Console(highlight=False)
     try:
         settings = _settings(output, options)
+        for name in (SUMMARY_NAME, FIGURE_NAME):  # those of an earlier run
+            (output / name).unlink(missing_ok=True)
         with Display(console, quiet) as display:
             state = run_mission(settings, display)
         record = read_record(output / BAG_NAME)
@@ -171,6 +174,7 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
         thresholds={"safety": options["nfr_safety"], "energy": options["nfr_energy"]},
         gui=options["gui"],
         rviz=options["rviz"],
+        port=options["port"],
         commit=current_commit(),
     )
 

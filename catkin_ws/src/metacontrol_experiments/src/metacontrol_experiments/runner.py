@@ -12,7 +12,7 @@ from roslib.packages import find_node
 from rospkg import ResourceNotFound
 
 from metacontrol_experiments.bag import TOPICS
-from metacontrol_experiments.processes import ProcessTree, free_port
+from metacontrol_experiments.processes import ProcessTree, free_port, is_free
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,7 +53,11 @@ def run_mission(settings: Settings, display: Display) -> State:
         folder.mkdir(parents=True, exist_ok=True)
     for old in (bag, bag.with_name(bag.name + ".active")):
         old.unlink(missing_ok=True)
-    port = free_port()
+    if settings.port is not None and not is_free(settings.port):
+        raise RunError(
+            f"--port: port {settings.port} is in use or not allowed: choose another, or leave the option out"
+        )
+    port = settings.port or free_port()
     environment = {
         "ROS_MASTER_URI": f"http://localhost:{port}",
         "ROS_HOSTNAME": "localhost",

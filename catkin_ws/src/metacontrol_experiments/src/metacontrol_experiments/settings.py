@@ -33,6 +33,7 @@ class Settings:
         thresholds: QA name -> level that must not be exceeded.
         gui: show the simulator's window.
         rviz: start RViz.
+        port: of the master; None for a free one.
         commit: of the code that runs.
     """
 
@@ -50,6 +51,7 @@ class Settings:
     thresholds: dict[str, float] = field(default_factory=lambda: dict(DEFAULT_THRESHOLDS))
     gui: bool = False
     rviz: bool = False
+    port: int | None = None
     commit: str = "unknown"
 
     @property
