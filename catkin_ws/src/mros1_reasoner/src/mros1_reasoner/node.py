@@ -32,7 +32,8 @@ from mros1_reasoner.reasoner import Reasoner, ReasonerError
 
 _LOG = "[RosReasoner] -- %s"
 _WARN_PERIOD = 10.0  # s, wall, between two warnings of the same text
-_TIMER_PERIOD = 0.05  # s, wall, between two looks at ROS time while the core waits for a moment
+_TIMER_PERIOD = 0.02  # s, wall, the shortest between two looks at ROS time while the core waits for a moment
+_FASTEST = 10.0  # ROS time may run so much faster than wall time
 _MASTER_PERIOD = 1.0  # s, wall, between two looks at the master
 _WARM_UP = 4  # analyses before the node is ready: the JVM compiles what it has run
 _QUEUE = 1000  # messages that wait at most
@@ -104,11 +105,16 @@ class ReasonerNode:
             self._drain()
             self._check_deadline()
             self._step(heartbeat=is_heartbeat)
-            waits_for_moment = self._core.due(rospy.get_time()) is not None
-            until = min(heartbeat, master_check, now + _TIMER_PERIOD if waits_for_moment else math.inf)
+            until = min(heartbeat, master_check, self._next_look())
             with self._wake:
                 if not self._waiting:
                     self._wake.wait(max(0.0, until - time.monotonic()))
+
+    def _next_look(self) -> float:
+        """Return the wall time at which to look whether the moment has come for which the core waits."""
+        ros_now = rospy.get_time()
+        due = self._core.due(ros_now)
+        return math.inf if due is None else time.monotonic() + max(_TIMER_PERIOD, (due - ros_now) / _FASTEST)
 
     def close(self) -> None:
         """End Pellet's process."""
@@ -153,7 +159,11 @@ class ReasonerNode:
                         self._core.observe_stale(fact.quality)
                         self._warn(f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
                     case ComponentFact():
-                        self._core.observe_component(now, fact.component, fact.status, stamp)
+                        if fact.component in self._knowledge_base.components:
+                            self._core.observe_component(now, fact.component, fact.status, stamp)
+                        else:  # nothing in the model requires it
+                            text = f"component {fact.component} is not in the model: its status is left out"
+                            self._throttled(text, lambda text=text: rospy.loginfo(_LOG, text), math.inf)
                     case BindingFact():
                         self._core.observe_binding(now, fact.grounding, fact.in_error)
                     case BadFact():
