@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -163,7 +164,7 @@ class ReasonerNode:
                             self._core.observe_component(now, fact.component, fact.status, stamp)
                         else:  # nothing in the model requires it
                             text = f"component {fact.component} is not in the model: its status is left out"
-                            self._throttled(text, lambda text=text: rospy.loginfo(_LOG, text), math.inf)
+                            self._throttled(text, partial(rospy.loginfo, _LOG, text), math.inf)
                     case BindingFact():
                         self._core.observe_binding(now, fact.grounding, fact.in_error)
                     case BadFact():

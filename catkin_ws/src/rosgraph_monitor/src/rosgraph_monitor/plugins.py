@@ -6,7 +6,7 @@ import importlib
 import re
 from typing import Any
 
-import rospkg
+from ros_model.plugins import exported
 
 from rosgraph_monitor.observer import Observer
 
@@ -20,16 +20,11 @@ class PluginError(Exception):
 
 def available() -> dict[str, str]:
     """Return the exported observers of all packages: `module:Class` by the name of the class."""
-    packages = rospkg.RosPack()
     found = {}
-    for package in sorted({PACKAGE, *packages.get_depends_on(PACKAGE, implicit=False)}):
-        try:
-            exports = packages.get_manifest(package).get_export(PACKAGE, "observer")
-        except (rospkg.ResourceNotFound, rospkg.InvalidManifest):
-            continue
-        for target in exports:
-            if target and _TARGET.fullmatch(target):
-                found[target.partition(":")[2]] = target
+    for _, attributes in exported(PACKAGE):
+        target = attributes.get("observer", "")
+        if _TARGET.fullmatch(target):
+            found[target.partition(":")[2]] = target
     return found
 
 

@@ -10,9 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import rospkg
-
 from ros_model.errors import ModelError
+from ros_model.plugins import exported
 
 if TYPE_CHECKING:
     from ros_model.project import Project
@@ -28,21 +27,15 @@ def find_generators() -> dict[str, Generator]:
     Raises:
         ModelError: an export tag is incomplete, or two packages give one name.
     """
-    packages = rospkg.RosPack()
     found: dict[str, Generator] = {}
-    for package in sorted(packages.list()):
-        try:
-            exports = packages.get_manifest(package).exports
-        except (rospkg.InvalidManifest, rospkg.ResourceNotFound):
-            continue  # somebody else's broken package is no reason to do nothing
-        for tag in exports:
-            if tag.tag != _PACKAGE or "generator" not in tag.attrs:
-                continue
-            name, function = tag.attrs["generator"], tag.attrs.get("function", "")
-            if name in found or not function:
-                problem = "exists already: rename it" if name in found else "names no function: add one"
-                raise ModelError(f"package {package}: package.xml: generator {name!r} {problem}")
-            found[name] = _load(package, name, function)
+    for package, attributes in exported(_PACKAGE):
+        if "generator" not in attributes:
+            continue
+        name, function = attributes["generator"], attributes.get("function", "")
+        if name in found or not function:
+            problem = "exists already: rename it" if name in found else "names no function: add one"
+            raise ModelError(f"package {package}: package.xml: generator {name!r} {problem}")
+        found[name] = _load(package, name, function)
     return found
 
 
