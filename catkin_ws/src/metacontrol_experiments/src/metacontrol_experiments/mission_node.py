@@ -28,7 +28,7 @@ from metacontrol_experiments import messages, mission
 from metacontrol_experiments.bag import TOPICS
 from metacontrol_experiments.mission import Action, GoalStatus
 from metacontrol_experiments.processes import wait_until
-from metacontrol_experiments.record import CostReport, Event
+from metacontrol_experiments.record import CostReport, Event, QualityReport
 from metacontrol_experiments.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -88,6 +88,7 @@ class MissionNode:
         self._stable = False
         self._failed: str | None = None
         self._server_seen = False
+        self._observed: set[str] = set()  # quality attributes of which a level came in
         self._goal: MoveBaseActionGoal | None = None
         self._began_wall = time.monotonic()
         self._master = rosgraph.Master("/mission")
@@ -113,6 +114,8 @@ class MissionNode:
         self._wait(lambda: self._position is not None, "the robot's pose on amcl_pose")
         self._wait(lambda: self._stable, f"a STABLE configuration on {MANIPULATOR_TOPIC}")
         self._wait(self._server_ready, "the action server of move_base")
+        for quality in self._settings.thresholds:
+            self._wait(partial(self._is_observed, quality), f"a level of {quality} on /diagnostics, from its observer")
         if self._settings.metacontrol:
             self._wait(self._reasoner_ready, f"the node {REASONER} with its topic {DECISION_TOPIC}")
 
@@ -179,6 +182,9 @@ class MissionNode:
 
     def _server_ready(self) -> bool:
         return self._server_seen and self._goals.get_num_connections() > 0
+
+    def _is_observed(self, quality: str) -> bool:
+        return quality in self._observed
 
     def _reasoner_ready(self) -> bool:
         publishers, _, _ = self._master.getSystemState()
@@ -356,6 +362,8 @@ class MissionNode:
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for report in messages.diagnostics(message, rospy.get_time()):
+            if isinstance(report, QualityReport) and report.level is not None:
+                self._observed.add(report.name)
             if not isinstance(report, CostReport):
                 self._tell(report)
 
