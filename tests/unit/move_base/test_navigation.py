@@ -17,7 +17,7 @@ def drive(simulation, goal, seconds=60.0, until=None):
 
 
 @pytest.mark.parametrize(
-    ("speed", "radius", "source"),
+    "settings",
     [
         (0.3, 0.8, "scan"),
         (0.5, 0.65, "scan"),
