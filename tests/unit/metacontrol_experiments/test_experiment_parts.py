@@ -3,11 +3,12 @@
 import socket
 import struct
 import sys
+from types import SimpleNamespace
 
 import psutil
 import pytest
 from click.testing import CliRunner
-from metacontrol_experiments import cli
+from metacontrol_experiments import cli, messages
 from metacontrol_experiments.bag import read_record
 from metacontrol_experiments.commit import current_commit
 from metacontrol_experiments.figure import configuration_spans, draw
@@ -218,3 +219,10 @@ def test_port_in_use_is_refused_with_one_line(tmp_path):
     assert result.exit_code == 2
     assert f"port {port} is in use" in result.output
     assert len(result.output.strip().splitlines()) == 1
+
+
+def test_goal_counts_by_its_own_stamp_even_if_the_recorder_lags():
+    sent = SimpleNamespace(
+        header=SimpleNamespace(stamp=SimpleNamespace(sec=2, nanosec=500_000_000)), goal_id=SimpleNamespace(id="a")
+    )
+    assert messages.goal(sent, received=2.3).stamp == pytest.approx(2.5)

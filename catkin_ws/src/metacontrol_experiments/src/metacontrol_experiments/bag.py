@@ -121,7 +121,7 @@ class _Builder:
             "/mission/event": lambda t, m: self._events.append(messages.event(m, t)),
             "/diagnostics": lambda t, m: self._diagnostics.extend(messages.diagnostics(m, t)),
             "/mros1_reasoner/decision": lambda t, m: self._decisions.append(messages.decision(m, t)),
-            "/move_base/goal": lambda t, m: self._goals.append(GoalReport(t, m.goal_id.id)),
+            "/move_base/goal": lambda t, m: self._goals.append(messages.goal(m, t)),
             "/move_base/result": lambda t, m: self._results.append(messages.result(m, t)),
             "/rosgraph_manipulator/active_configuration": lambda t, m: self._configurations.extend(
                 messages.configurations(m, t)

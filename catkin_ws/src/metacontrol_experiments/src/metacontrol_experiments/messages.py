@@ -83,10 +83,15 @@ def decision(message: Any, received: float) -> DecisionReport:
     )
 
 
+def goal(message: Any, received: float) -> GoalReport:
+    """A goal of move_base; by its own stamp, since the clock of who received it may lag."""
+    return GoalReport(header_stamp(message.header, received), message.goal_id.id)
+
+
 def result(message: Any, received: float) -> GoalReport:
     """A result of move_base."""
     status = message.status
-    return GoalReport(received, status.goal_id.id, int(status.status), status.text)
+    return GoalReport(header_stamp(message.header, received), status.goal_id.id, int(status.status), status.text)
 
 
 def _numbers(pairs: Any) -> list[tuple[str, float]]:

@@ -44,6 +44,9 @@ MAX_SHARE = {"safety": 0.05, "energy": 0.10}
 _SAME_MOMENT_S = 0.05
 """Stamps of different nodes may differ by a few periods of `/clock` (0.01 s) for what happened in the same moment."""
 
+_CLOCK_LAG_S = 0.5
+"""So far the clock of a node may lag behind another's on a loaded machine; the mission ends by its own."""
+
 
 def summarise(record: MissionRecord) -> dict[str, Any]:
     """The content of summary.json; figures that the bag does not hold are None."""
@@ -114,7 +117,7 @@ def mission_goals(record: MissionRecord) -> dict[str, GoalStatus | None]:
         goal.id: None for goal in record.goals if goal.id and start <= goal.stamp <= end
     }
     for result in record.results:
-        if result.id in goals and result.status is not None and result.stamp <= end:
+        if result.id in goals and result.status is not None and result.stamp <= record.end_stamp + _CLOCK_LAG_S:
             goals[result.id] = GoalStatus.of(result.status)
     return goals
 
