@@ -51,6 +51,14 @@ def test_way_round_a_rack_is_short_and_clear(floor):
     assert length(points) < 2 * np.hypot(2.0, 6.5) + 2.5
 
 
+def test_wide_way_is_taken_rather_than_a_gap_without_room(floor):
+    wall = [(5.0, 5.4, 0.0, 5.0), (5.0, 5.4, 6.1, 7.6)]  # a gap of 1.1 m around y = 5.55, open from y = 7.6 on
+    points = plan(floor(*wall), (2.0, 5.5), (9.0, 5.5)).points
+    assert points[:, 1].max() > 8.0
+    points = plan(floor(*wall, (5.0, 5.4, 7.6, 12.0)), (2.0, 5.5), (9.0, 5.5)).points
+    assert points[:, 1].max() < 6.0
+
+
 def test_points_are_evenly_spaced_and_directed(floor):
     result = plan(floor((4.0, 5.0, 0.0, 8.0)), (2.0, 2.0), (8.0, 2.0))
     assert np.hypot(*np.diff(result.points, axis=0).T).max() < 0.08

@@ -53,6 +53,14 @@ def test_hidden_obstacle_is_driven_round_on_the_camera_alone(simulate, walls, va
     assert log.contacts == 0
 
 
+def test_robot_gets_into_a_narrow_gap_that_it_meets_aslant(simulate, walls, variant):
+    boxes = [*walls(), (0.0, 3.4, 0.4, 5.6, 0.0), (0.0, -3.4, 0.4, 5.6, 0.0)]  # 1.2 m between them
+    simulation = simulate(boxes, start=(-1.5, 3.0, -1.57), tree=variant(0.75, 0.5))
+    log = drive(simulation, (1.5, -3.0, 0.0))
+    assert log.outcome is Outcome.SUCCEEDED
+    assert log.contacts == 0
+
+
 def test_robot_turns_before_it_drives_away_from_a_wall(simulate, walls):
     simulation = simulate(walls(), start=(4.9, 0.0, 0.0))
     log = drive(simulation, (-3.0, 0.0, math.pi))

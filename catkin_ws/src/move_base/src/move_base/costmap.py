@@ -101,12 +101,14 @@ class Snapshot:
         clearance: distance from each cell's centre to the nearest obstacle cell's centre (H, W), m, never beyond
             `clearance_limit`.
         clearance_limit: larger distances are not told apart, m.
+        inscribed_radius: of the padded footprint, m.
     """
 
     geometry: Geometry
     costs: NDArray[np.uint8]
     clearance: NDArray[np.float32]
     clearance_limit: float
+    inscribed_radius: float
 
 
 @dataclass(frozen=True)
@@ -323,7 +325,7 @@ class Costmap:
                 inflated[unknown & (inflated < INSCRIBED)] = UNKNOWN
             costs = inflated
         clearance = np.minimum(cells * np.float32(resolution), np.float32(limit))
-        return Snapshot(self.geometry, costs, clearance, limit)
+        return Snapshot(self.geometry, costs, clearance, limit, self.inscribed_radius)
 
     def _make_cost_table(self) -> tuple[NDArray[np.uint8], float]:
         """Tabulates the published cost function over the distance, so that a look-up inflates the whole grid.

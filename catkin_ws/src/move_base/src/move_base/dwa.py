@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from move_base.costmap import INSCRIBED, inscribed_radius
-from move_base.geometry import Pose, Velocity
+from move_base.geometry import Pose, Velocity, wrap_angle
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -44,6 +44,16 @@ SPEED_CHANGE_COST = 0.05
 
 ALIGN_ANGLE = 1.05
 """Off the path's direction by more than this (rad) the robot turns on the spot before it drives, if it can."""
+
+
+NARROW_ALIGN_ANGLE = 0.35
+"""The same for a robot that hardly moves in front of a narrow passage, which it can't enter aslant, rad."""
+
+NARROW_AHEAD = 1.0
+"""How far ahead a passage counts as in front, m: the robot's length."""
+
+ESCAPE_DISTANCE = 0.3
+"""Once it has to back off, the robot does so for this distance, m: with less it would come back to where it stuck."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +91,7 @@ class _Scene:
 
 
 class DwaController:
-    """The controller; it keeps nothing from one step to the next but the last command."""
+    """The controller; from one step to the next it keeps the last command, and where it began to back off."""
 
     def __init__(
         self,
@@ -102,11 +112,12 @@ class DwaController:
         self._period = period
         padding = inscribed_radius(padded_footprint) - inscribed_radius(footprint)
         self._shapes = [_Shape(footprint, share * padding) for share in HARD_PADDING]
-        self._last = Velocity()
+        self.reset()
 
     def reset(self) -> None:
         """Forgets the last command, for a new goal."""
         self._last = Velocity()
+        self._backing_from: Pose | None = None
 
     def follow(
         self, robot: Pose, velocity: Velocity, path: NDArray[np.float64], to_goal: float, snapshot: Snapshot
@@ -123,14 +134,16 @@ class DwaController:
         p = self.parameters
         horizon = min(p.sim_time, max(MIN_HORIZON, 2.0 * to_goal / p.max_vel_x))
         scene = _Scene(path, snapshot, self._shape_for(robot, snapshot))
-        direction = _direction_of(path)
-        error = abs(float(np.angle(np.exp(1j * (direction - robot.yaw)))))
-        samples = self._turn_samples(velocity) if error > ALIGN_ANGLE else self._arc_samples(velocity)
-        best = self._best(samples, robot, horizon, scene)
-        if best is None and error > ALIGN_ANGLE:
+        best = self._back_off(robot, scene)
+        error = abs(wrap_angle(_direction_of(path) - robot.yaw))
+        if best is None and error > self._align_angle(velocity, scene):
+            best = self._best(self._turn_samples(velocity), robot, horizon, scene)
+        if best is None:
             best = self._best(self._arc_samples(velocity), robot, horizon, scene)
         if best is None:
             best = self._best(self._escape_samples(), robot, MIN_HORIZON, scene)
+            backing = best is not None and best.velocity.x < 0.0
+            self._backing_from = robot if backing else None
         if best is not None:
             self._last = best.velocity
         return best
@@ -148,6 +161,28 @@ class DwaController:
             return None
         self._last = Velocity(0.0, 0.0, float(command[0, 2]))
         return _trajectory(rollout, 0, 0.0)
+
+    def _back_off(self, robot: Pose, scene: _Scene) -> Trajectory | None:
+        """Goes on backing off, if it has begun and is not far enough or blocked."""
+        if self._backing_from is None:
+            return None
+        if robot.distance(self._backing_from) < ESCAPE_DISTANCE:
+            backward = self._best(np.array([[self.parameters.escape_vel, 0.0, 0.0]]), robot, MIN_HORIZON, scene)
+            if backward is not None:
+                return backward
+        self._backing_from = None
+        return None
+
+    def _align_angle(self, velocity: Velocity, scene: _Scene) -> float:
+        """How far off the path's direction the robot may drive, rad."""
+        if velocity.x > 1.5 * self.parameters.min_vel_x:
+            return ALIGN_ANGLE
+        near = scene.path[np.hypot(*(scene.path - scene.path[0]).T) <= NARROW_AHEAD]
+        g = scene.snapshot.geometry
+        rows, columns = g.cells(near)
+        clearance = scene.snapshot.clearance[rows.clip(0, g.height - 1), columns.clip(0, g.width - 1)].min()
+        narrow = clearance < scene.shape.circumscribed + scene.shape.margin
+        return NARROW_ALIGN_ANGLE if narrow else ALIGN_ANGLE
 
     def _shape_for(self, robot: Pose, snapshot: Snapshot) -> _Shape:
         """The footprint with its margin; a smaller margin where an obstacle is in it already, or nothing could move."""

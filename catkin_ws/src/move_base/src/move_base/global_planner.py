@@ -24,6 +24,12 @@ COST_FACTOR = 0.8 / 50.0
 ESCAPE_WEIGHT, PUSH_WEIGHT = 30.0, 300.0
 """Weights of inscribed and of obstacle cells around a start that lies among them; high, for a short way out."""
 
+TIGHT_BAND = 0.1
+"""Cells with less clearance than this (m) beyond the inscribed radius leave the controller no room for corrections."""
+
+TIGHT_WEIGHT = 2.0
+"""Extra weight of those cells: a gap is passed where the way round is longer than three times its length."""
+
 STRAIGHT_BIAS = 0.02
 """Extra weight per metre from the line between start and goal: breaks the ties of pyastar2d's metric."""
 
@@ -85,7 +91,7 @@ def make_plan(
         raise PlanningError(f"the robot at ({start.x:.2f}, {start.y:.2f}) is outside the map")
     if not g.contains(*goal_cell):
         raise PlanningError(f"the goal ({goal.x:.2f}, {goal.y:.2f}) is outside the map")
-    weights = _weight_table(allow_unknown)[snapshot.costs]
+    weights = _weigh(snapshot, snapshot.costs, snapshot.clearance, allow_unknown)
     end_cell = _reachable_end(snapshot, weights, goal, goal_cell, tolerance)
     if not np.isfinite(weights[start_cell]):
         _open_start(weights, snapshot, start_cell, escape_radius)
@@ -114,7 +120,7 @@ def path_cost(points: NDArray[np.float64], snapshot: Snapshot, *, allow_unknown:
         return float("inf")
     if columns.max() >= snapshot.geometry.width:
         return float("inf")
-    weights = _weight_table(allow_unknown)[snapshot.costs[rows, columns]]
+    weights = _weigh(snapshot, snapshot.costs[rows, columns], snapshot.clearance[rows, columns], allow_unknown)
     lengths = np.hypot(*np.diff(points, axis=0).T)
     return float((lengths * weights[1:]).sum())
 
@@ -128,11 +134,16 @@ def resample(points: NDArray[np.float64], spacing: float) -> NDArray[np.float64]
     return np.stack([np.interp(wanted, along, points[:, axis]) for axis in (0, 1)], axis=1)
 
 
-def _weight_table(allow_unknown: bool) -> NDArray[np.float32]:
+def _weigh(
+    snapshot: Snapshot, costs: NDArray[np.uint8], clearance: NDArray[np.float32], allow_unknown: bool
+) -> NDArray[np.float32]:
+    """Returns the weights of cells by their costs and clearances: 1 for a free cell, infinite for a blocked one."""
     table = (1.0 + COST_FACTOR * np.arange(256)).astype(np.float32)
     table[INSCRIBED : LETHAL + 1] = np.inf
     table[UNKNOWN] = 1.0 if allow_unknown else np.inf
-    return table
+    weights = table[costs]
+    weights[clearance < np.float32(snapshot.inscribed_radius + TIGHT_BAND)] += np.float32(TIGHT_WEIGHT)
+    return weights
 
 
 def _reachable_end(
