@@ -8,6 +8,7 @@ import unittest
 import xmlrpc.client
 
 import actionlib
+import psutil
 import rosgraph
 import rospy
 import rostest
@@ -38,11 +39,11 @@ def pid_of(node):
 
 
 def is_alive(pid):
+    """Whether a process runs; one that ended but was not waited for by its parent does not."""
     try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
         return False
-    return True
 
 
 class ManipulatorTest(unittest.TestCase):

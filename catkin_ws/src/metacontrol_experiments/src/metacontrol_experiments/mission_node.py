@@ -193,10 +193,8 @@ class MissionNode:
     def _recorded(self, recorder: str) -> bool:
         _, subscribers, _ = self._master.getSystemState()
         taken = {topic for topic, nodes in subscribers if recorder in nodes}
-        return (
-            taken.issuperset(TOPICS)
-            and self._events.get_num_connections() > 0
-            and self._goals.get_num_connections() > 1  # move_base and the recorder
+        return taken.issuperset(TOPICS) and {self._events.resolved_name, self._goals.resolved_name} <= _topics_to(
+            recorder
         )
 
     # The mission
@@ -366,6 +364,13 @@ class MissionNode:
                 self._observed.add(report.name)
             if not isinstance(report, CostReport):
                 self._tell(report)
+
+
+def _topics_to(node: str) -> set[str]:
+    """The topics of this node over which it is connected to a subscriber."""
+    with xmlrpc.client.ServerProxy(rospy.get_node_uri(), transport=_ImpatientTransport()) as proxy:
+        answer: Any = proxy.getBusInfo(rospy.get_name())
+    return {topic for _, subscriber, direction, _, topic, *_ in answer[2] if subscriber == node and direction == "o"}
 
 
 class _ImpatientTransport(xmlrpc.client.Transport):
