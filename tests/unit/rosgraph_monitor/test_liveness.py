@@ -1,5 +1,7 @@
 """Decisions on the liveness of one node."""
 
+import errno
+
 from rosgraph_monitor.liveness import (
     Action,
     Life,
@@ -8,6 +10,7 @@ from rosgraph_monitor.liveness import (
     due,
     on_answer,
     on_closed,
+    on_connect_error,
     on_connected,
     on_refused,
 )
@@ -78,3 +81,10 @@ def test_connection_that_never_stands_means_unreachable():
     assert due(state, 1.4, TIMING) == (state, Action.NONE)
     state, action = due(state, 1.5, TIMING)
     assert (state.life, action) == (Life.UNREACHABLE, Action.DROP)
+
+
+def test_connection_reset_while_it_is_made_is_tried_again_and_not_taken_for_an_unreachable_host():
+    state = on_connect_error(Liveness(life=Life.ALIVE, connecting_since=1.0), errno.ECONNRESET, 1.1, TIMING)
+    assert (state.life, state.next_at, state.connecting_since) == (Life.ALIVE, 1.1, None)
+    assert on_connect_error(state, errno.ECONNREFUSED, 1.2, TIMING).life is Life.DEAD
+    assert on_connect_error(state, errno.EHOSTUNREACH, 1.2, TIMING).life is Life.UNREACHABLE

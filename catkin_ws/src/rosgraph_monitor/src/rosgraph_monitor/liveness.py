@@ -9,6 +9,7 @@ process that is stopped or stuck keeps its connection, but leaves getPid unanswe
 from __future__ import annotations
 
 import enum
+import errno
 from dataclasses import dataclass, replace
 
 
@@ -91,6 +92,18 @@ def on_closed(state: Liveness, now: float, timing: Timing) -> Liveness:
     if fruitless < _FRUITLESS_LIMIT:
         return Liveness(life=state.life, next_at=now, fruitless=fruitless)
     return Liveness(life=Life.HUNG, next_at=now + timing.retry_period, fruitless=fruitless)
+
+
+def on_connect_error(state: Liveness, error: int, now: float, timing: Timing) -> Liveness:
+    """An attempt to connect failed with this errno.
+
+    A process that ends in the middle of it resets the connection: the host was reached, so that counts as closed.
+    """
+    if error == errno.ECONNREFUSED:
+        return on_refused(state, now, timing)
+    if error in (errno.ECONNRESET, errno.ECONNABORTED, errno.EPIPE):
+        return on_closed(state, now, timing)
+    return on_unreachable(state, now, timing)
 
 
 def on_refused(_state: Liveness, now: float, timing: Timing) -> Liveness:

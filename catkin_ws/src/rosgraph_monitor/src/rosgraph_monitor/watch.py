@@ -205,8 +205,7 @@ class Watcher:
 
     def _connection_failed(self, target: _Target, error: int) -> None:
         self._drop(target)
-        event = liveness.on_refused if error == errno.ECONNREFUSED else liveness.on_unreachable
-        self._become(target, event(target.state, time.monotonic(), self._timing))
+        self._become(target, liveness.on_connect_error(target.state, error, time.monotonic(), self._timing))
 
     def _handle(self, target: _Target, events: int) -> None:
         if target.socket is None:
