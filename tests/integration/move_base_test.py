@@ -209,7 +209,7 @@ class MoveBaseTest(unittest.TestCase):
         self.robot.silent = True
         state, text = self.finish()
         self.assertEqual(state, GoalStatus.ABORTED)
-        self.assertEqual(text, "no current data from front/scan for 1.5 s")
+        self.assertRegex(text, r"^no current data from front/scan for \d+\.\d s$")
         self.assertLess(self.robot.x, 2.0)
         stale_from = time.monotonic() - 1.2
         self.assertFalse([twist for when, twist in self.robot.commands if when > stale_from and twist != Twist()])
