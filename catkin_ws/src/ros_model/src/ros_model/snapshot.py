@@ -163,7 +163,12 @@ class MasterClient:
 
     def _request(self, request: Any, method: str) -> Any:
         try:
-            return request()
+            try:
+                return request()
+            except (ConnectionResetError, BrokenPipeError):
+                # It closed the connection, or is ending in the middle of the call: the next attempt tells.
+                self.close()
+                return request()
         except ConnectionRefusedError as error:
             self.close()
             raise MasterGoneError(f"ROS master {self.uri} is gone ({error.strerror})") from error
