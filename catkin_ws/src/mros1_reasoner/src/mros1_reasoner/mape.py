@@ -10,17 +10,18 @@ import logging
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from mros1_reasoner import vocabulary as v
+from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED, PROPOSED, Cause, Decision
 from mros1_reasoner.knowledge_base import KnowledgeBase
 from mros1_reasoner.model import Analysis, Design, Facts, Objective, ObjectiveAnalysis
-from mros1_reasoner.planner import Candidate, Distance, Plan, Situation, Utility, difference, plan, utility_of
+from mros1_reasoner.planner import Distance, Plan, Situation, Utility, difference, plan, utility_of
 from mros1_reasoner.reasoner import Reasoner
 
 _log = logging.getLogger(__name__)
 
-DECIDED, EXECUTED, FAILED = "DECIDED", "EXECUTED", "FAILED"  # Decision.msg
 STABLE, RECONFIGURING, RECOVERING = "STABLE", "RECONFIGURING", "RECOVERING"  # FunctionGrounding.msg, with FAILED
 _BUSY = (RECONFIGURING, RECOVERING)
 
@@ -46,6 +47,7 @@ class Settings:
         desired: configuration that is asked for where none runs.
         always_improve: adapt also when a recovered component makes a clearly better design possible.
         improvement: utility that such a design must have more.
+        approval: a decision waits until an operator approves it.
     """
 
     violation_window: float = 2.0
@@ -60,33 +62,7 @@ class Settings:
     desired: str = ""
     always_improve: bool = False
     improvement: float = 0.05
-
-
-@dataclass(frozen=True)
-class Decision:
-    """An adaptation, explained: the fields of metacontrol_msgs/Decision.
-
-    `wall_began` is the wall time at which the decision was made, from which `execute_wall_s` counts.
-    """
-
-    id: str
-    state: str
-    objective: str
-    trigger: str
-    causes: tuple[str, ...]
-    from_configuration: str
-    to_configuration: str
-    degraded: bool
-    candidates: tuple[Candidate, ...]
-    explanation: str
-    stamp_monitored: float
-    stamp_analysed: float
-    stamp_planned: float
-    stamp_executed: float = 0.0
-    analyse_wall_s: float = 0.0
-    plan_wall_s: float = 0.0
-    execute_wall_s: float = 0.0
-    wall_began: float = field(default=0.0, compare=False)
+    approval: bool = False
 
 
 @dataclass
@@ -166,6 +142,9 @@ class Mape:
         self._levels: dict[tuple[str, str], _Level] = {}
         self._error_log: dict[tuple[str, str], tuple[float, str]] = {}
         self._pending: Decision | None = None
+        self._proposal: Decision | None = None
+        self._paused = False
+        self._locked: set[str] = set()
         self._started: float | None = None
         self._seen: tuple[object, ...] | None = None
         self._analysed: Facts | None = None
@@ -261,6 +240,161 @@ class Mape:
                 continue  # while it reconfigures, the configuration may be the old or the new one
             self._deployed(name, configuration, now)
 
+    # What an operator asks for
+
+    @property
+    def paused(self) -> bool:
+        """Whether nothing is decided at present."""
+        return self._paused
+
+    @property
+    def locked(self) -> frozenset[str]:
+        """Objectives that keep the configuration they have."""
+        return frozenset(self._locked)
+
+    @property
+    def proposal(self) -> Decision | None:
+        """The decision that waits for approval."""
+        return self._proposal
+
+    def pause(self) -> None:
+        """Decide nothing until `resume`; facts are taken in and analysed, and what is under way is finished."""
+        self._paused = True
+
+    def resume(self) -> None:
+        """Decide again, by what holds then."""
+        self._paused, self._seen = False, None
+
+    def lock(self, objective: str = "") -> None:
+        """Keep the configuration that an objective has, of all objectives where none is named.
+
+        What would have been done is told as a refusal.
+
+        Raises:
+            MapeError: there is no such objective.
+        """
+        self._locked |= self._named(objective)
+        self._seen = None
+
+    def unlock(self, objective: str = "") -> None:
+        """Take `lock` back.
+
+        Raises:
+            MapeError: there is no such objective.
+        """
+        self._locked -= self._named(objective)
+        self._seen = None
+
+    def approve(self, decision_id: str) -> Decision:
+        """Approve the proposed decision; it is now DECIDED, to be published and carried out.
+
+        Raises:
+            MapeError: no decision of that id waits for approval.
+        """
+        decision = replace(self._proposed(decision_id), state=DECIDED, wall_began=self._wall())
+        self._proposal, self._pending = None, decision
+        return decision
+
+    def reject(self, decision_id: str, now: float, reason: str = "") -> Decision:
+        """Reject the proposed decision; its design is not proposed again until the error log forgets it.
+
+        Returns:
+            The decision, FAILED, to publish.
+
+        Raises:
+            MapeError: no decision of that id waits for approval.
+        """
+        decision = self._proposed(decision_id)
+        words = f"rejected by the operator{f' ({reason})' if reason else ''}"
+        expiry = now + self.settings.error_log_expiry
+        self._error_log[decision.to_configuration, decision.objective] = expiry, words
+        self._proposal, self._seen = None, None
+        return replace(decision, state=FAILED, explanation=f"{decision.explanation}; {words}", stamp_executed=now)
+
+    def add_objective(self, objective: Objective) -> None:
+        """Ask for a function from now on.
+
+        Raises:
+            MapeError: the name is taken, or the model holds no such function or quality.
+        """
+        if objective.name in self.objectives:
+            raise MapeError(f"objective {objective.name} exists already: give another name")
+        if objective.function not in self._kb.functions:
+            known = ", ".join(self._kb.functions)
+            raise MapeError(f"objective {objective.name}: no Function is called {objective.function!r}: known: {known}")
+        for quality, limit in objective.limits.items():
+            self._check_limit(quality, limit)
+        self.objectives[objective.name] = objective
+        self._running[objective.name] = _Running()
+        self._seen = None
+
+    def remove_objective(self, name: str) -> None:
+        """No longer ask for a function.
+
+        Raises:
+            MapeError: there is no such objective, or a decision about it is being carried out.
+        """
+        self._named(name)
+        if self._pending and self._pending.objective == name:
+            raise MapeError(f"objective {name} is being adapted: remove it afterwards")
+        if self._proposal and self._proposal.objective == name:
+            self._proposal = None
+        del self.objectives[name], self._running[name]
+        self._locked.discard(name)
+        self._levels = {key: level for key, level in self._levels.items() if key[0] != name}
+        self._error_log = {key: entry for key, entry in self._error_log.items() if key[1] != name}
+        self._seen = None
+
+    def set_nfr(self, objective: str, quality: str, limit: float | None) -> None:
+        """Give an objective another limit of a quality; None takes the limit away.
+
+        Raises:
+            MapeError: there is no such objective or quality, or the limit is not finite.
+        """
+        self._named(objective)
+        self._check_limit(quality, 0.0 if limit is None else limit)
+        before = self.objectives[objective]
+        limits = {q: value for q, value in before.limits.items() if q != quality}
+        self.objectives[objective] = replace(before, limits=limits if limit is None else {**limits, quality: limit})
+        for key in [key for key in self._levels if key[1] == quality and key[0] == objective]:
+            del self._levels[key]  # since when the limit is passed must be found anew
+        self._seen = None
+
+    def feasible(self) -> dict[str, tuple[str, ...]]:
+        """Return the designs by which each function could be fulfilled now, the most useful first.
+
+        A design is left out while a component that it requires does not work, or no design fulfils a function that
+        it requires.
+
+        Raises:
+            ReasonerError: the analysis failed.
+        """
+        unrealisable = self._analysis_of_components().unrealisable
+        found: dict[str, tuple[str, ...]] = {}
+
+        def fulfilling(function: str) -> tuple[str, ...]:
+            if function not in found:
+                designs = [d for d in self._kb.solving(function) if d.name not in unrealisable]
+                fit = [d for d in designs if all(fulfilling(required) for required in d.requires)]
+                fit.sort(key=lambda d: (-self._utility(d), d.name))
+                found[function] = tuple(d.name for d in fit)
+            return found[function]
+
+        for function in self._kb.functions:
+            fulfilling(function)
+        return found
+
+    def save(self, path: Path) -> None:
+        """Write the knowledge base with the last facts and statuses as an OWL file that loads again as a model.
+
+        Raises:
+            MapeError: the file can't be written.
+        """
+        try:
+            self._kb.save(path, self.facts, self.analysis)
+        except OSError as error:
+            raise MapeError(f"{path}: {error.strerror or error}: give another file") from error
+
     # R2, R3
 
     def step(self, now: float, *, heartbeat: bool = False) -> list[Decision]:
@@ -273,7 +407,8 @@ class Mape:
             heartbeat: reason also when merely a level has changed.
 
         Returns:
-            Decisions to publish: at most one that is DECIDED, to be carried out and reported; the others are refusals.
+            Decisions to publish: at most one that is DECIDED, to be carried out and reported, or PROPOSED, to be
+            approved or rejected first; the others are refusals, and proposals that are withdrawn.
 
         Raises:
             ReasonerError: the analysis failed; the next step tries it again.
@@ -293,18 +428,46 @@ class Mape:
         analysed = self._stamp(now)
         self.facts, self.analysis = facts, analysis
         self._analysed, self._seen = facts, seen
+        if self._paused:
+            return []
         decisions = []
-        for objective in self.objectives.values():
+        chosen = None
+        for objective in tuple(self.objectives.values()):
             decision = self._decide(objective, now, analysed, analyse_wall)
             if decision is None:
                 continue
-            decisions.append(decision)
-            if decision.state == DECIDED:
-                self._pending, self._seen = decision, None  # the others' turn comes after it
+            if decision.to_configuration:  # the others' turn comes after it
+                chosen = decision
                 break
+            decisions.append(decision)
         else:
             self._heed_recoveries()
-        return decisions
+        return decisions + self._put_forward(chosen, now)
+
+    def _put_forward(self, decision: Decision | None, now: float) -> list[Decision]:
+        """Have a decision carried out, or approved first; a proposal that no longer holds is withdrawn."""
+        former = self._proposal
+        if (
+            former
+            and decision
+            and (former.objective, former.to_configuration)
+            == (
+                decision.objective,
+                decision.to_configuration,
+            )
+        ):
+            return []
+        found = []
+        if former:
+            words = f"{former.explanation}; withdrawn: what called for it has changed"
+            found.append(replace(former, state=FAILED, explanation=words, stamp_executed=now))
+        self._proposal = decision if self.settings.approval else None
+        if decision is None:
+            return found
+        if self.settings.approval:
+            return [*found, replace(decision, state=PROPOSED)]
+        self._pending, self._seen = decision, None
+        return [*found, decision]
 
     def due(self, now: float) -> float | None:
         """Return the next time at which a step can bring something without a new fact, None where there is none."""
@@ -374,6 +537,29 @@ class Mape:
         )
 
     # Parts
+
+    def _named(self, objective: str) -> set[str]:
+        if objective and objective not in self.objectives:
+            raise MapeError(f"no objective is called {objective!r}: known: {', '.join(self.objectives)}")
+        return {objective} if objective else set(self.objectives)
+
+    def _proposed(self, decision_id: str) -> Decision:
+        if self._proposal is None or self._proposal.id != decision_id:
+            raise MapeError(f"decision {decision_id} does not wait for approval")
+        return self._proposal
+
+    def _check_limit(self, quality: str, limit: float) -> None:
+        if not self._knows(quality):
+            raise MapeError(f"Unsupported QA TYPE received: {quality}")
+        if not math.isfinite(limit):
+            raise MapeError(f"limit of {quality} is {limit}, not a finite number: left as it is")
+
+    def _analysis_of_components(self) -> Analysis:
+        """Return the last analysis, or a new one where components have changed since."""
+        components = {name: component.status for name, component in self._components.items()}
+        if self._analysed is not None and self._analysed.components == components:
+            return self.analysis
+        return self._kb.analyse(Facts(components=components), self._reasoner)
 
     def _stamp(self, now: float) -> float:
         return max(now, self._clock()) if self._clock else now
@@ -466,13 +652,17 @@ class Mape:
         began = self._wall()
         outcome = self._plan(objective, running, now)
         plan_wall = self._wall() - began
-        stamp, trigger, _ = min(causes)
-        words = tuple(words for _, _, words in sorted(causes))
+        causes.sort(key=lambda cause: (cause.stamp, cause.trigger))
+        trigger = causes[0].trigger
+        words = tuple(cause.text for cause in causes)
         stays = outcome.choice is None or (outcome.choice == running.design and not broken)
+        reason = outcome.reason
+        if not stays and objective.name in self._locked:
+            stays, reason = True, f"locked by the operator; {outcome.choice} would be taken: {outcome.reason}"
         if result.causes == {v.UPDATABLE} and (stays or not self._improves(running, outcome)):
             return None
         if stays:
-            refusal = (words if trigger == "initial" else tuple(t for _, t, _ in sorted(causes)), outcome.choice)
+            refusal = (tuple(c.trigger for c in causes), outcome.choice)
             if refusal == running.refusal:
                 return None
             running.refusal = refusal
@@ -490,43 +680,54 @@ class Mape:
             to_configuration=target,
             degraded=outcome.degraded,
             candidates=outcome.candidates,
-            explanation=f"{objective.name}: {'; '.join(words)}: {change}: {outcome.reason}",
-            stamp_monitored=stamp,
+            explanation=f"{objective.name}: {'; '.join(words)}: {change}: {reason}",
+            stamp_monitored=causes[0].stamp,
             stamp_analysed=analysed,
             stamp_planned=self._stamp(now),
             analyse_wall_s=analyse_wall,
             plan_wall_s=plan_wall,
+            reasons=tuple(causes),
             wall_began=self._wall(),
         )
 
-    def _causes(
-        self, objective: Objective, running: _Running, result: ObjectiveAnalysis, now: float
-    ) -> list[tuple[float, str, str]]:
-        """Return (stamp, trigger, words) of everything that asks for an adaptation."""
+    def _causes(self, objective: Objective, running: _Running, result: ObjectiveAnalysis, now: float) -> list[Cause]:
+        """Return everything that asks for an adaptation."""
         if running.design is None:
             waited = self._started is not None and now - self._started >= self.settings.start_grace
-            return [(now, "initial", "no configuration runs")] if waited else []
+            return [Cause(now, "initial", "no configuration runs")] if waited else []
         causes = []
         if v.IN_ERROR_COMPONENT in result.causes:
             for name in self.analysis.unrealisable.get(running.design, ()):
                 component = self._components.get(name)
                 words = f"component {name}, which {running.design} requires, does not work"
-                causes.append((component.stamp if component else now, f"component:{name}", words))
+                stamp = component.stamp if component else now
+                causes.append(Cause(stamp, f"component:{name}", words, "compError, compErrFG, S1a"))
             if _is_broken(running) or not causes:
                 words = f"configuration {running.design} does not run"
-                causes.append((running.failed_stamp or now, f"component:{running.design}", words))
+                causes.append(Cause(running.failed_stamp or now, f"component:{running.design}", words, "S1a"))
         if v.IN_ERROR_NFR in result.causes:
-            for quality in result.violated:
-                level = self._levels[objective.name, quality]
-                passes, limit = self._kb.qualities[quality].passes, objective.limits[quality]
-                since = level.passed_since if level.passed_since is not None else now
-                words = f"{quality} {level.value:.3g} {passes} {limit:g} for {now - since:.1f} s"
-                causes.append((since, f"qa:{quality}", words))
+            causes += [self._violation(objective, quality, now) for quality in result.violated]
         if not causes and v.UPDATABLE in result.causes and (running.degraded or self.settings.always_improve):
             for name, component in self._components.items():
                 if component.status == v.RECOVERED:
-                    causes.append((component.stamp, f"component:{name}", f"component {name} works again"))
+                    words = f"component {name} works again"
+                    causes.append(Cause(component.stamp, f"component:{name}", words, "compRecov"))
         return causes
+
+    def _violation(self, objective: Objective, quality: str, now: float) -> Cause:
+        level, limit = self._levels[objective.name, quality], objective.limits[quality]
+        since = level.passed_since if level.passed_since is not None else now
+        kind = self._kb.qualities[quality]
+        return Cause(
+            stamp=since,
+            trigger=f"qa:{quality}",
+            text=f"{quality} {level.value:.3g} {kind.passes} {limit:g} for {now - since:.1f} s",
+            rules="QA, S9",
+            quality=quality,
+            level=level.value,
+            limit=limit,
+            excess=kind.excess(level.value, limit) / (abs(limit) or 1.0),
+        )
 
     def _improves(self, running: _Running, outcome: Plan) -> bool:
         if running.degraded:

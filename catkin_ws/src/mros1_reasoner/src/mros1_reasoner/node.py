@@ -268,7 +268,7 @@ class ReasonerNode:
                 setattr(message, item.name, rospy.Time.from_sec(max(0.0, value)))
             elif item.name == "candidates":
                 message.candidates = [_candidate(candidate) for candidate in value]
-            elif item.name != "wall_began":
+            elif item.name in message.__slots__:
                 setattr(message, item.name, list(value) if isinstance(value, tuple) else value)
         message.header.stamp = rospy.Time.now()
         self._publisher.publish(message)
@@ -394,6 +394,7 @@ def _settings(knowledge_base: KnowledgeBase, *, grounds_itself: bool) -> mape.Se
         utility=utility,
         desired=desired,
         always_improve=bool(rospy.get_param("~always_improve", False)),
+        approval=bool(rospy.get_param("~approval", False)),
     )
 
 
