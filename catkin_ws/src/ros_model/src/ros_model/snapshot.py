@@ -59,6 +59,7 @@ class ActionState:
     type: str
     servers: tuple[str, ...] = ()
     clients: tuple[str, ...] = ()
+    topics: tuple[TopicState, ...] = field(default=(), compare=False)  # the five, for who looks for mere watchers
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ class MasterClient:
         self.uri = uri
         self._caller_id = caller_id
         try:
-            self._proxy = xmlrpc.client.ServerProxy(uri, transport=_Transport(timeout))
+            self._proxy = xmlrpc.client.ServerProxy(uri, transport=TimedTransport(timeout))
         except (OSError, ValueError) as error:
             raise SnapshotError(f"ROS master address {uri!r}: {error}: set ROS_MASTER_URI") from error
 
@@ -245,7 +246,11 @@ def _fold_actions(topics: Mapping[str, TopicState]) -> dict[str, ActionState]:
             elif part:
                 servers.update(part.publishers)
         actions[base] = ActionState(
-            base, goal.type.removesuffix("Goal"), tuple(sorted(servers)), tuple(sorted(clients - servers))
+            base,
+            goal.type.removesuffix("Goal"),
+            tuple(sorted(servers)),
+            tuple(sorted(clients - servers)),
+            tuple(part for part in parts.values() if part),
         )
     return actions
 
@@ -301,7 +306,7 @@ def _topic_types(types: Any, uri: str) -> list[tuple[str, str]]:
     raise SnapshotError(f"ROS master {uri}: answer to getTopicTypes is garbage")
 
 
-class _Transport(xmlrpc.client.Transport):
+class TimedTransport(xmlrpc.client.Transport):
     """A transport whose socket operations end after a time."""
 
     def __init__(self, timeout: float) -> None:
