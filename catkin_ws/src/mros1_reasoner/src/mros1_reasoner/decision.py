@@ -8,6 +8,7 @@ from mros1_reasoner.planner import Candidate
 
 DECIDED, EXECUTED, FAILED = "DECIDED", "EXECUTED", "FAILED"  # Decision.msg
 PROPOSED = "PROPOSED"  # waits for an operator's approval
+ADVISED = "ADVISED"  # in a dry run: nothing follows
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mros1_reasoner import vocabulary as v
-from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED, PROPOSED, Cause, Decision
+from mros1_reasoner.decision import ADVISED, DECIDED, EXECUTED, FAILED, PROPOSED, Cause, Decision
 from mros1_reasoner.knowledge_base import KnowledgeBase
 from mros1_reasoner.model import Analysis, Design, Facts, Objective, ObjectiveAnalysis
 from mros1_reasoner.planner import Distance, Plan, Situation, Utility, difference, plan, utility_of
@@ -48,6 +48,7 @@ class Settings:
         always_improve: adapt also when a recovered component makes a clearly better design possible.
         improvement: utility that such a design must have more.
         approval: a decision waits until an operator approves it.
+        dry_run: what would be done is told once, as ADVISED, and not carried out.
     """
 
     violation_window: float = 2.0
@@ -63,6 +64,7 @@ class Settings:
     always_improve: bool = False
     improvement: float = 0.05
     approval: bool = False
+    dry_run: bool = False
 
 
 @dataclass
@@ -436,7 +438,7 @@ class Mape:
             decision = self._decide(objective, now, analysed, analyse_wall)
             if decision is None:
                 continue
-            if decision.to_configuration:  # the others' turn comes after it
+            if decision.state == DECIDED:  # the others' turn comes after it
                 chosen = decision
                 break
             decisions.append(decision)
@@ -661,18 +663,18 @@ class Mape:
             stays, reason = True, f"locked by the operator; {outcome.choice} would be taken: {outcome.reason}"
         if result.causes == {v.UPDATABLE} and (stays or not self._improves(running, outcome)):
             return None
-        if stays:
+        if stays or self.settings.dry_run:
             refusal = (tuple(c.trigger for c in causes), outcome.choice)
             if refusal == running.refusal:
                 return None
             running.refusal = refusal
-            running.degraded = True
+            running.degraded = running.degraded or stays
         self._count += 1
         target = "" if stays else outcome.choice or ""
         change = f"{running.design or 'nothing'} -> {target}" if target else f"stays with {running.design or 'nothing'}"
         return Decision(
             id=f"{self._name}-{self._count}",
-            state=FAILED if stays else DECIDED,
+            state=FAILED if stays else ADVISED if self.settings.dry_run else DECIDED,
             objective=objective.name,
             trigger=trigger,
             causes=words,
