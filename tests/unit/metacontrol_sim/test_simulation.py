@@ -2,7 +2,8 @@ import math
 
 import numpy as np
 import pytest
-from metacontrol_sim.simulation import VIBRATION, Pose, Settings, Simulation, SimulationError
+from metacontrol_sim.geometry import Pose
+from metacontrol_sim.simulation import VIBRATION, Settings, Simulation, SimulationError
 from metacontrol_sim.world import Box, World
 
 WALL = Box("wall", "wall", 4.5, 0.0, 1.0, 8.0, 2.0)

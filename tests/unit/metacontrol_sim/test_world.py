@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from metacontrol_sim.world import FREE, OCCUPIED, UNKNOWN, Box, WorldError, rasterise, read_world
+from metacontrol_sim.grid import FREE, OCCUPIED, UNKNOWN
+from metacontrol_sim.world import Box, WorldError, rasterise
+from metacontrol_sim.world_file import read_world
 
 WORLDS = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim/worlds"
 FLOOR = "floor: {x: [-5, 5], y: [-5, 5]}\n"

@@ -15,14 +15,15 @@ from sensor_msgs.msg import BatteryState, Imu
 from tf2_msgs.msg import TFMessage
 
 from metacontrol_sim.power import BATTERY_CAPACITY_WH
-from metacontrol_sim.simulation import GRAVITY, VIBRATION, Pose
+from metacontrol_sim.simulation import GRAVITY, VIBRATION
 
 if TYPE_CHECKING:
     import geometry_msgs.msg
 
+    from metacontrol_sim.geometry import Pose
+    from metacontrol_sim.grid import Grid
     from metacontrol_sim.robot import Mount, Robot
     from metacontrol_sim.simulation import Simulation
-    from metacontrol_sim.world import Grid
 
 MAP, ODOM, BASE = "map", "odom", "base_link"
 _SMALL = 1e-6
@@ -108,7 +109,8 @@ def occupancy_grid(grid: Grid, now: genpy.Time) -> OccupancyGrid:
     message.info.resolution = grid.resolution
     message.info.height, message.info.width = grid.cells.shape
     message.info.origin.position.x, message.info.origin.position.y = grid.origin_x, grid.origin_y
-    message.info.origin.orientation.w = 1.0
+    orientation = message.info.origin.orientation
+    orientation.z, orientation.w = _half_angle(grid.origin_yaw)
     message.data = grid.cells.ravel().tolist()
     return message
 

@@ -14,8 +14,10 @@ import numpy as np
 import pybullet
 from rosgraph_monitor.quality import braking_distance, closest_in_direction, energy_level, safety_risk
 
+from metacontrol_sim.geometry import ORIGIN, Pose, wrap
 from metacontrol_sim.power import Battery, PowerMeter, check_factor
 from metacontrol_sim.robot import Robot
+from metacontrol_sim.world import MAPPED, box_mesh
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -54,6 +56,7 @@ _NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _TRUTH_RAY_HEIGHT = 0.06
 _TRUTH_ANGLES = np.radians(np.linspace(-90.0, 90.0, 181))
 _NOISE_BLOCK = 1000
+_BOXES_PER_MESH = 4000  # PyBullet takes no more than 131,072 vertices at once
 _COLOURS = {
     "wall": (0.75, 0.75, 0.72, 1.0),
     "rack": (0.20, 0.35, 0.60, 1.0),
@@ -65,29 +68,6 @@ _COLOURS = {
 
 class SimulationError(RuntimeError):
     """The simulation cannot start, or was given a value it refuses."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pose:
-    """A pose in the plane: m, m, rad."""
-
-    x: float
-    y: float
-    yaw: float
-
-    def __matmul__(self, other: Pose) -> Pose:
-        """Return the pose `other`, given in this pose's frame, in the frame that this pose is given in."""
-        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
-        return Pose(
-            self.x + cos * other.x - sin * other.y,
-            self.y + sin * other.x + cos * other.y,
-            wrap(self.yaw + other.yaw),
-        )
-
-    def inverse(self) -> Pose:
-        """Return the inverse transform."""
-        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
-        return Pose(-cos * self.x - sin * self.y, sin * self.x - cos * self.y, wrap(-self.yaw))
 
 
 @dataclass(frozen=True)
@@ -102,7 +82,7 @@ class Settings:
         gui: show PyBullet's window.
     """
 
-    initial_pose: Pose = Pose(0.0, 0.0, 0.0)
+    initial_pose: Pose = ORIGIN
     seed: int = 0
     localisation_noise: float = 0.0
     odometry_drift: float = 0.0
@@ -281,9 +261,7 @@ class Simulation:
             (0.0, 0.0, math.sin(box.yaw / 2.0), math.cos(box.yaw / 2.0)),
             physicsClientId=self._client,
         )
-        everything = _WORLD_GROUP | _ROBOT_GROUP | _FLOOR_GROUP
-        pybullet.setCollisionFilterGroupMask(body, -1, _WORLD_GROUP, everything, physicsClientId=self._client)
-        self._names[body] = box.name
+        self._join_world(body, box.name)
         return int(body)
 
     def touching(self) -> tuple[str, ...]:
@@ -317,9 +295,32 @@ class Simulation:
             physicsClientId=client,
         )
         pybullet.setCollisionFilterGroupMask(floor, -1, _FLOOR_GROUP, _WORLD_GROUP, physicsClientId=client)
+        self._add_map([box for box in world.boxes if box.kind == MAPPED])
         for box in world.boxes:
-            self.add_obstacle(box)
+            if box.kind != MAPPED:
+                self.add_obstacle(box)
         self._body = self._build_robot()
+
+    def _add_map(self, boxes: list[Box]) -> None:
+        """Put the boxes of a map on the floor, thousands of them to a body: each as a body would slow every step."""
+        for first in range(0, len(boxes), _BOXES_PER_MESH):
+            part = boxes[first : first + _BOXES_PER_MESH]
+            vertices, indices = box_mesh(part)
+            mesh = {"vertices": vertices, "indices": indices, "physicsClientId": self._client}
+            flag = pybullet.GEOM_FORCE_CONCAVE_TRIMESH
+            body = pybullet.createMultiBody(
+                0.0,
+                pybullet.createCollisionShape(pybullet.GEOM_MESH, flags=flag, **mesh),
+                pybullet.createVisualShape(pybullet.GEOM_MESH, rgbaColor=_COLOURS["wall"], **mesh),
+                physicsClientId=self._client,
+            )
+            self._join_world(body, part[0].name)
+
+    def _join_world(self, body: int, name: str) -> None:
+        """Let a body be seen by rays and stand in the way of everything."""
+        everything = _WORLD_GROUP | _ROBOT_GROUP | _FLOOR_GROUP
+        pybullet.setCollisionFilterGroupMask(body, -1, _WORLD_GROUP, everything, physicsClientId=self._client)
+        self._names[body] = name
 
     def _build_robot(self) -> int:
         """Create the robot: a box on two sliding joints and a turning one, driven by their velocity motors."""
@@ -469,11 +470,6 @@ class Simulation:
         if not self._noise:
             self._noise = self._vibration_rng.standard_normal(_NOISE_BLOCK).tolist()
         return self._noise.pop()
-
-
-def wrap(angle: float) -> float:
-    """Return an angle within -pi and pi."""
-    return math.remainder(angle, 2.0 * math.pi)
 
 
 def _check_initial_pose(world: World, pose: Pose, robot: Robot) -> None:

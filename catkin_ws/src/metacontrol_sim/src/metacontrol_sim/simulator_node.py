@@ -18,6 +18,7 @@ from std_msgs.msg import Float32, Int32
 from tf2_msgs.msg import TFMessage
 
 from metacontrol_sim import messages, sensor_messages
+from metacontrol_sim.geometry import Pose
 from metacontrol_sim.pacing import Pacer
 from metacontrol_sim.parameters import ParameterError, file_path, flag, number, seed
 from metacontrol_sim.power import PowerError
@@ -26,12 +27,12 @@ from metacontrol_sim.simulation import (
     LOCALISATION_STEPS,
     SAFETY_STEPS,
     STEP,
-    Pose,
     Settings,
     Simulation,
     SimulationError,
 )
-from metacontrol_sim.world import World, WorldError, rasterise, read_world
+from metacontrol_sim.world import World, WorldError, rasterise
+from metacontrol_sim.world_file import read_world
 
 MOTION_STEPS = 2
 SENSOR_STEPS = 10
