@@ -3,7 +3,7 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        packages=["ros_model", "ros_model.commands", "ros_model.generators"],
+        packages=["ros_model", "ros_model.commands", "ros_model.extraction", "ros_model.generators"],
         package_dir={"": "src"},
         package_data={"ros_model": ["grammar/*.lark"]},
     )

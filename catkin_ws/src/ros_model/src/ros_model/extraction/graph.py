@@ -1,0 +1,311 @@
+"""From a snapshot of the running graph to the models of its packages and of the system."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from ros_model.extraction import plumbing
+from ros_model.extraction.names import as_seen_from, executable_name, is_known_type, split_name
+from ros_model.extraction.values import UnwritableValueError, leaves, typed
+from ros_model.metamodel import (
+    Component,
+    Connection,
+    ConnectionKind,
+    Port,
+    PortKind,
+    PortPath,
+    Reference,
+    RosParameter,
+    RosSystem,
+    SystemParameter,
+)
+from ros_model.packages import Artifact, Node, Package, PackageSet, ParameterDeclaration, PortDeclaration
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from ros_model.extraction.live import Details
+    from ros_model.snapshot import ActionState, GraphSnapshot
+
+NO_PACKAGE = "unknown_package"
+"""Package of nodes whose executable can't be traced; the artifact is then named as the node."""
+
+_SERVER_ENDS = {"goal": "subscribers", "cancel": "subscribers", "status": "publishers"} | dict.fromkeys(
+    ("feedback", "result"), "publishers"
+)
+
+
+@dataclass(frozen=True)
+class End:
+    """An interface of a running node, by its resolved name."""
+
+    node: str
+    kind: PortKind
+    name: str
+    type: str = ""
+
+
+@dataclass(frozen=True)
+class Models:
+    """The model of the packages, and that of the system which instantiates them."""
+
+    packages: PackageSet
+    system: RosSystem
+
+
+@dataclass
+class _Instance:
+    """A running node on its way into the models."""
+
+    name: str
+    label: str
+    namespace: str | None
+    reference: Reference
+    ends: list[End] = field(default_factory=list)
+    parameters: list[tuple[str, Any]] = field(default_factory=list)  # relative to the node
+
+
+def models_of(
+    snapshot: GraphSnapshot, details: Details, name: str, title: Sequence[str] = (), *, everything: bool = False
+) -> Models:
+    """Return the models of a running graph.
+
+    Args:
+        snapshot: what the master lists.
+        details: what the nodes tell.
+        name: name of the system.
+        title: first lines of both files' comments.
+        everything: keep what ROS itself makes for every node, and what roslaunch leaves on the parameter server.
+    """
+    remarks = _Remarks(snapshot, details, everything)
+    ends = [end for end in interfaces(snapshot, details) if everything or not plumbing.is_plumbing(end)]
+    running = [
+        node for node in snapshot.nodes if node not in details.dead and (everything or node not in plumbing.NODES)
+    ]
+    instances = _instances(running, details, remarks)
+    for end in ends:
+        if end.node in instances:
+            instances[end.node].ends.append(end)
+    unowned = _share_out(snapshot.parameters, instances)
+    if not everything:
+        unowned = [(key, value) for key, value in unowned if not plumbing.is_roslaunch_parameter(key)]
+    components = tuple(_component(instance, remarks) for instance in instances.values())
+    parameters = tuple(_system_parameters(unowned, remarks))
+    connections = tuple(_connections(instances))
+    packages = _packages(instances.values())
+    header = "\n".join([*title, *remarks.lines()])
+    return Models(PackageSet(packages, header), RosSystem(name, components, connections, parameters, header))
+
+
+def interfaces(snapshot: GraphSnapshot, details: Details) -> Iterator[End]:
+    """Yield all interfaces of all nodes; an action is one, and what else touches its topics is a topic's end."""
+    for topic in snapshot.topics.values():
+        known = topic.type if is_known_type(topic.type) else ""
+        for node in topic.publishers:
+            yield End(node, PortKind.PUBLISHER, topic.name, known)
+        for node in topic.subscribers:
+            yield End(node, PortKind.SUBSCRIBER, topic.name, known)
+    for service in snapshot.services.values():
+        for node in service.servers:
+            yield End(node, PortKind.SERVICE_SERVER, service.name, details.service_types.get(service.name, ""))
+    for action in snapshot.actions.values():
+        yield from _action_ends(action)
+
+
+def _action_ends(action: ActionState) -> Iterator[End]:
+    """Yield the ends of an action.
+
+    A server publishes status and result and listens to goals; who publishes goals is a client. The rest only watches,
+    or helps out, as a topic's publisher or subscriber.
+    """
+    touching: dict[str, set[tuple[str, str]]] = defaultdict(set)
+    types = {}
+    for topic in action.topics:
+        suffix = topic.name.rpartition("/")[2]
+        types[suffix] = topic.type
+        for side, nodes in (("publishers", topic.publishers), ("subscribers", topic.subscribers)):
+            for node in nodes:
+                touching[node].add((suffix, side))
+    server_ends = set(_SERVER_ENDS.items())
+    client_ends = {(suffix, "publishers" if side == "subscribers" else "subscribers") for suffix, side in server_ends}
+    for node, touched in sorted(touching.items()):
+        if {("goal", "subscribers"), ("status", "publishers"), ("result", "publishers")} <= touched:
+            yield End(node, PortKind.ACTION_SERVER, action.name, action.type)
+            rest = touched - server_ends
+        elif ("goal", "publishers") in touched:
+            yield End(node, PortKind.ACTION_CLIENT, action.name, action.type)
+            rest = touched - client_ends
+        else:
+            rest = touched
+        for suffix, side in sorted(rest):
+            kind = PortKind.PUBLISHER if side == "publishers" else PortKind.SUBSCRIBER
+            yield End(node, kind, f"{action.name}/{suffix}", types[suffix])
+
+
+def _instances(names: Sequence[str], details: Details, remarks: _Remarks) -> dict[str, _Instance]:
+    """Give every node its label, unique in the system, and the reference to the executable that it runs."""
+    labels = Counter(split_name(name)[1] for name in names)
+    found = {}
+    for name in names:
+        namespace, label = split_name(name)
+        # The ends of connections have nothing but the label: where it is not unique, it is the whole name.
+        ambiguous = labels[label] > 1
+        shown = name.strip("/") if ambiguous else label
+        origin = details.origins.get(name)
+        package = origin.package if origin else NO_PACKAGE
+        artifact = executable_name(origin.executable) if origin else label
+        if origin and artifact != origin.executable:
+            remarks.renamed[origin.executable] = artifact
+        found[name] = _Instance(
+            name, shown, None if ambiguous else namespace or None, Reference(package, artifact, executable_name(label))
+        )
+    return found
+
+
+def _share_out(tree: Mapping[str, Any], instances: Mapping[str, _Instance]) -> list[tuple[str, Any]]:
+    """Give each node its private parameters; return the others, by their full names without the leading slash."""
+    unowned = []
+    for name, value in leaves(tree):
+        parts = name.split("/")
+        owner = next(
+            (
+                instances[node]
+                for end in range(len(parts) - 1, 0, -1)
+                if (node := "/" + "/".join(parts[:end])) in instances
+            ),
+            None,
+        )
+        if owner:
+            owner.parameters.append((f"/{name}".removeprefix(f"{owner.name}/"), value))
+        else:
+            unowned.append((name, value))
+    return unowned
+
+
+def _component(instance: _Instance, remarks: _Remarks) -> Component:
+    reference = instance.reference
+    ports = tuple(
+        Port(name, end.kind, Reference(reference.package, reference.artifact, reference.node, name))
+        for end in sorted(instance.ends, key=_order)
+        for name in [as_seen_from(instance.name, end.name)]
+    )
+    parameters = []
+    for key, raw in instance.parameters:
+        try:
+            _, value = typed(raw)
+        except UnwritableValueError as error:
+            remarks.unwritable[f"{instance.name}/{key}"] = str(error)
+            value = None
+        full = Reference(reference.package, reference.artifact, reference.node, key)
+        parameters.append(RosParameter(key, full, value))
+    return Component(instance.label, reference, instance.namespace, ports, tuple(parameters))
+
+
+def _order(end: End) -> tuple[int, str]:
+    return list(PortKind).index(end.kind), end.name
+
+
+def _connections(instances: Mapping[str, _Instance]) -> Iterator[Connection]:
+    """Connect what bears the same name: publishers and subscribers, action servers and clients."""
+    for kind, source_kind, target_kind in (
+        (ConnectionKind.TOPIC, PortKind.PUBLISHER, PortKind.SUBSCRIBER),
+        (ConnectionKind.ACTION, PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT),
+    ):
+        sources, targets = (_paths(instances.values(), end) for end in (source_kind, target_kind))
+        for name in sorted(sources.keys() & targets.keys()):
+            yield Connection(name.lstrip("/"), kind, tuple(sources[name]), tuple(targets[name]))
+
+
+def _paths(instances: Iterable[_Instance], kind: PortKind) -> dict[str, list[PortPath]]:
+    found: dict[str, list[PortPath]] = defaultdict(list)
+    for instance in instances:
+        for end in instance.ends:
+            if end.kind is kind:
+                found[end.name].append(PortPath(instance.label, as_seen_from(instance.name, end.name)))
+    return found
+
+
+def _system_parameters(parameters: Iterable[tuple[str, Any]], remarks: _Remarks) -> Iterator[SystemParameter]:
+    for name, raw in parameters:
+        try:
+            kind, value = typed(raw)
+        except UnwritableValueError as error:
+            remarks.unwritable[f"/{name}"] = str(error)
+            continue
+        yield SystemParameter(name, kind, value)
+
+
+def _packages(instances: Iterable[_Instance]) -> tuple[Package, ...]:
+    """Declare what the instances refer to; instances of one node of one executable share its declaration."""
+    declared: dict[str, dict[str, dict[str, _Declaration]]] = defaultdict(lambda: defaultdict(dict))
+    for instance in instances:
+        reference = instance.reference
+        nodes = declared[reference.package][reference.artifact]
+        declaration = nodes.setdefault(reference.node, _Declaration({}, {}))
+        for end in sorted(instance.ends, key=_order):
+            name = as_seen_from(instance.name, end.name)
+            declaration.ports.setdefault((end.kind, name), PortDeclaration(name, end.kind, end.type))
+        for key, raw in instance.parameters:
+            try:
+                kind = typed(raw)[0]
+            except UnwritableValueError:
+                kind = None
+            declaration.parameters.setdefault(key, ParameterDeclaration(key, kind))
+    return tuple(
+        Package(
+            package,
+            tuple(
+                Artifact(
+                    artifact,
+                    tuple(
+                        Node(node, tuple(found.ports.values()), tuple(found.parameters.values()))
+                        for node, found in sorted(nodes.items())
+                    ),
+                )
+                for artifact, nodes in sorted(artifacts.items())
+            ),
+        )
+        for package, artifacts in sorted(declared.items())
+    )
+
+
+@dataclass
+class _Declaration:
+    ports: dict[tuple[PortKind, str], PortDeclaration]
+    parameters: dict[str, ParameterDeclaration]
+
+
+class _Remarks:
+    """What the models leave out or can't know, for the comments at their top."""
+
+    def __init__(self, snapshot: GraphSnapshot, details: Details, everything: bool) -> None:
+        self._snapshot = snapshot
+        self._details = details
+        self._everything = everything
+        self.unwritable: dict[str, str] = {}
+        self.renamed: dict[str, str] = {}
+
+    def lines(self) -> Iterator[str]:
+        """Yield the lines."""
+        yield "Not known, because a ROS 1 master doesn't: who calls which service."
+        snapshot, details = self._snapshot, self._details
+        if silent := [name for name in snapshot.services if not details.service_types.get(name) and self._alive(name)]:
+            yield f"Not known, because their nodes don't answer: the types of the services {', '.join(silent)}."
+        if untyped := [topic.name for topic in snapshot.topics.values() if not is_known_type(topic.type)]:
+            yield f"Not known, because nobody publishes them: the types of the topics {', '.join(untyped)}."
+        for node, why in sorted(details.unknown.items()):
+            if self._everything or node not in plumbing.NODES:
+                yield f"Not known: the package and executable of {node}: {why}."
+        if details.dead:
+            yield f"Left out: {', '.join(sorted(details.dead))}: the master lists them, but nobody listens there."
+        for name, why in sorted(self.unwritable.items()):
+            yield f"Left out: the value of the parameter {name}: {why}."
+        for executable, artifact in sorted(self.renamed.items()):
+            yield f"The artifact {artifact} is the executable {executable}: a reference can't hold the dot."
+        if not self._everything:
+            yield plumbing.REMARK
+
+    def _alive(self, service: str) -> bool:
+        return not set(self._snapshot.services[service].servers) <= self._details.dead
