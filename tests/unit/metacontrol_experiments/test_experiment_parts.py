@@ -1,5 +1,6 @@
 """Routes, commit, timeline, processes, the figure and the command's refusals."""
 
+import signal
 import socket
 import struct
 import sys
@@ -171,12 +172,21 @@ def test_process_of_somebody_else_is_not_owned():
     assert not ProcessTree({}).owns(1)
 
 
-def test_stop_interrupts_and_waits(tmp_path):
+@pytest.mark.parametrize("ours", [signal.default_int_handler, signal.SIG_IGN], ids=["terminal", "background job"])
+def test_stop_interrupts_and_waits(tmp_path, ours):
+    former = signal.signal(signal.SIGINT, ours)
+    try:
+        _stop_interrupts_and_waits(tmp_path)
+    finally:
+        signal.signal(signal.SIGINT, former)
+
+
+def _stop_interrupts_and_waits(tmp_path):
     tree = ProcessTree({})
     code = "import time\ntry:\n print('up', flush=True); time.sleep(60)\nexcept KeyboardInterrupt:\n print('bye')"
     process = tree.start([sys.executable, "-c", code], tmp_path / "log")
     assert wait_until(lambda: "up" in (tmp_path / "log").read_text(), 10.0)
-    assert tree.stop(process, 5.0)
+    assert tree.stop(process, 20.0)
     assert "bye" in (tmp_path / "log").read_text()
 
 

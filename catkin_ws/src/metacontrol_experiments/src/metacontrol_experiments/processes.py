@@ -6,7 +6,9 @@ its own, and a node whose parent died belongs to nobody, but both still carry th
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -24,6 +26,8 @@ MARK = "METACONTROL_RUN"
 """Name of the environment variable that marks a run's processes."""
 
 _POLL_S = 0.05
+_WITH_SIGINT = ("env", "--default-signal=INT")
+"""A background job of a shell script has SIGINT ignored, which its children would inherit; they are ended by it."""
 
 
 def free_port() -> int:
@@ -66,11 +70,13 @@ class ProcessTree:
         """Starts a command in a session of its own, so that Ctrl-C does not reach it; its output goes to a file.
 
         Raises:
-            OSError: the command or the log cannot be opened.
+            OSError: there is no such command, or the log cannot be opened.
         """
+        if not shutil.which(command[0]):
+            raise FileNotFoundError(errno.ENOENT, "no such command", command[0])
         with log.open("wb") as output:
             process = subprocess.Popen(
-                list(command),
+                [*_WITH_SIGINT, *command],
                 env={**os.environ, **self.environment},
                 stdin=subprocess.DEVNULL,
                 stdout=output,
