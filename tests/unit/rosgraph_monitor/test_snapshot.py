@@ -1,6 +1,7 @@
 """The snapshot of the graph, over a master that answers from a table."""
 
 import contextlib
+import json
 import socket
 import threading
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
@@ -145,3 +146,50 @@ def test_error_of_the_master_is_passed_on():
 def test_address_that_is_no_address():
     with pytest.raises(SnapshotError, match="ROS_MASTER_URI"):
         MasterClient("localhost:11311")
+
+
+def test_master_that_answers_by_drops_times_out():
+    ended = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def drip():
+            connection, _ = server.accept()
+            with connection, contextlib.suppress(OSError):
+                connection.sendall(b"HTTP/1.1 200 OK\r\n")
+                while not ended.wait(0.02):
+                    connection.sendall(b"X-Slow: 1\r\n")
+
+        thread = threading.Thread(target=drip, daemon=True)
+        thread.start()
+        try:
+            with pytest.raises(SnapshotError, match="does not answer getSystemState"):
+                take_snapshot(f"http://127.0.0.1:{server.getsockname()[1]}", timeout=0.3)
+        finally:
+            ended.set()
+            thread.join()
+
+
+def test_master_that_answers_slowly_is_waited_for():
+    slow = threading.Event()
+
+    def state(_caller):
+        slow.wait(0.2)
+        return [1, "", STATE]
+
+    with master(**(answers([]) | {"getSystemState": state})) as uri:
+        assert set(take_snapshot(uri, timeout=20.0).nodes) == set(ADDRESSES)
+
+
+def test_ten_thousand_parameters():
+    tree = {f"group_{i}": {f"parameter_{k}": float(k) for k in range(100)} for i in range(100)}
+    with master(**(answers([]) | {"getParam": lambda _caller, key: [1, "", tree]})) as uri:
+        graph = take_snapshot(uri, timeout=60.0)
+    assert graph.parameter("/group_99/parameter_99") == 99.0
+
+
+def test_snapshot_compares_and_becomes_json(graph):
+    assert graph == build_snapshot(STATE, TYPES, PARAMETERS, ADDRESSES)
+    assert graph != build_snapshot(STATE, TYPES, {}, ADDRESSES)
+    read = json.loads(json.dumps(graph.as_dict()))
+    assert read["nodes"]["/move"]["action_servers"] == ["/move"]
+    assert read["parameters"] == PARAMETERS

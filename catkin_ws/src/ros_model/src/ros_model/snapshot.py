@@ -6,7 +6,10 @@ the nodes' addresses. Nothing here is asked of the nodes themselves: a node that
 
 from __future__ import annotations
 
+import dataclasses
 import http.client
+import socket
+import time
 import xmlrpc.client
 from collections import defaultdict
 from dataclasses import dataclass, field
@@ -85,6 +88,10 @@ class GraphSnapshot:
     actions: Mapping[str, ActionState] = field(default_factory=dict)
     parameters: ParameterTree = field(default_factory=dict)
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return all of it as dicts, lists and scalars, fit for JSON but for binary parameters and dates."""
+        return dataclasses.asdict(self)
+
     def parameter(self, name: str) -> Any:
         """Return the value (a dict for a whole namespace) of a parameter by its resolved name.
 
@@ -100,7 +107,7 @@ class GraphSnapshot:
 
 
 class MasterClient:
-    """Asks the master over one kept connection, with a time-out per call. Not for use by several threads at once."""
+    """Asks the master over one kept connection, with a deadline per call. Not for use by several threads at once."""
 
     def __init__(self, uri: str, caller_id: str = "/rosgraph_snapshot", timeout: float = 1.5) -> None:
         """Prepare the client; nothing is connected yet.
@@ -108,7 +115,7 @@ class MasterClient:
         Args:
             uri: address of the master, e.g. `http://localhost:11311`.
             caller_id: name under which the master is asked.
-            timeout: wall seconds in which each part of an answer must arrive.
+            timeout: wall seconds in which a whole answer must have arrived.
 
         Raises:
             SnapshotError: the address is no http address.
@@ -307,14 +314,65 @@ def _topic_types(types: Any, uri: str) -> list[tuple[str, str]]:
 
 
 class TimedTransport(xmlrpc.client.Transport):
-    """A transport whose socket operations end after a time."""
+    """A transport whose calls end after a time, be the answer slow to begin or slow to come."""
 
     def __init__(self, timeout: float) -> None:
         super().__init__()
         self._timeout = timeout
+        self._deadline = 0.0
+
+    def request(self, *arguments: Any, **options: Any) -> Any:
+        """Call, within the time."""
+        self._deadline = time.monotonic() + self._timeout
+        return super().request(*arguments, **options)
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        """Return the kept connection, with the time-out set."""
-        connection = super().make_connection(host)
-        connection.timeout = self._timeout
-        return connection
+        """Return the kept connection, with the deadline of this call."""
+        if not self._connection or host != self._connection[0]:
+            name, self._extra_headers, _ = self.get_host_info(host)
+            self._connection = host, _Connection(name)
+        self._connection[1].deadline = self._deadline  # type: ignore[union-attr]
+        return self._connection[1]  # type: ignore[return-value]
+
+
+class _Connection(http.client.HTTPConnection):
+    """A connection that has a deadline."""
+
+    deadline = 0.0
+
+    def connect(self) -> None:
+        """Connect within what is left of the time."""
+        self.timeout = max(self.deadline - time.monotonic(), 0.001)
+        super().connect()
+        plain = self.sock
+        self.sock = _DeadlineSocket(plain.family, plain.type, plain.proto, fileno=plain.detach())
+
+    def send(self, data: Any) -> None:
+        """Send, after connecting where that is still to be done; the answer has the same deadline."""
+        if self.sock is None:
+            self.connect()
+        if isinstance(self.sock, _DeadlineSocket):
+            self.sock.deadline = self.deadline
+        super().send(data)
+
+
+class _DeadlineSocket(socket.socket):
+    """A socket on which all that is sent and received must be done by a deadline, however small the pieces."""
+
+    deadline = 0.0
+
+    def recv_into(self, *arguments: Any, **options: Any) -> int:
+        """Receive within what is left of the time."""
+        self._hurry()
+        return super().recv_into(*arguments, **options)
+
+    def sendall(self, *arguments: Any, **options: Any) -> None:
+        """Send within what is left of the time."""
+        self._hurry()
+        super().sendall(*arguments, **options)
+
+    def _hurry(self) -> None:
+        left = self.deadline - time.monotonic()
+        if left <= 0.0:
+            raise TimeoutError("timed out")
+        self.settimeout(left)
