@@ -5,6 +5,7 @@ import yaml
 from ros_model.errors import ModelError
 from ros_model.metamodel import PortPath, compose
 from ros_model.project import load_project
+from ros_model.settings import problems_of
 
 BASE = """RosSystem { Name base
     RosComponents (
@@ -102,7 +103,8 @@ def test_parameter_values_tell_what_models_without_wiring_require(load, settings
         " RosParameter sources { RefParameter 'n.nav.nav.local/sources' value 'scan points' } } } ) }"
     )
     settings["variants"] = {"component": "nav"}
-    settings["requires"] = {"sources": {"scan": "laser", "points": "camera", "sonar": "sonar"}}
+    settings["requires"] = {"sources": {"scan": "laser", "points": "camera", "echo": "sonar"}}
+    settings["components"]["sonar"] = {"node": "sonar"}
     assert load().required_components()["one"] >= {"laser", "camera"}
 
 
@@ -139,13 +141,13 @@ def test_without_a_table_variants_are_files(load, settings, tmp_path):
         ({"objectives": {"o": {"function": "f"}}}, "objectives.o.function: 'f' is none of functions: f_move"),
         (
             {"functions": {"f_move": {"designs": ["fast"]}}},
-            "f_move.designs: 'fast' is none of the 2 variants",
+            "f_move.designs[0]: 'fast' is none of the 2 variants",
         ),
         ({"components": {"laser": {}}}, "components.laser: is '{}', must be a mapping with either node or topic"),
         ({"base": "../base.rossystem"}, "base: ../base.rossystem leaves the folder"),
         ({"base": "none.rossystem"}, "No such file"),
-        ({"variants": {"component": "nav", "table": "variants.csv"}}, "nothing says what column 'sensor'"),
-        ({"variants": {"component": "arm", "table": "variants.csv"}}, "variants.component: 'arm' is no component"),
+        ({"variants": {"component": "nav", "table": "variants.csv"}}, "nothing says what column 'speed_mps'"),
+        ({"variants": {"component": "arm", "table": "variants.csv"}}, "'arm' is no component with a FromRosNode"),
     ],
 )
 def test_wrong_setting_is_refused_in_one_line(load, settings, change, message):
@@ -179,16 +181,16 @@ def test_wrong_yaml_is_refused_in_one_line(tmp_path, text, message):
         ({"table": ""}, "variants.csv:1:1: no column 'name'"),
         ({"table": "name,speed_mps,sensor\n"}, "variants.csv:1:1: no rows"),
         ({"table": "name,speed_mps\nslow,0.3\n"}, "column 'sensor' is missing"),
-        ({"table": "name,speed_mps,sensor\nslow,0.3\n"}, "variants.csv:2:1: must have 3 cells"),
+        ({"table": "name,speed_mps,sensor\nslow,0.3\n"}, "variants.csv:2:1: has 2 cells, must have 3"),
         ({"table": "name,speed_mps,sensor\nslow,quick,laser\n"}, "column 'speed_mps' is 'quick', must be a number"),
         (
             {"table": "name,speed_mps,sensor\nslow,1,sonar\n"},
             "2:1: column 'sensor' is 'sonar', must be camera or laser",
         ),
-        ({"table": TABLE + "slow,1,laser\n"}, "variants.csv:4:1: name 'slow' is empty or stands twice"),
+        ({"table": TABLE + "slow,1,laser\n"}, "variants.csv:4:1: name 'slow' stands twice"),
         ({"table": "name,speed_mps,sensor\n../slow,1,laser\n", "qa": "name,safety\n../slow,1\n"}, "can't name a file"),
-        ({"qa": "name,safety\nslow,0.2\n"}, "qa.csv: no row for blind"),
-        ({"qa": "name,safety\nslow,low\nblind,1\n"}, "qa.csv: slow: safety is 'low', must be a number"),
+        ({"qa": "name,safety\nslow,0.2\n"}, "qa.csv:1:1: no row for blind"),
+        ({"qa": "name,safety\nslow,low\nblind,1\n"}, "qa.csv:2:1: slow: safety is 'low', must be a number"),
     ],
 )
 def test_wrong_table_is_refused_with_its_line(load, files, message):
@@ -199,5 +201,98 @@ def test_wrong_table_is_refused_with_its_line(load, files, message):
 
 def test_wiring_to_what_the_base_does_not_publish_is_refused(load, settings):
     settings["variants"]["connections"]["sensor"]["camera"] = ["camera.image"]
-    with pytest.raises(ModelError, match=r"camera\.image is no RosPublisher"):
+    with pytest.raises(ModelError, match=r"metacontrol\.yaml:\d+:\d+: camera\.image is no publisher"):
         load()
+
+
+def test_hierarchy_is_required_by_all_designs_or_by_those_named(load, settings):
+    settings["functions"] = {
+        "f_move": {"designs": ["slow", "blind"], "requires": {"blind": ["f_see"]}},
+        "f_see": {"designs": []},
+    }
+    project = load()
+    assert [project.required_functions(name) for name in ("slow", "blind")] == [(), ("f_see",)]
+    settings["functions"]["f_move"]["requires"] = ["f_see"]
+    assert load().required_functions("slow") == ("f_see",)
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        ({"requires": ["f_fly"]}, "functions.f_move.requires[0]: 'f_fly' is none of functions: f_move"),
+        ({"requires": {"slow": ["f_move"]}}, "functions.f_move.requires.slow[0]: a function can't require itself"),
+        ({"requires": {"fast": []}}, "functions.f_move.requires.fast: 'fast' is none of the designs of f_move"),
+    ],
+)
+def test_hierarchy_that_leads_nowhere_is_refused(load, settings, function, message):
+    settings["functions"]["f_move"] |= function
+    with pytest.raises(ModelError) as caught:
+        load()
+    assert message in str(caught.value)
+
+
+def test_families_are_put_together(load, settings, tmp_path):
+    (tmp_path / "arm.rossystem").write_text("RosSystem { Name one_arm }")
+    settings["variants"] = [settings["variants"], {"files": ["arm.rossystem"]}]
+    project = load()
+    assert [variant.name for variant in project.variants] == ["slow", "blind", "one_arm"]
+    assert project.by_table == {"slow", "blind"}
+
+
+def test_variants_of_one_name_are_refused(load, settings, tmp_path):
+    (tmp_path / "arm.rossystem").write_text("RosSystem { Name slow }")
+    settings["variants"] = [settings["variants"], {"files": ["arm.rossystem"]}]
+    with pytest.raises(ModelError, match=r"metacontrol\.yaml:\d+:1: variants: two variants bear the name 'slow'"):
+        load()
+
+
+def test_requirement_of_an_unknown_component_is_refused(load, settings):
+    settings["requires"] = {"sources": {"echo": "sonar"}}
+    with pytest.raises(ModelError, match=r"requires\.sources\.echo: 'sonar' is a component neither of the base nor"):
+        load()
+
+
+def test_every_problem_of_the_settings_is_told_at_its_place(tmp_path):
+    path = tmp_path / "metacontrol.yaml"
+    path.write_text(
+        "package: robot models\n"
+        "base: base.rossystem\n"
+        "colour: red\n"
+        "variants: {component: nav, table: [a]}\n"
+        "functions:\n"
+        "  f_move: {designs: some}\n"
+        "quality_attributes: {safety: {direction: down, 15: x}}\n"
+        "objectives: {o: {function: f_move, nfrs: {safety: .nan}}}\n"
+    )
+    assert [str(problem).removeprefix(f"{path}:") for problem in problems_of(path)] == [
+        "1:1: utility: is missing, must be a name",
+        "1:1: package: is 'robot models', must be a name of letters, digits, '_' and '-'",
+        "3:1: colour: unknown key, allowed here: package, base, variants, functions, quality_attributes, utility, "
+        "objectives, components, observers, manipulator, requires",
+        "4:28: variants.table: is \"['a']\", must be the name of a CSV or YAML file",
+        "6:12: functions.f_move.designs: is 'some', must be 'all' or a list of variants",
+        "7:22: quality_attributes.safety: the key 15 must be text: put it in quotes",
+        "7:31: quality_attributes.safety.direction: is 'down', must be lower_is_better or higher_is_better",
+        "8:43: objectives.o.nfrs.safety: is 'nan', must be a finite number",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: &a [*a]", "1:1: is nested too deep"),
+        ("a: &a [1, 2, 3, 4, 5, 6, 7, 8, 9]\n" + "".join(
+            f"{new}: &{new} [{', '.join([f'*{old}'] * 9)}]\n" for old, new in zip("abcdef", "bcdefg", strict=True)
+        ), "holds more than 200000 values"),
+        ("a: 1\nb: 2\na: 3", "3:1: the key 'a' stands twice"),
+        ("a: \x07", "1:1: special characters are not allowed"),
+        ("a: 1\n---\nb: 1", "2:1: but found another document"),
+        ("base: 2001-99-99", "1:1: month must be in 1..12"),
+    ],
+)  # fmt: skip
+def test_treacherous_yaml_is_refused_in_one_line(tmp_path, text, message):
+    (tmp_path / "metacontrol.yaml").write_text(text)
+    with pytest.raises(ModelError, match=r"metacontrol\.yaml:") as caught:
+        load_project(tmp_path)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)

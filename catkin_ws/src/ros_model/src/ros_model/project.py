@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
-from ros_model import variants
-from ros_model.errors import ModelError
-from ros_model.files import read_text
-from ros_model.metamodel import RosSystem, compose
+from ros_model.columns import Columns, parse_columns
+from ros_model.metamodel import Position, RosSystem
 from ros_model.reader import read_system
+from ros_model.settings import FILE_NAME, Settings, locate, read_settings
+from ros_model.tables import read_table
+from ros_model.variants import make_systems, without
+from ros_model.wiring import required_by_parameters, required_components
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from ros_model.schema_check import Keys
 
-FILE_NAME = "metacontrol.yaml"
+__all__ = ["DIRECTIONS", "FILE_NAME", "Project", "load_project"]
+
 DIRECTIONS = ("lower_is_better", "higher_is_better")
-_Check = "Callable[[Any, str], None]"
 
 
 @dataclass(frozen=True)
@@ -30,19 +29,33 @@ class Project:
     Attributes:
         folder: the folder of metacontrol.yaml; the paths in it are relative to this.
         settings: the content of metacontrol.yaml, checked.
-        base: the system without the choices that variants make.
+        base: the system without the choices that variants make, and without the components that some of them lack.
         variants: one partial system each, composed with the base (metamodel.compose).
+        source: metacontrol.yaml, for positions in errors.
+        whole_base: the system as its file has it.
+        by_table: names of the variants that a table gives; the others are files of their own.
+        as_packages: generators write one catkin package for each variant, the published layout.
     """
 
     folder: Path
     settings: dict[str, Any]
     base: RosSystem
     variants: tuple[RosSystem, ...]
+    source: Settings = field(repr=False, compare=False)
+    whole_base: RosSystem = field(repr=False)
+    by_table: frozenset[str] = frozenset()
+    as_packages: bool = False
 
     @property
     def package(self) -> str:
         """Name of the catkin package that holds the models and what is generated from them."""
         return str(self.settings["package"])
+
+    @property
+    def base_file(self) -> str:
+        """Name of the file, in the folder of the models, that holds `base`."""
+        name = str(self.settings["base"])
+        return name if self.base == self.whole_base else f"{Path(name).stem}.core.rossystem"
 
     def designs(self, function: str) -> tuple[RosSystem, ...]:
         """Return the variants that solve a function."""
@@ -58,11 +71,20 @@ class Project:
         for function in self.settings["functions"]:
             if any(design.name == variant for design in self.designs(function)):
                 return str(function)
-        raise ModelError(f"{self.folder / FILE_NAME}: no function has {variant} among its designs: add it to one")
+        raise self.source.error(f"none has {variant} among its designs: add it to one", "functions")
+
+    def required_functions(self, variant: str) -> tuple[str, ...]:
+        """Return the functions that must be provided for a variant to work.
+
+        Raises:
+            ModelError: no function names the variant among its designs.
+        """
+        required = self.settings["functions"][self.function_of(variant)].get("requires", [])
+        return tuple(required.get(variant, ()) if isinstance(required, dict) else required)
 
     def required_components(self) -> dict[str, frozenset[str]]:
         """Return, for each variant, the components that it can't do without: by its wiring, and by `requires`."""
-        by_value = self.settings.get("requires", {})
+        by_value = self.settings["requires"]
         return {
             variant.name: required_components(self.base, variant) | required_by_parameters(variant, by_value)
             for variant in self.variants
@@ -72,243 +94,84 @@ class Project:
 def load_project(folder: str | Path) -> Project:
     """Read a folder's metacontrol.yaml, or that file itself, and the models that it names.
 
-    Variants come from the table that it names; without one, from the `.rossystem` files of `variants/`.
+    Variants come from the tables or files that it names; without one, from the `.rossystem` files of `variants/`.
 
     Raises:
-        ModelError: a file is missing or wrong; says which, and which key.
+        ModelError: a file is missing or wrong; says which, and where.
     """
-    path = Path(folder)
-    path = path / FILE_NAME if path.is_dir() else path
-    settings = _read_settings(path)
-    folder = path.parent.resolve()
-    base = read_system(_inside(folder, settings["base"], path, "base"))
-    section = settings["variants"]
-    if "table" in section:
-        table = _inside(folder, section["table"], path, "variants.table")
-        qa = _inside(folder, section["qa"], path, "variants.qa") if "qa" in section else None
-        found = variants.make_variants(base, section, table, qa, path)
-    else:
-        found = tuple(read_system(file) for file in sorted((folder / "variants").glob("*.rossystem")))
-        if not found:
-            raise ModelError(f"{path}: variants: no table is named, and {folder / 'variants'} holds no .rossystem file")
-    project = Project(folder, settings, base, found)
-    _check_names(project, path)
+    source = read_settings(locate(folder))
+    whole_base = read_system(source.inside("base"))
+    columns = {keys: parse_columns(family, _at(source, keys)) for keys, family in source.families}
+    optional = frozenset().union(*(found.optional for found in columns.values()))
+    base = without(whole_base, optional)
+    variants: list[RosSystem] = []
+    by_table: set[str] = set()
+    for keys, family in source.families:
+        if "table" in family:
+            found = _from_table(source, keys, whole_base, columns[keys])
+            by_table.update(variant.name for variant in found)
+        else:
+            found = _from_files(source, keys)
+        variants += found
+    project = Project(
+        folder=source.path.parent.resolve(),
+        settings=source.content,
+        base=base,
+        variants=tuple(variants),
+        source=source,
+        whole_base=whole_base,
+        by_table=frozenset(by_table),
+    )
+    _check_names(project)
     return project
 
 
-def required_components(base: RosSystem, variant: RosSystem) -> frozenset[str]:
-    """Return the components of the base that feed the variant's, directly or through others.
+def _at(source: Settings, keys: Keys) -> Any:
+    def where(*inner: str | int) -> Position:
+        return source.at(*keys, *inner)
 
-    The search stops at a component that the variant itself drives: that one is the plant (a robot's base takes
-    the velocity and gives the odometry). It is needed, but the variant doesn't depend on whatever else acts on it.
-    """
-    system = compose(base, variant)
-    own = {component.name for component in variant.components}
-    feeds: dict[str, set[str]] = {}
-    for connection in system.connections:
-        for target in connection.targets:
-            feeds.setdefault(target.component, set()).update(source.component for source in connection.sources)
-    driven = {target for target, sources in feeds.items() if sources & own}
-    required: set[str] = set()
-    waiting = list(own)
-    while waiting:
-        for source in feeds.get(waiting.pop(), ()):
-            if source not in required | own:
-                required.add(source)
-                if source not in driven:
-                    waiting.append(source)
-    return frozenset(required)
+    return where
 
 
-def required_by_parameters(variant: RosSystem, requires: Mapping[str, Mapping[str, str]]) -> frozenset[str]:
-    """Return the components that a variant's parameter values ask for, for models that have no wiring.
-
-    Args:
-        variant: the system.
-        requires: parameter (its key, or the key's last part) -> value -> component. A value of the variant may be
-            several, separated by blanks, as in costmap_2d's observation_sources.
-    """
-    found: set[str] = set()
-    for component in variant.components:
-        for parameter in component.parameters:
-            choices = requires.get(parameter.key) or requires.get(parameter.key.rsplit("/", 1)[-1]) or {}
-            found.update(choices[value] for value in str(parameter.value).split() if value in choices)
-    return frozenset(found)
+def _from_table(source: Settings, keys: Keys, base: RosSystem, columns: Columns) -> list[RosSystem]:
+    family = dict(source.families)[keys]
+    table = read_table(source.inside(*keys, "table"))
+    levels = read_table(source.inside(*keys, "qa")) if "qa" in family else None
+    return [part for _, part in make_systems(base, columns, table, levels)]
 
 
-def _inside(folder: Path, relative: str, path: Path, key: str) -> Path:
-    found = (folder / relative).resolve()
-    if not found.is_relative_to(folder):
-        raise ModelError(f"{path}: {key}: {relative} leaves the folder of the models: move the file into it")
-    return found
+def _from_files(source: Settings, keys: Keys) -> list[RosSystem]:
+    family = dict(source.families)[keys]
+    if "files" in family:
+        paths = [source.inside(*keys, "files", number) for number in range(len(family["files"]))]
+    else:
+        paths = sorted((source.path.parent.resolve() / "variants").glob("*.rossystem"))
+    if not paths:
+        raise source.error("names no table, and variants/ holds no .rossystem file: add one", *keys)
+    return [read_system(path) for path in paths]
 
 
-def _read_settings(path: Path) -> dict[str, Any]:
-    text = read_text(path)
-    try:
-        settings = yaml.safe_load(text)
-    except (yaml.YAMLError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"{path}:{mark.line + 1}:{mark.column + 1}" if mark else str(path)
-        what = getattr(error, "problem", None) or "is no YAML: check its first lines"
-        raise ModelError(f"{where}: {what}") from error
-    try:
-        _SETTINGS(settings, "")
-    except _SchemaError as error:
-        raise ModelError(f"{path}: {error}") from None
-    _check_links(settings, path)
-    return dict(settings)
-
-
-def _check_links(settings: Mapping[str, Any], path: Path) -> None:
-    """Check that what one section names stands in another."""
-    functions, qas = settings["functions"], settings["quality_attributes"]
-    if settings["utility"] not in qas:
-        raise ModelError(f"{path}: utility: {settings['utility']!r} is none of quality_attributes: {_names(qas)}")
-    for name, function in functions.items():
-        for required in function.get("requires", ()):
-            if required not in functions:
-                raise ModelError(
-                    f"{path}: functions.{name}.requires: {required!r} is none of functions: {_names(functions)}"
-                )
-    for name, objective in settings["objectives"].items():
-        if objective["function"] not in functions:
-            raise ModelError(
-                f"{path}: objectives.{name}.function: {objective['function']!r} is none of functions: "
-                f"{_names(functions)}"
-            )
-        for qa in objective.get("nfrs", {}):
-            if qa not in qas:
-                raise ModelError(f"{path}: objectives.{name}.nfrs: {qa!r} is none of quality_attributes: {_names(qas)}")
-
-
-def _check_names(project: Project, path: Path) -> None:
-    known = {variant.name for variant in project.variants}
-    if len(known) < len(project.variants):
-        raise ModelError(f"{path}: two variants bear the same name: rename one")
+def _check_names(project: Project) -> None:
+    source = project.source
+    known = [variant.name for variant in project.variants]
+    if twice := sorted({name for name in known if known.count(name) > 1}):
+        raise source.error(f"two variants bear the name {twice[0]!r}: rename one", "variants")
     for name, function in project.settings["functions"].items():
-        for design in function["designs"] if function["designs"] != "all" else ():
+        for number, design in enumerate(function["designs"] if function["designs"] != "all" else ()):
             if design not in known:
-                raise ModelError(f"{path}: functions.{name}.designs: {design!r} is none of the {len(known)} variants")
-
-
-def _names(names: Mapping[str, Any]) -> str:
-    return ", ".join(sorted(map(str, names)))
-
-
-class _SchemaError(Exception):
-    """A value of metacontrol.yaml is not as it must be; says the key and what is allowed."""
-
-
-def _fail(key: str, allowed: str, value: Any) -> None:
-    found = "is missing" if value is None else f"is {str(value)[:40]!r}"
-    raise _SchemaError(f"{key or 'the file'}: {found}, must be {allowed}")
-
-
-def _text(value: Any, key: str) -> None:
-    if not isinstance(value, str) or not value:
-        _fail(key, "a name", value)
-
-
-def _number(value: Any, key: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        _fail(key, "a finite number", value)
-
-
-def _range(value: Any, key: str) -> None:
-    if not isinstance(value, list) or len(value) != 2:
-        _fail(key, "a list of two numbers, [lowest, highest]", value)
-    for number in value:
-        _number(number, key)
-    if not value[0] < value[1]:
-        _fail(key, "a list of two numbers, the lower one first", value)
-
-
-def _one_of(*allowed: str) -> Callable[[Any, str], None]:
-    def check(value: Any, key: str) -> None:
-        if value not in allowed:
-            _fail(key, " or ".join(allowed), value)
-
-    return check
-
-
-def _list(item: Callable[[Any, str], None]) -> Callable[[Any, str], None]:
-    def check(value: Any, key: str) -> None:
-        if not isinstance(value, list):
-            _fail(key, "a list", value)
-        for number, entry in enumerate(value):
-            item(entry, f"{key}[{number}]")
-
-    return check
-
-
-def _map(item: Callable[[Any, str], None]) -> Callable[[Any, str], None]:
-    def check(value: Any, key: str) -> None:
-        if not isinstance(value, dict):
-            _fail(key, "a mapping of names", value)
-        for name, entry in value.items():
-            _text(name, f"{key}: the key {name!r}")
-            item(entry, f"{key}.{name}")
-
-    return check
-
-
-def _record(
-    required: Mapping[str, Callable[[Any, str], None]], optional: Mapping[str, Callable[[Any, str], None]] | None = None
-) -> Callable[[Any, str], None]:
-    known = {**required, **(optional or {})}
-
-    def check(value: Any, key: str) -> None:
-        if not isinstance(value, dict):
-            _fail(key, f"a mapping with {', '.join(required or known)}", value)
-        prefix = f"{key}." if key else ""
-        for name in value:
-            if name not in known:
-                raise _SchemaError(f"{prefix}{name}: unknown key, allowed here: {', '.join(known)}")
-        for name, item in known.items():
-            if name in value or name in required:
-                item(value.get(name), prefix + name)
-
-    return check
-
-
-def _designs(value: Any, key: str) -> None:
-    if value != "all":
-        if not isinstance(value, list):
-            _fail(key, "'all' or a list of variants", value)
-        _list(_text)(value, key)
-
-
-def _component(value: Any, key: str) -> None:
-    _record({}, {"node": _text, "topic": _text})(value, key)
-    if len(value) != 1:
-        _fail(key, "a mapping with either node or topic", value)
-
-
-_SETTINGS = _record(
-    {
-        "package": _text,
-        "base": _text,
-        "variants": _record(
-            {"component": _text},
-            {
-                "table": _text,
-                "qa": _text,
-                "parameters": _map(_list(_record({"name": _text}, {"factor": _number}))),
-                "connections": _map(_map(_list(_text))),
-            },
-        ),
-        "functions": _map(_record({"designs": _designs}, {"requires": _list(_text)})),
-        "quality_attributes": _map(_record({"direction": _one_of(*DIRECTIONS)}, {"range": _range})),
-        "utility": _text,
-        "objectives": _map(_record({"function": _text}, {"nfrs": _map(_number)})),
-        "components": _map(_component),
-    },
-    {
-        "observers": _list(_text),
-        "manipulator": _record(
-            {}, {"save_action": _text, "goal_msg_type": _text, "kill_nodes": _list(_text), "action_name": _text}
-        ),
-        "requires": _map(_map(_text)),
-    },
-)
+                keys = ("functions", name, "designs", number)
+                raise source.error(f"{design!r} is none of the {len(known)} variants", *keys)
+        if isinstance(function.get("requires"), dict):
+            solving = {design.name for design in project.designs(name)}
+            for design in function["requires"]:
+                if design not in solving:
+                    keys = ("functions", name, "requires", design)
+                    raise source.error(f"{design!r} is none of the designs of {name}", *keys)
+    components = {component.name for component in project.whole_base.components} | set(project.settings["components"])
+    for parameter, choices in project.settings["requires"].items():
+        for value, component in choices.items():
+            if component not in components:
+                raise source.error(
+                    f"{component!r} is a component neither of the base nor of components: add it to one",
+                    *("requires", parameter, value),
+                )

@@ -1,16 +1,13 @@
-"""A family of systems from one base and a table: what each column sets is written in metacontrol.yaml."""
+"""A family of systems from one base and a table: `columns` says what each column sets."""
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 from dataclasses import replace
-from decimal import Decimal, InvalidOperation
-from typing import TYPE_CHECKING, Any
+from decimal import Decimal
+from typing import TYPE_CHECKING
 
+from ros_model.columns import TARGET_OF, check_columns, outlet, with_implied
 from ros_model.errors import ModelError
-from ros_model.files import read_text, safe_file_name
 from ros_model.metamodel import (
     Component,
     Connection,
@@ -28,180 +25,235 @@ from ros_model.metamodel import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
+    from collections.abc import Collection, Iterator, Mapping
 
-Row = dict[str, str]
+    from ros_model.columns import Columns, Setting, Wire
+    from ros_model.tables import Row, Table
+
+_SOURCE = "source"  # column of a table of levels that says where they are from
+_CONNECTION_ORDER = list(ConnectionKind)
+_PORT_ORDER = list(PortKind)
+
+
+def make_systems(
+    base: RosSystem, columns: Columns, table: Table, levels: Table | None = None
+) -> tuple[tuple[RosSystem, RosSystem], ...]:
+    """Return, for each row of the table, the whole system and the part of it that the variant brings.
+
+    That part holds the components that vary, their connections, and the expected levels of the quality attributes as
+    parameters `qa_<name>`; `compose(fixed_part(...), part)` is the whole again.
+
+    Args:
+        base: the system with all that may be there.
+        columns: what the columns set.
+        table: one row a variant.
+        levels: a column for each quality attribute, and perhaps `source`.
+
+    Raises:
+        ModelError: the base, the columns and the tables do not fit together; says where.
+    """
+    check_columns(columns, base)
+    columns = with_implied(columns, table, base)
+    check_columns(columns, base)
+    doubles = {column for column in table.columns if any(isinstance(row.cells[column], float) for row in table.rows)}
+    found = []
+    for given in table.rows:
+        cells = {name: _double(cell) if name in doubles else cell for name, cell in given.cells.items()}
+        row = replace(given, cells=cells)
+        expected = (*_expected(row, columns.expected), *_levels(row, levels))
+        absent = _absent(row, columns)
+        whole = _rewired(without(base, absent), columns, row)
+        components = tuple(_with_parameters(component, columns, row) for component in whole.components)
+        own = {parameter.name for parameter in expected}
+        inherited = tuple(parameter for parameter in base.parameters if parameter.name not in own)
+        whole = RosSystem(row.name, components, whole.connections, (*inherited, *expected), position=row.position)
+        found.append((whole, replace(_part(whole, columns.varied), parameters=expected)))
+    return tuple(found)
 
 
 def make_variants(
-    base: RosSystem, section: Mapping[str, Any], table: Path, qa: Path | None, settings: Path
+    base: RosSystem, columns: Columns, table: Table, levels: Table | None = None
 ) -> tuple[RosSystem, ...]:
-    """Return one partial system for each row of the table.
+    """Return the part of each variant; as make_systems."""
+    return tuple(part for _, part in make_systems(base, columns, table, levels))
 
-    A variant holds the component of the base that varies, its connections, the parameters that the columns set, and
-    the expected levels of the quality attributes as parameters `qa_<name>`.
 
-    Args:
-        base: the system that varies.
-        section: `variants` of metacontrol.yaml: component; parameters: column -> [{name, factor}], connections:
-            column -> value -> [component.port of a source].
-        table: CSV with a column `name` and those that the section maps.
-        qa: CSV with a column `name`, one for each quality attribute, and `source`; may be None.
-        settings: path of metacontrol.yaml, for messages.
+def without(system: RosSystem, names: Collection[str]) -> RosSystem:
+    """Return the system without some of its components, and without the connections that lose an end."""
+    if not names:
+        return system
+    connections = []
+    for connection in system.connections:
+        sources = tuple(end for end in connection.sources if end.component not in names)
+        targets = tuple(end for end in connection.targets if end.component not in names)
+        if sources and targets:
+            connections.append(replace(connection, sources=sources, targets=targets))
+    components = tuple(component for component in system.components if component.name not in names)
+    return replace(system, components=components, connections=tuple(connections))
 
-    Raises:
-        ModelError: a file or mapping is wrong; says which, and where.
-    """
-    component = base.component(section["component"])
-    if component is None or component.executable is None:
-        raise ModelError(
-            f"{settings}: variants.component: {section['component']!r} is no component with a FromRosNode in "
-            f"{base.position.file}"
+
+def _part(whole: RosSystem, names: Collection[str]) -> RosSystem:
+    """Return some components with what connects them to each other and to the rest."""
+    connections = []
+    for connection in whole.connections:
+        sources = tuple(end for end in connection.sources if end.component in names)
+        targets = tuple(end for end in connection.targets if end.component in names)
+        if targets:
+            connections.append(replace(connection, targets=connection.targets if sources else targets))
+        elif sources:
+            connections.append(replace(connection, sources=sources))
+    components = tuple(component for component in whole.components if component.name in names)
+    return replace(whole, components=components, connections=tuple(connections))
+
+
+def _absent(row: Row, columns: Columns) -> frozenset[str]:
+    absent: set[str] = set()
+    for column, names in columns.presence.items():
+        if not isinstance(row.cells[column], bool):
+            raise ModelError(f"column {column!r} is {row.cells[column]!r}, must be true or false", row.position)
+        absent.update(names if not row.cells[column] else ())
+    return frozenset(absent)
+
+
+def _rewired(system: RosSystem, columns: Columns, row: Row) -> RosSystem:
+    """Return the system with the connections that the row chooses in place of all that it may choose from."""
+    chosen: list[Wire] = []
+    for column, choices in columns.wires.items():
+        value = _key(row.cells[column])
+        if value not in choices:
+            raise ModelError(f"column {column!r} is {value!r}, must be {' or '.join(choices)}", row.position)
+        chosen += choices[value]
+    names = _connection_names(system)
+    bare, system = _unwired(system, tuple(columns.all_wires()))
+    for wire in chosen:
+        system = _wired(system, wire, names, row.position)
+    ends = {end for connection in system.connections for end in (*connection.sources, *connection.targets)}
+    bare -= ends
+    components = tuple(
+        replace(
+            component, ports=tuple(port for port in component.ports if PortPath(component.name, port.name) not in bare)
         )
-    rows = _read_table(table)
-    levels = {row["name"]: row for _, row in _read_table(qa)} if qa else {}
-    mapped = {*section.get("parameters", {}), *section.get("connections", {})}
-    variants = []
-    for line, row in rows:
-        if unmapped := sorted(set(row) - mapped - {"name"}):
-            raise ModelError(f"{settings}: variants: nothing says what column {unmapped[0]!r} of {table} sets")
-        if absent := sorted(mapped - set(row)):
-            raise ModelError(f"{table}:1:1: column {absent[0]!r} is missing: {settings} maps it")
-        if qa and row["name"] not in levels:
-            raise ModelError(f"{qa}: no row for {row['name']}: add its expected levels")
-        expected = _expected(levels[row["name"]], qa) if qa else ()
-        where = Position(str(table), line, 1)
-        varied, connections = _vary(base, component, section, row, where)
-        name = safe_file_name(row["name"], f"{where}: variant")
-        variants.append(RosSystem(name, (varied,), connections, expected, position=where))
-    return tuple(variants)
-
-
-def _vary(
-    base: RosSystem, component: Component, section: Mapping[str, Any], row: Row, where: Position
-) -> tuple[Component, tuple[Connection, ...]]:
-    """Return the component and its connections as one row of the table wants them."""
-    wiring = section.get("connections", {})
-    chosen: list[PortPath] = []
-    for column, choices in wiring.items():
-        if row[column] not in choices:
-            raise ModelError(f"column {column!r} is {row[column]!r}, must be {' or '.join(choices)}", where)
-        chosen += [PortPath.parse(text) for text in choices[row[column]]]
-    options = {PortPath.parse(text) for choices in wiring.values() for texts in choices.values() for text in texts}
-    connections, dropped = _own_connections(base, component.name, options)
-    ports = [port for port in component.ports if port.name not in dropped]
-    for source in chosen:
-        port, connection = _connect(base, component, source, where)
-        ports.append(port)
-        connections.append(connection)
-    set_here = _parameters(component, section, row, where)
-    keys = {parameter.key for parameter in set_here}
-    varied = replace(
-        component,
-        ports=tuple(sorted(ports, key=lambda port: list(PortKind).index(port.kind))),
-        parameters=(*(p for p in component.parameters if p.key not in keys), *set_here),
+        for component in system.components
     )
-    return varied, tuple(sorted(connections, key=lambda connection: list(ConnectionKind).index(connection.kind)))
+    connections = sorted(system.connections, key=lambda connection: _CONNECTION_ORDER.index(connection.kind))
+    return replace(system, components=components, connections=tuple(connections))
 
 
-def _own_connections(base: RosSystem, name: str, options: set[PortPath]) -> tuple[list[Connection], set[str]]:
-    """Return the base's connections of a component without the optional ones, and the ports these leave bare."""
+def _connection_names(system: RosSystem) -> dict[PortPath, str]:
+    return {end: connection.name for connection in reversed(system.connections) for end in connection.sources}
+
+
+def _unwired(system: RosSystem, wires: Collection[Wire]) -> tuple[set[PortPath], RosSystem]:
+    """Return the system without some wires, and the ends that lost all of theirs in a connection."""
+    bare: set[PortPath] = set()
     connections: list[Connection] = []
-    dropped: set[str] = set()
-    for connection in base.connections:
-        sources = tuple(end for end in connection.sources if end not in options)
-        inward = tuple(end for end in connection.targets if end.component == name)
-        outward = tuple(end for end in connection.sources if end.component == name)
-        if inward and not sources:
-            dropped.update(end.port for end in inward)
-        elif inward:
-            connections.append(replace(connection, sources=sources, targets=inward))
-        elif outward:
-            connections.append(replace(connection, sources=outward))
-    return connections, dropped
+    for connection in system.connections:
+        left: dict[tuple[PortPath, ...], list[PortPath]] = {}
+        for target in connection.targets:
+            kept = tuple(s for s in connection.sources if not any(wire.leads_to(s, target) for wire in wires))
+            left.setdefault(kept, []).append(target)
+        bare.update(left.pop((), ()))
+        connections += [replace(connection, sources=sources, targets=tuple(left[sources])) for sources in left]
+    return bare, replace(system, connections=tuple(connections))
 
 
-def _connect(base: RosSystem, component: Component, source: PortPath, where: Position) -> tuple[Port, Connection]:
-    """Return the component's port and the connection that take up a source of the base."""
-    origin = base.component(source.component)
-    port = origin.port(source.port) if origin else None
+def _wired(system: RosSystem, wire: Wire, names: dict[PortPath, str], where: Position) -> RosSystem:
+    """Return the system with one more connection, and the port that takes it up."""
+    outlet_kind, component = outlet(system, wire.source), system.component(wire.component)
+    if outlet_kind is None or component is None:
+        missing = wire.source.component if outlet_kind is None else wire.component
+        raise ModelError(f"connects {missing!r}, which this variant lacks", where)
+    kind, port_kind = TARGET_OF[outlet_kind]
+    name = names.get(wire.source, wire.source.port)
+    target = PortPath(wire.component, wire.port or name)
+    if not any(port.name == target.port and port.kind is port_kind for port in component.ports):
+        system = _with_port(system, component, target.port, port_kind, where)
+    connections = list(system.connections)
+    for number, connection in enumerate(connections):
+        if (connection.name, connection.kind, connection.sources) == (name, kind, (wire.source,)):
+            connections[number] = replace(connection, targets=(*connection.targets, target))
+            break
+    else:
+        connections.append(Connection(name, kind, (wire.source,), (target,), where))
+    return replace(system, connections=tuple(connections))
+
+
+def _with_port(system: RosSystem, component: Component, name: str, kind: PortKind, where: Position) -> RosSystem:
     node = component.executable
-    if port is None or node is None or port.kind is not PortKind.PUBLISHER:
-        raise ModelError(f"{source} is no RosPublisher of {base.position.file}: check variants.connections", where)
-    existing = next((connection for connection in base.connections if source in connection.sources), None)
-    topic = existing.name if existing else port.name
-    reference = Reference(node.package, node.artifact, node.node, topic)
-    target = Port(topic, PortKind.SUBSCRIBER, reference, position=where)
-    path = PortPath(component.name, topic)
-    return target, Connection(topic, ConnectionKind.TOPIC, (source,), (path,), where)
-
-
-def _parameters(
-    component: Component, section: Mapping[str, Any], row: Row, where: Position
-) -> tuple[RosParameter, ...]:
-    node = component.executable
-    if node is None:
-        return ()
-    return tuple(
-        RosParameter(
-            entry["name"],
-            Reference(node.package, node.artifact, node.node, entry["name"]),
-            _scaled(row[column], entry.get("factor"), column, where),
-            position=where,
-        )
-        for column, entries in section.get("parameters", {}).items()
-        for entry in entries
+    reference = Reference(node.package, node.artifact, node.node, name) if node else None
+    ports = sorted(
+        (*component.ports, Port(name, kind, reference, position=where)), key=lambda port: _PORT_ORDER.index(port.kind)
     )
+    return _with_component(system, replace(component, ports=tuple(ports)))
 
 
-def _scaled(text: str, factor: float | None, column: str, where: Position) -> Value:
-    """Return a cell as an integer, a double or a string; times the factor, if there is one, as a double."""
-    try:
-        number = Decimal(text)
-    except InvalidOperation:
-        number = Decimal("nan")
-    if factor is not None:
-        if not number.is_finite():
-            raise ModelError(f"column {column!r} is {text!r}, must be a number: it is scaled by {factor}", where)
-        return float(number * Decimal(str(factor)))
-    if not number.is_finite():
-        return text
-    return int(text) if text.lstrip("+-").isdecimal() else float(number)
+def _with_component(system: RosSystem, changed: Component) -> RosSystem:
+    components = (changed if component.name == changed.name else component for component in system.components)
+    return replace(system, components=tuple(components))
 
 
-def _expected(row: Row, qa: Path | None) -> tuple[SystemParameter, ...]:
-    parameters = []
-    for name, text in row.items():
-        if name in {"name", "source"}:
-            continue
-        try:
-            level = float(text)
-        except ValueError:
-            level = math.nan
-        if not math.isfinite(level):
-            raise ModelError(f"{qa}: {row['name']}: {name} is {text!r}, must be a number")
-        parameters.append(SystemParameter(f"qa_{name}", ParameterType("Double"), level))
-    return tuple(parameters)
+def _with_parameters(component: Component, columns: Columns, row: Row) -> Component:
+    """Return the component with what the row sets; an empty cell leaves the base's value."""
+    node = component.executable
+    found = [
+        RosParameter(
+            setting.name,
+            Reference(node.package, node.artifact, node.node, setting.name),
+            _fitting(component, setting, _scaled(cell, setting.factor, column, row.position)),
+            position=row.position,
+        )
+        for column, settings in columns.parameters.items()
+        for setting in settings
+        if node and setting.component == component.name and (cell := row.cells[column]) is not None
+    ]
+    keys = {parameter.key for parameter in found}
+    kept = (parameter for parameter in component.parameters if parameter.key not in keys)
+    return replace(component, parameters=(*kept, *found))
 
 
-def _read_table(path: Path) -> list[tuple[int, Row]]:
-    """Return the rows of a CSV file with their lines; every row has a name of its own and all columns."""
-    reader = csv.DictReader(io.StringIO(read_text(path)), strict=True)
-    rows: list[tuple[int, Row]] = []
-    seen: set[str] = set()
-    try:
-        if "name" not in (reader.fieldnames or ()):
-            raise ModelError(f"{path}:1:1: no column 'name': the first line must name the columns")
-        for row in reader:
-            if None in row or None in row.values():
-                raise ModelError(f"{path}:{reader.line_num}:1: must have {len(reader.fieldnames or ())} cells")
-            if not row["name"] or row["name"] in seen:
-                raise ModelError(f"{path}:{reader.line_num}:1: name {row['name']!r} is empty or stands twice")
-            seen.add(row["name"])
-            rows.append((reader.line_num, {key: value.strip() for key, value in row.items()}))
-    except csv.Error as error:
-        raise ModelError(f"{path}:{reader.line_num}:1: {error}") from error
-    if not rows:
-        raise ModelError(f"{path}:1:1: no rows: add one for each variant")
-    return rows
+def _scaled(cell: Value, factor: float | None, column: str, where: Position) -> Value:
+    """Return a cell, times the factor, if there is one, as a double; exactly, as people reckon (0.3 * 12 is 3.6)."""
+    if factor is None:
+        return cell
+    if isinstance(cell, bool) or not isinstance(cell, (int, float)):
+        raise ModelError(f"column {column!r} is {cell!r}, must be a number: it is scaled by {factor}", where)
+    return float(Decimal(str(cell)) * Decimal(str(factor)))
+
+
+def _fitting(component: Component, setting: Setting, value: Value) -> Value:
+    """Return an integer as a double where the base's value is one."""
+    given = next((parameter.value for parameter in component.parameters if parameter.key == setting.name), None)
+    return _double(value) if isinstance(given, float) else value  # type: ignore[return-value]
+
+
+def _double(value: Value | None) -> Value | None:
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+def _expected(row: Row, columns: Mapping[str, str]) -> Iterator[SystemParameter]:
+    for column, quality in columns.items():
+        yield _level(quality, row.cells[column], f"column {column!r}", row.position)
+
+
+def _levels(row: Row, levels: Table | None) -> Iterator[SystemParameter]:
+    if levels is None:
+        return
+    found = levels.row(row.name)
+    if found is None:
+        raise ModelError(f"no row for {row.name}: add its expected levels", Position(str(levels.path), 1, 1))
+    for column, cell in found.cells.items():
+        if column != _SOURCE:
+            yield _level(column, cell, f"{row.name}: {column}", found.position)
+
+
+def _level(quality: str, cell: Value | None, what: str, where: Position) -> SystemParameter:
+    if isinstance(cell, bool) or not isinstance(cell, (int, float)):
+        raise ModelError(f"{what} is {cell!r}, must be a number", where)
+    return SystemParameter(f"qa_{quality}", ParameterType("Double"), float(cell), position=where)
+
+
+def _key(cell: Value | None) -> str:
+    """Return a cell as the mapping of its column writes it."""
+    if isinstance(cell, bool):
+        return str(cell).lower()
+    return "" if cell is None else str(cell)
