@@ -130,8 +130,8 @@ def test_objectives_of_the_model_bring_their_limits(load):
 def test_direction_comes_from_the_model_unless_set(load):
     extra = '<rdf:Description rdf:about="#safety"><t:qa_sign>-1</t:qa_sign></rdf:Description>'
     qualities = load(application(extra=extra)).qualities
-    assert qualities["safety"] is Direction.HIGHER_IS_BETTER
-    assert qualities["energy"] is Direction.LOWER_IS_BETTER
+    assert qualities["safety"].direction is Direction.HIGHER_IS_BETTER
+    assert qualities["energy"].direction is Direction.LOWER_IS_BETTER
 
 
 def test_imports_are_read_from_the_models_folder_never_from_the_network(load, monkeypatch, caplog):

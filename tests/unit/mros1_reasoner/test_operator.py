@@ -110,13 +110,15 @@ def test_proposal_gives_way_to_a_better_one(make):
 def test_added_objective_is_grounded_and_a_removed_one_no_longer_heeded(make):
     core = make()
     core.add_objective(Objective("o_more", "f_move", {"energy": 0.35}))
-    (decision,) = core.step(20.0)
+    core.observe_level(20.0, "energy", 0.4)
+    core.step(20.0)
+    (decision,) = core.step(22.0)
     assert (decision.objective, decision.to_configuration) == ("o_more", "scan_slower")
     with pytest.raises(MapeError, match="o_more is being adapted"):
         core.remove_objective("o_more")
-    core.report(21.0, decision.id, True)
+    core.report(23.0, decision.id, True)
     core.remove_objective("o_more")
-    (failure,) = fail(core, 22.0, "laser")
+    (failure,) = fail(core, 24.0, "laser")
     assert failure.objective == "o_move"
     assert set(core.facts.groundings) == {"o_move"}
 

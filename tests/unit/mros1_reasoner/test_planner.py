@@ -1,7 +1,7 @@
 from dataclasses import replace
 
 import pytest
-from mros1_reasoner.model import Design, Direction, Objective
+from mros1_reasoner.model import Design, Direction, Objective, Quality
 from mros1_reasoner.planner import Situation, difference, plan, utility_of
 
 OBJECTIVE = Objective("o", "f", {"risk": 0.6, "power": 0.62})
@@ -46,7 +46,7 @@ def test_direction_turns_the_comparison_round():
         design("low", use=0.3),
         design("high", use=0.5),
         objective=objective,
-        directions={"use": Direction.HIGHER_IS_BETTER},
+        qualities={"use": Quality(Direction.HIGHER_IS_BETTER)},
     )
     assert result.choice == "high"
     assert reasons(result)["low"] == "use 0.3 < 0.4"

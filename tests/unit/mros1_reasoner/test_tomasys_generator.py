@@ -53,5 +53,5 @@ def test_objectives_and_directions_are_those_of_metacontrol_yaml(written):
     assert [(o.name, o.function, dict(o.limits)) for o in knowledge_base.objectives] == [
         ("o_navigate", "f_navigate", {"safety": 0.6, "energy": 0.62})
     ]
-    assert knowledge_base.qualities["performance"] is Direction.HIGHER_IS_BETTER
-    assert knowledge_base.qualities["energy"] is Direction.LOWER_IS_BETTER
+    assert knowledge_base.qualities["performance"].direction is Direction.HIGHER_IS_BETTER
+    assert knowledge_base.qualities["energy"].direction is Direction.LOWER_IS_BETTER

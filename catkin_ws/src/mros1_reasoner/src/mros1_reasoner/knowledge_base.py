@@ -7,12 +7,13 @@ import logging
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import owlready2
 
 from mros1_reasoner import vocabulary as v
-from mros1_reasoner.model import Analysis, Design, Direction, Facts, Objective, ObjectiveAnalysis
+from mros1_reasoner.model import Analysis, Design, Direction, Facts, Objective, ObjectiveAnalysis, Quality
 from mros1_reasoner.reasoner import Assertion, Reasoner
 from mros1_reasoner.triples import (
     Triple,
@@ -32,6 +33,7 @@ _DECIMAL = v.XSD + "decimal"
 _STRING = v.XSD + "string"
 # Statements that hold at one moment only. They come as facts of each analysis, so the ontology goes without them.
 _MOMENTARY = (*v.DERIVED_STATUSES, v.C_STATUS, v.FD_ERROR_LOG, v.SOLVES_O, v.TYPE_FD)
+_QUALITIES = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES, v.QA_MIN, v.QA_MAX)
 _LEVELS = (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION, v.HAS_VALUE, v.IS_QA_TYPE)
 
 
@@ -63,7 +65,7 @@ class KnowledgeBase:
         functions: names of all functions.
         designs: every design by name, with its expected levels.
         components: names of all components.
-        qualities: direction of every quality attribute by name.
+        qualities: how levels compare, of every quality attribute by name.
         objectives: those that the models hold already.
         component_statuses: statuses that the models assert.
         ontology: vocabulary, rules and models as N-Triples, without what comes as facts.
@@ -109,7 +111,7 @@ class KnowledgeBase:
 
         self.functions = tuple(sorted(self._functions))
         self.components = frozenset(self._components)
-        self.qualities = {name: self._direction(graph, name, directions or {}) for name in sorted(self._quality_types)}
+        self.qualities = {name: self._quality(graph, name, directions or {}) for name in sorted(self._quality_types)}
         self.designs = {name: self._design(graph, name) for name in sorted(self._designs)}
         self.objectives = tuple(self._objective(graph, name) for name in sorted(self._objectives))
         self.component_statuses = {
@@ -157,6 +159,10 @@ class KnowledgeBase:
             result.append(Assertion(grounding, v.RDF_TYPE, v.FUNCTION_GROUNDING))
             result.append(Assertion(grounding, v.SOLVES_O, iri))
             result.append(Assertion(grounding, v.TYPE_FD, self._find(self._designs, design, "FunctionDesign")))
+            for required in facts.requires.get(objective.name, ()):
+                result.append(Assertion(grounding, v.REQUIRES_O, self._objective_iri(required)))
+            if objective.name in facts.failed:
+                result.append(Assertion(iri, v.O_CAUSE, v.IN_ERROR_NFR, _STRING))
             if objective.name in facts.broken:
                 result.append(Assertion(grounding, v.FG_CAUSE, v.IN_ERROR_COMPONENT, _STRING))
             for (owner, quality), level in sorted(facts.levels.items()):
@@ -248,13 +254,29 @@ class KnowledgeBase:
                 )
         return result
 
-    def _direction(self, graph: _Graph, name: str, directions: Mapping[str, Direction]) -> Direction:
-        if name in directions:
-            return directions[name]
-        signs = {float(value) for iri, value in graph.literals(v.QA_SIGN) if iri == self._quality_types[name]}
+    def _quality(self, graph: _Graph, name: str, directions: Mapping[str, Direction]) -> Quality:
+        """Return how levels of a quality compare: as given, else as the model says, else lower is better."""
+        iri = self._quality_types[name]
+        low, high = (self._bound(graph, iri, predicate) for predicate in (v.QA_MIN, v.QA_MAX))
+        operators = set(graph.literals_of(iri, v.QA_COMPARISON_OPERATOR))
+        signs = {_number(text) for text in graph.literals_of(iri, v.QA_SIGN)}
         if signs - {1.0, -1.0} or len(signs) > 1:
             raise KnowledgeBaseError(f"{self._where}: qa_sign of {name} must be one value, 1 or -1")
-        return Direction.HIGHER_IS_BETTER if signs == {-1.0} else Direction.LOWER_IS_BETTER
+        try:
+            quality = Quality.compared_by(operators.pop() if operators else ">", low, high)
+        except ValueError as error:
+            raise KnowledgeBaseError(f"{self._where}: qa_comparison_operator of {name}: {error}") from error
+        if operators:
+            raise KnowledgeBaseError(f"{self._where}: {name} has several qa_comparison_operator: give it one")
+        direction = Direction.HIGHER_IS_BETTER if signs == {-1.0} else Direction.LOWER_IS_BETTER
+        return replace(quality, direction=directions.get(name, direction if signs else quality.direction))
+
+    def _bound(self, graph: _Graph, quality: str, predicate: str) -> float | None:
+        numbers = [_number(text) for text in graph.literals_of(quality, predicate)]
+        if len(numbers) > 1 or not all(math.isfinite(number) for number in numbers):
+            name = local_name(quality)
+            raise KnowledgeBaseError(f"{self._where}: {local_name(predicate)} of {name} must be one finite number")
+        return numbers[0] if numbers else None
 
     def _design(self, graph: _Graph, name: str) -> Design:
         iri = self._designs[name]
@@ -278,7 +300,9 @@ class KnowledgeBase:
         functions = graph.objects_of(iri, v.TYPE_F)
         if len(functions) != 1:
             raise KnowledgeBaseError(f"{self._where}: Objective {name} must have one Function: give it one typeF")
-        return Objective(name, self._function_name[functions.pop()], self._read_levels(graph, iri, v.HAS_NFR))
+        limits = self._read_levels(graph, iri, v.HAS_NFR)
+        improves = {text in ("true", "1") for text in graph.literals_of(iri, v.O_ALWAYS_IMPROVE)}
+        return Objective(name, self._function_name[functions.pop()], limits, improves.pop() if improves else None)
 
     def _read_levels(self, graph: _Graph, owner: str, predicate: str) -> dict[str, float]:
         levels: dict[str, float] = {}
@@ -293,6 +317,18 @@ class KnowledgeBase:
                 )
                 continue
             quality = self._quality_name[types.pop()]
+            kind = self.qualities[quality]
+            if not kind.holds(numbers[0]):
+                _log.warning(
+                    "QAvalue %s of %s is left out: %g is not within the range of %s, %s to %s",
+                    local_name(value),
+                    local_name(owner),
+                    numbers[0],
+                    quality,
+                    "any" if kind.low is None else f"{kind.low:g}",
+                    "any" if kind.high is None else f"{kind.high:g}",
+                )
+                continue
             if quality in levels:
                 _log.warning("%s has two levels of %s: %s is left out", local_name(owner), quality, local_name(value))
                 continue
@@ -326,7 +362,7 @@ class KnowledgeBase:
             for predicate in (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION)
             for value in graph.objects(predicate)
         }
-        dropped = set(_MOMENTARY) | set(_LEVELS) | {v.QA_SIGN}
+        dropped = {*_MOMENTARY, *_LEVELS, *_QUALITIES}
 
         def stays(triple: Triple) -> bool:
             subject, predicate, value = triple
@@ -336,10 +372,12 @@ class KnowledgeBase:
             return name not in dropped and iri_of(subject) not in values
 
         triples = [triple for triple in graph.triples if stays(triple)]
-        for name, direction in self.qualities.items():
+        for name, quality in self.qualities.items():
             iri = self._quality_types[name]
             triples.append(assertion_triple(Assertion(iri, v.RDF_TYPE, v.QA_TYPE)))
-            triples.append(assertion_triple(Assertion(iri, v.QA_SIGN, str(direction.sign), _DECIMAL)))
+            triples.append(assertion_triple(Assertion(iri, v.QA_SIGN, str(quality.direction.sign), _DECIMAL)))
+            if quality.reaching_violates:
+                triples.append(assertion_triple(Assertion(iri, v.QA_REACHING_VIOLATES, "true", v.XSD + "boolean")))
         return write_ntriples(triples)
 
     # Names and IRIs

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+
+from mros1_reasoner.vocabulary import IN_ERROR_COMPONENT, IN_ERROR_NFR
 
 
 class Direction(enum.Enum):
@@ -22,10 +25,62 @@ class Direction(enum.Enum):
         """Return by how much a level passes a limit; zero or less where it keeps it."""
         return self.sign * (level - limit)
 
+    def better(self, first: float, second: float) -> float:
+        """Return the better one of two levels."""
+        return min(first, second) if self is Direction.LOWER_IS_BETTER else max(first, second)
+
     @property
     def passes(self) -> str:
         """The comparison that holds between a level and the limit that it does not keep."""
         return ">" if self is Direction.LOWER_IS_BETTER else "<"
+
+
+@dataclass(frozen=True)
+class Quality:
+    """A quality attribute: how its levels compare.
+
+    Attributes:
+        direction: which levels are the better ones.
+        reaching_violates: a level that equals the limit does not keep it.
+        low: no level is below; None where that is not known.
+        high: no level is above; None where that is not known.
+    """
+
+    direction: Direction = Direction.LOWER_IS_BETTER
+    reaching_violates: bool = False
+    low: float | None = None
+    high: float | None = None
+
+    @classmethod
+    def compared_by(cls, operator: str, low: float | None = None, high: float | None = None) -> Quality:
+        """Return the quality whose observed level is in error while the operator holds between it and the limit.
+
+        Raises:
+            ValueError: it is none of `>`, `>=`, `<`, `<=`.
+        """
+        if operator not in (">", ">=", "<", "<="):
+            raise ValueError(f"{operator!r} is no comparison: expected >, >=, < or <=")
+        direction = Direction.LOWER_IS_BETTER if operator[0] == ">" else Direction.HIGHER_IS_BETTER
+        return cls(direction, operator.endswith("="), low, high)
+
+    @property
+    def operator(self) -> str:
+        """The comparison that holds between a level and a limit that it does not keep."""
+        return self.direction.passes + ("=" if self.reaching_violates else "")
+
+    def excess(self, level: float, limit: float) -> float:
+        """Return by how much a level passes a limit; less than zero where it keeps it with room to spare."""
+        return self.direction.excess(level, limit)
+
+    def violates(self, level: float, limit: float) -> bool:
+        """Return whether a level does not keep a limit."""
+        excess = self.excess(level, limit)
+        return excess > 0 or (self.reaching_violates and excess == 0)
+
+    def holds(self, level: float) -> bool:
+        """Return whether there can be such a level."""
+        above = self.low is None or level >= self.low
+        return math.isfinite(level) and above and (self.high is None or level <= self.high)
 
 
 @dataclass(frozen=True)
@@ -49,11 +104,19 @@ class Design:
 
 @dataclass(frozen=True)
 class Objective:
-    """A function that is needed, and the limit that each quality attribute must keep."""
+    """A function that is needed.
+
+    Attributes:
+        name: local name of the individual.
+        function: the function.
+        limits: the limit that each quality attribute must keep.
+        always_improve: adapt also when a clearly better design has become available; None: as the settings say.
+    """
 
     name: str
     function: str
     limits: Mapping[str, float] = field(default_factory=dict)
+    always_improve: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -66,6 +129,8 @@ class Facts:
         levels: observed level, by objective and quality attribute.
         components: status of components, one of TRUE, FALSE, RECOVERED.
         broken: objectives whose grounding is known to be out of order as a whole.
+        failed: objectives whose task has failed, though nothing else is known to be wrong.
+        requires: objectives that the grounding of an objective requires, by the objective's name.
     """
 
     objectives: tuple[Objective, ...] = ()
@@ -73,6 +138,8 @@ class Facts:
     levels: Mapping[tuple[str, str], float] = field(default_factory=dict)
     components: Mapping[str, str] = field(default_factory=dict)
     broken: frozenset[str] = frozenset()
+    failed: frozenset[str] = frozenset()
+    requires: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -90,6 +157,11 @@ class ObjectiveAnalysis:
     causes: frozenset[str] = frozenset()
     violated: tuple[str, ...] = ()
     grounding_status: str = ""
+
+    @property
+    def in_error(self) -> bool:
+        """Whether it is not fulfilled as it should be."""
+        return bool(self.causes & {IN_ERROR_NFR, IN_ERROR_COMPONENT})
 
 
 @dataclass(frozen=True)

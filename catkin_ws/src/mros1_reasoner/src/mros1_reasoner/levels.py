@@ -1,0 +1,149 @@
+"""Observed levels of qualities: since when a limit is passed, and how they compare with what was expected."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+Key = tuple[str, str]  # objective, quality
+
+
+@dataclass(frozen=True)
+class Level:
+    """The last level of a quality of an objective.
+
+    Attributes:
+        value: the level.
+        stamp: when it was taken in, s.
+        last_good: the last level that kept the limit.
+        passed_since: since when the limit has been passed without a break.
+        count: levels since then whose ratio to the expected one is known.
+        ratios: sum of those ratios.
+    """
+
+    value: float
+    stamp: float
+    last_good: float | None = None
+    passed_since: float | None = None
+    count: int = 0
+    ratios: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Ratio:
+    value: float
+    stamp: float
+
+
+class Levels:
+    """What is known of levels; times in s of ROS time."""
+
+    def __init__(self, window: float, timeout: float, memory: float) -> None:
+        """Know nothing yet.
+
+        Args:
+            window: a limit must be passed for so long before it counts.
+            timeout: an older level is no longer known.
+            memory: time constant of the average ratio of observed to expected levels.
+        """
+        self._window, self._timeout, self._memory = window, timeout, memory
+        self._levels: dict[Key, Level] = {}
+        self._ratios: dict[Key, _Ratio] = {}
+
+    def __getitem__(self, key: Key) -> Level:
+        return self._levels[key]
+
+    def observe(
+        self, now: float, key: Key, value: float, *, passed: bool, stamp: float, expected: float | None
+    ) -> None:
+        """Take in a level.
+
+        Args:
+            now: present time.
+            key: objective and quality.
+            value: the level.
+            passed: whether it passes the limit.
+            stamp: of the diagnostic that brought it, 0 where it has none.
+            expected: level that is expected of the deployed design.
+        """
+        before = self._levels.get(key)
+        known = before if before and now - before.stamp <= self._timeout else None
+        ratio = value / expected if expected else None
+        if ratio is not None:
+            self._average(now, key, ratio)
+        if not passed:
+            self._levels[key] = Level(value, now, last_good=value)
+            return
+        goes_on = known if known and known.passed_since is not None else None
+        self._levels[key] = Level(
+            value,
+            now,
+            last_good=known.last_good if known else None,
+            passed_since=goes_on.passed_since if goes_on else stamp or now,
+            count=(goes_on.count if goes_on else 0) + (ratio is not None),
+            ratios=(goes_on.ratios if goes_on else 0.0) + (ratio or 0.0),
+        )
+
+    def forget(self, objective: str = "", quality: str = "", now: float | None = None) -> None:
+        """Know levels no longer; how they compared with the expected ones is kept.
+
+        Args:
+            objective: whose levels; empty: of all.
+            quality: levels of which quality; empty: of all.
+            now: present time; None: that of the levels.
+        """
+        for key in [k for k in self._levels if objective in ("", k[0]) and quality in ("", k[1])]:
+            stamp = self._levels[key].stamp
+            ratio = self.ratio(stamp if now is None else now, key)
+            if ratio is not None:
+                self._ratios[key] = _Ratio(ratio, stamp)
+            del self._levels[key]
+
+    def drop(self, objective: str) -> None:
+        """Know nothing of an objective that is no longer there."""
+        self._levels = {key: level for key, level in self._levels.items() if key[0] != objective}
+        self._ratios = {key: ratio for key, ratio in self._ratios.items() if key[0] != objective}
+
+    def counting(self, now: float, calm_until: Mapping[str, float]) -> dict[Key, float]:
+        """Return the levels that count: one that passes its limit does after the window, and when the calm is over."""
+        found = {}
+        for key, level in self._levels.items():
+            if now - level.stamp > self._timeout:
+                continue
+            if level.passed_since is None or (self._counts(level, now) and now >= calm_until[key[0]]):
+                found[key] = level.value
+            elif level.last_good is not None:
+                found[key] = level.last_good
+        return found
+
+    def latest(self, objective: str) -> dict[str, float]:
+        """Return the last level of each quality of an objective."""
+        return {quality: level.value for (name, quality), level in self._levels.items() if name == objective}
+
+    def ratio(self, now: float, key: Key) -> float | None:
+        """Return observed over expected, None where it is not known.
+
+        It is the mean since the limit has been passed, where it has for the window; else the average.
+        """
+        level = self._levels.get(key)
+        if level and level.count and self._counts(level, now):
+            return level.ratios / level.count
+        average = self._ratios.get(key)
+        return average.value if average else None
+
+    def due(self, calm_until: Mapping[str, float]) -> Iterator[float]:
+        """Yield the times at which a level begins or ceases to count."""
+        for (objective, _), level in self._levels.items():
+            if level.passed_since is not None:
+                yield max(level.passed_since + self._window, calm_until[objective])
+            yield level.stamp + self._timeout
+
+    def _counts(self, level: Level, now: float) -> bool:
+        return level.passed_since is not None and now - level.passed_since >= self._window
+
+    def _average(self, now: float, key: Key, ratio: float) -> None:
+        before = self._ratios.get(key) or _Ratio(1.0, now)
+        passed = min(max(0.0, now - before.stamp), self._timeout)
+        weight = 1.0 - math.exp(-passed / self._memory) if self._memory > 0 else 1.0
+        self._ratios[key] = _Ratio(before.value + weight * (ratio - before.value), now)
