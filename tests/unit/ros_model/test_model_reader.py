@@ -16,7 +16,8 @@ from ros_model.metamodel import (
     RosParameter,
     SystemParameter,
 )
-from ros_model.reader import MAX_NESTING, comments_inside, parse_system, read_system
+from ros_model.reader import parse_system, read_system
+from ros_model.syntax import MAX_NESTING, comments_inside
 from ros_model.writer import write_system
 
 CORPUS = os.environ.get("MROS_CORPUS")
@@ -233,7 +234,7 @@ def test_parameter_of_a_component_may_lack_its_name():
         ),
         ("RosSystem { Namex x }", "near 'Namex'"),
         ("RosSystem { Name x Parameters { Parameter { name p value 1e999 } } }", "too large for a double"),
-        ("RosSystem { Name x Parameters { Parameter { name p value {1 2} } } }", "expected ',' or '}' near '2'"),
+        ("RosSystem { Name x Parameters { Parameter { name p value {1 2} } } }", "expected ',' or '{' or '}' near '2'"),
         ("RosSystem { Name x Parameters { Parameter { name p value { 1, {a {value 1}} } } } }", "are mixed here"),
         (
             "RosSystem { Name x Parameters { Parameter { name p value { {a {value 1}}, {a {value 2}} } } } }",

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import codecs
 import re
+import stat
 from pathlib import Path
 
 import rospkg
 
 from ros_model.errors import ModelError
+from ros_model.metamodel import Position
+
+MAX_SIZE = 16_000_000
+"""Bytes of the largest file that is read; the largest published model has 432 thousand."""
 
 _SCHEME = "package://"
 _FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
@@ -49,19 +55,26 @@ def read_text(path: Path) -> str:
     """Return the text of a UTF-8 file.
 
     Raises:
-        ModelError: the file is missing, unreadable or not UTF-8; with the position of the first bad byte.
+        ModelError: the file is missing, unreadable, too large, no regular file, or not UTF-8; then with the position
+            of the first bad byte.
     """
     try:
+        about = path.stat()
+        if stat.S_ISFIFO(about.st_mode) or stat.S_ISCHR(about.st_mode) or stat.S_ISSOCK(about.st_mode):
+            raise ModelError(f"{path}: is no regular file: give the path of one")
+        if about.st_size > MAX_SIZE:
+            raise ModelError(f"{about.st_size} bytes are too many ({MAX_SIZE})", Position(str(path), 1, 1))
         data = path.read_bytes()
-    except OSError as error:
-        raise ModelError(f"{path}: {error.strerror or error}: check the path") from error
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        raise ModelError(f"{path}: {getattr(error, 'strerror', None) or error}: check the path") from error
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        good = data[: error.start]
-        line, column = good.count(b"\n") + 1, len(good) - (good.rfind(b"\n") + 1) + 1
+        good = data[: error.start].decode("utf-8-sig")
+        position = Position(str(path), good.count("\n") + 1, len(good) - (good.rfind("\n") + 1) + 1)
+        found = "it looks like UTF-16: " if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else ""
         raise ModelError(
-            f"{path}:{line}:{column}: byte 0x{data[error.start]:02x} is not UTF-8: save the file as UTF-8 text"
+            f"byte 0x{data[error.start]:02x} is not UTF-8: {found}save the file as UTF-8 text", position
         ) from error
 
 

@@ -40,6 +40,7 @@ class Reference:
     artifact: str
     node: str
     name: str = ""
+    position: Position = field(default=Position(), compare=False, repr=False)
 
     @classmethod
     def parse(cls, text: str) -> Reference:
@@ -51,7 +52,7 @@ class Reference:
         parts = text.split(".", 3)
         if len(parts) < 3 or not all(parts[:3]):
             raise ValueError(f"reference '{text}' is not package.artifact.node[.name]")
-        return cls(*parts)
+        return cls(parts[0], parts[1], parts[2], "".join(parts[3:]))
 
     def __str__(self) -> str:
         """Return the dotted form."""
@@ -120,6 +121,7 @@ class PortPath:
 
     component: str
     port: str
+    position: Position = field(default=Position(), compare=False, repr=False)
 
     @classmethod
     def parse(cls, text: str) -> PortPath:
@@ -163,6 +165,7 @@ class ParameterType:
     elements: tuple[ParameterType, ...] = ()
     members: tuple[tuple[str, ParameterType], ...] = ()
     default: Value | None = None
+    position: Position = field(default=Position(), compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -177,8 +180,18 @@ class SystemParameter:
 
 
 @dataclass(frozen=True)
+class ComponentStack:
+    """A named group of a system's components, with the quality attributes that it has as a whole."""
+
+    name: str
+    components: tuple[str, ...] = ()
+    quality_attributes: tuple[SystemParameter, ...] = ()
+    position: Position = field(default=Position(), compare=False)
+
+
+@dataclass(frozen=True)
 class RosSystem:
-    """A system: components, their wiring, global parameters."""
+    """A system: components, their wiring, global parameters. Components of stacks come after the others."""
 
     name: str
     components: tuple[Component, ...] = ()
@@ -186,6 +199,7 @@ class RosSystem:
     parameters: tuple[SystemParameter, ...] = ()
     header: str = ""  # comments at the top of the file
     position: Position = field(default=Position(), compare=False)
+    stacks: tuple[ComponentStack, ...] = ()
 
     def component(self, name: str) -> Component | None:
         """Return the component of that name, or None."""

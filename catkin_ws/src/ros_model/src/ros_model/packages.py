@@ -63,11 +63,12 @@ class SpecKind(enum.Enum):
 
 @dataclass(frozen=True)
 class MessageField:
-    """A field of a message, `float32[] data`, or a constant, `int8 OK=1`."""
+    """A field of a message, `float32[] data`, or a constant, `int8 OK=1`. Types of packages are `package/Type`."""
 
     type: str
     name: str
     constant: str | None = None
+    position: Position = field(default=Position(), compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,8 @@ class Package:
     specs: tuple[Spec, ...] = ()
     dependencies: tuple[str, ...] = ()
     catkin: bool = True  # written as CatkinPackage; plain Package otherwise
+    external_dependencies: tuple[str, ...] = ()  # what is no ROS package
+    repository: str | None = None  # where its source code is
     position: Position = field(default=Position(), compare=False)
 
 

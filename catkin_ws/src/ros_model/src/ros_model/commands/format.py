@@ -8,7 +8,8 @@ import click
 
 from ros_model.errors import ModelError
 from ros_model.files import read_text
-from ros_model.reader import comments_inside, parse_system
+from ros_model.reader import parse_system
+from ros_model.syntax import comments_inside
 from ros_model.writer import write_system
 
 
