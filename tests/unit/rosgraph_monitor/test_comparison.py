@@ -1,20 +1,21 @@
 """What runs against what should run."""
 
 import pytest
-from ros_model.metamodel import Component, Reference, RosParameter, RosSystem
-from ros_model.snapshot import GraphSnapshot, NodeState
-from rosgraph_monitor.comparison import (
+from ros_model.metamodel import Component, Reference, RosParameter, RosSystem, SystemParameter
+from ros_model.snapshot import GraphSnapshot, NodeState, build_snapshot
+from rosgraph_monitor.comparison import Scope, compare, wrong_topic_types
+from rosgraph_monitor.findings import (
+    NO_NODE,
+    NOT_SET,
     AdditionalNode,
     MissingNode,
     WrongParameter,
-    compare,
+    WrongType,
     finding_statuses,
-    is_ignored,
-    relative,
-    resolved,
-    same_value,
 )
-from rosgraph_monitor.status import Level, Status
+from rosgraph_monitor.names import instance, is_ignored_node, relative, resolved
+from rosgraph_monitor.status import Level
+from rosgraph_monitor.values import same_value
 
 
 def graph(*nodes, **parameters):
@@ -37,11 +38,13 @@ def test_graph_as_desired_has_no_findings():
 
 
 def test_node_that_is_not_registered_is_missing():
-    assert compare(graph(), system(BASE), dead={}) == (MissingNode("base", "not registered with the master"),)
+    assert compare(graph(), system(BASE), dead={}) == (MissingNode("base", "absent", "not registered with the master"),)
 
 
 def test_node_that_is_registered_but_dead_is_missing():
-    assert compare(graph("/base"), system(BASE), dead={"/base": "dead"}) == (MissingNode("base", "dead"),)
+    assert compare(graph("/base"), system(BASE), dead={"/base": ("dead", "no answer")}) == (
+        MissingNode("base", "dead", "no answer"),
+    )
 
 
 def test_excused_node_raises_no_alarm():
@@ -65,11 +68,12 @@ def test_parameter_that_is_not_set_is_wrong():
 def test_additional_node_is_a_warning():
     findings = compare(graph("/base", "/stray", base={"local": {"speed": 0.5}}), system(BASE), dead={})
     assert findings == (AdditionalNode("stray"),)
-    assert finding_statuses(findings) == [Status(Level.WARN, "stray", "Additional node")]
+    (status,) = finding_statuses(findings)
+    assert (status.level, status.name, status.message) == (Level.WARN, "stray", "Additional node")
 
 
 def test_dead_node_is_not_additional():
-    assert compare(graph("/stray"), system(), dead={"/stray": "dead"}) == ()
+    assert compare(graph("/stray"), system(), dead={"/stray": ("dead", "no answer")}) == ()
 
 
 @pytest.mark.parametrize("name", ["rosout", "rosgraph_monitor", "rviz_1700000000123", "any_4711_1700000000123"])
@@ -78,13 +82,13 @@ def test_tools_and_anonymous_nodes_are_ignored(name):
 
 
 def test_additional_patterns_are_a_setting():
-    assert is_ignored("tool_a", ("/tool_*",))
-    assert not is_ignored("driver_2", ("tool_*",))
+    assert is_ignored_node("tool_a", ("/tool_*",))
+    assert not is_ignored_node("driver_2", ("tool_*",))
 
 
 def test_system_in_a_namespace():
     live = graph("/robot/base", "/other", robot={"base": {"local": {"speed": 0.5}}})
-    assert compare(live, system(BASE), dead={}, namespace="/robot") == ()
+    assert compare(live, system(BASE), dead={}, scope=Scope(namespace="/robot")) == ()
     assert resolved("ns/base", "/robot") == "/robot/ns/base"
     assert relative("/other", "/robot") is None
 
@@ -109,3 +113,48 @@ def test_system_in_a_namespace():
 )
 def test_same_value(expected, actual, same):
     assert same_value(expected, actual) is same
+
+
+def test_nan_equals_nan_only():
+    assert same_value(float("nan"), float("nan"))
+    assert not same_value(float("nan"), 1.0)
+
+
+def test_parameter_in_a_namespace_of_the_node():
+    component = Component("base", parameters=(RosParameter("speed", None, 0.5, namespace="local"),))
+    assert compare(graph("/base", base={"local": {"speed": 0.5}}), system(component), dead={}) == ()
+
+
+def test_parameter_of_the_system_is_compared_but_not_what_only_describes_it():
+    described = RosSystem(
+        "s", parameters=(SystemParameter("robot_name", value="r"), SystemParameter("qa_safety", value=0.4))
+    )
+    assert compare(graph(), described, dead={}) == (WrongParameter(NO_NODE, "robot_name", "r", NOT_SET),)
+    assert compare(graph(robot_name="r"), described, dead={}) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("/talker", "/talker"),
+        ("/listener", "/listener_1700000000000"),
+        ("/pub_11_1600000000000", "/pub_4711_1700000000000"),
+        ("/twin", None),
+    ],
+)
+def test_anonymous_instance_stands_for_a_node_of_the_model(name, found):
+    running = (
+        *("/talker", "/listener_1700000000000", "/pub_4711_1700000000000"),
+        *("/twin_1_1700000000001", "/twin_2_1700000000002"),
+    )
+    assert instance(name, running) == found
+
+
+def test_type_of_a_topic_by_settings():
+    live = build_snapshot(
+        [[["/scan", ["/laser"]]], [], []], [["/scan", "std_msgs/String"]], {}, {"/laser": "http://x:1/"}
+    )
+    assert wrong_topic_types(live, {"scan": "std_msgs/String", "absent": "a/B"}) == []
+    assert wrong_topic_types(live, {"scan": "sensor_msgs/LaserScan"}) == [
+        WrongType("laser", "scan", "sensor_msgs/LaserScan", "std_msgs/String")
+    ]

@@ -1,6 +1,9 @@
 """Status of components over time."""
 
+import math
+
 import pytest
+from rosgraph_monitor.battery import charge_of, has_failed
 from rosgraph_monitor.components import (
     ComponentStatus,
     ComponentTracker,
@@ -8,6 +11,7 @@ from rosgraph_monitor.components import (
     component_statuses,
     parse_mapping,
 )
+from rosgraph_monitor.health import DEFAULT_MAX_AGE
 from rosgraph_monitor.status import Level, Status
 
 ALIVE, GONE, UNKNOWN = NodeCondition.ALIVE, NodeCondition.GONE, NodeCondition.UNKNOWN
@@ -71,11 +75,51 @@ def test_node_that_is_not_expected_any_more_is_forgotten():
 
 
 def test_node_maps_to_its_component():
-    tracker = ComponentTracker(parse_mapping({"laser_resender": {"node": "/laser"}}))
+    tracker = ComponentTracker(parse_mapping({"laser_resender": {"node": "/laser"}}).of_node)
     assert tracker.update({"laser": ALIVE}, 0.0) == [("laser_resender", TRUE)]
 
 
-@pytest.mark.parametrize("value", [[], {"a": "b"}, {"a": {"node": 1}}, {"a": {"node": "/"}}])
+def test_topic_stands_for_a_component():
+    found = parse_mapping(
+        {"laser": {"topic": "/front/scan"}, "camera": {"node": "cam", "topic": "depth", "min_rate": 5}}
+    )
+    assert found.topics["front/scan"].max_age == DEFAULT_MAX_AGE
+    assert (found.topics["depth"].min_rate, found.topics["depth"].component) == (5, "camera")
+    assert found.of_node == {"cam": "camera"}
+
+
+def test_battery_below_a_limit_fails_until_it_is_above_another():
+    (battery,) = parse_mapping({"battery": {"topic": "battery_state", "below": 0.2, "above": 0.3}}).batteries
+    charges = (0.5, 0.19, 0.25, 0.31)
+    states = [failed := False]
+    for charge in charges:
+        failed = has_failed(battery, charge, failed)
+        states.append(failed)
+    assert states[1:] == [False, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("fields", "charge"),
+    [((0.4, 1.0, 2.0), 0.4), ((math.nan, 1.0, 2.0), 0.5), ((math.nan, 1.0, math.nan), None), ((40.0, 0, 0), None)],
+)
+def test_charge_of_a_battery(fields, charge):
+    assert charge_of(*fields) == charge
+
+
+def test_node_that_runs_but_does_not_work_fails_without_grace_or_patience():
+    steps = (0.0, ALIVE), (1.0, NodeCondition.FAILED), (2.0, ALIVE)
+    assert history(ComponentTracker({}), *steps, patience={"laser": 9.0}) == [TRUE, FALSE, RECOVERED]
+    assert history(ComponentTracker({}), (0.0, NodeCondition.FAILED)) == [FALSE]
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        *([], {"a": "b"}, {"a": {"node": 1}}, {"a": {"node": "/"}}, {"a": {"topic": "t", "max_age": -1}}),
+        *({"a": {"topic": "t", "below": 2}}, {"a": {"topic": "t", "below": 0.3, "above": 0.2}}, {"a": {}}),
+        *({"a": {"node": "n", "max_age": 1}}, {"a": {"topic": "t", "max_age": math.nan}}),
+    ],
+)
 def test_mapping_of_another_shape_is_refused(value):
     with pytest.raises(ValueError, match="components"):
         parse_mapping(value)

@@ -1,10 +1,12 @@
 """Evaluations of the monitor, one after the other."""
 
-from ros_model.metamodel import Component, RosSystem
-from ros_model.snapshot import GraphSnapshot, NodeState
+from ros_model.metamodel import Component, Port, PortKind, RosSystem
+from ros_model.snapshot import GraphSnapshot, NodeState, build_snapshot
+from rosgraph_monitor.components import NodeCondition
 from rosgraph_monitor.desired import Desired
+from rosgraph_monitor.health import TopicSpec, Verdict
 from rosgraph_monitor.liveness import Life
-from rosgraph_monitor.monitor import GraphMonitor
+from rosgraph_monitor.monitor import GraphMonitor, Patience
 
 LASER = "/front_laser"
 SYSTEM = RosSystem("base", components=(Component("front_laser"), Component("move_base")))
@@ -20,7 +22,7 @@ def lives(**life):
 
 
 def monitor(**settings):
-    return GraphMonitor({"front_laser": "laser_resender"}, startup_grace=5.0, restart_patience=1.0, **settings)
+    return GraphMonitor({"front_laser": "laser_resender"}, patience=Patience(5.0, 1.0, 1.0), **settings)
 
 
 def said(statuses):
@@ -96,3 +98,80 @@ def test_problem_of_the_model_is_told_in_place_of_running_ok():
 
 def test_without_model_only_mapped_components_are_told():
     assert said(monitor().evaluate(BOTH, ALIVE, Desired(None), 0.0)) == {("laser_resender", "Component status", "TRUE")}
+
+
+def test_node_that_ends_cleanly_has_its_own_words_and_one_that_died_keeps_its():
+    watched = monitor()
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.0)
+    ended = watched.evaluate(graph("/move_base"), ALIVE, DESIRED, 0.1)
+    assert ("front_laser", "Missing node", "ended: it has unregistered from the master") in said(ended)
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.2)
+    watched.evaluate(BOTH, ALIVE | lives(front_laser=Life.DEAD), DESIRED, 0.3)
+    cleaned_up = watched.evaluate(graph("/move_base"), ALIVE, DESIRED, 0.4)
+    assert ("front_laser", "Missing node", Life.DEAD.value) in said(cleaned_up)
+
+
+def test_each_way_to_go_has_its_own_words():
+    assert len({Life.DEAD.value, Life.HUNG.value, Life.UNREACHABLE.value, "ended", "not registered"}) == 5
+
+
+LISTENER = RosSystem(
+    "s",
+    components=(Component("move_base", ports=(Port("scan", PortKind.SUBSCRIBER), Port("map", PortKind.SUBSCRIBER))),),
+)
+
+
+def test_difference_in_interfaces_must_last_and_nodes_may_start():
+    watched = GraphMonitor({}, patience=Patience(5.0, 1.0, 1.0))
+    live = build_snapshot([[], [["/scan", ["/move_base"]]], []], [], {}, {"/move_base": "http://host/move_base"})
+    alive = lives(move_base=Life.ALIVE)
+
+    def missing(now):
+        return [s.values[0][1] for s in watched.evaluate(live, alive, Desired(LISTENER), now) if "port" in s.message]
+
+    assert [missing(now) for now in (0.0, 4.9, 5.0)] == [[], [], ["map"]]
+
+
+SCAN = TopicSpec("front/scan", max_age=1.0)
+SILENT = Verdict(SCAN, "Silent topic", "last message 3.0 s ago", "max_age 1", "3.00")
+PUBLISHED = build_snapshot([[["/front/scan", [LASER]]], [], []], [], {}, {LASER: f"http://host{LASER}"})
+
+
+def test_silent_topic_fails_the_component_of_its_publisher_at_once():
+    watched = monitor()
+    alone = Desired(RosSystem("base", components=(Component("front_laser"),)))
+    watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.0, topics=[Verdict(SCAN)])
+    told = said(watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.1, topics=[SILENT]))
+    assert ("laser_resender", "Component status", "FALSE") in told
+    assert ("front/scan", "Silent topic", "last message 3.0 s ago") in told
+    assert not any(message == "running OK" for _, message, _ in told)
+    back = said(watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.2, topics=[Verdict(SCAN)]))
+    assert ("laser_resender", "Component status", "RECOVERED") in back
+
+
+def test_topic_stands_for_its_component_without_a_model():
+    watched = GraphMonitor({})
+    spec = TopicSpec("front/scan", max_age=1.0, component="laser")
+    unknown = Verdict(spec, heard=False)
+    assert said(watched.evaluate(graph(), {}, Desired(None), 0.0, topics=[unknown])) == set()
+    silent = Verdict(spec, "Silent topic", "none")
+    told = said(watched.evaluate(graph(), {}, Desired(None), 1.0, topics=[silent]))
+    assert told == {("laser", "Component status", "FALSE"), ("front/scan", "Silent topic", "none")}
+
+
+def test_publisher_without_a_mapping_is_a_component_of_its_own_name():
+    told = said(
+        GraphMonitor({}).evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), Desired(None), 0.0, topics=[SILENT])
+    )
+    assert ("front_laser", "Component status", "FALSE") in told
+
+
+def test_topics_of_nodes_under_reconfiguration_are_excused():
+    in_change = Desired(SYSTEM, frozenset({"front_laser"}), excused=frozenset({"front_laser"}))
+    assert monitor().excused_topics(PUBLISHED, in_change, ["front/scan", "odom"]) == {"front/scan"}
+    assert monitor().excused_topics(PUBLISHED, DESIRED, ["front/scan"]) == frozenset()
+
+
+def test_battery_is_a_component():
+    told = said(monitor().evaluate(BOTH, ALIVE, DESIRED, 0.0, others={"battery": NodeCondition.FAILED}))
+    assert ("battery", "Component status", "FALSE") in told

@@ -1,11 +1,14 @@
-"""Status of components: what the liveness of nodes means for them, over time. Pure; time is an argument."""
+"""Status of components: what the state of nodes and topics means for them, over time. Pure; time is an argument."""
 
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from rosgraph_monitor.battery import BatterySpec
+from rosgraph_monitor.health import DEFAULT_MAX_AGE, TopicSpec, parse_spec
 from rosgraph_monitor.status import COMPONENT_STATUS, Level, Status
 
 if TYPE_CHECKING:
@@ -21,10 +24,11 @@ class ComponentStatus(enum.Enum):
 
 
 class NodeCondition(enum.Enum):
-    """What is known of a node at this moment."""
+    """What is known of a node at this moment. FAILED: it runs, but does not do what it should."""
 
     ALIVE = "alive"
     GONE = "gone"
+    FAILED = "failed"
     UNKNOWN = "unknown"
 
 
@@ -37,30 +41,71 @@ class _Seen:
     failed: bool = False
 
 
-def parse_mapping(value: Any) -> dict[str, str]:
-    """Return the component of each node, from `{component: {node: NAME}}`.
+@dataclass(frozen=True)
+class ComponentMap:
+    """What stands for components.
+
+    Attributes:
+        of_node: component by name of the node, relative to the system's namespace.
+        topics: what is expected of topics that stand for components, by name of the topic.
+        batteries: batteries that stand for components.
+    """
+
+    of_node: dict[str, str] = field(default_factory=dict)
+    topics: dict[str, TopicSpec] = field(default_factory=dict)
+    batteries: tuple[BatterySpec, ...] = ()
+
+
+def parse_mapping(value: Any) -> ComponentMap:
+    """Return what stands for each component.
+
+    An entry is `{node: NAME}`, `{topic: NAME, max_age: S, min_rate: HZ, stuck_after: N}` (limits as one likes), both
+    in one, or `{topic: NAME, below: CHARGE, above: CHARGE}` for a battery.
 
     Raises:
         ValueError: the value has another shape; the message names the entry.
     """
     if not isinstance(value, dict):
-        raise ValueError(f"components: must map each component to {{node: NAME}}, not {value!r}")
-    mapping = {}
+        raise ValueError(f"components: must map each component to {{node: NAME}} or {{topic: NAME}}, not {value!r}")
+    of_node, topics, batteries = {}, {}, []
     for component, entry in value.items():
-        match entry:
-            case {"node": str(node)} if node.strip("/"):
-                mapping[node.strip("/")] = str(component)
-            case _:
-                raise ValueError(f"components/{component}: must be {{node: NAME}}, not {entry!r}")
-    return mapping
+        settings = dict(entry) if isinstance(entry, dict) else {}
+        node, topic = settings.pop("node", None), settings.pop("topic", None)
+        if not (node or topic) or not all(isinstance(n, str) and n.strip("/") for n in (node, topic) if n is not None):
+            raise ValueError(f"components/{component}: must be {{node: NAME}} or {{topic: NAME}}, not {entry!r}")
+        if node:
+            of_node[node.strip("/")] = str(component)
+        if topic and settings.keys() & {"below", "above"}:
+            batteries.append(_battery(str(component), topic, settings))
+        elif topic:
+            spec = parse_spec(topic, settings | {"component": str(component)}, where=f"components/{component}")
+            topics[spec.name] = (
+                spec
+                if spec.is_watched
+                else TopicSpec(
+                    spec.name, spec.type, max_age=DEFAULT_MAX_AGE, component=spec.component, wall_time=spec.wall_time
+                )
+            )
+        elif settings:
+            raise ValueError(f"components/{component}: {', '.join(settings)} need a topic")
+    return ComponentMap(of_node, topics, tuple(batteries))
+
+
+def _battery(component: str, topic: str, settings: dict[str, Any]) -> BatterySpec:
+    below, above = settings.pop("below", None), settings.pop("above", None)
+    above = below if above is None else above
+    good = all(isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v) for v in (below, above))
+    if settings or not good or not 0.0 < below <= above <= 1.0:
+        raise ValueError(f"components/{component}: a battery has topic, below and above, with 0 < below <= above <= 1")
+    return BatterySpec(component, topic, float(below), float(above))
 
 
 class ComponentTracker:
     """Follows nodes, and says what becomes of their components.
 
     A node that ran and went has failed at once, unless somebody may restart it (it has patience then); one that never
-    ran, after a grace. A node that is excused (being reconfigured) is not judged; if it had failed before and runs
-    afterwards, it has recovered.
+    ran, after a grace; one that runs but does not do what it should, at once. A node that is excused (being
+    reconfigured) is not judged; if it had failed before and runs afterwards, it has recovered.
     """
 
     def __init__(self, component_of: Mapping[str, str], grace: float = 10.0) -> None:
@@ -79,6 +124,10 @@ class ComponentTracker:
     def waited_for(self) -> frozenset[str]:
         """Nodes that are absent but not failed yet, as of the last update."""
         return self._waited_for
+
+    def has_run(self, name: str) -> bool:
+        """Say whether an expected node was seen alive, as of the last update."""
+        return name in self._seen and self._seen[name].ever_alive
 
     def update(
         self,
@@ -126,6 +175,8 @@ class ComponentTracker:
             return before, ComponentStatus.FALSE
         if condition is NodeCondition.UNKNOWN:
             return before, None
+        if condition is NodeCondition.FAILED:
+            return _Seen(now, ever_alive=True, failed=True), ComponentStatus.FALSE
         since = now if before.absent_since is None else before.absent_since
         failed = now - since >= (patience if before.ever_alive else self._grace)
         return _Seen(since, before.ever_alive, failed), ComponentStatus.FALSE if failed else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import socket
 import sys
 import threading
 import time
@@ -16,19 +17,24 @@ from metacontrol_msgs.msg import ActiveConfiguration
 from ros_model.errors import ModelError
 from ros_model.files import resolve, safe_file_name
 from ros_model.reader import read_system
-from ros_model.snapshot import GraphSnapshot, MasterClient, MasterGoneError, SnapshotError
+from ros_model.snapshot import MasterClient, SnapshotError
 
-from rosgraph_monitor.comparison import DEFAULT_IGNORED, resolved
-from rosgraph_monitor.components import parse_mapping
+from rosgraph_monitor.comparison import Scope
+from rosgraph_monitor.components import ComponentMap, parse_mapping
 from rosgraph_monitor.desired import DesiredModel, Grounding
+from rosgraph_monitor.health import TopicSpec, merged, model_topics, parse_topics
 from rosgraph_monitor.liveness import Life, Timing
-from rosgraph_monitor.monitor import GraphMonitor
+from rosgraph_monitor.look import Look, Looker
+from rosgraph_monitor.monitor import GraphMonitor, Patience
+from rosgraph_monitor.names import IGNORED_NODES, IGNORED_PORTS, resolved
 from rosgraph_monitor.observer_node import ObserverHost
+from rosgraph_monitor.topics_node import BatteryListener, TopicListener
 from rosgraph_monitor.usage import UsageMeter
 from rosgraph_monitor.watch import Watcher
+from rosgraph_monitor.wiring import PortTypes, port_types
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from ros_model.metamodel import RosSystem
 
@@ -37,11 +43,15 @@ if TYPE_CHECKING:
 BAD_START = 2
 """Exit status of a start that failed. The loss of the master ends the node with 0: it has done all it could."""
 
-_MASTER = "ROS master"
-_MASTER_SILENCE = 5.0
+_MASTER_TIMEOUT = 1.2
+"""Wall seconds for one answer of the master: with a tick of 0.5 s before it, its silence is told within 2 s."""
+_MASTER_SILENCE = 10.0
 """Wall seconds without a useful answer after which the master counts as lost; if it is gone, that shows at once."""
 _COALESCE = 0.02
-"""Wall seconds between evaluations, for events that come in a bunch."""
+"""Wall seconds between evaluations at least, for events that come in a bunch."""
+_FRESH = 0.15
+"""Wall seconds to wait, after a node died, for a look that says whether it has unregistered."""
+_TOPIC_PERIOD = 0.05
 _USAGE_PERIOD = 1.0
 _LAUNCHER = "rosgraph_launcher"
 _METACONTROL_NODES = ["rosgraph_monitor", "reasoner", "rosgraph_manipulator", _LAUNCHER]
@@ -64,107 +74,144 @@ class MonitorNode:
             ParameterError: a parameter has the wrong type or range.
             ModelError: the base model can't be read.
         """
-        self._period = 1.0 / _number("~rate", 2.0)
         self._namespace = rospy.get_namespace()
         self._variants = _text("~variants")
-        self._monitor = GraphMonitor(
-            _components(),
-            ignored=(*DEFAULT_IGNORED, *_names("~ignore", [])),
-            namespace=self._namespace,
-            startup_grace=_number("~startup_grace", 10.0),
-            restart_patience=_number("~restart_patience", 1.0),
+        components = _components()
+        self._topic_specs = merged(components.topics, _topics())
+        patience = Patience(
+            startup=_number("~startup_grace", Patience.startup),
+            restart=_number("~restart_patience", Patience.restart),
+            ports=_number("~port_patience", Patience.ports),
         )
+        self._monitor = GraphMonitor(components.of_node, scope=self._scope(), patience=patience)
         base = _text("~desired_rossystem")
         self._model = DesiredModel(read_system(resolve(base)) if base else None, self._read_variant)
         self._metacontrol = _names("~metacontrol_nodes", _METACONTROL_NODES)
         self._meter = UsageMeter(alone=frozenset({_LAUNCHER}))
         self._usage_due = 0.0
-        self._changed = threading.Event()
-        self._refresh = False
-        self._silent_since: float | None = None
-        self._snapshot: GraphSnapshot | None = None
-        self._client = MasterClient(rosgraph.get_master_uri(), rospy.get_name())
+        self._events = threading.Event()
+        self._looked = threading.Event()
+        self._silence_told = False
         timing = Timing(
             probe_period=_number("~probe_period", Timing.probe_period),
             probe_deadline=_number("~probe_deadline", Timing.probe_deadline),
         )
-        self._watcher = Watcher(self._changed.set, timing, rospy.get_name())
+        self._watcher = Watcher(self._on_life, timing, rospy.get_name())
+        self._looker = Looker(
+            MasterClient(rosgraph.get_master_uri(), rospy.get_name(), _MASTER_TIMEOUT),
+            self._watcher,
+            1.0 / _number("~rate", 2.0),
+            rospy.get_name(),
+            self._on_look,
+        )
         observers = dict.fromkeys((*_names("~observers", []), *load))
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
         self._observers = ObserverHost(self._diagnostics)
         self._observers.follow(self._model.current.system)
         for name in observers:
             self._observers.load(name)
+        self._topics = TopicListener(patience.startup)
+        self._topic_states: dict[str, str] = {}
+        self._follow_topics()
+        self._batteries = BatteryListener(components.batteries, self._events.set)
         self._subscriber = rospy.Subscriber(
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, self._follow, queue_size=5
         )
-        rospy.on_shutdown(self._changed.set)
+        rospy.on_shutdown(self._events.set)
 
     def run(self) -> None:
-        """Evaluate at the fixed rate and whenever a node dies or returns, until the node or the master ends."""
+        """Evaluate after every look, and whenever a node or topic fails or returns, until node or master end."""
         self._watcher.start()
-        due = time.monotonic()
+        self._looker.start()
         try:
-            while not rospy.is_shutdown():
-                now = time.monotonic()
-                if now >= due or self._refresh or self._master_seems_gone():
-                    self._refresh = False
-                    if not self._look(now):
-                        break
-                    due = max(due + self._period, now)
-                self._publish(self._evaluate())
-                self._wait(due)
+            while not rospy.is_shutdown() and not self._master_is_lost():
+                look = self._looker.latest
+                if look:
+                    begin = time.monotonic()
+                    self._publish(self._evaluate(look))
+                    # Never more than half the time: hundreds of nodes may come or go together.
+                    time.sleep(max(_COALESCE, time.monotonic() - begin))
+                self._wait()
         finally:
+            self._looker.close()
             self._watcher.close()
-            self._client.close()
 
-    def _wait(self, due: float) -> None:
-        """Wait until the next look is due or something has changed."""
-        time.sleep(_COALESCE)
-        self._changed.wait(max(due - time.monotonic(), 0.0))
-        self._changed.clear()
+    def _scope(self) -> Scope:
+        return Scope(
+            ignored_nodes=(*IGNORED_NODES, *_names("~ignore", [])),
+            ignored_ports=(*IGNORED_PORTS, *_names("~ignore_ports", [])),
+            types=_port_types(_names("~ros_models", [])),
+            topic_types={name: spec.type for name, spec in self._topic_specs.items() if spec.type},
+            namespace=self._namespace,
+        )
 
-    def _look(self, now: float) -> bool:
-        """Take a snapshot; False if the master is lost."""
-        try:
-            self._snapshot = self._client.snapshot()
-            self._silent_since = None
-        except MasterGoneError as error:
-            rospy.logfatal("%s: the monitor ends, start it again with the master", error)
+    def _on_life(self) -> None:
+        """A node died or came back: look whether it has unregistered or has another address, then evaluate."""
+        self._looked.clear()
+        self._looker.request()
+        self._events.set()
+
+    def _on_look(self) -> None:
+        self._looked.set()
+        self._events.set()
+
+    def _wait(self) -> None:
+        """Wait until there is something to evaluate."""
+        while not self._events.wait(_TOPIC_PERIOD if self._topics.topics else None):
+            if self._topics_changed():
+                return
+        self._events.clear()
+        if not rospy.is_shutdown():
+            self._looked.wait(_FRESH)
+
+    def _master_is_lost(self) -> bool:
+        """Say in one line that the master is lost, or that it is silent."""
+        lost, silence = self._looker.lost, self._looker.silence
+        if lost is None and silence is None:
+            self._silence_told = False
             return False
-        except SnapshotError as error:
-            if self._silent_since is None:
-                self._silent_since = now
-                rospy.logerr("%s", error)
-            elif time.monotonic() - self._silent_since > _MASTER_SILENCE:
-                rospy.logfatal("%s: silent for %g s, the monitor ends", error, _MASTER_SILENCE)
-                return False
+        if lost:
+            rospy.logfatal("%s: the monitor ends, start it again with the master", lost)
             return True
-        nodes = {name: node.uri for name, node in self._snapshot.nodes.items() if name != rospy.get_name()}
-        self._watcher.watch(nodes | {_MASTER: self._client.uri})
+        since, error = silence  # type: ignore[misc]
+        if not self._silence_told:
+            self._silence_told = True
+            rospy.logerr("%s: the monitor ends if it stays silent for %g s", error, _MASTER_SILENCE)
+        if time.monotonic() - since < _MASTER_SILENCE:
+            return False
+        # A node unregisters when it ends: it must not wait for this master.
+        socket.setdefaulttimeout(_MASTER_TIMEOUT)
         return True
 
-    def _master_seems_gone(self) -> bool:
-        return self._watcher.lives().get((_MASTER, self._client.uri)) is Life.DEAD
+    def _topics_changed(self) -> bool:
+        states = {v.spec.name: v.message for v in self._topics.judge(self._excused_topics())}
+        return states != self._topic_states
 
-    def _evaluate(self) -> list[Status]:
-        if self._snapshot is None:
-            return []
-        lives = self._watcher.lives()
-        own = self._snapshot.nodes.get(rospy.get_name())
+    def _excused_topics(self) -> frozenset[str]:
+        look = self._looker.latest
+        desired = self._model.current
+        return self._monitor.excused_topics(look.snapshot, desired, self._topics.topics) if look else frozenset()
+
+    def _evaluate(self, look: Look) -> list[Status]:
+        lives = look.lives if self._looked.is_set() else self._watcher.lives()
+        own = look.snapshot.nodes.get(rospy.get_name())
         if own:
             lives[own.name, own.uri] = Life.ALIVE
         now = time.monotonic()
-        statuses = self._monitor.evaluate(self._snapshot, lives, self._model.current, now)
+        verdicts = self._topics.judge(self._excused_topics())
+        self._topic_states = {verdict.spec.name: verdict.message for verdict in verdicts}
+        statuses = self._monitor.evaluate(
+            look.snapshot, lives, self._model.current, now, topics=verdicts, others=self._batteries.conditions
+        )
         if now >= self._usage_due:
             self._usage_due = now + _USAGE_PERIOD
-            statuses.extend(self._meter.measure(self._metacontrol_pids(), now))
+            statuses.extend(self._meter.measure(self._metacontrol_pids(look), now))
         return statuses
 
-    def _metacontrol_pids(self) -> dict[str, int]:
+    def _metacontrol_pids(self, look: Look) -> dict[str, int]:
         """Return the process ids of the meta-controller's nodes that run on this host."""
         pids = self._watcher.pids() | {rospy.get_name(): os.getpid()}
-        nodes = self._snapshot.nodes if self._snapshot else {}
+        nodes = look.snapshot.nodes
         local = {}
         for name in self._metacontrol:
             graph_name = resolved(name, self._namespace)
@@ -187,8 +234,15 @@ class MonitorNode:
             rospy.logerr("desired model stays as it was: %s", current.problem)
         if current.system != before.system:
             self._observers.follow(current.system)
-        self._refresh = True
-        self._changed.set()
+            self._follow_topics()
+        self._looked.clear()
+        self._looker.request()
+        self._events.set()
+
+    def _follow_topics(self) -> None:
+        """Watch the topics of which the settings or the active model expect something; settings go first."""
+        system = self._model.current.system
+        self._topics.follow(merged(model_topics(system) if system else {}, self._topic_specs))
 
     def _read_variant(self, name: str) -> RosSystem:
         if not self._variants:
@@ -255,8 +309,24 @@ def _names(name: str, default: list[str]) -> list[str]:
     return value
 
 
-def _components() -> dict[str, str]:
+def _port_types(paths: Iterable[str]) -> PortTypes:
+    paths = list(paths)
+    if not paths:
+        return {}
+    from ros_model.packages_reader import read_packages  # grammars take a while to load: only where they are needed
+
+    return port_types(read_packages(resolve(path)) for path in paths)
+
+
+def _components() -> ComponentMap:
     try:
         return parse_mapping(_parameter("~components", {}))
     except ValueError as error:
         raise ParameterError(f"parameter {rospy.resolve_name('~components')}: {error}") from error
+
+
+def _topics() -> Mapping[str, TopicSpec]:
+    try:
+        return parse_topics(_parameter("~topics", {}))
+    except ValueError as error:
+        raise ParameterError(f"parameter {rospy.resolve_name('~topics')}: {error}") from error

@@ -1,0 +1,73 @@
+"""Names in the graph: namespaces, anonymous nodes, patterns of what may run beside the model."""
+
+from __future__ import annotations
+
+import fnmatch
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable
+
+IGNORED_NODES = (
+    *("rosout", "rosgraph_*", "reasoner", "mission", "mission_*", "rviz*", "rosbag*", "record", "rostopic*"),
+    *("rosservice*", "rqt*", "diagnostic_aggregator", "diagnostic_names", "roslaunch*", "rostest*"),
+)
+"""Nodes that never count as additional: the meta-controller's own, missions and tools."""
+IGNORED_PORTS = (
+    *("/rosout", "/rosout_agg", "/clock", "/tf", "/tf_static", "/diagnostics", "/statistics", "*/bond"),
+    *("*/parameter_descriptions", "*/parameter_updates", "~*"),
+)
+"""Interfaces that never count as additional: those that most nodes have, and what lies under a node's own name."""
+
+# rospy: NAME_PID_MILLISECONDS; roscpp: NAME_NANOSECONDS (and tools with epoch seconds, such as /rviz_1700000000).
+_ANONYMOUS = re.compile(r"(?P<stem>.+?)(_\d+)?_\d{10,}")
+
+
+def resolved(name: str, namespace: str = "/") -> str:
+    """Return the name in the graph, from one relative to the namespace."""
+    return name if name.startswith("/") else f"/{namespace.strip('/')}/{name}".replace("//", "/")
+
+
+def relative(name: str, namespace: str = "/") -> str | None:
+    """Return the name relative to the namespace, without a leading slash; None where it is outside."""
+    prefix = f"/{namespace.strip('/')}/".replace("//", "/")
+    return name.removeprefix(prefix) if name.startswith(prefix) else None
+
+
+def in_node(name: str, node: str) -> str:
+    """Return the name in the graph that a node means, given the node's resolved name: `~` is the node itself."""
+    if name.startswith("~"):
+        return f"{node}/{name[1:].lstrip('/')}"
+    return resolved(name, node.rpartition("/")[0] or "/")
+
+
+def is_ignored_node(name: str, patterns: Iterable[str]) -> bool:
+    """Say whether a node may run beside the model: its name is anonymous, or fits a shell pattern."""
+    return _ANONYMOUS.fullmatch(name) is not None or any(fnmatch.fnmatchcase(name, p.lstrip("/")) for p in patterns)
+
+
+def is_ignored_port(name: str, node: str, patterns: Iterable[str]) -> bool:
+    """Say whether a node may have an interface beside the model.
+
+    Args:
+        name: resolved name of the topic, service or action.
+        node: resolved name of the node.
+        patterns: shell patterns of resolved names, and with `~` in place of the node's own name.
+    """
+    own = f"~{name.removeprefix(node + '/')}" if name.startswith(node + "/") else ""
+    return any(fnmatch.fnmatchcase(own if p.startswith("~") else name, p) for p in patterns)
+
+
+def instance(name: str, nodes: Collection[str]) -> str | None:
+    """Return the running node that a resolved name of the model stands for: itself, else its one anonymous instance."""
+    if name in nodes:
+        return name
+    stem = _stem(name)
+    found = [node for node in nodes if node.startswith(stem) and node != stem and _stem(node) == stem]
+    return found[0] if len(found) == 1 else None
+
+
+def _stem(name: str) -> str:
+    match = _ANONYMOUS.fullmatch(name)
+    return match["stem"] if match else name
