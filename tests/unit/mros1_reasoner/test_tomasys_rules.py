@@ -40,6 +40,7 @@ def test_published_labels_are_there():
     labels = re.findall(r"<swrl:Imp>\s*<rdfs:label>(\w+)</rdfs:label>", texts)
     expected = [
         "QA",
+        "QA_reached",
         "S9",
         "compError",
         "compErrFG",
@@ -89,6 +90,27 @@ def test_qa_where_higher_is_better_must_not_fall_below(knowledge_base, reasoner,
     objective = replace(OBJECTIVE, limits={"performance": 0.5})
     facts = Facts((objective,), {"o_move": "scan_slow"}, {("o_move", "performance"): level})
     assert outcome(knowledge_base, reasoner, facts).objectives["o_move"].status == status
+
+
+@pytest.mark.parametrize(
+    ("operator", "level", "status"),
+    [
+        (">", 0.6, v.IN_PROGRESS),
+        (">=", 0.6, v.IN_ERROR_NFR),
+        (">=", 0.59, v.IN_PROGRESS),
+        ("<=", 0.6, v.IN_ERROR_NFR),
+        ("<=", 0.61, v.IN_PROGRESS),
+        ("<", 0.6, v.IN_PROGRESS),
+        ("<", 0.59, v.IN_ERROR_NFR),
+    ],
+)
+def test_qa_of_a_type_with_a_comparison_operator_compares_by_it(load, pellet, operator, level, status):
+    extra = '<rdf:Description rdf:about="#safety"><t:qa_comparison_operator>{}</t:qa_comparison_operator></rdf:Description>'
+    knowledge_base = load(application(extra=extra.format(operator.replace("<", "&lt;"))))
+    pellet.load(knowledge_base.ontology)
+    assert knowledge_base.qualities["safety"].violates(level, 0.6) == (status == v.IN_ERROR_NFR)
+    facts = replace(FACTS, levels={("o_move", "safety"): level})
+    assert outcome(knowledge_base, pellet, facts).objectives["o_move"].status == status
 
 
 def test_comp_error_makes_the_laser_designs_unrealisable(knowledge_base, reasoner):

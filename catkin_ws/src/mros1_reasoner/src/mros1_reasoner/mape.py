@@ -235,13 +235,14 @@ class Mape:
                 return
         raise MapeError(f"binding error of {grounding}: no objective is grounded so: left out")
 
-    def observe_task(self, now: float, name: str, failed: bool, message: str = "") -> None:
+    def observe_task(self, now: float, name: str, failed: bool, stamp: float = 0.0, message: str = "") -> None:
         """Take in that the task of an objective has failed though nothing else is known to be wrong, or goes on.
 
         Args:
             now: present time.
             name: of the objective or of its function; empty where there is but one that nothing else requires.
             failed: whether it has failed; until the next adaptation, or until it is reported not to have.
+            stamp: of the message that said so; 0 where it has none.
             message: why.
 
         Raises:
@@ -257,7 +258,7 @@ class Mape:
             if running.design is None and failed:
                 raise MapeError(f"task of {objective} is said to have failed, but nothing is deployed for it: left out")
             if failed and running.task_failure is None:
-                running.task_failure = now, message
+                running.task_failure = stamp or now, message
             elif not failed:
                 running.task_failure = None
 
