@@ -111,11 +111,11 @@ def test_lazy_node_subscribes_when_somebody_listens():
     model = system(
         connection("rays", "laser.rays", "nav.rays"),
         laser=[port("rays", PUB)],
-        nav=[port("rays", SUB), port("points", PUB)],
+        nav=[port("rays", SUB), port("nav/points", PUB)],
     )
-    idle = {"pubs": [["/rays", ["/laser"]], ["/points", ["/nav"]]]}
+    idle = {"pubs": [["/rays", ["/laser"]], ["/nav/points", ["/nav"]]]}
     assert findings(model, **idle) == ()
-    asked = idle | {"subs": [["/points", ["/driver"]]], "nodes": ("/laser", "/nav", "/driver")}
+    asked = idle | {"subs": [["/nav/points", ["/driver"]]], "nodes": ("/laser", "/nav", "/driver")}
     assert MissingPort("nav", "subscriber", "rays") in findings(model, **asked)
 
 

@@ -14,9 +14,11 @@ IGNORED_NODES = (
     *("rosservice*", "rqt*", "diagnostic_aggregator", "diagnostic_names", "roslaunch*", "rostest*"),
 )
 """Nodes that never count as additional: the meta-controller's own, missions and tools."""
+COMMON_TOPICS = ("/rosout", "/rosout_agg", "/clock", "/tf", "/tf_static", "/diagnostics", "/statistics")
+"""Topics that any node may have, and that say nothing of what it is for."""
 IGNORED_PORTS = (
-    *("/rosout", "/rosout_agg", "/clock", "/tf", "/tf_static", "/diagnostics", "/statistics", "*/bond"),
-    *("*/parameter_descriptions", "*/parameter_updates", "~*"),
+    *COMMON_TOPICS,
+    *("*/bond", "*/parameter_descriptions", "*/parameter_updates", "~*"),
 )
 """Interfaces that never count as additional: those that most nodes have, and what lies under a node's own name."""
 

@@ -14,7 +14,7 @@ from rosgraph_monitor.findings import (
     PortFinding,
     WrongType,
 )
-from rosgraph_monitor.names import in_node, is_ignored_port, relative
+from rosgraph_monitor.names import COMMON_TOPICS, in_node, is_ignored_port, relative
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -113,7 +113,7 @@ def _component_ports(
     if not wanted:
         return
     has = {kind: _has(entry.node, kind) for kind in PortKind}
-    idle = _nobody_listens(snapshot, entry.node, patterns)
+    idle = _nobody_listens(snapshot, entry.node)
     for (kind, port_name), (port, names) in wanted.items():
         if kind is PortKind.SERVICE_CLIENT or (kind is PortKind.SUBSCRIBER and idle):
             continue
@@ -170,12 +170,12 @@ def _names_of(
 
 
 def _is_lazy(snapshot: GraphSnapshot, end: PortPath, kind: PortKind, live: Mapping[str, Live]) -> bool:
-    return kind is PortKind.SUBSCRIBER and _nobody_listens(snapshot, live[end.component].node, ())
+    return kind is PortKind.SUBSCRIBER and _nobody_listens(snapshot, live[end.component].node)
 
 
-def _nobody_listens(snapshot: GraphSnapshot, node: NodeState, patterns: tuple[str, ...]) -> bool:
+def _nobody_listens(snapshot: GraphSnapshot, node: NodeState) -> bool:
     """Say whether a node publishes something of its own, to which nobody listens."""
-    own = [topic for topic in node.publications if not is_ignored_port(topic, node.name, (*patterns, "/rosout"))]
+    own = [topic for topic in node.publications if topic not in COMMON_TOPICS]
     return bool(own) and not any(snapshot.topics[topic].subscribers for topic in own)
 
 
