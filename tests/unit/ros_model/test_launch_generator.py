@@ -1,17 +1,22 @@
 """Launch files from models: roslaunch's own loader reads them back; nothing in a model is evaluated or injected."""
 
 from dataclasses import replace
+from xmlrpc.client import Binary
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from ros_model.errors import ModelError
 from ros_model.generators.launch import launch_file
 from ros_model.metamodel import (
     Component,
     Connection,
     ConnectionKind,
+    ParameterType,
     Port,
     PortKind,
     PortPath,
+    Position,
     Reference,
     RosParameter,
     RosSystem,
@@ -27,10 +32,14 @@ def of(*parameters, name="laser", node=NODE, namespace=None, ports=(), connectio
     return RosSystem("x", (Component(name, node, namespace, ports, parameters),), connections)
 
 
-def loaded(system):
+def loaded_text(text):
     config = ROSLaunchConfig()
-    XmlLoader(resolve_anon=False).load_string(launch_file(system), config, verbose=False)
+    XmlLoader(resolve_anon=False).load_string(text, config, verbose=False)
     return config
+
+
+def loaded(system):
+    return loaded_text(launch_file(system))
 
 
 def remaps(system):
@@ -54,6 +63,91 @@ def test_parameter_keeps_its_type(value):
     actual = loaded(of(parameter)).params["/laser/group/rate"].value
     assert actual == value
     assert type(actual) is type(value)
+
+
+TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"], exclude_characters="\ufffe\uffff"))
+SCALARS = st.booleans() | st.integers(-(2**31), 2**31 - 1) | st.floats(allow_nan=False, allow_infinity=False) | TEXTS
+
+
+@given(SCALARS | st.lists(SCALARS, max_size=4))
+def test_value_arrives_as_it_is_or_is_refused(value):
+    try:
+        text = launch_file(of(RosParameter("a", None, value)))
+    except ModelError as error:
+        assert "$(" in str(error)
+        return
+    actual = loaded_text(text).params["/laser/a"].value
+    assert (actual, type(actual)) == (value, type(value))
+
+
+@pytest.mark.parametrize("value", [" a", "a ", "\t", "two\nlines", "- a", "{", "#x", "'", '"', "&amp;", "]]>", "é", "deg(90)", "1e3"])
+def test_text_that_xml_or_yaml_might_take_for_something_else(value):
+    for sent in (value, [value], {"m": [value]}):
+        actual = loaded(of(RosParameter("a", None, sent))).params
+        expected = {"/laser/a/m": [value]} if isinstance(sent, dict) else {"/laser/a": sent}
+        assert {name: param.value for name, param in actual.items()} == expected
+
+
+def declared(kind, value=None, **more):
+    system = RosSystem("x", parameters=(SystemParameter("a", ParameterType(kind, **more), value, position=HERE),))
+    (param,) = loaded(system).params.values()
+    return param.value
+
+
+HERE = Position("x.rossystem", 3, 5)
+TEXT, WHOLE, DOUBLE, BYTES = (ParameterType(kind) for kind in ("String", "Integer", "Double", "Base64"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "more", "expected"),
+    [
+        ("Double", 1, {}, 1.0),
+        ("String", 15, {}, "15"),
+        ("String", True, {}, "true"),
+        ("Boolean", False, {}, False),
+        ("Base64", "aGVsbG8=", {}, Binary(b"hello")),
+        ("Integer", None, {"default": 7}, 7),
+        ("Array", [1, 2.5], {"elements": (DOUBLE,)}, [1.0, 2.5]),
+        ("List", [1, 1, "aGk="], {"elements": (DOUBLE, TEXT, BYTES)}, [1.0, "1", Binary(b"hi")]),
+        ("Any", [1, "x"], {}, [1, "x"]),
+    ],
+)
+def test_declared_type_decides(kind, value, more, expected):
+    actual = declared(kind, value, **more)
+    assert actual == expected
+    assert type(actual) is type(expected)
+
+
+def test_members_of_a_struct_have_their_declared_types():
+    kind = ParameterType("Struct", members=(("gain", DOUBLE), ("id", TEXT), ("key", BYTES)))
+    system = RosSystem("x", parameters=(SystemParameter("a", kind, {"gain": 2, "id": 7, "key": "aGk="}),))
+    params = {name: param.value for name, param in loaded(system).params.items()}
+    assert params == {"/a/gain": 2.0, "/a/id": "7", "/a/key": Binary(b"hi")}
+    assert isinstance(params["/a/gain"], float)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "more"),
+    [
+        ("Integer", 0.5, {}),
+        ("Integer", True, {}),
+        ("Boolean", 1, {}),
+        ("Double", "fast", {}),
+        ("Base64", "no base!", {}),
+        ("List", [1], {"elements": (WHOLE, WHOLE)}),
+        ("Array", ["a"], {"elements": (WHOLE,)}),
+        ("Struct", {"a": 1}, {"members": (("b", WHOLE),)}),
+    ],
+)
+def test_value_that_is_none_of_its_type_is_refused(kind, value, more):
+    with pytest.raises(ModelError, match=rf"^x\.rossystem:3:5: the value .* is no {kind}|Integer"):
+        declared(kind, value, **more)
+
+
+@pytest.mark.parametrize("value", [2**31, -(2**31) - 1, [2**40], {"a": 2**31}, float("inf"), [float("nan")]])
+def test_number_that_the_parameter_server_can_not_hold_is_refused(value):
+    with pytest.raises(ModelError, match="^x.rossystem:3:5: "):
+        launch_file(of(RosParameter("a", None, value, position=HERE)))
 
 
 def test_struct_becomes_a_group_of_parameters():

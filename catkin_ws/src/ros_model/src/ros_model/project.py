@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ros_model.columns import Columns, parse_columns
+from ros_model.errors import ModelError
 from ros_model.metamodel import Position, RosSystem
 from ros_model.reader import read_system
 from ros_model.settings import FILE_NAME, Settings, locate, read_settings
@@ -34,7 +35,7 @@ class Project:
         source: metacontrol.yaml, for positions in errors.
         whole_base: the system as its file has it.
         by_table: names of the variants that a table gives; the others are files of their own.
-        as_packages: generators write one catkin package for each variant, the published layout.
+        packages_folder: where each variant is to become a catkin package, the published layout; None: plain files.
     """
 
     folder: Path
@@ -44,7 +45,7 @@ class Project:
     source: Settings = field(repr=False, compare=False)
     whole_base: RosSystem = field(repr=False)
     by_table: frozenset[str] = frozenset()
-    as_packages: bool = False
+    packages_folder: Path | None = None
 
     @property
     def package(self) -> str:
@@ -148,7 +149,11 @@ def _from_files(source: Settings, keys: Keys) -> list[RosSystem]:
         paths = sorted((source.path.parent.resolve() / "variants").glob("*.rossystem"))
     if not paths:
         raise source.error("names no table, and variants/ holds no .rossystem file: add one", *keys)
-    return [read_system(path) for path in paths]
+    variants = [read_system(path) for path in paths]
+    for path, variant in zip(paths, variants, strict=True):
+        if path.parent.name == "variants" and path.stem != variant.name:
+            raise ModelError(f"the variant {variant.name!r} must be in a file of its name: rename one", variant.position)
+    return variants
 
 
 def _check_names(project: Project) -> None:

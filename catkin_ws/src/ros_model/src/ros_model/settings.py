@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ros_model.errors import ModelError
+from ros_model.errors import ModelError, first_of
 from ros_model.metamodel import Position
 from ros_model.schema_check import Keys, dotted, load_schema, part_of, violations
 from ros_model.yaml_file import read_yaml
@@ -83,11 +83,11 @@ def read_settings(path: Path, sections: Sequence[str] = ()) -> Settings:
         sections: check only these, and let the others be absent; all of them if empty.
 
     Raises:
-        ModelError: it can't be read, or the first thing that is wrong in it.
+        ModelError: it can't be read, or everything that is wrong in it.
     """
     settings, problems = examine(path, sections)
-    for problem in problems:
-        raise problem
+    if problems:
+        raise first_of(problems)
     return settings
 
 

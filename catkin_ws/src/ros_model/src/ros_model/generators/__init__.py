@@ -6,7 +6,7 @@ A package adds one with `<export><ros_model generator="NAME" function="module:fu
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,6 +37,15 @@ def find_generators() -> dict[str, Generator]:
             raise ModelError(f"package {package}: package.xml: generator {name!r} {problem}")
         found[name] = _load(package, name, function)
     return found
+
+
+def write_files(texts: Mapping[Path, str], root: Path) -> list[Path]:
+    """Write generated files, all of whose texts are known before the first is written; return their paths.
+
+    Raises:
+        ModelError: as write_file.
+    """
+    return [write_file(path, text, root) for path, text in texts.items()]
 
 
 def write_file(path: Path, text: str, root: Path) -> Path:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from ros_model.generators import write_file
+from ros_model.files import safe_file_name
+from ros_model.generators import write_files
 
 if TYPE_CHECKING:
     from ros_model.project import Project
@@ -27,14 +28,14 @@ def generate(project: Project, output: Path) -> list[Path]:
         "reasoner": reasoner(project),
         "rosgraph_monitor": monitor(project),
     }
-    return [
-        write_file(
-            output / "config" / f"{name}.yaml",
-            _COMMENT + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120),
-            output,
-        )
-        for name, content in contents.items()
-    ]
+    return write_files(
+        {
+            output / "config" / f"{name}.yaml": _COMMENT
+            + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120)
+            for name, content in contents.items()
+        },
+        output,
+    )
 
 
 def manipulator(project: Project) -> dict[str, Any]:
@@ -42,16 +43,20 @@ def manipulator(project: Project) -> dict[str, Any]:
     settings = project.settings.get("manipulator", {})
     return {
         "configurations": {
-            variant.name: {
-                "function": project.function_of(variant.name),
-                "launch": f"package://{project.package}/launch/variants/{variant.name}.launch",
-            }
+            variant.name: {"function": project.function_of(variant.name), **_deployed(project, variant.name)}
             for variant in project.variants
         },
         **{key: settings[key] for key in ("save_action", "goal_msg_type") if key in settings},
         "reconfiguration_action_name": settings.get("action_name", DEFAULT_ACTION),
         "kill_nodes": list(settings.get("kill_nodes", ())),
     }
+
+
+def _deployed(project: Project, name: str) -> dict[str, str]:
+    """Return how a variant is deployed: its launch file, or the published command."""
+    if project.packages_folder:
+        return {"command": f"roslaunch {name} {name}.launch"}
+    return {"launch": f"package://{project.package}/launch/variants/{safe_file_name(name, 'variant')}.launch"}
 
 
 def reasoner(project: Project) -> dict[str, Any]:
@@ -76,8 +81,8 @@ def monitor(project: Project) -> dict[str, Any]:
     """Return what the monitor needs to know: the models to compare with, components and observers."""
     settings = project.settings
     return {
-        "desired_rossystem": f"package://{project.package}/models/{settings['base']}",
+        "desired_rossystem": f"package://{project.package}/models/{project.base_file}",
         "variants": f"package://{project.package}/models/variants",
         "components": settings["components"],
-        "observers": list(settings.get("observers", ())),
+        "observers": [entry["name"] if isinstance(entry, dict) else entry for entry in settings["observers"]],
     }
