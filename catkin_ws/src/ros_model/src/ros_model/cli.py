@@ -20,6 +20,7 @@ _COMMANDS = {
     "format": "ros_model.commands.format:format_",
     "generate": "ros_model.commands.generate:generate",
     "show": "ros_model.commands.show:show",
+    "variants": "ros_model.commands.variants:variants",
 }
 """Command -> where it is. A command's module is imported when it is run, so that the others' imports cost nothing."""
 

@@ -16,6 +16,7 @@ from ros_model.variants import make_systems, without
 from ros_model.wiring import required_by_parameters, required_components
 
 if TYPE_CHECKING:
+    from ros_model.columns import Where
     from ros_model.schema_check import Keys
 
 __all__ = ["DIRECTIONS", "FILE_NAME", "Project", "load_project"]
@@ -102,7 +103,7 @@ def load_project(folder: str | Path) -> Project:
     """
     source = read_settings(locate(folder))
     whole_base = read_system(source.inside("base"))
-    columns = {keys: parse_columns(family, _at(source, keys)) for keys, family in source.families}
+    columns = {keys: parse_columns(family, position_within(source, keys)) for keys, family in source.families}
     optional = frozenset().union(*(found.optional for found in columns.values()))
     base = without(whole_base, optional)
     variants: list[RosSystem] = []
@@ -127,7 +128,9 @@ def load_project(folder: str | Path) -> Project:
     return project
 
 
-def _at(source: Settings, keys: Keys) -> Any:
+def position_within(source: Settings, keys: Keys) -> Where:
+    """Return what gives the position of a value within a section of the settings."""
+
     def where(*inner: str | int) -> Position:
         return source.at(*keys, *inner)
 
