@@ -80,7 +80,9 @@ def test_value_arrives_as_it_is_or_is_refused(value):
     assert (actual, type(actual)) == (value, type(value))
 
 
-@pytest.mark.parametrize("value", [" a", "a ", "\t", "two\nlines", "- a", "{", "#x", "'", '"', "&amp;", "]]>", "é", "deg(90)", "1e3"])
+@pytest.mark.parametrize(
+    "value", [" a", "a ", "\t", "two\nlines", "- a", "{", "#x", "'", '"', "&amp;", "]]>", "é", "deg(90)", "1e3"]
+)
 def test_text_that_xml_or_yaml_might_take_for_something_else(value):
     for sent in (value, [value], {"m": [value]}):
         actual = loaded(of(RosParameter("a", None, sent))).params
@@ -146,7 +148,7 @@ def test_value_that_is_none_of_its_type_is_refused(kind, value, more):
 
 @pytest.mark.parametrize("value", [2**31, -(2**31) - 1, [2**40], {"a": 2**31}, float("inf"), [float("nan")]])
 def test_number_that_the_parameter_server_can_not_hold_is_refused(value):
-    with pytest.raises(ModelError, match="^x.rossystem:3:5: "):
+    with pytest.raises(ModelError, match=r"^x\.rossystem:3:5: "):
         launch_file(of(RosParameter("a", None, value, position=HERE)))
 
 

@@ -68,7 +68,9 @@ def test_optional_component_is_no_part_of_the_base_that_the_monitor_expects(run,
     assert [component.name for component in compose(core, safe).components] == ["robot", "guard", "nav"]
     assert [component.name for component in compose(core, bold).components] == ["robot", "nav"]
     nodes = {
-        name: [node.name for node in load_config_default([str(tmp_path / f"launch/variants/{name}.launch")], None).nodes]
+        name: [
+            node.name for node in load_config_default([str(tmp_path / f"launch/variants/{name}.launch")], None).nodes
+        ]
         for name in ("safe", "bold")
     }
     assert nodes == {"safe": ["guard", "nav"], "bold": ["nav"]}
@@ -136,7 +138,7 @@ def test_wrong_arguments_are_refused(run, models, arguments, message):
         ("'p.nav.nav'", "'../../bin.sh.x'", "base.rossystem:7:51: reference '../../bin.sh.x' is not"),
         ("'p.nav.nav'", "'p.$(env HOME).nav'", "base.rossystem:7:9: '$(env HOME)' can't name a package or executable"),
         ("'p.nav.nav'", "'p.bin/sh.nav'", "base.rossystem:7:9: 'bin/sh' can't name a package or executable"),
-        ("name nav", 'name \'nav" args="x\'', "base.rossystem:7:9: 'nav\" args=\"x' is no name of ROS"),
+        ("name nav", "name 'nav\" args=\"x'", "base.rossystem:7:9: 'nav\" args=\"x' is no name of ROS"),
         ("name nav", "name '$(arg x)'", "is no name of ROS"),
         ("name nav", "name nav NameSpace '../up'", "is no name of ROS"),
     ],

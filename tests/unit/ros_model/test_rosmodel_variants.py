@@ -18,7 +18,7 @@ OPTIONS = [
     *("--set", "controller_frequency_hz=global_costmap/update_frequency*0.2"),
     *("--set", "controller_frequency_hz=local_costmap/update_frequency*0.5"),
     *("--set", "max_vel_mps=TrajectoryPlannerROS/max_vel_x", "--set", "max_vel_mps=TrajectoryPlannerROS/max_vel_y"),
-    *("--set", "max_vel_mps=TrajectoryPlannerROS/acc_lim_x*12", "--set", "max_vel_mps=TrajectoryPlannerROS/acc_lim_y*12"),
+    *(o for axis in "xy" for o in ("--set", f"max_vel_mps=TrajectoryPlannerROS/acc_lim_{axis}*12")),
     *(o for c in COSTMAPS for o in ("--set", f"inflation_radius_m={c}/inflater_layer/inflation_radius")),
     *(o for c in COSTMAPS for o in ("--set", f"observation_source={c}/obstacles_layer/observation_sources")),
     *("--connect", "observation_source:scan=front_laser.front/scan"),
@@ -61,7 +61,9 @@ def test_two_sections_of_metacontrol_yaml_are_enough(run, tmp_path):
 
 def test_table_in_place_of_that_of_the_project(run, tmp_path):
     table = tmp_path / "other.yaml"
-    table.write_text("crawl: {controller_frequency_hz: 5, max_vel_mps: 0.1, inflation_radius_m: 1.0, observation_source: scan}")
+    table.write_text(
+        "crawl: {controller_frequency_hz: 5, max_vel_mps: 0.1, inflation_radius_m: 1, observation_source: scan}"
+    )
     qa = tmp_path / "qa.csv"
     qa.write_text("name,safety\ncrawl,0.1\n")
     assert run(D2, table, "--qa", qa, "-o", tmp_path / "out")[0] == 0

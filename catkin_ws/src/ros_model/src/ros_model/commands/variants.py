@@ -39,7 +39,11 @@ _PAIR = re.compile(r"(?P<column>[^=]+)=(?P<name>.+)")
 @click.option("--qa", metavar="FILE", help="Table of expected levels: a column for each quality attribute.")
 @click.option("--component", metavar="NAME", help="The component that varies.")
 @click.option(
-    "--set", "sets", multiple=True, metavar="COLUMN=[COMPONENT:]PARAMETER[*FACTOR]", help="The column sets the parameter."
+    "--set",
+    "sets",
+    multiple=True,
+    metavar="COLUMN=[COMPONENT:]PARAMETER[*FACTOR]",
+    help="The column sets the parameter.",
 )
 @click.option(
     "--connect",

@@ -182,7 +182,7 @@ _SCALARS = {
 
 
 def _param(name: str, value: Sent, where: Position) -> ET.Element:
-    """Return a typed `<param>`, or `<rosparam>` for what that can't carry: lists, structs, bytes, blanks at the ends."""
+    """Return a typed `<param>`, or `<rosparam>` for what that can not carry: lists, structs, bytes, outer blanks."""
     _check_range(value, where)
     for kind, word in ((bool, "bool"), (int, "int"), (float, "double"), (str, "str")):
         if isinstance(value, kind) and not (isinstance(value, str) and value != value.strip()):
