@@ -105,8 +105,8 @@ def test_qa_where_higher_is_better_must_not_fall_below(knowledge_base, reasoner,
     ],
 )
 def test_qa_of_a_type_with_a_comparison_operator_compares_by_it(load, pellet, operator, level, status):
-    extra = '<rdf:Description rdf:about="#safety"><t:qa_comparison_operator>{}</t:qa_comparison_operator></rdf:Description>'
-    knowledge_base = load(application(extra=extra.format(operator.replace("<", "&lt;"))))
+    text = f"<t:qa_comparison_operator>{operator.replace('<', '&lt;')}</t:qa_comparison_operator>"
+    knowledge_base = load(application(extra=f'<rdf:Description rdf:about="#safety">{text}</rdf:Description>'))
     pellet.load(knowledge_base.ontology)
     assert knowledge_base.qualities["safety"].violates(level, 0.6) == (status == v.IN_ERROR_NFR)
     facts = replace(FACTS, levels={("o_move", "safety"): level})

@@ -578,20 +578,18 @@ class Mape:
         """Return the objectives whose running design requires an objective."""
         return [o for o in self.objectives if name in self._required(self._running[o].design)]
 
-    def _needed(self, instead: Mapping[str, str] | None = None) -> dict[str, str]:
-        """Return the objectives that are needed, and the function of each, from the roots down.
+    def _deployments(self) -> dict[str, str]:
+        """Return the design that runs by objective."""
+        return {name: running.design for name, running in self._running.items() if running.design}
 
-        Args:
-            instead: design by objective, in place of the one that runs and the one that is wanted.
-        """
+    def _needed(self, *deployments: Mapping[str, str]) -> dict[str, str]:
+        """Return the objectives that deployments need, with the function of each, from the roots down."""
         needed = {name: self.objectives[name].function for name in self._roots}
         queue = list(needed)
         while queue:
             name = queue.pop(0)
-            running = self._running.get(name)
-            designs = [running.design if running else None, self._wanted.get(name)]
-            for design in [instead[name]] if instead and name in instead else designs:
-                for function in self._kb.designs[design].requires if design else ():
+            for design in {deployment[name]: None for deployment in deployments if name in deployment}:
+                for function in self._kb.designs[design].requires:
                     provider = self._provider(function)
                     if provider not in needed:
                         needed[provider] = function
@@ -601,7 +599,7 @@ class Mape:
     def _match_requirements(self) -> None:
         """Have an objective for every function that is required, and release those that no longer are."""
         while True:  # what runs for a new objective may require further ones
-            needed = self._needed()
+            needed = self._needed(self._deployments(), self._wanted)
             missing = {name: function for name, function in needed.items() if name not in self.objectives}
             if not missing:
                 break
@@ -718,7 +716,9 @@ class Mape:
         """Decide for every objective in trouble, from the roots down, until something is to be done."""
         decisions: list[Decision] = []
         chosen = None
-        for name in tuple(self._needed()):  # what a root's design requires is released where the root takes another one
+        for name in self._needed(
+            self._deployments()
+        ):  # what a root's design requires is released where the root takes another one
             decision = self._decide(name, timing)
             if decision and decision.state == DECIDED:  # the others' turn comes after it
                 chosen = decision
@@ -803,8 +803,8 @@ class Mape:
         if locked:
             reason = f"locked by the operator; {outcome.choice} would be taken: {outcome.reason}"
             return self._refuse(name, replace(outcome, reason=reason), causes, timing, self._wall() - began)
+        self._wanted.update({o: plan.choice for o, plan in steps if plan.choice})
         if any(self._waits(o, timing.now) for o, _ in steps if o in self._running):
-            self._wanted.update({o: plan.choice for o, plan in steps[1:] if plan.choice})
             return None
         running = self._running.get(objective)
         if self.settings.dry_run and not self._is_news(self._running[name], causes, outcome):
@@ -817,9 +817,8 @@ class Mape:
         if objective != level:
             words += f", which {outcome.choice} of {level} requires: {first.reason}"
         words += f": {outcome.reason}"
-        self._wanted.update({o: plan.choice for o, plan in steps[1:] if plan.choice})
         self._match_requirements()
-        releases = set(self.objectives) - set(self._needed({level: outcome.choice or ""}))
+        releases = set(self.objectives) - set(self._needed({**self._deployments(), **self._wanted}))
         decision = self._decision(objective, causes, first, timing, words, self._wall() - began)
         return replace(
             decision,
@@ -986,9 +985,6 @@ class Mape:
         objective = self.objectives.get(name) or Objective(name, function)
         running = self._running.get(name) or _Running()
         designs: tuple[Design, ...] = self._kb.solving(objective.function)
-        desired = self.settings.desired
-        if running.design is None and desired and (desired, name) not in self._error_log:
-            designs = tuple(design for design in designs if design.name == desired) or designs
         unfulfilled: dict[str, list[str]] = {}
         strained: dict[str, list[str]] = {}
         for design in designs:
@@ -1013,6 +1009,10 @@ class Mape:
             factors=self._factors(name, now),
             worth=self.settings.worth,
         )
+        desired = self.settings.desired
+        is_possible = situation.can_deploy(desired) and desired not in strained and desired not in situation.tried
+        if running.design is None and is_possible:
+            designs = tuple(design for design in designs if design.name == desired) or designs
         return plan(objective, designs, situation, self._utility, self._distance)
 
     def _factors(self, name: str, now: float) -> dict[str, float]:
