@@ -7,73 +7,13 @@ import sys
 import tempfile
 import time
 import unittest
-from pathlib import Path
 
-import actionlib
 import psutil
-import rosgraph
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from metacontrol_msgs.msg import (
-    ActiveConfiguration,
-    Decision,
-    FunctionGrounding,
-    MvpReconfigurationAction,
-    MvpReconfigurationResult,
-)
-from rosgraph_msgs.msg import Log
+from reasoner_harness import DEADLINE_S, MODEL, NODE, Diagnostics, Listener, Manipulator, node_pid, status, wait_for
 
 PACKAGE = "metacontrol_tests"
-DEADLINE_S = 15.0
-HERE = Path(__file__).resolve().parent
-MODEL = HERE / "reasoner" / "application.owl"
-NODE = HERE.parents[1] / "catkin_ws" / "src" / "mros1_reasoner" / "nodes" / "reasoner"
-
-
-def wait_for(condition, what, deadline=DEADLINE_S):
-    """Wait, at most until the deadline, until the condition holds; return what it gave."""
-    until = time.monotonic() + deadline
-    while not (found := condition()):
-        if time.monotonic() > until:
-            raise AssertionError(f"not within {deadline:g} s: {what}")
-        time.sleep(0.02)
-    return found
-
-
-class Manipulator:
-    """Deploys in no time: announces, answers with the result that the test has set, None: not at all."""
-
-    def __init__(self):
-        self.result = 1
-        self.requests = []
-        self.running = ""
-        self._active = rospy.Publisher(
-            "rosgraph_manipulator/active_configuration", ActiveConfiguration, queue_size=5, latch=True
-        )
-        self._server = actionlib.SimpleActionServer(
-            "rosgraph_manipulator_action_server", MvpReconfigurationAction, self._execute, auto_start=False
-        )
-        self._server.start()
-
-    def announce(self, configuration, state="STABLE"):
-        """Say what runs."""
-        self.running = configuration
-        grounding = FunctionGrounding("f_move", configuration, state)
-        self._active.publish(ActiveConfiguration(functions=[grounding]))
-
-    def _execute(self, goal):
-        name = goal.desired_configuration_name
-        self.requests.append(name)
-        if self.result is None:
-            wait_for(self._server.is_preempt_requested, "a request to give up")
-            self._server.set_preempted()
-        elif self.result == 1:
-            self.announce(name, "RECONFIGURING")
-            self.announce(name)
-            self._server.set_succeeded(MvpReconfigurationResult(1))
-        else:
-            self._server.set_aborted(MvpReconfigurationResult(self.result), "it did not come up")
 
 
 class ReasonerTest(unittest.TestCase):
@@ -82,51 +22,24 @@ class ReasonerTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         rospy.init_node("reasoner_test")
-        cls.decisions, cls.log = [], []
-        rospy.Subscriber("/mros1_reasoner/decision", Decision, cls.decisions.append, queue_size=50)
-        rospy.Subscriber("/rosout", Log, cls._on_log, queue_size=500)
-        cls.diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
+        cls.listener = Listener()
+        cls.diagnostics = Diagnostics()
         cls.manipulator = Manipulator()
         cls.manipulator.announce("scan_slow")
-        wait_for(cls.is_ready, "the reasoner is ready")
+        wait_for(lambda: cls.diagnostics.reaches("/reasoner"), "the reasoner is ready")
 
-    @classmethod
-    def _on_log(cls, message):
-        if message.name.startswith("/reasoner"):
-            cls.log.append(message.msg)
-
-    @classmethod
-    def is_ready(cls):
-        """Tell whether the reasoner listens, and is heard."""
-        state = rosgraph.Master("/reasoner_test").getSystemState()
-        listens = any(topic == "/diagnostics" and "/reasoner" in nodes for topic, nodes in state[1])
-        return listens and cls.diagnostics.get_num_connections() >= 1
-
-    def tell(self, message, *values, level=0, name="", stamp=None):
-        """Publish one status, and return its stamp."""
-        status = DiagnosticStatus(level=level, name=name, message=message, values=[KeyValue(*pair) for pair in values])
-        array = DiagnosticArray(status=[status])
-        array.header.stamp = stamp or rospy.Time.now()
-        self.diagnostics.publish(array)
-        return array.header.stamp
-
-    def component(self, name, status):
-        """Publish the status of a component."""
-        return self.tell("Component status", (name, status), name=name, level=2 if status == "FALSE" else 0)
+    def component(self, name, value):
+        return self.diagnostics.component(name, value)
 
     def decided(self, state, count):
-        """Wait until so many decisions of a state were heard; return the last."""
-        found = wait_for(
-            lambda: [d for d in self.decisions if d.state == state][count - 1 :], f"decision {count} of state {state}"
-        )
-        return found[0]
+        return self.listener.decided(state, count)
 
     def quality(self, name, level):
         """Publish levels until the next request; return how long that took, s."""
         began, before = time.monotonic(), len(self.manipulator.requests)
 
         def asked():
-            self.tell("QA status", (name, str(level)))
+            self.diagnostics.tell(status("QA status", (name, str(level))))
             time.sleep(0.1)  # the observer's period
             return len(self.manipulator.requests) > before
 
@@ -153,11 +66,16 @@ class ReasonerTest(unittest.TestCase):
             ("Component status", [("laser", "")]),
             ("QA stale", [("safety", "no scan")]),
         ):
-            self.tell(message, *values)
-        wait_for(lambda: any("Unsupported QA TYPE received: comfort" in line for line in self.log), "the warning")
-        wait_for(lambda: any("sonar is not in the model" in line for line in self.log), "the warning of the component")
+            self.diagnostics.tell(status(message, *values))
+        wait_for(
+            lambda: any("Unsupported QA TYPE received: comfort" in line for line in self.listener.log), "the warning"
+        )
+        wait_for(
+            lambda: any("sonar is not in the model" in line for line in self.listener.log),
+            "the warning of the component",
+        )
         self.assertEqual(self.manipulator.requests, [])
-        self.assertEqual(self.decisions, [])
+        self.assertEqual(self.listener.decisions, [])
 
     def takes_the_best_camera_design_when_the_laser_fails(self):
         stamp = self.component("laser", "FALSE")
@@ -178,8 +96,8 @@ class ReasonerTest(unittest.TestCase):
         self.assertGreater(done.analyse_wall_s, 0.0)
         self.assertGreater(done.execute_wall_s, 0.0)
 
-        for status in ("FALSE", "RECOVERED", "TRUE"):  # repeated failure, return: nothing to do
-            self.component("laser", status)
+        for value in ("FALSE", "RECOVERED", "TRUE"):  # repeated failure, return: nothing to do
+            self.component("laser", value)
 
     def heeds_a_quality_after_window_and_cool_down_and_tries_another_design_after_a_failure(self):
         manipulator = self.manipulator
@@ -198,7 +116,7 @@ class ReasonerTest(unittest.TestCase):
         manipulator = self.manipulator
         manipulator.result = None
         count = len(manipulator.requests)
-        self.tell("Missing node", level=2, name="front_laser")
+        self.diagnostics.tell(status("Missing node", level=2, name="front_laser"))
         hung = self.decided("FAILED", 2)
         self.assertEqual(hung.trigger, "component:laser")
         self.assertIn("no result within 3 s", hung.explanation)
@@ -212,30 +130,31 @@ class ReasonerTest(unittest.TestCase):
             "Exited timer_cb after successful reconfiguration",
             "QA value received!\tTYPE: energy\tVALUE: 0.9",
         ):
-            wait_for(lambda text=text: any(text in line for line in self.log), text)
+            wait_for(lambda text=text: any(text in line for line in self.listener.log), text)
 
     def survives_the_death_of_pellets_process(self):
-        pid = rosgraph_pid("/reasoner")
+        pid = node_pid("/reasoner")
         (child,) = psutil.Process(pid).children()
         child.kill()
-        before = len(self.decisions)
+        before = len(self.listener.decisions)
         self.component("base", "FALSE")
-        refusal = wait_for(lambda: self.decisions[before:], "a refusal")[0]
+        refusal = wait_for(lambda: self.listener.decisions[before:], "a refusal")[0]
         self.assertEqual((refusal.state, refusal.to_configuration), ("FAILED", ""))
 
     def test_without_a_manipulator_it_grounds_what_it_decides(self):
         arguments = ["__name:=reasoner_second", "rosgraph_manipulator/active_configuration:=second/active"]
         arguments += [f"_model_file:={MODEL}", "_use_reconfigure_srv:=false", "_nfr_safety:=0.25"]
-        before = len(self.log)
+        second = Listener()
+        second.node = "/reasoner_second"
         process = subprocess.Popen([sys.executable, str(NODE), *arguments], stdout=subprocess.DEVNULL)
         try:
             for text in (
-                "Objective created and set to ungrounded: o_moveA",
+                "o_moveA needs f_move with safety 0.25",
                 "[RosReasoner] -- Reasoner Initialization Ok",
                 "o_moveA: no configuration runs: nothing -> scan_slower",
                 "Exited timer_cb after successful reconfiguration",
             ):
-                wait_for(lambda text=text: any(text in line for line in self.log[before:]), text)
+                second.logged(text)
         finally:
             process.terminate()
             process.wait(DEADLINE_S)
@@ -272,14 +191,6 @@ class ReasonerTest(unittest.TestCase):
                 self.assertEqual(len(lines), 1, f"{name}: {error}")
                 self.assertIn(cases[name][2], lines[0])
                 self.assertNotIn("Traceback", error, name)
-
-
-def rosgraph_pid(node):
-    """Return the process id of a node."""
-    import xmlrpc.client
-
-    uri = rosgraph.Master("/reasoner_test").lookupNode(node)
-    return xmlrpc.client.ServerProxy(uri).getPid("/reasoner_test")[2]
 
 
 if __name__ == "__main__":

@@ -10,38 +10,52 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import fields
+from concurrent.futures import Future
 from functools import partial
-from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import actionlib
 import rosgraph
 import rospy
-from actionlib_msgs.msg import GoalStatus
-from diagnostic_msgs.msg import DiagnosticArray
+import yaml
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_msgs import msg as messages
 from ros_model.errors import ModelError
-from ros_model.files import resolve
+from std_msgs.msg import Bool
 
-from mros1_reasoner import mape
-from mros1_reasoner.diagnostics import BadFact, BindingFact, ComponentFact, LevelFact, StaleFact, read_statuses
+from mros1_reasoner import journal, mape
+from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED, Decision
+from mros1_reasoner.diagnostics import (
+    BindingFact,
+    ComponentFact,
+    DiagnosticsReader,
+    LevelFact,
+    Reading,
+    Remark,
+    StaleFact,
+    TaskFact,
+)
+from mros1_reasoner.explain import line
 from mros1_reasoner.knowledge_base import KnowledgeBase, KnowledgeBaseError
-from mros1_reasoner.model import Direction, Facts, Objective
+from mros1_reasoner.model import Facts, Objective
+from mros1_reasoner.parameters import ParameterError, Parameters
 from mros1_reasoner.pellet import make_reasoner
 from mros1_reasoner.reasoner import Reasoner, ReasonerError
+from mros1_reasoner.record import fill_message, record_of
+from mros1_reasoner.services_node import Services
+from mros1_reasoner.tasks import newest_goal
+from mros1_reasoner.throttle import Throttle
 
 _LOG = "[RosReasoner] -- %s"
-_WARN_PERIOD = 10.0  # s, wall, between two warnings of the same text
 _TIMER_PERIOD = 0.02  # s, wall, the shortest between two looks at ROS time while the core waits for a moment
 _FASTEST = 10.0  # ROS time may run so much faster than wall time
 _MASTER_PERIOD = 1.0  # s, wall, between two looks at the master
 _WARM_UP = 4  # analyses before the node is ready: the JVM compiles what it has run
-_QUEUE = 1000  # messages that wait at most
+_QUEUE = 1000  # diagnostics that wait at most
+_ANSWER_DEADLINE = 60.0  # s, wall, for a service; an analysis may have to start Pellet again
 
-
-class ParameterError(Exception):
-    """A parameter can't be used; one line with its name, its value and what to do."""
+_T = TypeVar("_T")
 
 
 class ReasonerNode:
@@ -54,40 +68,55 @@ class ReasonerNode:
         """Read parameters and models, start Pellet, warm it up.
 
         Raises:
-            ParameterError, KnowledgeBaseError, ReasonerError: the node can't work.
+            ParameterError, KnowledgeBaseError, ModelError, ReasonerError: the node can't work.
         """
-        self._period = _positive("~reasoning_rate", 2.0)
-        self._deadline = _positive("~execution_deadline", 60.0)
-        self._asks = bool(rospy.get_param("~use_reconfigure_srv", True))
-        self._nodes = _component_nodes()
+        parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
+        self._period, self._deadline = parameters.period, parameters.execution_deadline
+        files = [*parameters.model_files, *parameters.vocabulary_files]
         self._reasoner: Reasoner = make_reasoner()
-        self._knowledge_base = _load_knowledge_base()
-        objectives = _objectives(self._knowledge_base)
-        settings = _settings(self._knowledge_base, grounds_itself=not self._asks)
-        self._reasoner.load(self._knowledge_base.ontology)
-        self._warm_up(objectives)
-        self._core = mape.Mape(
-            self._knowledge_base,
-            self._reasoner,
-            objectives,
-            settings,
-            clock=rospy.get_time,
-            name=f"{rospy.get_name().strip('/')}-{int(time.time())}",
+        self.knowledge_base = parameters.knowledge_base()
+        objectives = parameters.objectives(self.knowledge_base)
+        settings = parameters.settings(self.knowledge_base)
+        self._reasoner.load(self.knowledge_base.ontology)
+        for path in files:
+            rospy.loginfo(f"Loaded ontology: {path}")
+        _warm_up(self.knowledge_base, self._reasoner, objectives)
+        name = f"{rospy.get_name().strip('/')}-{int(time.time())}"
+        self.core = mape.Mape(
+            self.knowledge_base, self._reasoner, objectives, settings, clock=rospy.get_time, name=name
         )
-        for objective in objectives:
-            limits = ", ".join(f"{quality} {limit:g}" for quality, limit in sorted(objective.limits.items()))
-            rospy.loginfo(_LOG, f"Objective created and set to ungrounded: {objective.name} ({limits or 'no limits'})")
-        self._waiting: deque[Callable[[], None]] = deque(maxlen=_QUEUE)
+        self._waiting: deque[Callable[[], object]] = deque()
         self._wake = threading.Condition()
-        self._warned: dict[str, float] = {}
+        self._reader = DiagnosticsReader(
+            self.knowledge_base.qualities, self.knowledge_base.components, parameters.nodes
+        )
+        self._throttle, self._levels_told = Throttle(), Throttle(self._period, burst=1)
+        self._told: set[str] = set()
+        self._taken_over: set[str] = set()
+        self._goals: dict[str, tuple[str, bool]] = {}  # newest goal of an objective's task, and whether it failed
         self._request_ends = math.inf  # wall time
-        self._publisher = rospy.Publisher("mros1_reasoner/decision", messages.Decision, queue_size=10)
-        action = rospy.get_param("~reconfigure_srv_name", "rosgraph_manipulator_action_server")
-        self._client = actionlib.ActionClient(action, messages.MvpReconfigurationAction) if self._asks else None
         self._goal: Any = None
-        rospy.Subscriber("rosgraph_manipulator/active_configuration", messages.ActiveConfiguration, self._on_active)
-        rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=100)
+        self._failures, self._trouble = 0, ""
+        self._journal = _JournalTopic(name, parameters, files)
+        self._decisions = rospy.Publisher("mros1_reasoner/decision", messages.Decision, queue_size=10, latch=True)
+        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        asks = parameters.asks and not settings.dry_run
+        action = parameters.action
+        self._client = actionlib.ActionClient(action, messages.MvpReconfigurationAction) if asks else None
+        self._listen(parameters.task_actions)
+        self._services = Services(self, parameters.save_folder)
+        for objective in objectives:
+            self._tell_objective(objective)
         rospy.loginfo(_LOG, "Reasoner Initialization Ok")
+
+    def _listen(self, task_actions: dict[str, str]) -> None:
+        active = "rosgraph_manipulator/active_configuration"
+        rospy.Subscriber(active, messages.ActiveConfiguration, self._on_active)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=100)
+        rospy.Subscriber("obj_error", Bool, self._on_obj_error)
+        for objective, action in task_actions.items():
+            listen = partial(self._on_task_status, objective, action)
+            rospy.Subscriber(f"{action}/status", GoalStatusArray, listen)
 
     def run(self) -> None:
         """Work until the node is shut down or the master is gone."""
@@ -103,9 +132,11 @@ class ReasonerNode:
             is_heartbeat = now >= heartbeat
             if is_heartbeat:
                 heartbeat = now + self._period
+                self._report_trouble()
             self._drain()
             self._check_deadline()
-            self._step(heartbeat=is_heartbeat)
+            self._take("step", is_heartbeat)
+            self._journal.flush()
             until = min(heartbeat, master_check, self._next_look())
             with self._wake:
                 if not self._waiting:
@@ -114,104 +145,165 @@ class ReasonerNode:
     def _next_look(self) -> float:
         """Return the wall time at which to look whether the moment has come for which the core waits."""
         ros_now = rospy.get_time()
-        due = self._core.due(ros_now)
+        due = self.core.due(ros_now)
         return math.inf if due is None else time.monotonic() + max(_TIMER_PERIOD, (due - ros_now) / _FASTEST)
 
     def close(self) -> None:
         """End Pellet's process."""
         self._reasoner.close()
 
-    # R1: what comes in
+    # What comes in
+
+    def ask(self, work: Callable[[], _T]) -> _T:
+        """Have the loop's thread do something; wait for what it returns.
+
+        Raises:
+            MapeError, KnowledgeBaseError, ReasonerError, ValueError: as `work` does.
+            TimeoutError: the loop is busy for too long.
+        """
+        answer: Future[_T] = Future()
+
+        def run() -> None:
+            if not answer.set_running_or_notify_cancel():
+                return  # nobody waits any more
+            try:
+                answer.set_result(work())
+            except (mape.MapeError, KnowledgeBaseError, ReasonerError, ValueError) as error:
+                answer.set_exception(error)
+
+        self._queue(run)
+        try:
+            return answer.result(_ANSWER_DEADLINE)
+        except TimeoutError:
+            answer.cancel()
+            raise
+
+    def command(self, kind: str, *values: object) -> None:
+        """Take in what an operator asks for, in the loop's thread; kinds and values: journal.py.
+
+        Raises:
+            MapeError, ReasonerError: it does not fit.
+        """
+        self._announce(self._applied(kind, *values))
+        shown = " ".join(str(value) for value in values)
+        rospy.loginfo(_LOG, f"operator: {kind} {shown}".strip())
+        if kind == "add_objective":
+            self._tell_objective(self.core.objectives[str(values[0])])
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
-        facts = read_statuses(array.status, self._nodes)
-        if facts:
-            stamp = array.header.stamp.to_sec()
-            self._queue(lambda: self._take_facts(facts, stamp))
+        reading = self._reader.read(array.status)
+        if not reading.facts and not reading.remarks:
+            return
+        if len(self._waiting) > _QUEUE:
+            reading = Reading(
+                remarks=(Remark("queue", "diagnostics come faster than they can be read: some are lost"),)
+            )
+            self._queue(lambda: self._take_reading(reading, 0.0), at_most=_QUEUE + 1)
+            return
+        stamp = array.header.stamp.to_sec()
+        self._queue(lambda: self._take_reading(reading, stamp))
 
     def _on_active(self, active: messages.ActiveConfiguration) -> None:
         self._queue(lambda: self._take_active(active))
 
-    def _queue(self, work: Callable[[], None]) -> None:
+    def _on_obj_error(self, message: Bool) -> None:
+        self._queue(lambda: self._take("task", "", message.data, "reported on obj_error"))
+
+    def _on_task_status(self, objective: str, action: str, statuses: GoalStatusArray) -> None:
+        """Take in how the newest goal of an objective's action fares, where that is new."""
+        newest = newest_goal(statuses)
+        if newest is None or self._goals.get(objective) == newest:
+            return
+        self._goals[objective] = newest
+        self._queue(lambda: self._take("task", objective, newest[1], f"a goal of {action} was aborted"))
+
+    def _queue(self, work: Callable[[], object], at_most: float = math.inf) -> None:
         with self._wake:
-            self._waiting.append(work)
+            if len(self._waiting) <= at_most:
+                self._waiting.append(work)
             self._wake.notify()
 
     def _drain(self) -> None:
-        while True:
-            with self._wake:
-                if not self._waiting:
-                    return
-                work = self._waiting.popleft()
-            try:
-                work()
-            except (mape.MapeError, KnowledgeBaseError) as error:
-                self._warn(str(error))
+        with self._wake:
+            works, self._waiting = self._waiting, deque()
+        for work in works:
+            work()
 
-    def _take_facts(self, facts: list[Any], stamp: float) -> None:
-        now = rospy.get_time()
-        for fact in facts:
-            try:
-                match fact:
-                    case LevelFact():
-                        self._core.observe_level(now, fact.quality, fact.level, fact.grounding, stamp)
-                        self._log_level(fact)
-                    case StaleFact():
-                        self._core.observe_stale(fact.quality)
-                        self._warn(f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
-                    case ComponentFact():
-                        if fact.component in self._knowledge_base.components:
-                            self._core.observe_component(now, fact.component, fact.status, stamp)
-                        else:  # nothing in the model requires it
-                            text = f"component {fact.component} is not in the model: its status is left out"
-                            self._throttled(text, partial(rospy.loginfo, _LOG, text), math.inf)
-                    case BindingFact():
-                        self._core.observe_binding(now, fact.grounding, fact.in_error)
-                    case BadFact():
-                        self._warn(fact.warning)
-            except mape.MapeError as error:
-                self._warn(str(error))
+    def _take(self, kind: str, *values: object) -> bool:
+        """Take something in and announce what follows; say what is wrong where it does not fit."""
+        try:
+            self._announce(self._applied(kind, *values))
+        except (mape.MapeError, KnowledgeBaseError) as error:
+            self._warn(kind, str(error))
+        except ReasonerError as error:
+            self._warn("analysis", f"analysis failed: {error}")
+        else:
+            return True
+        return False
 
-    def _log_level(self, fact: LevelFact) -> None:
-        """Log a level as published tools expect it, but at most once in a period for each quality."""
-        text = f"QA value received!\tTYPE: {fact.quality}\tVALUE: {fact.level}"
-        self._throttled(f"level of {fact.quality}", lambda: rospy.loginfo(text), self._period)
+    def _applied(self, kind: str, *values: object) -> list[Decision]:
+        item = journal.entry(rospy.get_time(), kind, *values)
+        decisions = journal.apply(self.core, item)
+        self._journal.append(item)
+        for brought in journal.decided(item.now, decisions):
+            self._journal.append(brought)
+        return decisions
+
+    def _take_reading(self, reading: Reading, stamp: float) -> None:
+        for remark in reading.remarks:
+            self._tell_remark(remark)
+        for fact in reading.facts:
+            match fact:
+                case LevelFact():
+                    if self._take("level", fact.quality, fact.level, fact.grounding, stamp):
+                        self._tell_level(fact)
+                case StaleFact():
+                    self._take("stale", fact.quality)
+                    self._warn("stale", f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
+                case ComponentFact():
+                    self._take("component", fact.component, fact.status, stamp)
+                case BindingFact():
+                    self._take("binding", fact.grounding, fact.in_error)
+                case TaskFact():
+                    self._take("task", fact.name, fact.failed, "reported as a diagnostic")
 
     def _take_active(self, active: messages.ActiveConfiguration) -> None:
-        now = rospy.get_time()
         for function in active.functions:
-            if function.configuration:
-                self._core.observe_active(now, function.function, function.configuration, function.state)
+            if not function.configuration:
+                continue
+            taken = self._take("active", function.function, function.configuration, function.state)
+            if taken and function.function not in self._taken_over:
+                self._taken_over.add(function.function)
+                say = f"{function.function} runs {function.configuration} ({function.state}): taken over as it is"
+                rospy.loginfo(_LOG, say)
 
-    # R2 and R3
+    # What goes out
 
-    def _step(self, *, heartbeat: bool) -> None:
-        try:
-            decisions = self._core.step(rospy.get_time(), heartbeat=heartbeat)
-        except ReasonerError as error:
-            self._warn(f"analysis failed: {error}")
-            return
+    def _announce(self, decisions: list[Decision]) -> None:
+        """Tell of decisions and have those carried out that are to be."""
         for decision in decisions:
-            log = rospy.loginfo if decision.to_configuration else rospy.logwarn
-            log(_LOG, decision.explanation)
             self._publish(decision)
-            if decision.state == mape.DECIDED:
+            self._tell_decision(decision)
+            if decision.state == DECIDED:
                 self._execute(decision)
 
-    def _warm_up(self, objectives: tuple[Objective, ...]) -> None:
-        """Let the JVM compile what an analysis runs, with every kind of fact."""
-        facts = Facts(
-            objectives=objectives,
-            groundings={o.name: d.name for o in objectives for d in self._knowledge_base.solving(o.function)[:1]},
-            levels={(o.name, quality): limit for o in objectives for quality, limit in o.limits.items()},
-            components=dict.fromkeys(self._knowledge_base.components, "FALSE"),
-        )
-        for _ in range(_WARM_UP):
-            self._knowledge_base.analyse(facts, self._reasoner)
+    def _tell_decision(self, decision: Decision) -> None:
+        if decision.state == EXECUTED:
+            rospy.loginfo("Exited timer_cb after successful reconfiguration")
+            took = f"{decision.objective} has {decision.to_configuration} after {decision.execute_wall_s:.2f} s"
+            rospy.loginfo(_LOG, f"executed: {took} ({decision.id})")
+        elif decision.state == FAILED and decision.to_configuration:
+            rospy.logwarn(_LOG, f"failed: {decision.explanation} ({decision.id})")
+        else:
+            (rospy.loginfo if decision.to_configuration else rospy.logwarn)(_LOG, line(record_of(decision)))
 
-    # R4
+    def _publish(self, decision: Decision) -> None:
+        record = record_of(decision)
+        message = fill_message(messages.Decision(), record, rospy.Time.from_sec, messages)
+        message.header.stamp = rospy.Time.now()
+        self._decisions.publish(message)
 
-    def _execute(self, decision: mape.Decision) -> None:
+    def _execute(self, decision: Decision) -> None:
         if self._client is None:
             self._report(decision.id, True)
             return
@@ -232,15 +324,15 @@ class ReasonerNode:
         self._queue(lambda: self._take_result(decision_id, status, code, text))
 
     def _take_result(self, decision_id: str, status: int, code: int | None, text: str) -> None:
-        if self._core.pending is None or self._core.pending.id != decision_id:
+        if self.core.pending is None or self.core.pending.id != decision_id:
             return  # it came after the deadline
         ok = code == 1 and status == GoalStatus.SUCCEEDED
         meanings = {0: "the manipulator restored the former one", -1: "the manipulator does not know it"}
         reason = text or meanings.get(code if code is not None else -2, "the manipulator gave no result")
-        self._report(decision_id, ok, reason, blame=code in (0, -1))
+        self._report(decision_id, ok, "" if ok else reason, blame=code in (0, -1))
 
     def _check_deadline(self) -> None:
-        pending = self._core.pending
+        pending = self.core.pending
         if pending is None or time.monotonic() < self._request_ends:
             return
         if self._goal is not None:
@@ -249,41 +341,102 @@ class ReasonerNode:
 
     def _report(self, decision_id: str, ok: bool, message: str = "", *, blame: bool = True) -> None:
         self._request_ends, self._goal = math.inf, None
-        decision = self._core.report(rospy.get_time(), decision_id, ok, message, blame=blame)
-        self._publish(decision)
-        if ok:
-            rospy.loginfo(_LOG, "Exited timer_cb after successful reconfiguration")
-        else:
-            target = decision.to_configuration
-            rospy.logwarn(_LOG, f"reconfiguration of {decision.objective} to {target} failed: {message}")
+        was_in_trouble = bool(self._trouble)
+        self._failures, self._trouble = (0, "") if ok else (self._failures + 1, message)
+        self._take("result", decision_id, ok, message, blame)
+        if self._trouble or was_in_trouble:
+            self._report_trouble(is_over=ok)
         self._queue(lambda: None)  # look at once at what happened meanwhile
 
-    # What goes out
-
-    def _publish(self, decision: mape.Decision) -> None:
-        message = messages.Decision()
-        for item in fields(decision):
-            value = getattr(decision, item.name)
-            if item.name.startswith("stamp_"):
-                setattr(message, item.name, rospy.Time.from_sec(max(0.0, value)))
-            elif item.name == "candidates":
-                message.candidates = [_candidate(candidate) for candidate in value]
-            elif item.name in message.__slots__:
-                setattr(message, item.name, list(value) if isinstance(value, tuple) else value)
-        message.header.stamp = rospy.Time.now()
-        self._publisher.publish(message)
-
-    def _warn(self, text: str) -> None:
-        self._throttled(text, lambda: rospy.logwarn(_LOG, text), _WARN_PERIOD)
-
-    def _throttled(self, key: str, action: Callable[[], None], period: float) -> None:
-        now = time.monotonic()
-        if now - self._warned.get(key, -math.inf) < period:
+    def _report_trouble(self, *, is_over: bool = False) -> None:
+        """Publish the state of reconfigurations as a diagnostic while they fail, and once when they no longer do."""
+        if not self._trouble and not is_over:
             return
-        if len(self._warned) > _QUEUE:
-            self._warned.clear()
-        self._warned[key] = now
-        action()
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.OK if is_over else DiagnosticStatus.ERROR,
+            name=f"{rospy.get_name().strip('/')}: reconfiguration",
+            message="Reconfiguration works" if is_over else f"Reconfiguration fails: {self._trouble}",
+            hardware_id=rospy.get_name(),
+            values=[KeyValue("failed attempts in a row", str(self._failures))],
+        )
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = rospy.Time.now()
+        self._diagnostics.publish(array)
+
+    # What is logged
+
+    def _tell_objective(self, objective: Objective) -> None:
+        rospy.loginfo("Objective created and set to ungrounded")
+        limits = ", ".join(f"{quality} {limit:g}" for quality, limit in sorted(objective.limits.items()))
+        rospy.loginfo(_LOG, f"{objective.name} needs {objective.function} with {limits or 'no limits'}")
+
+    def _tell_level(self, fact: LevelFact) -> None:
+        """Log a level as published tools expect it, but at most once in a period for each quality."""
+        text = f"QA value received!\tTYPE: {fact.quality}\tVALUE: {fact.text}"
+        if self._levels_told.admit(time.monotonic(), fact.quality, text):
+            rospy.loginfo(text)
+
+    def _tell_remark(self, remark: Remark) -> None:
+        if remark.is_warning:
+            self._warn(remark.kind, remark.text)
+        elif remark.text not in self._told and len(self._told) < _QUEUE:
+            self._told.add(remark.text)
+            rospy.loginfo(_LOG, remark.text)
+
+    def _warn(self, kind: str, text: str) -> None:
+        said = self._throttle.admit(time.monotonic(), kind, text)
+        if said:
+            is_published = text.startswith("Unsupported QA TYPE received: ")  # tools wait for that line as it is
+            rospy.logwarn(said) if is_published else rospy.logwarn(_LOG, said)
+
+
+class _JournalTopic:
+    """Publishes what the loop takes in, so that a bag holds what a replay needs; a new subscriber gets what was before.
+
+    The loop's thread appends and flushes; subscribers come in rospy's threads.
+    """
+
+    def __init__(self, name: str, parameters: Parameters, files: list[Any]) -> None:
+        self._name = name
+        self._parameters = yaml.safe_dump(dict(parameters.values))
+        self._files = [str(path) for path in files]
+        self._contents = [path.read_text(encoding="utf-8", errors="replace") for path in files]
+        self._journal = journal.Journal()
+        self._lock = threading.Lock()
+        self._fresh: list[journal.Entry] = []
+        self._first = 0
+        listener = rospy.SubscribeListener()
+        listener.peer_subscribe = lambda _topic, _publish, publish_to_peer: publish_to_peer(self._beginning())
+        self._publisher = rospy.Publisher(
+            "mros1_reasoner/journal", messages.ReasonerJournal, subscriber_listener=listener, queue_size=1000
+        )
+
+    def append(self, item: journal.Entry) -> None:
+        """Add an entry."""
+        with self._lock:
+            number = self._journal.append(item)
+        if not self._fresh:
+            self._first = number
+        self._fresh.append(item)
+
+    def flush(self) -> None:
+        """Publish the entries since the last flush."""
+        fresh, self._fresh = self._fresh, []
+        if fresh and self._publisher.get_num_connections():
+            self._publisher.publish(self._message(self._first, fresh))
+
+    def _beginning(self) -> messages.ReasonerJournal:
+        with self._lock:
+            first, entries = self._journal.snapshot()
+        message = self._message(first, entries)
+        message.parameters, message.files, message.contents = self._parameters, self._files, self._contents
+        return message
+
+    def _message(self, first: int, entries: list[journal.Entry]) -> messages.ReasonerJournal:
+        message = messages.ReasonerJournal(name=self._name, first=first)
+        message.header.stamp = rospy.Time.now()
+        message.entries = [messages.JournalEntry(item.now, item.kind, list(item.values)) for item in entries]
+        return message
 
 
 def main() -> None:
@@ -315,120 +468,16 @@ class _RosLog(logging.Handler):
         log(_LOG, record.getMessage())
 
 
-def _candidate(candidate: Any) -> messages.Candidate:
-    return messages.Candidate(
-        name=candidate.design.name,
-        expected_qas=[messages.ExpectedQA(name, level) for name, level in sorted(candidate.design.expected.items())],
-        utility=candidate.utility,
-        chosen=candidate.chosen,
-        refused_because=candidate.refused_because,
+def _warm_up(knowledge_base: KnowledgeBase, reasoner: Reasoner, objectives: tuple[Objective, ...]) -> None:
+    """Let the JVM compile what an analysis runs, with every kind of fact."""
+    facts = Facts(
+        objectives=objectives,
+        groundings={o.name: d.name for o in objectives for d in knowledge_base.solving(o.function)[:1]},
+        levels={(o.name, quality): limit for o in objectives for quality, limit in o.limits.items()},
+        components=dict.fromkeys(knowledge_base.components, "FALSE"),
     )
-
-
-def _load_knowledge_base() -> KnowledgeBase:
-    models = _files("~model_file")
-    if not models:
-        raise ParameterError("parameter ~model_file is not set: give the application's OWL file")
-    directions = {}
-    given = rospy.get_param("~qa_direction", {})
-    if not isinstance(given, dict):
-        raise ParameterError(f"parameter ~qa_direction is {given!r}: expected a mapping QA -> direction")
-    for quality, direction in given.items():
-        try:
-            directions[quality] = Direction(direction)
-        except ValueError as error:
-            known = " or ".join(d.value for d in Direction)
-            raise ParameterError(f"parameter ~qa_direction/{quality} is {direction!r}: expected {known}") from error
-    return KnowledgeBase(models, _files("~tomasys_file"), directions)
-
-
-def _files(parameter: str) -> list[Path]:
-    """Return the files that a parameter names: one, several separated by commas, or a list."""
-    value = rospy.get_param(parameter, "")
-    names = value if isinstance(value, list) else str(value).split(",")
-    return [resolve(str(name).strip()) for name in names if str(name).strip()]
-
-
-def _objectives(knowledge_base: KnowledgeBase) -> tuple[Objective, ...]:
-    """Return the model's objectives, else one for each function that no design requires, with the `~nfr_` limits."""
-    objectives = knowledge_base.objectives
-    if not objectives:
-        required = {function for design in knowledge_base.designs.values() for function in design.requires}
-        objectives = tuple(
-            Objective(f"o_{function.removeprefix('f_')}A", function)
-            for function in knowledge_base.functions
-            if function not in required
-        )
-    limits = {}
-    for name in rospy.get_param(rospy.get_name(), None) or {}:
-        if not name.startswith("nfr_"):
-            continue
-        quality = name.removeprefix("nfr_")
-        if quality not in knowledge_base.qualities:
-            rospy.logwarn(_LOG, f"parameter ~{name}: Unsupported QA TYPE received: {quality}: left out")
-            continue
-        limits[quality] = _finite(f"~{name}", 0.0)
-    return tuple(Objective(o.name, o.function, {**o.limits, **limits}) for o in objectives)
-
-
-def _settings(knowledge_base: KnowledgeBase, *, grounds_itself: bool) -> mape.Settings:
-    defaults = mape.Settings()
-    desired = str(rospy.get_param("~desired_configuration", "") or "")
-    if desired and desired not in knowledge_base.designs:
-        raise ParameterError(f"parameter ~desired_configuration is {desired!r}: no FunctionDesign of the model")
-    utility = str(rospy.get_param("~utility", defaults.utility))
-    if utility not in knowledge_base.qualities:
-        rospy.logwarn(_LOG, f"parameter ~utility: no QA is called {utility!r}: every design is as useful as another")
-    names = (
-        "violation_window",
-        "cool_down",
-        "level_timeout",
-        "error_log_expiry",
-        "backoff",
-        "backoff_limit",
-        "busy_limit",
-    )
-    return mape.Settings(
-        **{name: _not_negative(f"~{name}", getattr(defaults, name)) for name in names},
-        start_grace=0.0 if grounds_itself else _not_negative("~start_grace", defaults.start_grace),
-        utility=utility,
-        desired=desired,
-        always_improve=bool(rospy.get_param("~always_improve", False)),
-        approval=bool(rospy.get_param("~approval", False)),
-    )
-
-
-def _component_nodes() -> dict[str, str]:
-    """Return component by node from `~components`: {component: {node: name}}."""
-    given = rospy.get_param("~components", {})
-    if not isinstance(given, dict):
-        raise ParameterError(f"parameter ~components is {given!r}: expected a mapping component -> {{node: name}}")
-    return {
-        str(entry["node"]).strip("/"): component
-        for component, entry in given.items()
-        if isinstance(entry, dict) and entry.get("node")
-    }
-
-
-def _finite(parameter: str, default: float) -> float:
-    value = rospy.get_param(parameter, default)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ParameterError(f"parameter {parameter} is {value!r}: expected a finite number")
-    return float(value)
-
-
-def _not_negative(parameter: str, default: float) -> float:
-    value = _finite(parameter, default)
-    if value < 0:
-        raise ParameterError(f"parameter {parameter} is {value:g}: expected 0 or more")
-    return value
-
-
-def _positive(parameter: str, default: float) -> float:
-    value = _finite(parameter, default)
-    if value <= 0:
-        raise ParameterError(f"parameter {parameter} is {value:g}: expected more than 0")
-    return value
+    for _ in range(_WARM_UP):
+        knowledge_base.analyse(facts, reasoner)
 
 
 def _master_answers() -> bool:
