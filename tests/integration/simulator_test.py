@@ -12,13 +12,14 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import rostest
-from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
-from metacontrol_sim.srv import IncreaseConsumptionFactor
+from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Twist
+from metacontrol_sim.srv import DeleteObstacle, IncreaseConsumptionFactor, SetLight, SpawnObstacle
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, LaserScan, PointCloud2
 from std_msgs.msg import Float32, Int32
 from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
 
 TOPICS = {
     "/clock": Clock,
@@ -31,11 +32,14 @@ TOPICS = {
     "/tf": TFMessage,
     "/tf_static": TFMessage,
     "front/scan": LaserScan,
+    "rear/scan": LaserScan,
     "camera/depth/points": PointCloud2,
     "ground_truth/state": Odometry,
     "ground_truth/safety": Float32,
     "ground_truth/energy": Float32,
     "ground_truth/contacts": Int32,
+    "ground_truth/obstacles": MarkerArray,
+    "simulator/light": Float32,
     "power_load": Float32,
 }
 
@@ -101,9 +105,54 @@ class SimulatorTest(unittest.TestCase):
         self.assertEqual(cloud.header.frame_id, "camera_link")
         self.assertGreater(cloud.width, 1000)
         frames = {transform.child_frame_id for transform in latest["/tf_static"].message.transforms}
-        self.assertEqual(frames, {"front_laser", "rear_laser", "camera_link"})
+        self.assertLessEqual({"front_laser", "rear_laser", "camera_link", "imu_link"}, frames)
         for heard in latest.values():
             heard.close()
+
+    def call(self, service, kind, *arguments, **fields):
+        rospy.wait_for_service(service, 30.0)
+        return rospy.ServiceProxy(service, kind)(*arguments, **fields)
+
+    def test_spawned_obstacle_stands_in_the_scan_but_not_on_the_map_until_deleted(self):
+        pose = self.state.message.pose.pose
+        yaw = 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
+        place = {"x": pose.position.x + 2.0 * math.cos(yaw), "y": pose.position.y + 2.0 * math.sin(yaw)}
+        scan, shown = Latest("front/scan", LaserScan), Latest("ground_truth/obstacles", MarkerArray)
+        spawned = self.call("simulator/spawn_obstacle", SpawnObstacle, name="crate", yaw=yaw, **place)
+        self.assertTrue(spawned.success, spawned.message)
+        expected = 2.0 - 0.15 - 0.393
+        self.assertIsNotNone(scan.wait(lambda s: abs(s.ranges[180] - expected) < 0.1, 30.0), "not seen")
+        self.assertIsNotNone(
+            shown.wait(lambda m: "crate" in {marker.text for marker in m.markers}, 30.0) or shown.message
+        )
+        again = self.call("simulator/spawn_obstacle", SpawnObstacle, name="crate", **place)
+        self.assertFalse(again.success)
+        self.assertIn("the name is taken", again.message)
+        self.assertTrue(self.call("simulator/delete_obstacle", DeleteObstacle, "crate").success)
+        self.assertIsNotNone(scan.wait(lambda s: abs(s.ranges[180] - expected) > 0.5, 30.0), "still there")
+        self.assertIn("no obstacle 'crate'", self.call("simulator/delete_obstacle", DeleteObstacle, "crate").message)
+        for heard in (scan, shown):
+            heard.close()
+
+    def test_spawned_person_walks(self):
+        way = [Point(-8.0, 8.0, 0.0), Point(-5.5, 8.0, 0.0)]
+        spawned = self.call("simulator/spawn_obstacle", SpawnObstacle, name="ann", waypoints=way, speed=2.0)
+        self.assertTrue(spawned.success, spawned.message)
+        shown = Latest("ground_truth/obstacles", MarkerArray)
+        walked = shown.wait(lambda m: any(k.text == "ann" and k.pose.position.x > -7.0 for k in m.markers), 30.0)
+        self.assertIsNotNone(walked, "she stands")
+        self.assertTrue(self.call("simulator/delete_obstacle", DeleteObstacle, "").success)
+        shown.close()
+
+    def test_camera_goes_blind_in_the_dark(self):
+        cloud = Latest("camera/depth/points", PointCloud2)
+        self.assertIsNotNone(cloud.wait(lambda c: c.width > 1000, 30.0))
+        self.assertTrue(self.call("simulator/set_light", SetLight, 0.0).success)
+        self.assertIsNotNone(cloud.wait(lambda c: c.width == 0, 30.0), "it sees in the dark")
+        self.assertFalse(self.call("simulator/set_light", SetLight, math.nan).success)
+        self.assertTrue(self.call("simulator/set_light", SetLight, 1.0).success)
+        self.assertIsNotNone(cloud.wait(lambda c: c.width > 1000, 30.0), "it stays blind")
+        cloud.close()
 
     def test_command_moves_the_robot_and_its_end_stops_it(self):
         start = self.state.message.pose.pose.position

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from metacontrol_sim.robot import Robot
 from metacontrol_sim.sensor_messages import depth_image, laser_scan, point_cloud, read_depth
-from metacontrol_sim.sensors import DepthProjector, SensorError, measure_ranges
+from metacontrol_sim.sensors import FULL_LIGHT, DepthProjector, SensorError, measure_depth, measure_ranges
 
 NOW = genpy.Time(1)
 
@@ -47,6 +47,27 @@ def test_points_lie_where_the_pixels_look():
 def test_pixels_out_of_range_have_no_point():
     depth = np.array([[1.0, math.inf], [math.nan, 9.0]], dtype=np.float32)
     assert DepthProjector(2, 2, 1.0).points(depth, 0.05, 8.0).shape == (1, 3)
+
+
+def test_depth_noise_grows_with_the_square_of_the_depth_and_repeats():
+    deviations = []
+    for metres in (1.0, 4.0):
+        true = np.full((100, 100), metres, dtype=np.float32)
+        measured = measure_depth(true, 1.0, 0.01, np.random.default_rng(1))
+        assert np.array_equal(measured, measure_depth(true, 1.0, 0.01, np.random.default_rng(1)))
+        deviations.append(np.std(measured))
+    assert deviations == pytest.approx([0.01, 0.16], rel=0.1)
+
+
+@pytest.mark.parametrize(("light", "share"), [(1.0, 1.0), (FULL_LIGHT, 1.0), (FULL_LIGHT / 2, 0.5), (0.0, 0.0)])
+def test_camera_loses_pixels_in_the_dark(light, share):
+    depth = measure_depth(np.full((100, 100), 2.0, dtype=np.float32), light, 0.0, np.random.default_rng(1))
+    assert np.isfinite(depth).mean() == pytest.approx(share, abs=0.03)
+
+
+def test_nothing_stays_nothing_for_the_camera():
+    depth = measure_depth(np.full((2, 2), np.inf, dtype=np.float32), 1.0, 0.01, np.random.default_rng(1))
+    assert np.isinf(depth).all()
 
 
 def test_depth_image_survives_its_message():

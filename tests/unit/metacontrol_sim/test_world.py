@@ -48,6 +48,12 @@ def gap(one, other):
         (FLOOR + "boxes: [{name: a, position: [0, 0], size: [1, 1], height: 1, mass: 2}]", "'a': unknown key mass"),
         (FLOOR + "boxes: [{name: a, position: [9, 0], size: [1, 1], height: 1}]", "'a': position .* off the floor"),
         (FLOOR + "racks: [&a {name: a, position: [0, 0], size: [1, 1], height: 1}, *a]", "'a': the name stands twice"),
+        (FLOOR + "people: [3]", r"people\[0\]: must be a person with a name"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0]]}]", r"people\[0\] 'a': waypoints: must be two or more"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, x]]}]", r"'a': waypoints: must be 2 finite"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 9]]}]", "'a': waypoint .* off the floor"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 1]], speed: 0}]", "'a': speed: 0 must be more"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 1]], age: 7}]", "'a': unknown key age"),
     ],
 )
 def test_bad_world_is_refused_with_file_and_entry(tmp_path, text, message):
@@ -67,6 +73,21 @@ def test_distance_to_a_turned_box():
     assert box.distance(1.0, 1.9) == pytest.approx(0.0)
     assert box.distance(2.5, 1.0) == pytest.approx(1.0)
     assert box.distance(1.5 + 0.3, 2.0 + 0.4) == pytest.approx(0.5)
+
+
+def test_people_are_in_the_world_but_not_on_its_map(tmp_path):
+    world = world_of(tmp_path, FLOOR + "people: [{name: ann, waypoints: [[0, 0], [3, 0], [3, 4]], speed: 1.5}]")
+    (ann,) = world.walkers
+    assert ann.speed == 1.5
+    assert [ann.place(walked) for walked in (0.0, 1.0, 5.0, 7.0, 9.0, 14.0)] == [
+        (0.0, 0.0),
+        (1.0, 0.0),
+        (3.0, 2.0),
+        (3.0, 4.0),
+        (3.0, 2.0),
+        (0.0, 0.0),
+    ]
+    assert OCCUPIED not in rasterise(world).cells
 
 
 def test_map_marks_boxes_floor_and_outside(tmp_path):

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import threading
 
+import numpy as np
 import rospy
 from sensor_msgs.msg import Image, PointCloud2
+from std_msgs.msg import Float32
 
-from metacontrol_sim.parameters import ParameterError, number
+from metacontrol_sim.parameters import ParameterError, number, seed
 from metacontrol_sim.sensor_messages import point_cloud, read_depth
-from metacontrol_sim.sensors import DepthProjector, SensorError
+from metacontrol_sim.sensors import DepthProjector, SensorError, measure_depth
 
 
 class CameraNode(rospy.SubscribeListener):
@@ -27,10 +29,14 @@ class CameraNode(rospy.SubscribeListener):
         self._field_of_view = math.radians(degrees)
         self._range_min = number(rospy.get_param("~range_min", 0.05), "~range_min", 0.0, 100.0)
         self._range_max = number(rospy.get_param("~range_max", 8.0), "~range_max", 0.1, 100.0)
+        self._noise = number(rospy.get_param("~noise", 0.001), "~noise", 0.0, 1.0)
+        self._rng = np.random.default_rng([seed(rospy.get_param("~seed", 0)), 8])
+        self._light = 1.0
         self._projector: DepthProjector | None = None
         self._depth: rospy.Subscriber | None = None
         self._lock = threading.Lock()
         self._points = rospy.Publisher("camera/depth/points", PointCloud2, subscriber_listener=self, queue_size=1)
+        self._lamp = rospy.Subscriber("simulator/light", Float32, self._on_light, queue_size=1)
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
         """Start to take images: somebody wants points (called by rospy)."""
@@ -47,11 +53,16 @@ class CameraNode(rospy.SubscribeListener):
                 self._depth.unregister()
                 self._depth = None
 
+    def _on_light(self, light: Float32) -> None:
+        if math.isfinite(light.data):
+            self._light = light.data
+
     def _on_depth(self, image: Image) -> None:
         try:
             depth = read_depth(image)
             if self._projector is None or self._projector.shape != depth.shape:
                 self._projector = DepthProjector(image.width, image.height, self._field_of_view)
+            depth = measure_depth(depth, self._light, self._noise, self._rng)
             points = self._projector.points(depth, self._range_min, self._range_max)
         except SensorError as error:
             rospy.logwarn_throttle(10.0, f"simulator/depth refused: {error}")

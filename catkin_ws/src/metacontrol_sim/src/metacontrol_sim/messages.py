@@ -13,19 +13,24 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from sensor_msgs.msg import BatteryState, Imu
 from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
 
+from metacontrol_sim.motion_sensors import VIBRATION
+from metacontrol_sim.physics import GRAVITY
 from metacontrol_sim.power import BATTERY_CAPACITY_WH
-from metacontrol_sim.simulation import GRAVITY, VIBRATION
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     import geometry_msgs.msg
 
     from metacontrol_sim.geometry import Pose
     from metacontrol_sim.grid import Grid
-    from metacontrol_sim.robot import Mount, Robot
+    from metacontrol_sim.motion_sensors import Errors
+    from metacontrol_sim.obstacles import Shown
     from metacontrol_sim.simulation import Simulation
 
-MAP, ODOM, BASE = "map", "odom", "base_link"
+MAP, ODOM, BASE, IMU = "map", "odom", "base_link", "imu_link"
 _SMALL = 1e-6
 """Variance of what the simulation knows exactly; 0 would mean "unknown"."""
 
@@ -38,12 +43,13 @@ def stamp(time_ns: int) -> genpy.Time:
 class OdometryWriter:
     """nav_msgs/Odometry with the velocity in base_link."""
 
-    def __init__(self, frame: str) -> None:
-        """Prepare a message whose pose is in `frame`."""
+    def __init__(self, frame: str, deviation: float = 0.0) -> None:
+        """Prepare a message whose pose is in `frame`; `deviation` is that of the velocity, as a share of 1 m/s."""
         self._message = Odometry()
         self._message.header.frame_id = frame
         self._message.child_frame_id = BASE
-        self._message.pose.covariance = self._message.twist.covariance = _diagonal(_SMALL, 6)
+        self._message.pose.covariance = _diagonal(_SMALL, 6)
+        self._message.twist.covariance = _diagonal(max(deviation**2, _SMALL), 6)
 
     def write(self, now: genpy.Time, pose: Pose, velocity: tuple[float, float, float]) -> Odometry:
         """Return the message for a pose and a velocity (forward, left, turn rate)."""
@@ -56,25 +62,25 @@ class OdometryWriter:
 
 
 class ImuWriter:
-    """sensor_msgs/Imu in base_link: gravity upwards, as a device at rest reports it."""
+    """sensor_msgs/Imu, its axes those of base_link: gravity upwards, as a device at rest reports it."""
 
-    def __init__(self) -> None:
+    def __init__(self, errors: Errors) -> None:
         """Prepare the message."""
         self._message = Imu()
-        self._message.header.frame_id = BASE
+        self._message.header.frame_id = IMU
         self._message.orientation_covariance = _diagonal(_SMALL, 3)
-        self._message.angular_velocity_covariance = _diagonal(_SMALL, 3)
+        self._message.angular_velocity_covariance = _diagonal(max(errors.gyro**2, _SMALL), 3)
         # The vibration at 0.5 m/s, a usual speed.
-        self._message.linear_acceleration_covariance = [(0.5 * VIBRATION) ** 2, *_diagonal(_SMALL, 3)[1:]]
+        sideways = max(errors.imu**2, _SMALL)
+        self._message.linear_acceleration_covariance = [(0.5 * VIBRATION) ** 2, *_diagonal(sideways, 3)[1:]]
         self._message.linear_acceleration.z = GRAVITY
 
     def write(self, now: genpy.Time, simulation: Simulation) -> Imu:
-        """Return the message for the last step."""
+        """Return the message for the last sample."""
         message = self._message
         message.header.stamp = now
-        half = simulation.odometry.yaw / 2.0
-        message.orientation.z, message.orientation.w = math.sin(half), math.cos(half)
-        message.angular_velocity.z = simulation.velocity[2]
+        message.orientation.z, message.orientation.w = _half_angle(simulation.odometry.filtered.yaw)
+        message.angular_velocity.z = simulation.odometry.turn_rate
         message.linear_acceleration.x, message.linear_acceleration.y = simulation.acceleration
         return message
 
@@ -93,12 +99,6 @@ class TransformWriter:
             transform.transform.translation.x, transform.transform.translation.y = pose.x, pose.y
             transform.transform.rotation.z, transform.transform.rotation.w = _half_angle(pose.yaw)
         return self._message
-
-
-def static_transforms(robot: Robot, now: genpy.Time) -> TFMessage:
-    """Return the frames of the robot's sensors."""
-    mounts = (robot.front_laser.mount, robot.rear_laser.mount, robot.camera.mount)
-    return TFMessage([_mount_transform(mount, now) for mount in mounts])
 
 
 def occupancy_grid(grid: Grid, now: genpy.Time) -> OccupancyGrid:
@@ -144,6 +144,22 @@ def battery_state(simulation: Simulation, now: genpy.Time) -> BatteryState:
     return message
 
 
+def obstacle_markers(shown: Iterable[Shown], now: genpy.Time) -> MarkerArray:
+    """Return the obstacles that no map shows, after one marker that takes away what was shown before."""
+    markers = [Marker(action=Marker.DELETEALL)]
+    for number, obstacle in enumerate(shown):
+        marker = Marker(ns="obstacles", id=number, text=obstacle.name, frame_locked=False)
+        marker.header.stamp, marker.header.frame_id = now, MAP
+        marker.type = Marker.CYLINDER if obstacle.person else Marker.CUBE
+        _set_pose(marker.pose, obstacle.pose)
+        marker.pose.position.z = obstacle.size[2] / 2.0
+        marker.scale.x, marker.scale.y, marker.scale.z = obstacle.size
+        marker.color.r, marker.color.g, marker.color.b = (0.2, 0.6, 0.3) if obstacle.person else (0.75, 0.15, 0.15)
+        marker.color.a = 0.9
+        markers.append(marker)
+    return MarkerArray(markers)
+
+
 def _set_pose(target: geometry_msgs.msg.Pose, pose: Pose) -> None:
     target.position.x, target.position.y = pose.x, pose.y
     target.orientation.z, target.orientation.w = _half_angle(pose.yaw)
@@ -158,15 +174,6 @@ def _transform(frame: str, child: str) -> TransformStamped:
     transform = TransformStamped()
     transform.header.frame_id, transform.child_frame_id = frame, child
     transform.transform.rotation.w = 1.0
-    return transform
-
-
-def _mount_transform(mount: Mount, now: genpy.Time) -> TransformStamped:
-    transform = _transform(BASE, mount.frame)
-    transform.header.stamp = now
-    translation = transform.transform.translation
-    translation.x, translation.y, translation.z = mount.x, mount.y, mount.z
-    transform.transform.rotation.z, transform.transform.rotation.w = _half_angle(mount.yaw)
     return transform
 
 

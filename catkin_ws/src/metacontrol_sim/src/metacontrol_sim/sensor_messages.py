@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from metacontrol_sim.robot import DepthCamera, Laser
 
 
-def laser_scan(laser: Laser, ranges: NDArray[np.float32], now: genpy.Time) -> LaserScan:
-    """Return a scan of a laser at 10 Hz."""
+def laser_scan(laser: Laser, ranges: NDArray[np.float32], now: genpy.Time, period: float = 0.1) -> LaserScan:
+    """Return a scan of a laser that turns once in `period` s."""
     message = LaserScan()
     message.header.stamp = now
     message.header.frame_id = laser.mount.frame
     message.angle_min, message.angle_max = laser.angle_min, -laser.angle_min
     message.angle_increment = laser.angle_increment
-    message.scan_time = 0.1
+    message.scan_time = period
     message.range_min, message.range_max = laser.range_min, laser.range_max
     message.ranges = ranges.tolist()
     return message

@@ -41,6 +41,31 @@ def measure_ranges(
     return np.where(true < range_max, np.minimum(noisy, np.float32(range_max)), np.float32(np.inf))
 
 
+FULL_LIGHT = 0.25
+"""Light (1 is a well-lit hall) from which on the depth camera sees all; below, it loses pixels in proportion."""
+
+
+def measure_depth(
+    depth: NDArray[np.float32], light: float, noise: float, rng: np.random.Generator
+) -> NDArray[np.float32]:
+    """Return what a stereo depth camera reports for true depths.
+
+    Args:
+        depth: (height, width) true depths in m; inf where there is nothing.
+        light: brightness, 0 to 1; in the dark the two images have nothing to match.
+        noise: standard deviation in m at a depth of 1 m; it grows with the depth's square.
+        rng: source of the noise; the same number of values is drawn for every image of one size.
+
+    Returns:
+        (height, width) depths in m; NaN where a pixel is lost.
+    """
+    errors = rng.standard_normal(depth.shape, dtype=np.float32)
+    chances = rng.random(depth.shape, dtype=np.float32)
+    finite = np.where(np.isfinite(depth), depth, np.float32(0.0))
+    noisy = depth + np.float32(noise) * finite * finite * errors
+    return np.where(chances * FULL_LIGHT < light, noisy, np.float32(np.nan)).astype(np.float32)
+
+
 class DepthProjector:
     """Turns depth images of one size and field of view into points; keeps the directions of the pixels."""
 

@@ -1,29 +1,32 @@
 """The simulation: a world and a robot in PyBullet, stepped at 100 Hz, with the robot's sensors and the ground truth.
 
-One seed gives one run: the only sources of chance are two seeded generators (IMU vibration, localisation).
+One seed gives one run: every source of chance is a generator seeded from it (see `noise`).
 """
 
 from __future__ import annotations
 
-import ctypes
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pybullet
 from rosgraph_monitor.quality import braking_distance, closest_in_direction, energy_level, safety_risk
 
-from metacontrol_sim.geometry import ORIGIN, Pose, wrap
+from metacontrol_sim.geometry import ORIGIN, Pose
+from metacontrol_sim.motion_sensors import PERFECT, Errors, Imu, Localisation, Odometry, Slip
+from metacontrol_sim.obstacles import Obstacles, outline
+from metacontrol_sim.physics import Physics, PhysicsError
 from metacontrol_sim.power import Battery, PowerMeter, check_factor
 from metacontrol_sim.robot import Robot
-from metacontrol_sim.world import MAPPED, box_mesh
+from metacontrol_sim.robot_file import RobotFileError
+from metacontrol_sim.world import Box
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from metacontrol_sim.robot import Laser
-    from metacontrol_sim.world import Box, World
+    from metacontrol_sim.robot import DepthCamera, Laser
+    from metacontrol_sim.walking import Walker
+    from metacontrol_sim.world import World
 
 STEP_NS = 10_000_000
 """ns of simulated time per step: 100 Hz."""
@@ -31,39 +34,19 @@ STEP = STEP_NS / 1e9
 """s of simulated time per step."""
 START_NS = 1_000_000_000
 """ns of simulated time before the first step; 0 would mean "no clock yet" to rospy."""
+MOTION_STEPS = 2
 LOCALISATION_STEPS = 20
 SAFETY_STEPS = 10
 ENERGY_STEPS = 100
-"""Steps between two updates: localisation at 5 Hz, ground truth of safety at 10 Hz and of energy at 1 Hz."""
-GRAVITY = 9.81
-"""m/s2."""
-
-VIBRATION = 10.8
-"""Standard deviation of the IMU's forward acceleration in m/s2 per m/s of speed, at 100 Hz.
-
-Derived from the published energies of the thirty variants of D2: solved for the acceleration peak per second, they give
-25 to 28 m/s2 per m/s at the variants' top speeds, about 27 once slower stretches of a mission are allowed for. The
-expected maximum of the 100 normal samples of a second is 2.5 standard deviations: 27 / 2.5 = 10.8.
-"""
+"""Steps between two updates: IMU, odometry and slip at 50 Hz, localisation at 5 Hz, ground truth of safety at 10 Hz and
+of energy at 1 Hz."""
 SAFETY_MIN_SPEED = 0.01
 """m/s; below it the robot counts as at rest, where nothing is a risk."""
 CONTACT_PAUSE_STEPS = 50
 """Steps without touching (0.5 s) after which the next touch of the same body is a contact episode of its own."""
 
-_WORLD_GROUP, _ROBOT_GROUP, _FLOOR_GROUP = 1, 2, 4
-_JOINTS = (0, 1, 2)
-_NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 _TRUTH_RAY_HEIGHT = 0.06
 _TRUTH_ANGLES = np.radians(np.linspace(-90.0, 90.0, 181))
-_NOISE_BLOCK = 1000
-_BOXES_PER_MESH = 4000  # PyBullet takes no more than 131,072 vertices at once
-_COLOURS = {
-    "wall": (0.75, 0.75, 0.72, 1.0),
-    "rack": (0.20, 0.35, 0.60, 1.0),
-    "pillar": (0.55, 0.55, 0.55, 1.0),
-    "pallet": (0.70, 0.50, 0.25, 1.0),
-    "box": (0.80, 0.45, 0.15, 1.0),
-}
 
 
 class SimulationError(RuntimeError):
@@ -77,15 +60,13 @@ class Settings:
     Attributes:
         initial_pose: of base_link in the map frame.
         seed: of every random number.
-        localisation_noise: standard deviation of the localised position in m; the heading's is a tenth of it in rad.
-        odometry_drift: error per distance travelled: scale of the distance and, per metre, heading in rad.
+        errors: of the sensors of motion; perfect ones by default.
         gui: show PyBullet's window.
     """
 
     initial_pose: Pose = ORIGIN
     seed: int = 0
-    localisation_noise: float = 0.0
-    odometry_drift: float = 0.0
+    errors: Errors = PERFECT
     gui: bool = False
 
 
@@ -97,54 +78,64 @@ class Simulation:
         pose: true pose of base_link in the map frame.
         velocity: true (forward, left, turn rate) in base_link, m/s, m/s, rad/s.
         acceleration: (forward, left) of the IMU in base_link, vibration included, m/s2.
-        odometry: pose in the odom frame, which is the initial pose unless the odometry drifts.
+        odometry: what the wheels and the IMU's turn rate tell of the motion since the start.
         localised: pose in the map frame as the localisation has it.
         map_to_odom: pose of the odom frame in the map frame, as the localisation has it.
         contacts: contact episodes of the robot with anything but the floor, since the start.
         safety: ground truth of the safety risk, 0..1.
         energy: ground truth of the energy level, 0..1.
         battery: state of charge.
+        obstacles: what no map shows.
+        light: brightness, 1 is a well-lit hall, 0 the dark.
     """
 
     def __init__(self, world: World, settings: Settings | None = None, robot: Robot | None = None) -> None:
         """Build the world.
 
         Raises:
-            SimulationError: the initial pose is off the floor or within an obstacle, or the window cannot open.
+            SimulationError: the initial pose is off the floor or within an obstacle, or PyBullet cannot start.
         """
         self.robot = robot or Robot()
         self.settings = settings or Settings()
-        _check_initial_pose(world, self.settings.initial_pose, self.robot)
-        self._client = _connect(self.settings.gui)
-        self._names: dict[int, str] = {}
-        self._build(world)
+        start, seed, errors = self.settings.initial_pose, self.settings.seed, self.settings.errors
+        _check_initial_pose(world, start, self.robot)
+        try:
+            self.physics = Physics(world, self.robot, start, STEP, self.settings.gui)
+        except (PhysicsError, RobotFileError) as error:
+            raise SimulationError(str(error)) from error
+        self._names = dict.fromkeys(self.physics.map_bodies, "map")
+        self._names |= {self.physics.add_box(box): box.name for box in world.boxes if not box.mapped}
+        self.obstacles = Obstacles(self.physics, world, self.robot)
 
         self.time_ns = START_NS
-        self.pose = self.settings.initial_pose
+        self.pose = start
         self.velocity = (0.0, 0.0, 0.0)
         self.acceleration = (0.0, 0.0)
-        self.odometry = Pose(0.0, 0.0, 0.0)
-        self.localised = self.pose
-        self.map_to_odom = self.pose
+        self.odometry = Odometry(errors, seed)
+        self.localised = start
+        self.map_to_odom = start
         self.contacts = 0
         self.safety = 0.0
         self.energy = 0.0
         self.battery = Battery()
+        self.light = 1.0
 
         self._steps = 0
-        self._initial_inverse = self.pose.inverse()
         self._target = (0.0, 0.0, 0.0)
         self._setpoint = (0.0, 0.0, 0.0)
         self._command_ns = -1
         self._world_velocity = (0.0, 0.0)
+        self._measured = (start, (0.0, 0.0))  # pose and velocity (map frame) at the last sample of IMU and odometry
         self._last_touch: dict[int, int] = {}
         self._meter = PowerMeter(self.time)
         self._true_load = 0.0
         self._heard_load: float | None = None
-        self._vibration_rng = np.random.default_rng([self.settings.seed, 1])
-        self._localisation_rng = np.random.default_rng([self.settings.seed, 2])
-        self._noise: list[float] = []
-        self._rays = {laser.mount.frame: self._laser_rays(laser) for laser in self._lasers}
+        self._slip = Slip(errors.slip, seed)
+        self._imu = Imu(errors.imu, seed)
+        self._localisation = Localisation(errors.localisation, seed)
+        self._rays = {
+            laser.mount.frame: _ray_angles(laser) for laser in (self.robot.front_laser, self.robot.rear_laser)
+        }
 
     @property
     def time(self) -> float:
@@ -188,14 +179,44 @@ class Simulation:
             raise SimulationError(f"power load {load} refused: it must be a finite number, 0 or more")
         self._heard_load = load
 
+    def set_light(self, light: float) -> None:
+        """Set the brightness.
+
+        Raises:
+            SimulationError: it is not within 0 and 1.
+        """
+        if not (math.isfinite(light) and 0.0 <= light <= 1.0):
+            raise SimulationError(f"light {light} refused: it must be a number from 0 (dark) to 1 (well lit)")
+        self.light = light
+
+    def spawn(self, box: Box, mass: float = 0.0) -> str:
+        """Put a box on the floor and return its name.
+
+        Raises:
+            ObstacleError: it cannot stand there.
+        """
+        return self.obstacles.spawn(box, mass, self.pose)
+
+    def spawn_walker(self, walker: Walker) -> str:
+        """Put a person on their way and return their name.
+
+        Raises:
+            ObstacleError: the way makes no sense.
+        """
+        return self.obstacles.spawn_walker(walker, self.pose)
+
     def step(self) -> None:
         """Advance by 10 ms of simulated time."""
         self._drive()
-        pybullet.stepSimulation(physicsClientId=self._client)
+        if self.obstacles.walking:
+            self.obstacles.advance(self.pose, STEP)
+        self.physics.step()
         self.time_ns += STEP_NS
         self._steps += 1
         self._read_motion()
         self._count_contacts()
+        if self._steps % MOTION_STEPS == 0:
+            self._measure_motion()
         if self._steps % LOCALISATION_STEPS == 0:
             self._localise()
         if self._steps % SAFETY_STEPS == 0:
@@ -207,175 +228,22 @@ class Simulation:
 
     def scan(self, laser: Laser) -> NDArray[np.float32]:
         """Return the true ranges of one of the robot's lasers: (rays,) in m, inf where nothing is hit."""
-        origins, ends = self._rays[laser.mount.frame]
-        hits = pybullet.rayTestBatch(
-            origins,
-            ends,
-            parentObjectUniqueId=self._body,
-            parentLinkIndex=_JOINTS[-1],
-            collisionFilterMask=_WORLD_GROUP,
-            physicsClientId=self._client,
-        )
-        fractions = np.array([hit[2] for hit in hits], dtype=np.float32)
-        return np.where(fractions < 1.0, fractions * np.float32(laser.range_max), np.float32(np.inf))
+        mount = self.pose @ Pose(laser.mount.x, laser.mount.y, laser.mount.yaw)
+        distances = self._cast(mount, laser.mount.z, self._rays[laser.mount.frame] + mount.yaw, laser.range_max)
+        return distances.astype(np.float32)
 
-    def depth_image(self) -> NDArray[np.float32]:
+    def depth_image(self, camera: DepthCamera | None = None) -> NDArray[np.float32]:
         """Return the camera's image: (height, width), m along the optical axis, inf beyond the camera's range."""
-        camera = self.robot.camera
-        eye = self.pose @ Pose(camera.mount.x, camera.mount.y, camera.mount.yaw)
-        ahead = (eye.x + math.cos(eye.yaw), eye.y + math.sin(eye.yaw), camera.mount.z)
-        vertical = 2.0 * math.degrees(math.atan(camera.height / 2.0 / camera.focal_length))
-        near, far = camera.range_min, camera.range_max
-        _, _, _, buffer, _ = pybullet.getCameraImage(
-            camera.width,
-            camera.height,
-            pybullet.computeViewMatrix((eye.x, eye.y, camera.mount.z), ahead, (0.0, 0.0, 1.0)),
-            pybullet.computeProjectionMatrixFOV(vertical, camera.width / camera.height, near, far),
-            shadow=0,
-            renderer=pybullet.ER_TINY_RENDERER,
-            flags=pybullet.ER_NO_SEGMENTATION_MASK,
-            physicsClientId=self._client,
-        )
-        buffer = np.asarray(buffer, dtype=np.float32).reshape(camera.height, camera.width)
-        depth = far * near / (far - (far - near) * buffer)
-        return np.where(buffer < 1.0, depth, np.float32(np.inf)).astype(np.float32)
-
-    def add_obstacle(self, box: Box, mass: float = 0.0) -> int:
-        """Put a box on the floor and return its PyBullet body.
-
-        Args:
-            box: what and where, in the map frame.
-            mass: kg; 0 cannot be moved.
-        """
-        half = (box.length / 2.0, box.width / 2.0, box.height / 2.0)
-        body = pybullet.createMultiBody(
-            mass,
-            pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self._client),
-            pybullet.createVisualShape(
-                pybullet.GEOM_BOX,
-                halfExtents=half,
-                rgbaColor=_COLOURS.get(box.kind, _COLOURS["box"]),
-                physicsClientId=self._client,
-            ),
-            (box.x, box.y, box.height / 2.0),
-            (0.0, 0.0, math.sin(box.yaw / 2.0), math.cos(box.yaw / 2.0)),
-            physicsClientId=self._client,
-        )
-        self._join_world(body, box.name)
-        return int(body)
+        return self.physics.depth_image(camera or self.robot.camera, self.pose)
 
     def touching(self) -> tuple[str, ...]:
         """Return the names of what the robot touched in the last step, sorted."""
-        now = self._steps
-        return tuple(sorted(self._names[body] for body, last in self._last_touch.items() if last == now))
+        bodies = (body for body, last in self._last_touch.items() if last == self._steps)
+        return tuple(sorted(self._names.get(body) or self.obstacles.name_of(body) or "something" for body in bodies))
 
     def close(self) -> None:
         """Free PyBullet's world; the simulation cannot be used any more."""
-        if pybullet.isConnected(self._client):
-            pybullet.disconnect(self._client)
-
-    @property
-    def _lasers(self) -> tuple[Laser, Laser]:
-        return self.robot.front_laser, self.robot.rear_laser
-
-    def _build(self, world: World) -> None:
-        """Create floor, boxes and robot."""
-        client = self._client
-        pybullet.setTimeStep(STEP, physicsClientId=client)
-        pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
-        pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=client)
-        half = ((world.x_max - world.x_min) / 2.0 + 2.0, (world.y_max - world.y_min) / 2.0 + 2.0, 0.5)
-        floor = pybullet.createMultiBody(
-            0.0,
-            pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client),
-            pybullet.createVisualShape(
-                pybullet.GEOM_BOX, halfExtents=half, rgbaColor=(0.4, 0.42, 0.4, 1.0), physicsClientId=client
-            ),
-            ((world.x_max + world.x_min) / 2.0, (world.y_max + world.y_min) / 2.0, -0.5),
-            physicsClientId=client,
-        )
-        pybullet.setCollisionFilterGroupMask(floor, -1, _FLOOR_GROUP, _WORLD_GROUP, physicsClientId=client)
-        self._add_map([box for box in world.boxes if box.kind == MAPPED])
-        for box in world.boxes:
-            if box.kind != MAPPED:
-                self.add_obstacle(box)
-        self._body = self._build_robot()
-
-    def _add_map(self, boxes: list[Box]) -> None:
-        """Put the boxes of a map on the floor, thousands of them to a body: each as a body would slow every step."""
-        for first in range(0, len(boxes), _BOXES_PER_MESH):
-            part = boxes[first : first + _BOXES_PER_MESH]
-            vertices, indices = box_mesh(part)
-            mesh = {"vertices": vertices, "indices": indices, "physicsClientId": self._client}
-            flag = pybullet.GEOM_FORCE_CONCAVE_TRIMESH
-            body = pybullet.createMultiBody(
-                0.0,
-                pybullet.createCollisionShape(pybullet.GEOM_MESH, flags=flag, **mesh),
-                pybullet.createVisualShape(pybullet.GEOM_MESH, rgbaColor=_COLOURS["wall"], **mesh),
-                physicsClientId=self._client,
-            )
-            self._join_world(body, part[0].name)
-
-    def _join_world(self, body: int, name: str) -> None:
-        """Let a body be seen by rays and stand in the way of everything."""
-        everything = _WORLD_GROUP | _ROBOT_GROUP | _FLOOR_GROUP
-        pybullet.setCollisionFilterGroupMask(body, -1, _WORLD_GROUP, everything, physicsClientId=self._client)
-        self._names[body] = name
-
-    def _build_robot(self) -> int:
-        """Create the robot: a box on two sliding joints and a turning one, driven by their velocity motors."""
-        client, robot = self._client, self.robot
-        thickness = robot.height - robot.ground_clearance
-        self._link_height = robot.ground_clearance + thickness / 2.0
-        half = (robot.length / 2.0, robot.width / 2.0, thickness / 2.0)
-        collision = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
-        visual = pybullet.createVisualShape(
-            pybullet.GEOM_BOX, halfExtents=half, rgbaColor=(0.9, 0.75, 0.1, 1.0), physicsClientId=client
-        )
-        origin = [(0.0, 0.0, 0.0)] * 3
-        rotation = [_NO_ROTATION] * 3
-        slide, turn = pybullet.JOINT_PRISMATIC, pybullet.JOINT_REVOLUTE
-        body = pybullet.createMultiBody(
-            0.0,
-            -1,
-            -1,
-            (0.0, 0.0, self._link_height),
-            _NO_ROTATION,
-            linkMasses=[1.0, 1.0, robot.mass],
-            linkCollisionShapeIndices=[-1, -1, collision],
-            linkVisualShapeIndices=[-1, -1, visual],
-            linkPositions=origin,
-            linkOrientations=rotation,
-            linkInertialFramePositions=origin,
-            linkInertialFrameOrientations=rotation,
-            linkParentIndices=[0, 1, 2],
-            linkJointTypes=[slide, slide, turn],
-            linkJointAxis=[(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)],
-            physicsClientId=client,
-        )
-        pybullet.setCollisionFilterGroupMask(body, _JOINTS[-1], _ROBOT_GROUP, _WORLD_GROUP, physicsClientId=client)
-        start = self.settings.initial_pose
-        for joint, value in zip(_JOINTS, (start.x, start.y, start.yaw), strict=True):
-            pybullet.changeDynamics(
-                body, joint, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, physicsClientId=client
-            )
-            pybullet.resetJointState(body, joint, value, physicsClientId=client)
-        # Twice what the acceleration limits need: the motors follow, but are too weak to push through an obstacle.
-        inertia = robot.mass * (robot.length**2 + robot.width**2) / 12.0
-        push = 2.0 * robot.mass * robot.max_acceleration
-        self._forces = (push, push, 2.0 * inertia * robot.max_turn_acceleration)
-        return int(body)
-
-    def _laser_rays(self, laser: Laser) -> tuple[list[tuple[float, float, float]], list[tuple[float, float, float]]]:
-        """Return starts and ends of a laser's rays in the frame of the robot's body."""
-        mount = laser.mount
-        height = mount.z - self._link_height
-        ends = []
-        for index in range(laser.rays):
-            angle = mount.yaw + laser.angle_min + index * laser.angle_increment
-            x, y = mount.x + laser.range_max * math.cos(angle), mount.y + laser.range_max * math.sin(angle)
-            ends.append((x, y, height))
-        return [(mount.x, mount.y, height)] * laser.rays, ends
+        self.physics.close()
 
     def _drive(self) -> None:
         """Move the set point towards the command within the acceleration limits, and hand it to the motors."""
@@ -390,59 +258,45 @@ class Simulation:
             limit = robot.max_turn_acceleration * STEP
             change_turn = min(max(target[2] - turn, -limit), limit)
             self._setpoint = (forward + share * change_x, left + share * change_y, turn + change_turn)
-            forward, left, turn = self._setpoint
+        forward, left, turn = (value * grip for value, grip in zip(self._setpoint, self._slip.factors, strict=True))
         cos, sin = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
-        pybullet.setJointMotorControlArray(
-            self._body,
-            _JOINTS,
-            pybullet.VELOCITY_CONTROL,
-            targetVelocities=(cos * forward - sin * left, sin * forward + cos * left, turn),
-            forces=self._forces,
-            physicsClientId=self._client,
-        )
+        self.physics.drive(cos * forward - sin * left, sin * forward + cos * left, turn)
 
     def _read_motion(self) -> None:
-        """Take over pose and velocity, and derive odometry and IMU from them."""
-        slide_x, slide_y, turn = pybullet.getJointStates(self._body, _JOINTS, physicsClientId=self._client)
-        last = self.pose
-        pose = Pose(slide_x[0], slide_y[0], wrap(turn[0]))
-        cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-        velocity_x, velocity_y = slide_x[1], slide_y[1]
-        change_x, change_y = velocity_x - self._world_velocity[0], velocity_y - self._world_velocity[1]
+        """Take over pose and velocity."""
+        self.pose, (velocity_x, velocity_y, turn) = self.physics.motion()
+        cos, sin = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
         self._world_velocity = (velocity_x, velocity_y)
-        self.pose = pose
-        self.velocity = (cos * velocity_x + sin * velocity_y, cos * velocity_y - sin * velocity_x, turn[1])
-        vibration = VIBRATION * math.hypot(velocity_x, velocity_y) * self._normal()
-        forward = (cos * change_x + sin * change_y) / STEP + vibration
-        self.acceleration = (forward, (cos * change_y - sin * change_x) / STEP)
+        self.velocity = (cos * velocity_x + sin * velocity_y, cos * velocity_y - sin * velocity_x, turn)
         self._meter.add_speed(self.velocity[0])
-        self._meter.add_acceleration(forward)
-        drift = self.settings.odometry_drift
-        if drift == 0.0:
-            self.odometry = self._initial_inverse @ pose
-        else:
-            moved = last.inverse() @ pose
-            heading = moved.yaw + drift * math.hypot(moved.x, moved.y)
-            self.odometry = self.odometry @ Pose(moved.x * (1.0 + drift), moved.y * (1.0 + drift), heading)
+
+    def _measure_motion(self) -> None:
+        """Let IMU and odometry take their sample."""
+        duration = MOTION_STEPS * STEP
+        last_pose, (last_x, last_y) = self._measured
+        velocity_x, velocity_y = self._world_velocity
+        self._measured = (self.pose, self._world_velocity)
+        cos, sin = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
+        change_x, change_y = velocity_x - last_x, velocity_y - last_y
+        change = (cos * change_x + sin * change_y, cos * change_y - sin * change_x)
+        self.acceleration = self._imu.measure(change, math.hypot(velocity_x, velocity_y), duration)
+        self._meter.add_acceleration(self.acceleration[0])
+        self.odometry.advance(last_pose.inverse() @ self.pose, self.velocity, self._slip.factors, duration)
+        self._slip.advance(duration)
 
     def _count_contacts(self) -> None:
         """Count the bodies that press on the robot now and have not done so for a while."""
         now = self._steps
-        for point in pybullet.getContactPoints(self._body, physicsClientId=self._client):
-            other, force = point[2], point[9]
-            if force > 0.0:
-                if now - self._last_touch.get(other, -CONTACT_PAUSE_STEPS - 1) > CONTACT_PAUSE_STEPS:
-                    self.contacts += 1
-                self._last_touch[other] = now
+        for body in self.physics.pressing():
+            if now - self._last_touch.get(body, -CONTACT_PAUSE_STEPS - 1) > CONTACT_PAUSE_STEPS:
+                self.contacts += 1
+            self._last_touch[body] = now
 
     def _localise(self) -> None:
-        """Let the localisation find the pose, with its noise, and correct the odom frame by it."""
-        pose, noise = self.pose, self.settings.localisation_noise
-        if noise > 0.0:
-            error_x, error_y, error_yaw = self._localisation_rng.standard_normal(3).tolist()
-            pose = Pose(pose.x + noise * error_x, pose.y + noise * error_y, wrap(pose.yaw + 0.1 * noise * error_yaw))
-        self.localised = pose
-        self.map_to_odom = pose @ self.odometry.inverse()
+        """Let the localisation find the pose, with its error, and correct the odom frame by it."""
+        self._localisation.advance(LOCALISATION_STEPS * STEP)
+        self.localised = self._localisation.locate(self.pose)
+        self.map_to_odom = self.localised @ self.odometry.filtered.inverse()
 
     def _safety_risk(self) -> float:
         """Return the risk by the closest thing, seen from the front laser, within 90 degrees of the way it moves."""
@@ -454,22 +308,25 @@ class Simulation:
         mount = self.robot.front_laser.mount
         sensor = self.pose @ Pose(mount.x, mount.y, 0.0)
         angles = _TRUTH_ANGLES + math.atan2(velocity_y, velocity_x)
-        origins = np.tile((sensor.x, sensor.y, _TRUTH_RAY_HEIGHT), (angles.size, 1))
-        ends = origins.copy()
-        ends[:, 0] += d_break * np.cos(angles)
-        ends[:, 1] += d_break * np.sin(angles)
-        hits = pybullet.rayTestBatch(origins, ends, collisionFilterMask=_WORLD_GROUP, physicsClientId=self._client)
-        fractions = np.array([hit[2] for hit in hits])
-        distances = np.where(fractions < 1.0, fractions * d_break, np.inf)
+        distances = self._cast(sensor, _TRUTH_RAY_HEIGHT, angles, d_break)
         hit = np.isfinite(distances)
         x, y = distances[hit] * np.cos(_TRUTH_ANGLES[hit]), distances[hit] * np.sin(_TRUTH_ANGLES[hit])
         return safety_risk(closest_in_direction(x, y, 0.0), d_break)
 
-    def _normal(self) -> float:
-        """Return the next normal random number of the vibration; drawn in blocks, for speed."""
-        if not self._noise:
-            self._noise = self._vibration_rng.standard_normal(_NOISE_BLOCK).tolist()
-        return self._noise.pop()
+    def _cast(self, start: Pose, height: float, angles: NDArray[np.float64], length: float) -> NDArray[np.float64]:
+        """Return the distances that level rays get: (n,) m, inf where nothing is hit; angles in the map frame."""
+        ends = np.empty((angles.size, 3))
+        ends[:, 0] = start.x + length * np.cos(angles)
+        ends[:, 1] = start.y + length * np.sin(angles)
+        ends[:, 2] = height
+        origins = np.broadcast_to((start.x, start.y, height), ends.shape)
+        shares = self.physics.cast(origins, ends)
+        return np.where(shares < 1.0, shares * length, math.inf)
+
+
+def _ray_angles(laser: Laser) -> NDArray[np.float64]:
+    """Return the directions of a laser's rays, seen from its mount, rad."""
+    return np.linspace(laser.angle_min, -laser.angle_min, laser.rays)
 
 
 def _check_initial_pose(world: World, pose: Pose, robot: Robot) -> None:
@@ -480,41 +337,8 @@ def _check_initial_pose(world: World, pose: Pose, robot: Robot) -> None:
             f"{where} is off the floor of world {world.name!r} "
             f"({world.x_min:g}..{world.x_max:g}, {world.y_min:g}..{world.y_max:g}); choose one on it"
         )
-    for x, y in _outline(pose, robot):
-        box, distance = world.nearest(x, y)
+    body = Box("robot", "robot", pose.x, pose.y, robot.length, robot.width, robot.height, pose.yaw)
+    for x, y in zip(*outline(body), strict=True):
+        box, distance = world.nearest(float(x), float(y))
         if box is not None and distance <= 0.0:
             raise SimulationError(f"{where} puts the robot into {box.name!r}; choose a free place")
-
-
-def _outline(pose: Pose, robot: Robot) -> list[tuple[float, float]]:
-    """Return points of the footprint in the map frame, centre included, 0.1 m apart or less."""
-    across = np.linspace(-robot.width / 2.0, robot.width / 2.0, 9)
-    along = np.linspace(-robot.length / 2.0, robot.length / 2.0, 11)
-    placed = (pose @ Pose(float(x), float(y), 0.0) for x in along for y in across)
-    return [(point.x, point.y) for point in placed]
-
-
-def _connect(gui: bool) -> int:
-    """Return a PyBullet client, with a window or without."""
-    if gui:
-        _check_display()
-    client = int(pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT))
-    if client < 0:
-        raise SimulationError("PyBullet does not start; run without its window (gui:=false)")
-    if gui:
-        pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=client)
-        pybullet.resetDebugVisualizerCamera(16.0, 0.0, -65.0, (0.0, 0.0, 0.0), physicsClientId=client)
-    return client
-
-
-def _check_display() -> None:
-    """Raise SimulationError where no X display answers; PyBullet itself would end the process."""
-    try:
-        x11 = ctypes.CDLL("libX11.so.6")
-    except OSError as error:
-        raise SimulationError("PyBullet's window needs libX11: ./mros setup --gui, or gui:=false") from error
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    display = x11.XOpenDisplay(None)
-    if not display:
-        raise SimulationError("PyBullet's window needs a display, and none answers: set DISPLAY, or use gui:=false")
-    x11.XCloseDisplay(ctypes.c_void_p(display))

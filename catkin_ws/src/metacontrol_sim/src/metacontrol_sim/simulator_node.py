@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
+from collections import deque
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeout
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rospkg
 import rospy
@@ -16,27 +18,47 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan
 from std_msgs.msg import Float32, Int32
 from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
 
 from metacontrol_sim import messages, sensor_messages
 from metacontrol_sim.geometry import Pose
+from metacontrol_sim.motion_sensors import REAL, Errors
+from metacontrol_sim.obstacles import CLUTTER_MASS, CLUTTER_SIZE, ObstacleError
 from metacontrol_sim.pacing import Pacer
 from metacontrol_sim.parameters import ParameterError, file_path, flag, number, seed
 from metacontrol_sim.power import PowerError
 from metacontrol_sim.simulation import (
     ENERGY_STEPS,
     LOCALISATION_STEPS,
+    MOTION_STEPS,
     SAFETY_STEPS,
     STEP,
     Settings,
     Simulation,
     SimulationError,
 )
-from metacontrol_sim.world import World, WorldError, rasterise
+from metacontrol_sim.srv import (
+    DeleteObstacle,
+    DeleteObstacleRequest,
+    DeleteObstacleResponse,
+    SetLight,
+    SetLightRequest,
+    SetLightResponse,
+    SpawnObstacle,
+    SpawnObstacleRequest,
+    SpawnObstacleResponse,
+)
+from metacontrol_sim.walking import SPEED, Walker
+from metacontrol_sim.world import Box, World, WorldError, rasterise
 from metacontrol_sim.world_file import read_world
 
-MOTION_STEPS = 2
-SENSOR_STEPS = 10
-"""Steps between two messages: odometry, tf and true state at 50 Hz; rays and depth images at 10 Hz."""
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+WALKING_STEPS = 20
+"""Steps between two messages with the places of people who walk."""
+_SERVICE_S = 10.0
+"""Wall seconds that a service call waits for the loop."""
 
 
 class SimulatorNode:
@@ -48,29 +70,27 @@ class SimulatorNode:
         Raises:
             ParameterError: a parameter cannot be used.
             WorldError: the world file is missing or wrong.
-            SimulationError: the initial pose is not free, or the window cannot open.
+            SimulationError: the initial pose is not free, or PyBullet cannot start.
         """
         factor = number(rospy.get_param("~real_time_factor", 1.0), "~real_time_factor", 0.0, 1000.0)
-        settings = Settings(
-            Pose(*(number(rospy.get_param(f"~initial_pose_{key}", 0.0), f"~initial_pose_{key}") for key in "xya")),
-            seed(rospy.get_param("~seed", 0)),
-            number(rospy.get_param("~localisation_noise", 0.0), "~localisation_noise", 0.0, 10.0),
-            number(rospy.get_param("~odometry_drift", 0.0), "~odometry_drift", -0.5, 0.5),
-            flag(rospy.get_param("~gui", False), "~gui"),
-        )
         world = read_world(_world_path(rospy.get_param("~world", "")))
-        self._simulation = Simulation(world, settings)
+        self._laser_steps = _steps("~laser_rate", 10.0, 50.0)
+        self._camera_steps = _steps("~camera_rate", 10.0, 50.0)
+        self._simulation = Simulation(world, _settings())
         self._pacer = Pacer(STEP / factor if factor > 0.0 else 0.0)
         self._contacts = -1
-        self._lock = threading.Lock()
-        self._command: list[tuple[float, float, float]] = []
-        self._load: float | None = None
-        self._factor: float | None = None
+        self._changes = -1
+        self._work: deque[Callable[[], None]] = deque()
         self._advertise(world)
         self._inputs = (
             rospy.Subscriber("cmd_vel", Twist, self._on_command, queue_size=10, tcp_nodelay=True),
             rospy.Subscriber("power_load", Float32, self._on_load, queue_size=1),
             rospy.Subscriber("power_consumption_factor", Float32, self._on_factor, queue_size=1),
+        )
+        self._services = (
+            rospy.Service("~spawn_obstacle", SpawnObstacle, self._on_spawn),
+            rospy.Service("~delete_obstacle", DeleteObstacle, self._on_delete),
+            rospy.Service("~set_light", SetLight, self._on_set_light),
         )
 
     def run(self) -> None:
@@ -80,7 +100,8 @@ class SimulatorNode:
             pause = self._pacer.wait(time.monotonic())
             # A pause of 0 lets the threads that receive and send have the interpreter when no pace is kept.
             time.sleep(pause)
-            self._take_input()
+            while self._work:
+                self._work.popleft()()
             self._simulation.step()
             step += 1
             self._publish(step)
@@ -101,81 +122,127 @@ class SimulatorNode:
         self._safety = rospy.Publisher("ground_truth/safety", Float32, queue_size=10)
         self._energy = rospy.Publisher("ground_truth/energy", Float32, queue_size=10)
         self._contact_count = rospy.Publisher("ground_truth/contacts", Int32, queue_size=10, latch=True)
+        self._obstacles = rospy.Publisher("ground_truth/obstacles", MarkerArray, queue_size=2, latch=True)
         self._front = rospy.Publisher("simulator/front_rays", LaserScan, queue_size=1, tcp_nodelay=True)
         self._rear = rospy.Publisher("simulator/rear_rays", LaserScan, queue_size=1, tcp_nodelay=True)
         self._depth = rospy.Publisher("simulator/depth", Image, queue_size=1, tcp_nodelay=True)
-        self._odometry_writer = messages.OdometryWriter(messages.ODOM)
+        self._light = rospy.Publisher("simulator/light", Float32, queue_size=1, latch=True)
+        errors = self._simulation.settings.errors
+        self._odometry_writer = messages.OdometryWriter(messages.ODOM, errors.slip)
         self._state_writer = messages.OdometryWriter(messages.MAP)
-        self._imu_writer = messages.ImuWriter()
+        self._imu_writer = messages.ImuWriter(errors)
         self._transform_writer = messages.TransformWriter()
         now = messages.stamp(self._simulation.time_ns)
         self._map = rospy.Publisher("map", OccupancyGrid, queue_size=1, latch=True)
         self._map.publish(messages.occupancy_grid(rasterise(world), now))
-        self._tf_static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
-        self._tf_static.publish(messages.static_transforms(self._simulation.robot, now))
+        self._light.publish(self._simulation.light)
+
+    # Input: called in rospy's threads, done in the loop's
 
     def _on_command(self, twist: Twist) -> None:
-        with self._lock:
-            self._command.append((twist.linear.x, twist.linear.y, twist.angular.z))
+        values = (twist.linear.x, twist.linear.y, twist.angular.z)
+        self._work.append(lambda: self._offer("cmd_vel", lambda: self._simulation.command(*values)))
 
     def _on_load(self, message: Float32) -> None:
-        with self._lock:
-            self._load = message.data
+        self._work.append(lambda: self._offer("power_load", lambda: self._simulation.set_power_load(message.data)))
 
     def _on_factor(self, message: Float32) -> None:
-        with self._lock:
-            self._factor = message.data
+        topic, factor = "power_consumption_factor", message.data
+        self._work.append(lambda: self._offer(topic, lambda: self._simulation.set_consumption_factor(factor)))
 
-    def _take_input(self) -> None:
-        """Hand what has come since the last step to the simulation, and warn of what it refuses."""
-        with self._lock:
-            commands, load, factor = self._command, self._load, self._factor
-            self._command, self._load, self._factor = [], None, None
-        for command in commands:
-            self._offer("cmd_vel", self._simulation.command, *command)
-        if load is not None:
-            self._offer("power_load", self._simulation.set_power_load, load)
-        if factor is not None:
-            self._offer("power_consumption_factor", self._simulation.set_consumption_factor, factor)
-
-    def _offer(self, topic: str, take: Any, *values: float) -> None:
+    def _offer(self, topic: str, take: Callable[[], None]) -> None:
         try:
-            take(*values)
+            take()
         except (SimulationError, PowerError) as error:
             rospy.logwarn_throttle(10.0, f"{topic} ignored: {error}")
+
+    def _on_spawn(self, request: SpawnObstacleRequest) -> SpawnObstacleResponse:
+        if request.waypoints:
+            walker = Walker(request.name, tuple((p.x, p.y) for p in request.waypoints), request.speed or SPEED)
+            name, problem = self._in_loop(lambda: self._simulation.spawn_walker(walker))
+        else:
+            asked = (request.length, request.width, request.height)
+            length, width, height = (given or usual for given, usual in zip(asked, CLUTTER_SIZE, strict=True))
+            box = Box(request.name, "clutter", request.x, request.y, length, width, height, request.yaw)
+            mass = max(request.mass or CLUTTER_MASS, 0.0)
+            name, problem = self._in_loop(lambda: self._simulation.spawn(box, mass))
+        if not problem:
+            rospy.loginfo(f"spawned {name}")
+        return SpawnObstacleResponse(not problem, name or "", problem)
+
+    def _on_delete(self, request: DeleteObstacleRequest) -> DeleteObstacleResponse:
+        _, problem = self._in_loop(lambda: self._simulation.obstacles.delete(request.name))
+        return DeleteObstacleResponse(not problem, problem)
+
+    def _on_set_light(self, request: SetLightRequest) -> SetLightResponse:
+        _, problem = self._in_loop(lambda: self._simulation.set_light(request.light))
+        if not problem:
+            self._light.publish(request.light)
+        return SetLightResponse(not problem, problem)
+
+    def _in_loop(self, do: Callable[[], Any]) -> tuple[Any, str]:
+        """Have something done between two steps; return its result and, where it was refused, why."""
+        future: Future[Any] = Future()
+
+        def work() -> None:
+            try:
+                future.set_result(do())
+            except (ObstacleError, SimulationError) as error:
+                future.set_exception(error)
+
+        self._work.append(work)
+        try:
+            return future.result(_SERVICE_S), ""
+        except (ObstacleError, SimulationError) as error:
+            return None, str(error)
+        except FutureTimeout:
+            return None, f"the simulation did not answer within {_SERVICE_S:g} s"
+
+    # Output
 
     def _publish(self, step: int) -> None:
         """Publish what is due after a step, /clock first."""
         simulation = self._simulation
         now = messages.stamp(simulation.time_ns)
         self._clock.publish(now)
-        self._imu.publish(self._imu_writer.write(now, simulation))
         if step % MOTION_STEPS == 0:
-            self._tf.publish(self._transform_writer.write(now, simulation.map_to_odom, simulation.odometry))
-            odometry = self._odometry_writer.write(now, simulation.odometry, simulation.velocity)
-            self._odom.publish(odometry)
-            self._filtered.publish(odometry)
-            self._state.publish(self._state_writer.write(now, simulation.pose, simulation.velocity))
+            self._publish_motion(now)
         if simulation.contacts != self._contacts or step % ENERGY_STEPS == 0:
             self._report_contacts()
-        if step % SENSOR_STEPS == 0:
-            self._publish_sensors(now)
+        self._publish_sensors(step, now)
         if step % SAFETY_STEPS == 0:
             self._safety.publish(simulation.safety)
         if step % LOCALISATION_STEPS == 0:
-            noise = simulation.settings.localisation_noise
-            self._localised.publish(messages.localised_pose(simulation.localised, noise, now))
+            deviation = simulation.settings.errors.localisation
+            self._localised.publish(messages.localised_pose(simulation.localised, deviation, now))
         if step % ENERGY_STEPS == 0:
             self._energy.publish(simulation.energy)
             self._battery.publish(messages.battery_state(simulation, now))
+        obstacles = simulation.obstacles
+        if obstacles.changes != self._changes or (obstacles.walking and step % WALKING_STEPS == 0):
+            self._changes = obstacles.changes
+            self._obstacles.publish(messages.obstacle_markers(obstacles.shown(), now))
 
-    def _publish_sensors(self, now: rospy.Time) -> None:
-        """Publish the raw data that somebody listens to."""
+    def _publish_motion(self, now: rospy.Time) -> None:
+        """Publish what the robot measures of its motion, and what it truly is."""
+        simulation = self._simulation
+        odometry = simulation.odometry
+        self._imu.publish(self._imu_writer.write(now, simulation))
+        self._tf.publish(self._transform_writer.write(now, simulation.map_to_odom, odometry.filtered))
+        self._odom.publish(self._odometry_writer.write(now, odometry.wheels, odometry.velocity))
+        velocity = (*odometry.velocity[:2], odometry.turn_rate)
+        self._filtered.publish(self._odometry_writer.write(now, odometry.filtered, velocity))
+        self._state.publish(self._state_writer.write(now, simulation.pose, simulation.velocity))
+
+    def _publish_sensors(self, step: int, now: rospy.Time) -> None:
+        """Publish the raw data that are due and that somebody listens to."""
         robot = self._simulation.robot
-        for publisher, laser in ((self._front, robot.front_laser), (self._rear, robot.rear_laser)):
-            if publisher.get_num_connections() > 0:
-                publisher.publish(sensor_messages.laser_scan(laser, self._simulation.scan(laser), now))
-        if self._depth.get_num_connections() > 0:
+        if step % self._laser_steps == 0:
+            for publisher, laser in ((self._front, robot.front_laser), (self._rear, robot.rear_laser)):
+                if publisher.get_num_connections() > 0:
+                    ranges = self._simulation.scan(laser)
+                    publisher.publish(sensor_messages.laser_scan(laser, ranges, now, self._laser_steps * STEP))
+        if step % self._camera_steps == 0 and self._depth.get_num_connections() > 0:
             image = self._simulation.depth_image()
             self._depth.publish(sensor_messages.depth_image(robot.camera, image, now))
 
@@ -187,6 +254,30 @@ class SimulatorNode:
             rospy.logwarn(f"contact {contacts}: the robot touches {touched or 'something'}")
         self._contacts = contacts
         self._contact_count.publish(contacts)
+
+
+def _settings() -> Settings:
+    """Return the simulation's settings from the node's parameters.
+
+    Raises:
+        ParameterError: one of them cannot be used.
+    """
+    pose = Pose(*(number(rospy.get_param(f"~initial_pose_{key}", 0.0), f"~initial_pose_{key}") for key in "xya"))
+    errors = Errors(
+        slip=number(rospy.get_param("~slip", REAL.slip), "~slip", 0.0, 0.1),
+        odometry_drift=number(rospy.get_param("~odometry_drift", REAL.odometry_drift), "~odometry_drift", -0.5, 0.5),
+        imu=number(rospy.get_param("~imu_noise", REAL.imu), "~imu_noise", 0.0, 10.0),
+        gyro=number(rospy.get_param("~gyro_noise", REAL.gyro), "~gyro_noise", 0.0, 1.0),
+        localisation=number(
+            rospy.get_param("~localisation_noise", REAL.localisation), "~localisation_noise", 0.0, 10.0
+        ),
+    )
+    return Settings(pose, seed(rospy.get_param("~seed", 0)), errors, flag(rospy.get_param("~gui", False), "~gui"))
+
+
+def _steps(name: str, default: float, fastest: float) -> int:
+    """Return the steps between two messages of a device whose rate (Hz) is a parameter."""
+    return round(1.0 / STEP / number(rospy.get_param(name, default), name, 1.0, fastest))
 
 
 def _world_path(value: Any) -> Path:

@@ -61,6 +61,11 @@ class Box:
     height: float
     yaw: float = 0.0
 
+    @property
+    def mapped(self) -> bool:
+        """Whether it comes from a map."""
+        return self.kind == MAPPED
+
     def distance(self, x: Any, y: Any) -> Any:
         """Return the distance in m of points (floats or arrays, map frame) to the box's outline, 0 inside."""
         return _distance(self.x, self.y, self.length, self.width, self.yaw, x, y)
