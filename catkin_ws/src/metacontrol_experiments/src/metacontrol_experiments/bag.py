@@ -56,6 +56,7 @@ TOPICS = (
     "/rosgraph_manipulator_action_server/goal",
     "/rosgraph_manipulator_action_server/result",
     "/mros1_reasoner/decision",
+    "/mros1_reasoner/journal",
     "/mission/event",
     "/rosout",
 )
