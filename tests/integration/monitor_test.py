@@ -3,65 +3,20 @@
 
 import math
 import signal
-import subprocess
-import sys
 import threading
-import time
 import unittest
 
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
 from metacontrol_msgs.srv import ListObservers, LoadObserver, UnloadObserver
+from monitor_common import Diagnostics, end, start_node
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 
 NODES = ("front_driver", "clean_driver", "navigation")
-NODE = "import rospy, sys; rospy.init_node(sys.argv[1]); rospy.spin()"
-
-
-class Diagnostics:
-    """Keeps what came on /diagnostics, with the wall time of its arrival."""
-
-    def __init__(self):
-        self._seen = []
-        self._changed = threading.Condition()
-        self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._receive, tcp_nodelay=True)
-
-    def _receive(self, msg):
-        with self._changed:
-            self._seen.extend((time.monotonic(), status) for status in msg.status)
-            self._changed.notify_all()
-
-    def forget(self):
-        with self._changed:
-            self._seen.clear()
-
-    def statuses(self, name, message):
-        with self._changed:
-            return [status for _, status in self._seen if (status.name, status.message) == (name, message)]
-
-    def wait(self, what, condition, timeout=20.0):
-        """Return arrival time and status of the first one that meets the condition since the last `forget`."""
-        end = time.monotonic() + timeout
-        with self._changed:
-            while True:
-                for at, status in self._seen:
-                    if condition(status):
-                        return at, status
-                if not self._changed.wait(end - time.monotonic()):
-                    seen = sorted({f"{s.name}: {s.message} {[v.value for v in s.values]}" for _, s in self._seen})
-                    raise AssertionError(f"no {what} within {timeout} s; seen: {seen}")
-
-    def wait_status(self, name, message, value=None, timeout=20.0):
-        def fits(status):
-            return (status.name, status.message) == (name, message) and (
-                value is None or value in [entry.value for entry in status.values]
-            )
-
-        return self.wait(f"{message} {value or ''} of {name!r}", fits, timeout)
 
 
 class MonitorTest(unittest.TestCase):
@@ -75,18 +30,17 @@ class MonitorTest(unittest.TestCase):
         cls.configuration = rospy.Publisher(
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, queue_size=5, latch=True
         )
-        cls.seen.wait_status("ROS Graph", "running OK", timeout=15.0)
+        cls.seen.wait_status("ROS Graph", "running OK", timeout=60.0)
         cls.seen.wait_status("laser_resender", "Component status", "TRUE")
 
     @classmethod
     def tearDownClass(cls):
         for process in cls.nodes.values():
-            process.kill()
-            process.wait()
+            end(process)
 
     @classmethod
     def start(cls, name):
-        cls.nodes[name] = subprocess.Popen([sys.executable, "-c", NODE, name])
+        cls.nodes[name] = start_node(name)
 
     def setUp(self):
         for name in NODES:  # what a test that failed left undone
@@ -122,7 +76,8 @@ class MonitorTest(unittest.TestCase):
 
     def test_node_that_exits_cleanly_is_missing(self):
         self.end("clean_driver", signal.SIGINT)
-        self.seen.wait_status("clean_driver", "Missing node")
+        _, status = self.seen.wait_status("clean_driver", "Missing node")
+        self.assertIn("ended", status.values[0].value)
         self.seen.wait_status("clean_driver", "Component status", "FALSE")
         self.restart_and_expect_recovery("clean_driver", "clean_driver")
 

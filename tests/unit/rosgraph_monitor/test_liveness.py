@@ -9,9 +9,11 @@ from rosgraph_monitor.liveness import (
     Timing,
     due,
     on_answer,
+    on_broken,
     on_closed,
     on_connect_error,
     on_connected,
+    on_no_socket,
     on_refused,
 )
 
@@ -88,3 +90,17 @@ def test_connection_reset_while_it_is_made_is_tried_again_and_not_taken_for_an_u
     assert (state.life, state.next_at, state.connecting_since) == (Life.ALIVE, 1.1, None)
     assert on_connect_error(state, errno.ECONNREFUSED, 1.2, TIMING).life is Life.DEAD
     assert on_connect_error(state, errno.EHOSTUNREACH, 1.2, TIMING).life is Life.UNREACHABLE
+
+
+def test_lost_host_confirms_nothing_and_a_reset_connection_is_tried_again():
+    asked = due(alive(), 1.0, TIMING)[0]
+    assert on_broken(asked, errno.ETIMEDOUT, 2.8, TIMING).life is Life.UNREACHABLE
+    assert on_broken(asked, errno.ECONNRESET, 2.8, TIMING).life is Life.ALIVE
+    assert TIMING.confirmation_deadline < TIMING.probe_deadline
+
+
+def test_lack_of_sockets_says_nothing_of_the_node():
+    state = on_no_socket(due(Liveness(life=Life.ALIVE), 0.0, TIMING)[0], 0.0, TIMING)
+    assert state.life is Life.ALIVE
+    assert due(state, 0.4, TIMING)[1] is Action.NONE
+    assert due(state, 0.5, TIMING)[1] is Action.CONNECT

@@ -3,7 +3,8 @@
 A connection is held open to each node. When a process dies, the kernel closes its end at once: measured with rospy,
 an idle connection stays open for minutes and closes 3 ms after a SIGKILL. A closed connection alone proves nothing,
 since a server may close it after an answer (HTTP/1.0): so the node is called again, and is dead when it refuses. A
-process that is stopped or stuck keeps its connection, but leaves getPid unanswered until a deadline.
+process that is stopped or stuck keeps its connection, and its kernel goes on confirming what arrives, but getPid stays
+unanswered until a deadline. A host that is lost confirms nothing, which the kernel on this side tells before that.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ class Life(enum.Enum):
     ALIVE = "alive"
     DEAD = "dead: nobody answers at its address, though the master lists it"
     HUNG = "hung: its process accepts connections but leaves getPid unanswered"
-    UNREACHABLE = "unreachable: its address can't be reached"
+    UNREACHABLE = "unreachable: its host does not answer, or its address leads nowhere"
 
 
 class Action(enum.Enum):
@@ -33,6 +34,9 @@ class Action(enum.Enum):
 
 
 _FRUITLESS_LIMIT = 4
+_NO_WAY = frozenset(
+    {errno.ETIMEDOUT, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.EHOSTDOWN, errno.ENETDOWN, errno.EADDRNOTAVAIL}
+)
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,11 @@ class Timing:
     probe_deadline: float = 3.0
     connect_deadline: float = 1.5
     retry_period: float = 0.5
+
+    @property
+    def confirmation_deadline(self) -> float:
+        """Wall seconds in which the other host must confirm what it is sent: sooner than a process must answer."""
+        return 0.6 * self.probe_deadline
 
 
 @dataclass(frozen=True)
@@ -92,6 +101,16 @@ def on_closed(state: Liveness, now: float, timing: Timing) -> Liveness:
     if fruitless < _FRUITLESS_LIMIT:
         return Liveness(life=state.life, next_at=now, fruitless=fruitless)
     return Liveness(life=Life.HUNG, next_at=now + timing.retry_period, fruitless=fruitless)
+
+
+def on_broken(state: Liveness, error: int, now: float, timing: Timing) -> Liveness:
+    """The connection that stood failed with this errno: the host is lost, or the other end reset it."""
+    return on_unreachable(state, now, timing) if error in _NO_WAY else on_closed(state, now, timing)
+
+
+def on_no_socket(state: Liveness, now: float, timing: Timing) -> Liveness:
+    """This process could not make a socket: that says nothing of the node."""
+    return replace(state, connecting_since=None, next_at=now + timing.retry_period)
 
 
 def on_connect_error(state: Liveness, error: int, now: float, timing: Timing) -> Liveness:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import resource
 import socket
 import sys
 import threading
@@ -259,6 +260,8 @@ def main() -> None:
     if not rosgraph.is_master_online():
         sys.stderr.write(f"rosgraph_monitor: no ROS master at {uri}: start roscore or set ROS_MASTER_URI\n")
         sys.exit(BAD_START)
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))  # a connection to each node
     rospy.init_node("rosgraph_monitor")
     try:
         node = MonitorNode(options.load)

@@ -194,9 +194,16 @@ class Watcher:
             return
         family, host = address
         target.received.clear()
-        target.socket = socket.socket(family, socket.SOCK_STREAM)
+        try:
+            target.socket = socket.socket(family, socket.SOCK_STREAM)
+        except OSError as refused:  # no more file descriptors
+            _log.warning("no socket to watch %s: %s", target.key[0], refused)
+            self._become(target, liveness.on_no_socket(target.state, now, self._timing))
+            return
         target.socket.setblocking(False)
         target.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        confirmation = round(1000 * self._timing.confirmation_deadline)
+        target.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, confirmation)
         error = target.socket.connect_ex((host, target.port))
         if error in (0, errno.EINPROGRESS):
             self._selector.register(target.socket, selectors.EVENT_WRITE, target)
@@ -226,8 +233,8 @@ class Watcher:
             # A few hundred bytes into an empty buffer: it takes all or the connection is of no use.
             if target.socket is None or target.socket.send(target.request) != len(target.request):
                 self._closed(target)
-        except OSError:
-            self._closed(target)
+        except OSError as error:
+            self._closed(target, error.errno or 0)
 
     def _receive(self, target: _Target) -> None:
         if target.socket is None:
@@ -236,8 +243,9 @@ class Watcher:
             data = target.socket.recv(_LONGEST_ANSWER)
         except BlockingIOError:
             return
-        except OSError:
-            data = b""
+        except OSError as error:
+            self._closed(target, error.errno or 0)
+            return
         if not data:
             self._closed(target)
             return
@@ -254,9 +262,9 @@ class Watcher:
         target.pid = integers[-1] if len(integers) >= 2 and integers[0] == 1 else None
         self._become(target, liveness.on_answer(target.state, time.monotonic(), self._timing))
 
-    def _closed(self, target: _Target) -> None:
+    def _closed(self, target: _Target, error: int = 0) -> None:
         self._drop(target)
-        self._become(target, liveness.on_closed(target.state, time.monotonic(), self._timing))
+        self._become(target, liveness.on_broken(target.state, error, time.monotonic(), self._timing))
         self._step(target)
 
     def _drop(self, target: _Target) -> None:

@@ -1,0 +1,69 @@
+"""What the monitor's tests share: diagnostics as they arrive, and nodes that are processes of their own."""
+
+import subprocess
+import sys
+import threading
+import time
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+
+NODE = "import rospy, sys; rospy.init_node(sys.argv[1]); rospy.spin()"
+
+
+class Diagnostics:
+    """Keeps what came on /diagnostics, with the wall time of its arrival."""
+
+    def __init__(self, topic="/diagnostics"):
+        self._seen = []
+        self._changed = threading.Condition()
+        self._subscriber = rospy.Subscriber(topic, DiagnosticArray, self._receive, tcp_nodelay=True)
+
+    def _receive(self, msg):
+        with self._changed:
+            self._seen.extend((time.monotonic(), status) for status in msg.status)
+            self._changed.notify_all()
+
+    def forget(self):
+        with self._changed:
+            self._seen.clear()
+
+    def statuses(self, name, message):
+        with self._changed:
+            return [status for _, status in self._seen if (status.name, status.message) == (name, message)]
+
+    def wait(self, what, condition, timeout=40.0):
+        """Return arrival time and status of the first one that meets the condition since the last `forget`."""
+        end = time.monotonic() + timeout
+        with self._changed:
+            while True:
+                for at, status in self._seen:
+                    if condition(status):
+                        return at, status
+                if not self._changed.wait(end - time.monotonic()):
+                    seen = sorted({f"{s.name}: {s.message} {[v.value for v in s.values]}" for _, s in self._seen})
+                    raise AssertionError(f"no {what} within {timeout} s; seen: {seen}")
+
+    def wait_status(self, name, message, value=None, timeout=40.0):
+        def fits(status):
+            return (status.name, status.message) == (name, message) and (
+                value is None or value in [entry.value for entry in status.values]
+            )
+
+        return self.wait(f"{message} {value or ''} of {name!r}", fits, timeout)
+
+
+def start_node(name, *, code=NODE, arguments=(), prefix=(), **options):
+    """Start a node as a process."""
+    return subprocess.Popen([*prefix, sys.executable, "-c", code, name, *arguments], **options)
+
+
+def end(process):
+    """End a process for good."""
+    process.kill()
+    process.wait()
+
+
+def value_of(status, key):
+    """Return a value of a status by its key."""
+    return next(entry.value for entry in status.values if entry.key == key)
