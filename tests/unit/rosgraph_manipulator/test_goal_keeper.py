@@ -78,3 +78,33 @@ def test_goal_without_an_id_takes_the_one_that_the_server_gave_it():
     keeper.on_goal(goal(""))
     keeper.on_status(status("server-1", GoalStatus.ACTIVE))
     assert keeper.pending.goal_id.id == "server-1"
+
+
+def test_adopted_goal_is_kept_while_the_server_has_it_at_work():
+    keeper = GoalKeeper()
+    keeper.adopt(goal("a"))
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    assert keeper.pending_id == "a"
+
+
+def test_adopted_goal_that_ended_meanwhile_is_dropped():
+    keeper = GoalKeeper()
+    keeper.adopt(goal("a"))
+    keeper.on_status(GoalStatusArray())
+    assert keeper.pending is None
+
+
+def test_adopted_goal_is_kept_while_its_server_is_replaced():
+    keeper = GoalKeeper()
+    keeper.server_changes(True)
+    keeper.adopt(goal("a"))
+    keeper.on_status(GoalStatusArray())
+    assert keeper.pending_id == "a"
+    assert not keeper.is_at_work
+
+
+def test_goal_at_work_that_is_not_pending_is_a_stray():
+    keeper = GoalKeeper()
+    keeper.on_goal(goal("new"))
+    keeper.on_status(status("old", GoalStatus.ACTIVE))
+    assert keeper.strays == {"old"}

@@ -21,12 +21,16 @@ class ConfigurationError(Exception):
 
 @dataclass(frozen=True)
 class Configuration:
-    """One way to deploy a function: a launch file with its arguments (`NAME:=VALUE`)."""
+    """One way to deploy a function: a launch file with its arguments (`NAME:=VALUE`).
+
+    It counts as ready only when the topics are published.
+    """
 
     name: str
     function: str
     launch_file: str
     args: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -45,8 +49,8 @@ def parse_settings(parameters: Mapping[str, Any]) -> Settings:
 
     Args:
         parameters: keys configurations, kill_nodes, save_action, goal_msg_type, reconfiguration_action_name. A
-            configuration is `{launch: FILE or package://PKG/FILE, args: [...], function: NAME}` or the published
-            `{command: roslaunch PKG FILE [ARG:=VALUE ...]}`.
+            configuration is `{launch: FILE or package://PKG/FILE, args: [...], function: NAME, topics: [...]}` or the
+            published `{command: roslaunch PKG FILE [ARG:=VALUE ...]}`.
 
     Raises:
         ConfigurationError: a key is missing or has a value that cannot be used.
@@ -88,13 +92,16 @@ def _configuration(name: str, entry: object) -> Configuration:
     for arg in args:
         if not ARGUMENT.fullmatch(arg):
             raise ConfigurationError(f"{where}: launch argument '{arg}' is not NAME:=VALUE")
+    topics = entry.get("topics") or []
+    if not isinstance(topics, list) or not all(isinstance(topic, str) and topic for topic in topics):
+        raise ConfigurationError(f"{where}: 'topics' must be a list of names")
     try:
         launch_file = resolve(uri)
     except ModelError as error:
         raise ConfigurationError(f"{where}: {error}") from error
     if not launch_file.is_file():
         raise ConfigurationError(f"{where}: there is no launch file {launch_file}: correct the name, or generate it")
-    return Configuration(name, function, str(launch_file), tuple(args))
+    return Configuration(name, function, str(launch_file), tuple(args), tuple(topics))
 
 
 def _parse_command(where: str, command: str) -> tuple[str, list[str]]:

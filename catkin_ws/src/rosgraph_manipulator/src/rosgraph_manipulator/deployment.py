@@ -1,12 +1,16 @@
-"""The sequence of a reconfiguration: stop, start, wait until ready; and back when that fails."""
+"""One change of configuration: the plans one after the other, and the way back when none gets there."""
 
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from rosgraph_manipulator.configuration import Configuration
+from rosgraph_manipulator.tactics import Plan
+from rosgraph_manipulator.tactics import Platform as StepPlatform
 
 
 class Result(enum.IntEnum):
@@ -22,41 +26,132 @@ class DeploymentError(Exception):
     """A step of a deployment failed; the message says which and why."""
 
 
-class Platform(Protocol):
-    """What a deployment needs of the running system. Every call blocks until done or its deadline is over."""
+class CancelledError(DeploymentError):
+    """The request was taken back, or, where it is superseded, another one takes its place at once."""
 
-    def stop(self) -> None:
-        """Stop the running configuration and wait until its nodes are gone."""
+    def __init__(self, message: str, superseded: bool = False) -> None:
+        super().__init__(message)
+        self.superseded = superseded
 
-    def start(self, configuration: Configuration) -> None:
-        """Start a configuration's nodes and wait until they are ready."""
+
+class Platform(StepPlatform, Protocol):
+    """What a deployment needs of the running system; the calls block, and raise DeploymentError."""
+
+    def begin(self, wanted: Configuration, plan: Plan) -> None:
+        """Prepare the way to a configuration by a plan; nothing is touched."""
+
+    def wait_until_ready(self) -> None:
+        """Wait until the wanted configuration's nodes answer and what it offers is there."""
+
+    def wait_until_settled(self) -> None:
+        """Wait until nodes that were started are past the age at which most that die early are dead."""
+
+    def restore(self, configuration: Configuration) -> None:
+        """Stop what runs, and start all of a configuration."""
+
+    def stop_everything(self) -> None:
+        """Stop what the launcher runs, and the robot."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a request ended: the code, the configuration that runs now (None: none does), and why."""
+    """How a request ended.
+
+    Attributes:
+        result: the code.
+        running: the configuration that runs now; None: none does, or, where a request was superseded, a part of one.
+        message: why, in one line.
+        tactic: name of the tactic that got there, `rollback`, or empty.
+        cancelled: whether the request was taken back.
+    """
 
     result: Result
     running: Configuration | None
     message: str
+    tactic: str = ""
+    cancelled: bool = False
 
 
-def deploy(platform: Platform, wanted: Configuration, last_good: Configuration | None) -> Outcome:
-    """Replace what runs by the wanted configuration; on failure restore the last good one."""
+@dataclass
+class Stopwatch:
+    """Durations of a change's phases, s, in the order in which they first began."""
+
+    clock: Callable[[], float]
+    phases: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Add the time that the body takes to a phase."""
+        self.phases.setdefault(name, 0.0)
+        began = self.clock()
+        try:
+            yield
+        finally:
+            self.phases[name] += self.clock() - began
+
+
+def deploy(
+    platform: Platform,
+    wanted: Configuration,
+    plans: Sequence[Plan],
+    last_good: Configuration | None,
+    watch: Stopwatch,
+) -> Outcome:
+    """Carry out the first plan that gets to the wanted configuration; where none does, restore the last good one.
+
+    Args:
+        platform: the running system.
+        wanted: the configuration to deploy.
+        plans: cheapest first.
+        last_good: what ran before and may be restored; None: there is nothing to go back to.
+        watch: takes the durations.
+    """
+    reasons: list[str] = []
+    touched = False
+    for plan in plans:
+        try:
+            platform.begin(wanted, plan)
+            touched = True
+            _carry_out(platform, plan, watch)
+        except CancelledError as error:
+            reason = f"{wanted.name}: {error}"
+            if not touched or error.superseded:
+                return Outcome(Result.FAILED, None if touched else last_good, reason, cancelled=True)
+            return _go_back(platform, last_good, reason, watch, cancelled=True)
+        except DeploymentError as error:
+            reasons.append(f"{plan.tactic}: {error}")
+        else:
+            failed = f" ({'; '.join(reasons)})" if reasons else ""
+            return Outcome(Result.OK, wanted, f"{wanted.name} is deployed by {plan.tactic}{failed}", plan.tactic)
+    return _go_back(platform, last_good, f"{wanted.name}: {'; '.join(reasons) or 'no tactic has a plan'}", watch)
+
+
+def _carry_out(platform: Platform, plan: Plan, watch: Stopwatch) -> None:
+    for step in plan.steps:
+        with watch.phase("change"):
+            step.run(platform)
+    with watch.phase("ready"):
+        platform.wait_until_ready()
+    if plan.started:
+        with watch.phase("settle"):
+            platform.wait_until_settled()
+
+
+def _go_back(
+    platform: Platform, last_good: Configuration | None, reason: str, watch: Stopwatch, cancelled: bool = False
+) -> Outcome:
     try:
-        platform.stop()
-        platform.start(wanted)
-    except DeploymentError as error:
-        return _restore(platform, last_good, f"{wanted.name}: {error}")
-    return Outcome(Result.OK, wanted, f"{wanted.name} is deployed")
-
-
-def _restore(platform: Platform, last_good: Configuration | None, reason: str) -> Outcome:
-    try:
-        platform.stop()
         if last_good is None:
-            return Outcome(Result.GENERAL_ERROR, None, f"{reason}; there is no earlier configuration to restore")
-        platform.start(last_good)
+            reason = f"{reason}; there is no earlier configuration to restore"
+        else:
+            with watch.phase("rollback"):
+                platform.restore(last_good)
+            return Outcome(Result.FAILED, last_good, f"{reason}; {last_good.name} was restored", "rollback", cancelled)
     except DeploymentError as error:
-        return Outcome(Result.GENERAL_ERROR, None, f"{reason}; restoring the last good one failed too: {error}")
-    return Outcome(Result.FAILED, last_good, f"{reason}; {last_good.name} was restored")
+        reason = f"{reason}; restoring {last_good.name} failed too: {error}" if last_good else f"{reason}; {error}"
+    with watch.phase("stop"):
+        try:
+            platform.stop_everything()
+        except DeploymentError as error:
+            reason = f"{reason}; {error}"
+    return Outcome(Result.GENERAL_ERROR, None, reason, cancelled=cancelled)

@@ -6,6 +6,7 @@ Works on action messages of any type: it reads only the goal ids and states that
 from __future__ import annotations
 
 import copy
+from collections import OrderedDict
 from typing import Any
 
 # States of actionlib_msgs/GoalStatus.
@@ -13,6 +14,7 @@ PENDING, ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED, PREEMPTING, RECALLING,
 TERMINAL = frozenset({PREEMPTED, SUCCEEDED, ABORTED, REJECTED, RECALLED})
 # What a server says of a goal that it drops because it is being shut down.
 DROPPED_BY_SHUTDOWN = frozenset({PREEMPTED, ABORTED, RECALLED})
+REMEMBERED = 1000  # ids of goals that have ended: many more than can be told twice
 
 
 class GoalKeeper:
@@ -20,8 +22,10 @@ class GoalKeeper:
 
     def __init__(self) -> None:
         self._goal: Any = None
-        self._finished: set[str] = set()
+        self._finished: OrderedDict[str, None] = OrderedDict()
         self._changing = False
+        self._doubted = False  # the goal was known to an earlier keeper: the server has to confirm it
+        self._listed: frozenset[str] = frozenset()
 
     @property
     def pending(self) -> Any:
@@ -33,6 +37,20 @@ class GoalKeeper:
         """Id of the pending goal, or None."""
         return self._goal.goal_id.id if self._goal is not None else None
 
+    @property
+    def is_at_work(self) -> bool:
+        """Whether the server's last status has the pending goal as one that it works at or will."""
+        return self.pending_id in self._listed
+
+    @property
+    def strays(self) -> frozenset[str]:
+        """Goals that the server has at work though they are not pending: they were cancelled or replaced meanwhile."""
+        return self._listed - {self.pending_id}
+
+    def adopt(self, goal: Any) -> None:
+        """Take over a goal from an earlier keeper, until the server's status shows that it has ended meanwhile."""
+        self._goal, self._doubted = copy.deepcopy(goal), True
+
     def server_changes(self, changing: bool) -> None:
         """Tell that the server is being replaced: that it drops the goal meanwhile does not end the goal."""
         self._changing = changing
@@ -41,10 +59,11 @@ class GoalKeeper:
         """Take in a message of the topic `goal`; a newer goal replaces the pending one."""
         if goal.goal_id.id and goal.goal_id.id in self._finished:
             return
-        self._goal = copy.deepcopy(goal)
+        self._goal, self._doubted = copy.deepcopy(goal), False
 
     def on_status(self, status: Any) -> None:
         """Take in a message of the topic `status`: it ends goals, and names those sent without an id."""
+        self._listed = frozenset(entry.goal_id.id for entry in status.status_list if entry.status in (PENDING, ACTIVE))
         for entry in status.status_list:
             goal_id, state = entry.goal_id.id, entry.status
             if state in TERMINAL:
@@ -52,6 +71,10 @@ class GoalKeeper:
             elif self._goal is not None and not self._goal.goal_id.id and state in (PENDING, ACTIVE):
                 # The server made up an id for a goal that came without one.
                 self._goal.goal_id.id, self._goal.goal_id.stamp = goal_id, entry.goal_id.stamp
+        if self._doubted and not self._changing:
+            if not self.is_at_work:
+                self._goal = None
+            self._doubted = False
 
     def on_result(self, result: Any) -> None:
         """Take in a message of the topic `result`."""
@@ -77,6 +100,6 @@ class GoalKeeper:
 
     def _finish(self, goal_id: str) -> None:
         self._goal = None
-        self._finished.add(goal_id)
-        if len(self._finished) > 1000:
-            self._finished.pop()
+        self._finished[goal_id] = None
+        if len(self._finished) > REMEMBERED:
+            self._finished.popitem(last=False)

@@ -1,12 +1,13 @@
-"""Node rosgraph_launcher: owns the processes of the configuration that runs.
-
-The roslaunch API starts them from the main thread; each gets the kernel's parent-death signal, so none outlives this
-node, however it ends.
-"""
+"""Node rosgraph_launcher: the ROS shell around `launcher`."""
 
 from __future__ import annotations
 
+import contextlib
+import math
+import os
 import queue
+import select
+import signal
 import sys
 import threading
 import time
@@ -14,29 +15,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-import rosgraph.names
-import roslaunch
-import roslaunch.pmon
+import rosgraph
 import rospy
-from metacontrol_msgs.srv import (
-    LaunchConfiguration,
-    LaunchConfigurationRequest,
-    LaunchConfigurationResponse,
-    StopConfiguration,
-    StopConfigurationRequest,
-    StopConfigurationResponse,
-)
-from std_msgs.msg import String
+from metacontrol_msgs.msg import LauncherState, Phase
+from metacontrol_msgs.srv import ChangeConfiguration, ChangeConfigurationRequest, ChangeConfigurationResponse
 
-from rosgraph_manipulator.master import NodeApi
+from rosgraph_manipulator.launcher import Launcher, LauncherError, Options
+from rosgraph_manipulator.master import MasterWatch
+from rosgraph_manipulator.settings import SettingError, boolean, number
+from rosgraph_manipulator.supervision import RestartPolicy
 
-# Kills the node when the launcher dies (PR_SET_PDEATHSIG); from util-linux, which every Debian has. The path is
-# absolute, since for cwd="node" roslaunch changes to the folder of the command's first word.
-DIE_WITH_LAUNCHER = "/usr/bin/setpriv --pdeathsig KILL --"
-SHUTDOWN_TIMEOUT = 3.0  # s, wall, for a node to end after it was asked to over XML-RPC; rospy takes 0.5 s
-SIGINT_TIMEOUT = 2.0  # s, wall, then SIGTERM
-SIGTERM_TIMEOUT = 1.0  # s, wall, then SIGKILL
-POLL_PERIOD = 0.02  # s, wall
+LOOK_PERIOD = 0.2  # s, wall, between two looks at whether the node is to end
+STANDBY_DELAY = 0.5  # s, wall, after a change: a warm process's imports must not slow the new nodes down
 
 
 @dataclass
@@ -48,115 +38,125 @@ class _Job:
     answer: Any = None
 
 
-class Launcher:
-    """Starts and stops configurations; everything but the service callbacks runs in the main thread."""
+class LauncherNode:
+    """Services and topic of the launcher; everything but the service callbacks runs in the main thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, options: Options) -> None:
         self._jobs: queue.Queue[_Job] = queue.Queue()
-        self._monitor = roslaunch.pmon.start_process_monitor()
-        self._running = ""
-        self._processes: dict[str, Any] = {}
-        self._publisher = rospy.Publisher("~running", String, queue_size=1, latch=True)
-        self._publisher.publish(String(""))
-        rospy.Service(
-            "~launch", LaunchConfiguration, lambda request: self._in_main_thread(lambda: self._launch(request))
-        )
-        rospy.Service("~stop", StopConfiguration, lambda request: self._in_main_thread(lambda: self._stop(request)))
+        self._wake_read, self._wake_write = os.pipe()
+        os.set_blocking(self._wake_write, False)
+        self._ends = ""
+        self._changed_at = time.monotonic()
+        for kind in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(kind, lambda received, _frame: self.end(f"signal {received}"))
+        self._state = rospy.Publisher("~state", LauncherState, queue_size=10, latch=True)
+        self._launcher = Launcher(options, self._publish, rospy.logwarn)
+        self._publish()
+        self._watch = MasterWatch(lambda: self.end("the master is lost"))
+        self._service = rospy.Service("~change", ChangeConfiguration, self._on_change)
+
+    def end(self, reason: str) -> None:
+        """Have the main thread end the node."""
+        self._ends = self._ends or reason
+        self._wake()
 
     def spin(self) -> None:
-        """Serve requests until the node is told to end; then stop what runs."""
-        while not self._monitor.is_shutdown and not rospy.is_shutdown():
-            self._monitor.mainthread_spin_once()
-            try:
-                job = self._jobs.get(timeout=0.1)
-            except queue.Empty:
-                continue
-            job.answer = job.work()
-            job.done.set()
-        if not self._monitor.is_shutdown:
-            self._stop_processes()
-            self._monitor.shutdown()
-        self._monitor.join()
-        rospy.signal_shutdown("the launcher ends")
+        """Serve requests and look after the nodes until the node is told to end; then stop what runs."""
+        while not self._ends and not rospy.is_shutdown():
+            self._wait()
+            with contextlib.suppress(queue.Empty):
+                job = self._jobs.get_nowait()
+                job.answer = job.work()
+                job.done.set()
+                self._changed_at = time.monotonic()
+            self._launcher.look_after()
+            if self._jobs.empty() and time.monotonic() - self._changed_at > STANDBY_DELAY:
+                self._launcher.stand_by()
+        self._watch.close()
+        lost = self._ends == "the master is lost"
+        if lost:
+            sys.stderr.write(f"rosgraph_launcher: {self._ends}: its nodes are stopped, and it ends\n")
+        self._launcher.close(gently=not lost)
+        if not lost:
+            rospy.signal_shutdown(self._ends)
 
-    def _in_main_thread(self, work: Callable[[], Any]) -> Any:
-        job = _Job(work)
+    def _wait(self) -> None:
+        due = self._launcher.next_due()
+        timeout = LOOK_PERIOD if due is None else min(LOOK_PERIOD, max(0.0, due - time.monotonic()))
+        poll = select.poll()
+        poll.register(self._wake_read, select.POLLIN)
+        for descriptor in self._launcher.pidfds():
+            poll.register(descriptor, select.POLLIN)
+        for descriptor, _ in poll.poll(math.ceil(1000.0 * timeout)):
+            if descriptor == self._wake_read:
+                os.read(self._wake_read, 4096)
+
+    def _wake(self) -> None:
+        with contextlib.suppress(BlockingIOError):  # full: it will wake up
+            os.write(self._wake_write, b"\0")
+
+    def _on_change(self, request: ChangeConfigurationRequest) -> ChangeConfigurationResponse:
+        job = _Job(lambda: self._change(request))
         self._jobs.put(job)
+        self._wake()
         while not job.done.wait(0.5):
-            if rospy.is_shutdown() or self._monitor.is_shutdown:
+            if rospy.is_shutdown() or self._ends:
                 raise rospy.ServiceException("the launcher is shutting down")
         return job.answer
 
-    def _launch(self, request: LaunchConfigurationRequest) -> LaunchConfigurationResponse:
-        if self._running:
-            return LaunchConfigurationResponse(False, f"{self._running} still runs: stop it first", [])
+    def _change(self, request: ChangeConfigurationRequest) -> ChangeConfigurationResponse:
         try:
-            config = roslaunch.config.load_config_default(
-                [(request.launch_file, list(request.args))], None, assign_machines=True
+            phases = self._launcher.change(
+                request.configuration, request.launch_file, list(request.args), list(request.start)
             )
-            if config.config_errors:
-                return LaunchConfigurationResponse(False, _one_line(config.config_errors[0]), [])
-            names = [rosgraph.names.ns_join(node.namespace, node.name) for node in config.nodes]
-            if not names:
-                return LaunchConfigurationResponse(False, f"{request.launch_file} starts no node", [])
-            for node in config.nodes:
-                node.launch_prefix = f"{DIE_WITH_LAUNCHER} {node.launch_prefix or ''}".strip()
-            runner = roslaunch.launch.ROSLaunchRunner(
-                rospy.get_param("/run_id", None) or roslaunch.core.generate_run_id(),
-                config,
-                pmon=self._monitor,
-                sigint_timeout=SIGINT_TIMEOUT,
-                sigterm_timeout=SIGTERM_TIMEOUT,
-            )
-            before = set(self._monitor.procs)
-            _, failed = runner.launch()
-        except (roslaunch.core.RLException, roslaunch.xmlloader.XmlParseException, OSError) as error:
-            return LaunchConfigurationResponse(False, _one_line(error), [])
-        started = [process for process in self._monitor.procs if process not in before]
-        self._processes = dict(zip(names, started, strict=False))
-        if failed:
-            self._stop_processes()
-            return LaunchConfigurationResponse(False, f"could not start {', '.join(map(str, failed))}", [])
-        self._set_running(request.name)
-        return LaunchConfigurationResponse(True, "", names)
+        except LauncherError as error:
+            return ChangeConfigurationResponse(False, str(error), [])
+        return ChangeConfigurationResponse(True, "", [Phase(*phase) for phase in phases.items()])
 
-    def _stop(self, request: StopConfigurationRequest) -> StopConfigurationResponse:
-        if request.name and request.name != self._running:
-            return StopConfigurationResponse(False, f"'{request.name}' does not run, '{self._running}' does")
-        errors = self._stop_processes()
-        self._set_running("")
-        return StopConfigurationResponse(not errors, "; ".join(errors))
-
-    def _stop_processes(self) -> list[str]:
-        """Ask the nodes to shut down, wait until they are gone, and escalate where they are not."""
-        for name, process in self._processes.items():
-            if process.is_alive():
-                NodeApi.request_shutdown(name, "replaced by another configuration")
-        deadline = time.monotonic() + SHUTDOWN_TIMEOUT
-        while time.monotonic() < deadline and any(process.is_alive() for process in self._processes.values()):
-            time.sleep(POLL_PERIOD)
-        errors: list[str] = []
-        for process in self._processes.values():
-            if process.is_alive():
-                process.stop(errors)
-        self._processes = {}
-        return [_one_line(error) for error in errors]
-
-    def _set_running(self, name: str) -> None:
-        self._running = name
-        self._publisher.publish(String(name))
+    def _publish(self) -> None:
+        launcher = self._launcher if hasattr(self, "_launcher") else None
+        if launcher is None:
+            return  # it is being made, and nothing runs
+        message = LauncherState(
+            configuration=launcher.configuration,
+            state=launcher.state,
+            nodes=list(launcher.nodes),
+            dead=list(launcher.dead),
+            message=launcher.message,
+        )
+        message.header.stamp = rospy.Time.now()
+        self._state.publish(message)
 
 
-def _one_line(error: object) -> str:
-    return " ".join(str(error).split())
+def read_options() -> Options:
+    """Read the node's parameters.
+
+    Raises:
+        SettingError: one can't be used.
+    """
+    get = rospy.get_param
+    policy = RestartPolicy()
+    return Options(
+        mark=f"{rosgraph.get_master_uri()}{rospy.get_name()}",
+        run_id=str(get("/run_id", "")),
+        shutdown_timeout=number("~shutdown_timeout", get("~shutdown_timeout", Options.shutdown_timeout), low=0.0),
+        sigint_timeout=number("~sigint_timeout", get("~sigint_timeout", Options.sigint_timeout), low=0.0),
+        standby=boolean("~standby", get("~standby", Options.standby)),
+        policy=RestartPolicy(
+            intensity=int(number("~restart_intensity", get("~restart_intensity", policy.intensity), low=0)),
+            period=number("~restart_period", get("~restart_period", policy.period), low=0.1),
+            first_delay=number("~restart_delay", get("~restart_delay", policy.first_delay), low=0.0),
+        ),
+    )
 
 
 def main() -> None:
-    """Run the node."""
+    """Run the node; exit status 2 when it can't start."""
     try:
-        # roslaunch's process monitor handles the signals of this process.
+        # Signals are for the main thread, which first stops the nodes.
         rospy.init_node("rosgraph_launcher", disable_signals=True)
-    except rospy.ROSInitException as error:
-        sys.stderr.write(f"rosgraph_launcher: {_one_line(error)}\n")
+        node = LauncherNode(read_options())
+    except (rospy.ROSInitException, SettingError, OSError) as error:
+        sys.stderr.write(f"rosgraph_launcher: {' '.join(str(error).split())}\n")
         sys.exit(2)
-    Launcher().spin()
+    node.spin()

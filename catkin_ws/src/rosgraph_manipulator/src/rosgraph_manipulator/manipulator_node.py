@@ -2,303 +2,401 @@
 
 from __future__ import annotations
 
-import base64
-import io
+import queue
 import sys
 import threading
 import time
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import actionlib
-import rosgraph
-import roslib.message
 import rospy
 import yaml
-from actionlib_msgs.msg import GoalID, GoalStatusArray
-from geometry_msgs.msg import Twist
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
     FunctionGrounding,
+    LauncherState,
     MvpReconfigurationAction,
-    MvpReconfigurationGoal,
     MvpReconfigurationResult,
+    Phase,
 )
-from metacontrol_msgs.srv import LaunchConfiguration, StopConfiguration
-from std_msgs.msg import String
 
 from rosgraph_manipulator.configuration import Configuration, ConfigurationError, Settings, parse_settings
-from rosgraph_manipulator.deployment import DeploymentError, Outcome, Result, deploy
-from rosgraph_manipulator.goal_keeper import GoalKeeper
-from rosgraph_manipulator.master import NodeApi
+from rosgraph_manipulator.deployment import CancelledError, DeploymentError, Outcome, Result, Stopwatch, deploy
+from rosgraph_manipulator.description import compare
+from rosgraph_manipulator.goal_node import PendingGoal
+from rosgraph_manipulator.journal import Journal, Resumption, parse_journal, resume
+from rosgraph_manipulator.master import MasterWatch
+from rosgraph_manipulator.platform_node import RosPlatform
+from rosgraph_manipulator.request_queue import Policy, RequestQueue
+from rosgraph_manipulator.settings import SettingError, choice, number
+from rosgraph_manipulator.tactics import Plan, Tactic, TacticError, load_tactics, plans
 
-POLL_PERIOD = 0.02  # s, wall
 KEYS = ("configurations", "kill_nodes", "save_action", "goal_msg_type", "reconfiguration_action_name")
-
-
-def wait_until(condition: Callable[[], bool], timeout: float) -> bool:
-    """Wait, in wall time, for a condition; return whether it came to hold within `timeout` seconds."""
-    deadline = time.monotonic() + timeout
-    while not condition():
-        if time.monotonic() > deadline or rospy.is_shutdown():
-            return False
-        time.sleep(POLL_PERIOD)
-    return True
-
-
-class PendingGoal:
-    """Carries the pending goal of an action over to a new server."""
-
-    def __init__(self, action: str, action_type: str) -> None:
-        self._action = action
-        self._goal_type = action_type + "Goal"
-        self._keeper = GoalKeeper()
-        self._lock = threading.Lock()
-        self._status_count = 0
-        self._server_goals: frozenset[str] = frozenset()
-        goal_class = _message_class(self._goal_type)
-        result_class = _message_class(action_type + "Result")
-        self._goal_publisher = rospy.Publisher(f"{action}/goal", goal_class, queue_size=1)
-        self._cancel_publisher = rospy.Publisher(f"{action}/cancel", GoalID, queue_size=1)
-        rospy.Subscriber(f"{action}/goal", goal_class, self._locked(self._keeper.on_goal), queue_size=10)
-        rospy.Subscriber(f"{action}/result", result_class, self._locked(self._keeper.on_result), queue_size=10)
-        rospy.Subscriber(f"{action}/cancel", GoalID, self._locked(self._keeper.on_cancel), queue_size=10)
-        rospy.Subscriber(f"{action}/status", GoalStatusArray, self._locked(self._on_status), queue_size=10)
-
-    def before_stop(self) -> None:
-        """Note that the server is about to be stopped."""
-        with self._lock:
-            self._keeper.server_changes(True)
-
-    def hand_over(self) -> int:
-        """Leave the goal where a new server finds it at its start; return the count of status messages so far."""
-        with self._lock:
-            goal = self._keeper.pending
-            parameter = f"{self._action}/resume_goal"
-            if goal is not None:
-                buffer = io.BytesIO()
-                goal.serialize(buffer)
-                data = base64.b64encode(buffer.getvalue()).decode("ascii")
-                rospy.set_param(parameter, {"type": self._goal_type, "data": data})
-            elif rospy.has_param(parameter):
-                rospy.delete_param(parameter)
-            return self._status_count
-
-    def server_is_up(self, status_count: int) -> bool:
-        """Tell whether a new server has published its status since `hand_over`."""
-        return self._status_count > status_count
-
-    def after_start(self) -> None:
-        """Send the goal again where the new server did not take it over, and tell it what was cancelled meanwhile."""
-        with self._lock:
-            self._keeper.server_changes(False)
-            goal = self._keeper.pending
-            strays = self._server_goals - {self._keeper.pending_id}
-            if goal is not None and goal.goal_id.id not in self._server_goals:
-                rospy.loginfo("sending the pending goal %s to the new server of %s", goal.goal_id.id, self._action)
-                self._goal_publisher.publish(goal)
-        for goal_id in strays:
-            self._cancel_publisher.publish(GoalID(id=goal_id))
-
-    def _on_status(self, status: GoalStatusArray) -> None:
-        self._keeper.on_status(status)
-        self._server_goals = frozenset(entry.goal_id.id for entry in status.status_list if entry.status <= 1)
-        self._status_count += 1
-
-    def _locked(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        def locked(message: Any) -> None:
-            with self._lock:
-                callback(message)
-
-        return locked
-
-
-class RosPlatform:
-    """What a deployment needs of the running ROS system (the Platform of `deploy`)."""
-
-    def __init__(self, settings: Settings) -> None:
-        self._kill_nodes = settings.kill_nodes
-        self._ready_timeout = float(rospy.get_param("~ready_timeout", 15.0))  # s, wall, from start to ready
-        self._service_timeout = float(rospy.get_param("~launcher_timeout", 10.0))  # s, wall, to find the launcher
-        self._goal = PendingGoal(settings.save_action, str(settings.action_type)) if settings.save_action else None
-        self._launch = rospy.ServiceProxy("rosgraph_launcher/launch", LaunchConfiguration)
-        self._stop = rospy.ServiceProxy("rosgraph_launcher/stop", StopConfiguration)
-
-    def stop(self) -> None:
-        """Stop the running configuration, and nodes of the same function that somebody else started."""
-        if self._goal:
-            self._goal.before_stop()
-        answer = self._call(self._stop, name="")
-        if not answer.ok:
-            raise DeploymentError(f"stopping failed: {answer.message}")
-        for node in self._kill_nodes:
-            name = rospy.resolve_name(node)
-            if NodeApi.is_answering(name):
-                NodeApi.request_shutdown(name, "replaced by another configuration")
-                if not wait_until(partial(_is_gone, name), self._ready_timeout):
-                    raise DeploymentError(f"node {name} does not end")
-
-    def start(self, configuration: Configuration) -> None:
-        """Start the nodes; wait until each answers and the action server, if one is kept, is up with its goal."""
-        status_count = self._goal.hand_over() if self._goal else 0
-        answer = self._call(
-            self._launch,
-            name=configuration.name,
-            launch_file=configuration.launch_file,
-            args=list(configuration.args),
-        )
-        if not answer.ok:
-            raise DeploymentError(answer.message)
-        deadline = time.monotonic() + self._ready_timeout
-        for node in answer.nodes:
-            if not wait_until(partial(NodeApi.is_answering, node), deadline - time.monotonic()):
-                raise DeploymentError(f"node {node} is not up within {self._ready_timeout:g} s; see its log")
-        if self._goal:
-            goal = self._goal
-            if not wait_until(lambda: goal.server_is_up(status_count), deadline - time.monotonic()):
-                raise DeploymentError(f"its action server is not up within {self._ready_timeout:g} s")
-            goal.after_start()
-
-    def _call(self, service: rospy.ServiceProxy, **request: Any) -> Any:
-        try:
-            service.wait_for_service(self._service_timeout)
-            return service(**request)
-        except (rospy.ServiceException, rospy.ROSException) as error:
-            raise DeploymentError(f"rosgraph_launcher did not do its part ({error}); is it running?") from error
+HEARTBEAT_PERIOD = 2.0  # s, wall
 
 
 class Manipulator:
-    """The action server, and what is known to run."""
+    """The action server, and what is known to run; one thread carries out everything, one thing after the other."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, tactics: Mapping[str, Tactic], initial: str) -> None:
+        get = rospy.get_param
         self._settings = settings
-        self._platform = RosPlatform(settings)
-        self._lock = threading.RLock()  # one deployment at a time
+        self._tactics = tactics
+        self._probation = number("~probation", get("~probation", 5.0), low=0.0)  # s, wall
+        policy = choice("~concurrency", get("~concurrency", Policy.WAIT.value), [policy.value for policy in Policy])
+        self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._requests = RequestQueue(Policy(policy))
+        self._handles: dict[str, actionlib.ServerGoalHandle] = {}
+        self._lock = threading.Lock()  # requests, handles, interruption
+        self._interruption: CancelledError | None = None
         self._running: Configuration | None = None
-        self._launcher_runs: str | None = None  # None until the launcher has said so
+        self._last_good: Configuration | None = None
+        self._previous: Configuration | None = None  # what the present one has replaced
+        self._recovering = False
+        self._deployed_at = -self._probation  # time.monotonic()
+        self._journal = Journal()
+        self._journal_lock = threading.Lock()
         self._active = rospy.Publisher(
-            "rosgraph_manipulator/active_configuration", ActiveConfiguration, queue_size=5, latch=True
+            "rosgraph_manipulator/active_configuration", ActiveConfiguration, queue_size=10, latch=True
         )
-        self._cmd_vel = rospy.Publisher("cmd_vel", Twist, queue_size=1)
-        rospy.Subscriber("rosgraph_launcher/running", String, self._on_launcher_state, queue_size=5)
-        self._server = actionlib.SimpleActionServer(
-            settings.reconfiguration_action_name, MvpReconfigurationAction, self._execute, auto_start=False
+        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        self._resumption = self._find_resumption(initial, number("~launcher_timeout", get("~launcher_timeout", 10.0)))
+        self._server = actionlib.ActionServer(
+            settings.reconfiguration_action_name,
+            MvpReconfigurationAction,
+            self._on_goal,
+            self._on_cancel,
+            auto_start=False,
         )
 
-    def start(self, initial: Configuration | None) -> None:
-        """Take over what the launcher runs already, else deploy the initial configuration; then serve requests."""
-        timeout = float(rospy.get_param("~launcher_timeout", 10.0))
-        if not wait_until(lambda: self._launcher_runs is not None, timeout):
+    def _find_resumption(self, initial: str, launcher_timeout: float) -> Resumption:
+        """Look what the launcher runs and what an earlier manipulator has left, and begin to follow both."""
+        get = rospy.get_param
+        journal = parse_journal(get("~journal", None))
+        try:
+            state = rospy.wait_for_message("rosgraph_launcher/state", LauncherState, launcher_timeout)
+        except rospy.ROSException:
+            state = LauncherState()
             rospy.logwarn("rosgraph_launcher is not there; start it beside this node: nothing can be deployed without")
-        running = self._settings.configurations.get(self._launcher_runs or "")
+        known = self._settings.configurations
+        launched = state.configuration if state.configuration in known else ""
+        failed = state.state == LauncherState.FAILED
+        resumption = resume(journal, launched, failed, initial, time.time())
+        goal = None
+        if self._settings.save_action:
+            goal = PendingGoal(
+                self._settings.save_action,
+                str(self._settings.action_type),
+                adopt=resumption.keep_goal,
+                changing=bool(resumption.deploy),
+            )
+        self._platform = RosPlatform(
+            self._settings,
+            goal,
+            ready_timeout=number("~ready_timeout", get("~ready_timeout", 15.0), low=0.1),
+            settle_time=number("~settle_time", get("~settle_time", 1.0), low=0.0),
+            launcher_timeout=launcher_timeout,
+            on_state=lambda _state: self._work.put(self._follow_launcher),
+        )
+        self._platform.check = self._check
+        self._platform.launcher = self._platform.launcher or state
+        return resumption
+
+    # -- life -----------------------------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Take over what runs, else deploy; then serve requests until the node or the master ends."""
+        known = self._settings.configurations
+        running = known.get(self._resumption.running)
+        wanted = known.get(self._resumption.deploy)
+        self._last_good = known.get(self._resumption.last_good)
+        self._watch = MasterWatch(self._on_master_loss, heartbeat=self._heartbeat)
+        rospy.on_shutdown(self._close)
         if running:
-            self._running = running
+            self._running = self._last_good = running
+            self._note()
             self._announce(running, FunctionGrounding.STABLE)
             rospy.loginfo("took over the running configuration %s", running.name)
-        elif initial:
-            self._deploy(initial)
+        elif wanted:
+            self._deploy(wanted)
         self._server.start()
+        while not rospy.is_shutdown():
+            try:
+                work = self._work.get(timeout=0.2)
+            except queue.Empty:
+                continue
+            work()
 
-    def _execute(self, goal: MvpReconfigurationGoal) -> None:
-        name = goal.desired_configuration_name
-        wanted = self._settings.configurations.get(name)
-        if wanted is None:
+    def _close(self) -> None:
+        self._watch.close()
+        self._note(ended=True)
+
+    def _on_master_loss(self) -> None:
+        sys.stderr.write("rosgraph_manipulator: the master is lost: the manipulator ends\n")
+        self._watch.close()
+        rospy.signal_shutdown("the master is lost")
+
+    def _heartbeat(self) -> None:
+        if time.time() - self._journal.alive > HEARTBEAT_PERIOD:
+            self._note()
+
+    def _note(self, wanted: str | None = None, ended: bool = False) -> None:
+        """Write the journal."""
+        with self._journal_lock:
+            self._journal = replace(
+                self._journal,
+                configuration=self._last_good.name if self._last_good else "",
+                wanted=self._journal.wanted if wanted is None else wanted,
+                alive=time.time(),
+                ended=ended,
+            )
+            try:
+                rospy.set_param("~journal", self._journal.as_parameter())
+            except (rospy.ROSException, OSError):
+                return  # without a master there is nobody to read it
+
+    # -- requests -------------------------------------------------------------------------------------------------
+
+    def _on_goal(self, handle: actionlib.ServerGoalHandle) -> None:
+        name = handle.get_goal().desired_configuration_name
+        if name not in self._settings.configurations:
             message = f"unknown configuration '{name}'; known are: {', '.join(sorted(self._settings.configurations))}"
             rospy.logerr("%s", message)
-            self._server.set_aborted(MvpReconfigurationResult(Result.UNKNOWN), message)
+            handle.set_accepted()
+            handle.set_aborted(MvpReconfigurationResult(Result.UNKNOWN), message)
             return
-        outcome = self._deploy(wanted)
+        request = handle.get_goal_id().id
+        with self._lock:
+            arrival = self._requests.arrive(request)
+            dropped = [self._handles.pop(old) for old in arrival.dropped]
+            if arrival.accepted:
+                self._handles[request] = handle
+            if arrival.interrupts:
+                self._interruption = CancelledError(f"given up for {name}", superseded=True)
+        for old in dropped:
+            old.set_canceled(MvpReconfigurationResult(Result.FAILED), f"given up for {name}")
+        if not arrival.accepted:
+            handle.set_rejected(MvpReconfigurationResult(Result.FAILED), "another change is under way")
+            return
+        handle.set_accepted()
+        self._work.put(self._next_request)
+
+    def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
+        request = handle.get_goal_id().id
+        with self._lock:
+            waited = self._requests.take_back(request)
+            if waited:
+                self._handles.pop(request, None)
+            elif self._requests.running == request and self._interruption is None:
+                self._interruption = CancelledError("the request was taken back")
+        if waited:
+            handle.set_canceled(MvpReconfigurationResult(Result.FAILED), "taken back before its turn came")
+
+    def _next_request(self) -> None:
+        with self._lock:
+            request = self._requests.next()
+            handle = self._handles.pop(request, None) if request else None
+            self._interruption = None
+        if handle is None:
+            return
+        try:
+            outcome = self._deploy(self._settings.configurations[handle.get_goal().desired_configuration_name])
+        finally:
+            with self._lock:
+                self._requests.finish()
+                self._interruption = None
         result = MvpReconfigurationResult(int(outcome.result))
         if outcome.result is Result.OK:
-            self._server.set_succeeded(result, outcome.message)
+            handle.set_succeeded(result, outcome.message)
+        elif outcome.cancelled:
+            handle.set_canceled(result, outcome.message)
         else:
-            self._server.set_aborted(result, outcome.message)
+            handle.set_aborted(result, outcome.message)
+
+    def _check(self) -> None:
+        interruption = self._interruption
+        if interruption is not None:
+            raise interruption
+
+    # -- changes --------------------------------------------------------------------------------------------------
 
     def _deploy(self, wanted: Configuration) -> Outcome:
-        with self._lock:
-            if wanted == self._running:
-                return Outcome(Result.OK, wanted, f"{wanted.name} runs already")
-            began = time.monotonic()
-            self._announce(wanted, FunctionGrounding.RECONFIGURING)
-            try:
-                outcome = deploy(self._platform, wanted, self._running)
-            except (rospy.ROSException, rosgraph.MasterException, OSError) as error:
-                outcome = Outcome(Result.GENERAL_ERROR, None, f"{wanted.name}: {error}")
-            self._running = outcome.running
-            if outcome.running:
-                self._announce(outcome.running, FunctionGrounding.STABLE)
-            else:
-                self._cmd_vel.publish(Twist())
-                self._announce(wanted, FunctionGrounding.FAILED)
-            log = rospy.loginfo if outcome.result is Result.OK else rospy.logerr
-            log("%s (%.2f s)", outcome.message, time.monotonic() - began)
-            return outcome
+        watch = Stopwatch(time.monotonic)
+        began = time.monotonic()
+        last_good = self._last_good if self._last_good != wanted else None
+        self._announce(wanted, FunctionGrounding.RECONFIGURING)
+        self._note(wanted=wanted.name)
+        try:
+            with watch.phase("plan"):
+                found = self._plans(wanted)
+            outcome = deploy(self._platform, wanted, found, last_good or self._running, watch)
+        except (DeploymentError, rospy.ROSException, OSError) as error:
+            outcome = self._untouched(wanted, " ".join(str(error).split()))
+        self._take(wanted, outcome, watch, began)
+        return outcome
 
-    def _announce(self, configuration: Configuration, state: str) -> None:
+    def _plans(self, wanted: Configuration) -> list[Plan]:
+        difference = compare(self._platform.running(), self._platform.describe(wanted))
+        found, problems = plans(difference, self._platform.facts, self._tactics)
+        for problem in problems:
+            rospy.logwarn("%s", problem)
+        return found
+
+    def _untouched(self, wanted: Configuration, reason: str) -> Outcome:
+        """What becomes of a request that failed before anything was touched."""
+        if self._running is None:
+            return Outcome(Result.GENERAL_ERROR, None, f"{wanted.name}: {reason}")
+        return Outcome(Result.FAILED, self._running, f"{wanted.name}: {reason}; {self._running.name} runs on")
+
+    def _take(self, wanted: Configuration, outcome: Outcome, watch: Stopwatch, began: float) -> None:
+        """Take in how a change ended, and tell it."""
+        phases = watch.phases
+        if "change" in phases and outcome.result is Result.OK:
+            phases = {}
+            for name, duration in watch.phases.items():
+                phases.update(self._platform.launcher_phases if name == "change" else {name: duration})
+        phases["total"] = time.monotonic() - began
+        self._running, self._recovering = outcome.running, False
+        if outcome.running:
+            replaced = self._last_good if outcome.result is Result.OK and self._last_good != outcome.running else None
+            self._previous, self._last_good = replaced, outcome.running
+            self._deployed_at = time.monotonic()
+            self._announce(outcome.running, FunctionGrounding.STABLE, outcome, phases)
+        elif outcome.result is Result.GENERAL_ERROR:
+            self._platform.stop_robot()
+            self._announce(wanted, FunctionGrounding.FAILED, outcome, phases)
+        self._note(wanted="")
+        durations = ", ".join(f"{name} {duration:.3f}" for name, duration in phases.items())
+        log = rospy.loginfo if outcome.result is Result.OK else rospy.logerr
+        log("%s (s: %s)", outcome.message, durations)
+        self._diagnose(outcome.result is Result.OK, outcome.message, wanted.name)
+
+    # -- the launcher's part --------------------------------------------------------------------------------------
+
+    def _follow_launcher(self) -> None:
+        """See whether what runs is what should run; the launcher has said something new."""
+        state, running = self._platform.launcher, self._running
+        if state is None or running is None or state.state == LauncherState.CHANGING:
+            return
+        if state.configuration != running.name:
+            rospy.logwarn("rosgraph_launcher runs %s: deploying %s", state.configuration or "nothing", running.name)
+            self._running = None
+            self._deploy(running)
+        elif state.state == LauncherState.FAILED:
+            self._give_up(running, state.message)
+        elif state.state == LauncherState.RECOVERING and not self._recovering:
+            self._recover(running, state.message)
+        elif state.state == LauncherState.STABLE and self._recovering:
+            self._end_recovery(running)
+
+    def _recover(self, running: Configuration, reason: str) -> None:
+        previous = self._previous
+        if previous is not None and time.monotonic() - self._deployed_at < self._probation:
+            rospy.logerr("%s soon after the change: %s: going back to %s", running.name, reason, previous.name)
+            self._diagnose(False, f"{running.name}: {reason}; {previous.name} is restored", running.name)
+            self._running = self._last_good = None
+            self._deploy(previous)
+            return
+        self._recovering = True
+        self._platform.node_died()
+        self._announce(running, FunctionGrounding.RECOVERING, Outcome(Result.OK, running, reason))
+        self._diagnose(False, reason, running.name)
+
+    def _end_recovery(self, running: Configuration) -> None:
+        try:
+            self._platform.recovered()
+        except DeploymentError as error:
+            rospy.logwarn("%s", error)
+            return  # the launcher will say how it goes on
+        self._recovering = False
+        self._announce(running, FunctionGrounding.STABLE, Outcome(Result.OK, running, "recovered", "recovery"))
+        self._diagnose(True, "recovered", running.name)
+
+    def _give_up(self, running: Configuration, reason: str) -> None:
+        self._running = self._last_good = None
+        self._recovering = False
+        self._platform.stop_robot()
+        self._note(wanted="")
+        rospy.logerr("%s has failed: %s", running.name, reason)
+        self._announce(running, FunctionGrounding.FAILED, Outcome(Result.GENERAL_ERROR, None, reason))
+        self._diagnose(False, reason, running.name)
+
+    # -- what is told ---------------------------------------------------------------------------------------------
+
+    def _announce(
+        self,
+        configuration: Configuration,
+        state: str,
+        outcome: Outcome | None = None,
+        phases: Mapping[str, float] | None = None,
+    ) -> None:
         message = ActiveConfiguration(functions=[FunctionGrounding(configuration.function, configuration.name, state)])
         message.header.stamp = rospy.Time.now()
+        if outcome:
+            message.tactic, message.message = outcome.tactic, outcome.message
+            message.phases = [Phase(*phase) for phase in (phases or {}).items()]
         self._active.publish(message)
 
-    def _on_launcher_state(self, message: String) -> None:
-        """Bring the configuration back when the launcher was restarted and runs nothing."""
-        self._launcher_runs = message.data
-        if message.data or not self._lock.acquire(blocking=False):
-            return  # something runs, or a change is under way
-        lost, self._running = self._running, None
-        self._lock.release()
-        if lost:
-            rospy.logwarn("rosgraph_launcher came back without %s: deploying it again", lost.name)
-            threading.Thread(target=self._deploy, args=(lost,), daemon=True).start()
+    def _diagnose(self, ok: bool, message: str, configuration: str) -> None:
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.OK if ok else DiagnosticStatus.ERROR,
+            name="rosgraph_manipulator",
+            message=message,
+            values=[KeyValue("configuration", configuration)],
+        )
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = rospy.Time.now()
+        self._diagnostics.publish(array)
 
 
-def _is_gone(node: str) -> bool:
-    return not NodeApi.is_answering(node)
-
-
-def _message_class(name: str) -> Any:
-    message_class = roslib.message.get_message_class(name)
-    if message_class is None:
-        raise ConfigurationError(f"parameter 'goal_msg_type': message type {name} is not installed")
-    return message_class
-
-
-def _read_parameters(arguments: list[str]) -> dict[str, Any]:
+def read_parameters(arguments: list[str]) -> dict[str, Any]:
     """Read the configuration from the file named by the first argument, else from parameters.
 
     As published, a file's keys become parameters of the node's namespace too.
+
+    Raises:
+        ConfigurationError: the file can't be read.
     """
     if arguments:
-        try:
-            with open(arguments[0], encoding="utf-8") as file:
-                content = yaml.safe_load(file)
-        except (OSError, UnicodeDecodeError) as error:
-            raise ConfigurationError(f"{arguments[0]}: cannot be read: {error}") from error
-        except yaml.YAMLError as error:
-            raise ConfigurationError(f"{arguments[0]}: is not YAML: {' '.join(str(error).split())}") from error
-        if not isinstance(content, dict):
-            raise ConfigurationError(f"{arguments[0]}: expected keys such as 'configurations', found none")
+        content = read_file(arguments[0])
         for key, value in content.items():
             rospy.set_param(key, value)
         return content
     return {key: rospy.get_param(f"~{key}", rospy.get_param(key, None)) for key in KEYS}
 
 
+def read_file(name: str) -> dict[str, Any]:
+    """Return the keys of a configuration file.
+
+    Raises:
+        ConfigurationError: it can't be read.
+    """
+    try:
+        with open(name, encoding="utf-8") as file:
+            content = yaml.safe_load(file)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"{name}: cannot be read: {error}") from error
+    except yaml.YAMLError as error:
+        raise ConfigurationError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(content, dict):
+        raise ConfigurationError(f"{name}: expected keys such as 'configurations', found none")
+    return content
+
+
 def main() -> None:
     """Run the node; exit status 2 when its configuration cannot be used."""
     try:
         rospy.init_node("rosgraph_manipulator")
-        settings = parse_settings(_read_parameters(rospy.myargv()[1:]))
-        initial = None
-        name = rospy.get_param("~initial_configuration", "")
-        if name:
-            initial = settings.configurations.get(name)
-            if initial is None:
-                known = ", ".join(sorted(settings.configurations))
-                raise ConfigurationError(f"parameter '~initial_configuration' is '{name}'; known are: {known}")
-        manipulator = Manipulator(settings)
-    except (ConfigurationError, rospy.ROSInitException) as error:
+        settings = parse_settings(read_parameters(rospy.myargv()[1:]))
+        initial = str(rospy.get_param("~initial_configuration", ""))
+        if initial and initial not in settings.configurations:
+            known = ", ".join(sorted(settings.configurations))
+            raise ConfigurationError(f"parameter '~initial_configuration' is '{initial}'; known are: {known}")
+        manipulator = Manipulator(settings, load_tactics(), initial)
+    except (ConfigurationError, SettingError, TacticError, rospy.ROSInitException) as error:
         sys.stderr.write(f"rosgraph_manipulator: {' '.join(str(error).split())}\n")
         sys.exit(2)
-    manipulator.start(initial)
-    rospy.spin()
+    manipulator.run()

@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import http.client
+import os
 import socket
+import threading
+import time
 import xmlrpc.client
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import rosgraph
 
 CALL_TIMEOUT = 1.0  # s, wall
+WATCH_PERIOD = 0.4  # s, wall, between two calls that see whether the master is there
+LOST_AFTER = 1.2  # s, wall, without an answer, after which it counts as lost: noticed within 2 s
+CALLER = "/rosgraph_manipulator"
+
+_TRANSPORT_ERRORS = (OSError, xmlrpc.client.Error, http.client.HTTPException)
+
+
+class MasterError(Exception):
+    """The master does not answer, or refuses; the message says what."""
 
 
 class _Transport(xmlrpc.client.Transport):
@@ -22,30 +35,188 @@ class _Transport(xmlrpc.client.Transport):
         return connection
 
 
+def _proxy(uri: str) -> Any:
+    return xmlrpc.client.ServerProxy(uri, transport=_Transport(), allow_none=False)
+
+
+def _master() -> Any:
+    return _proxy(rosgraph.get_master_uri())
+
+
 class NodeApi:
     """The XML-RPC API that every ROS node offers."""
 
-    CALLER = "/rosgraph_manipulator"
+    @classmethod
+    def address(cls, name: str) -> str | None:
+        """Return the address that the master has of a node; None where it has none."""
+        try:
+            code, _, uri = _master().lookupNode(CALLER, name)
+        except (*_TRANSPORT_ERRORS, ValueError):
+            return None
+        return str(uri) if code == 1 and uri else None
+
+    @classmethod
+    def pid(cls, name: str) -> int | None:
+        """Return a node's process id, or None where it is not registered or does not answer."""
+        uri = cls.address(name)
+        if uri is None:
+            return None
+        try:
+            code, _, pid = _proxy(uri).getPid(CALLER)
+        except (*_TRANSPORT_ERRORS, ValueError):
+            return None
+        return int(pid) if code == 1 else None
 
     @classmethod
     def is_answering(cls, name: str) -> bool:
         """Tell whether a node is registered at the master and answers."""
-        try:
-            uri = rosgraph.Master(cls.CALLER).lookupNode(name)
-            answer: Any = xmlrpc.client.ServerProxy(uri, transport=_Transport()).getPid(cls.CALLER)
-            code = answer[0]
-        except (rosgraph.MasterException, OSError, xmlrpc.client.Error, http.client.HTTPException, LookupError):
-            return False
-        return bool(code == 1)
+        return cls.pid(name) is not None
 
     @classmethod
     def request_shutdown(cls, name: str, reason: str) -> bool:
         """Ask a node to end; return whether it could be asked."""
+        uri = cls.address(name)
+        if uri is None:
+            return False
         try:
-            uri = rosgraph.Master(cls.CALLER).lookupNode(name)
-            xmlrpc.client.ServerProxy(uri, transport=_Transport()).shutdown(cls.CALLER, reason)
-        except (rosgraph.MasterException, xmlrpc.client.Error, socket.gaierror, ConnectionRefusedError):
+            _proxy(uri).shutdown(CALLER, reason)
+        except (xmlrpc.client.Error, socket.gaierror, ConnectionRefusedError):
             return False
         except (OSError, http.client.HTTPException):
             return True  # it may go down before it has answered
         return True
+
+
+def get_parameters(names: Iterable[str]) -> dict[str, Any]:
+    """Return the values of parameters, by full name; those that are not set are left out.
+
+    Raises:
+        MasterError: the master does not answer.
+    """
+    names = list(names)
+    answers = _multicall([("getParam", name) for name in names])
+    return {name: value for name, (code, value) in zip(names, answers, strict=True) if code == 1}
+
+
+def set_parameters(values: Mapping[str, Any], delete: Iterable[str] = ()) -> None:
+    """Delete parameters, then set others, by full name.
+
+    Raises:
+        MasterError: the master does not answer, or refuses a value.
+    """
+    _multicall([("deleteParam", name) for name in delete])
+    names = list(values)
+    for name, (code, _) in zip(names, _multicall([("setParam", name, values[name]) for name in names]), strict=True):
+        if code != 1:
+            raise MasterError(f"the master refuses parameter {name} = {values[name]!r}")
+
+
+def publishers(topic: str) -> set[str]:
+    """Return the nodes that publish a topic.
+
+    Raises:
+        MasterError: the master does not answer.
+    """
+    return set(dict(_system_state()[0]).get(topic, ()))
+
+
+def advertised(nodes: Iterable[str] | None = None) -> set[str]:
+    """Return the topics that the nodes (None: all) publish, and the services that they offer.
+
+    Raises:
+        MasterError: the master does not answer.
+    """
+    wanted = None if nodes is None else set(nodes)
+    topics, _, services = _system_state()
+    return {name for name, owners in (*topics, *services) if wanted is None or wanted & set(owners)}
+
+
+def services_of(node: str) -> list[str]:
+    """Return the services that a node offers.
+
+    Raises:
+        MasterError: the master does not answer.
+    """
+    return [name for name, owners in _system_state()[2] if node in owners]
+
+
+def forget_node(name: str) -> None:
+    """Unregister, on its behalf, a node that ended without doing so; a node that answers is left alone.
+
+    Raises:
+        MasterError: the master does not answer.
+    """
+    uri = NodeApi.address(name)
+    if uri is None or NodeApi.is_answering(name):
+        return
+    published, subscribed, services = _system_state()
+    calls = [("unregisterPublisher", topic, uri) for topic, owners in published if name in owners]
+    calls += [("unregisterSubscriber", topic, uri) for topic, owners in subscribed if name in owners]
+    for service, owners in services:
+        if name in owners:
+            code, address = _multicall([("lookupService", service)])[0]
+            calls += [("unregisterService", service, address)] if code == 1 else []
+    _multicall(calls, caller=name)
+
+
+def _system_state() -> Any:
+    try:
+        code, text, state = _master().getSystemState(CALLER)
+    except (*_TRANSPORT_ERRORS, ValueError) as error:
+        raise MasterError(f"the master does not answer: {error}") from error
+    if code != 1:
+        raise MasterError(f"the master refuses getSystemState: {text}")
+    return state
+
+
+def _multicall(calls: list[tuple[Any, ...]], caller: str = CALLER) -> list[tuple[int, Any]]:
+    """Return (code, value) of each call, in one request."""
+    if not calls:
+        return []
+    requests = [{"methodName": name, "params": [caller, *arguments]} for name, *arguments in calls]
+    try:
+        answers = _master().system.multicall(requests)
+    except (*_TRANSPORT_ERRORS, TypeError, OverflowError) as error:
+        raise MasterError(f"the master does not answer: {error}") from error
+    return [(int(answer[0][0]), answer[0][2]) if isinstance(answer, list) else (-1, None) for answer in answers]
+
+
+class MasterWatch:
+    """Notices the loss of the master: it does not come back, and nodes never register again."""
+
+    def __init__(self, on_loss: Callable[[], None], heartbeat: Callable[[], None] | None = None) -> None:
+        """Begin to watch.
+
+        Args:
+            on_loss: called once, in a thread of its own, when the master was not there for LOST_AFTER.
+            heartbeat: called, in that thread, after each answer.
+        """
+        self._on_loss = on_loss
+        self._heartbeat = heartbeat
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="master watch", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop watching."""
+        self._end.set()
+
+    def _run(self) -> None:
+        seen, master_pid = time.monotonic(), None
+        while not self._end.wait(WATCH_PERIOD):
+            pid = self._pid()
+            if pid is not None and master_pid in (None, pid):
+                seen, master_pid = time.monotonic(), pid
+                if self._heartbeat:
+                    self._heartbeat()
+            elif pid is not None or time.monotonic() - seen > LOST_AFTER:
+                break  # another master at the same address knows nothing of us
+        if not self._end.is_set():
+            self._on_loss()
+
+    @staticmethod
+    def _pid() -> int | None:
+        try:
+            return int(_master().getPid(f"{CALLER}_{os.getpid()}")[2])
+        except (*_TRANSPORT_ERRORS, LookupError, TypeError, ValueError):
+            return None
