@@ -21,6 +21,7 @@ class Mission:
     """A robot whose levels are those that are expected of the design that runs, but for noise and a power factor."""
 
     core: Mape
+    designs: dict[str, Design]
     factor: float
     seed: int = 1
     noise: float = 0.12
@@ -33,7 +34,7 @@ class Mission:
         noise = random.Random(self.seed)
         for second in range(int(DURATION)):
             running = self.core.facts.groundings.get("o_navigate", design)
-            expected = self.core._kb.designs[running].expected
+            expected = self.designs[running].expected
             load = (0.2 + 4.8 * expected["energy"]) * (self.factor if second >= ONSET else 1.0)
             energy = (min(load, 5.0) - 0.2) / 4.8 * (1.0 + noise.gauss(0.0, self.noise))
             self.above += second >= ONSET and energy > 0.62
@@ -61,7 +62,7 @@ def mission(d2, pellet):
     pellet.load(d2.ontology)
 
     def make(factor, seed=1, **settings):
-        return Mission(Mape(d2, pellet, d2.objectives, Settings(**settings)), factor, seed)
+        return Mission(Mape(d2, pellet, d2.objectives, Settings(**settings)), d2.designs, factor, seed)
 
     return make
 
@@ -112,7 +113,7 @@ def test_factor_is_bounded_and_never_makes_things_look_better(mission, ratio, fa
     core.observe_active(0.0, "f_navigate", "f2_v2_r2", "STABLE")
     for now in range(300):
         core.observe_level(now, "energy", 0.57 * ratio)
-    assert core._factors("o_navigate", 300.0)["energy"] == pytest.approx(factor, abs=0.01)
+    assert core._deliberation.factors("o_navigate", 300.0)["energy"] == pytest.approx(factor, abs=0.01)
 
 
 def test_what_was_learnt_of_one_design_holds_for_the_next(mission):
