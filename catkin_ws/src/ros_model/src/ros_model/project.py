@@ -155,7 +155,9 @@ def _from_files(source: Settings, keys: Keys) -> list[RosSystem]:
     variants = [read_system(path) for path in paths]
     for path, variant in zip(paths, variants, strict=True):
         if path.parent.name == "variants" and path.stem != variant.name:
-            raise ModelError(f"the variant {variant.name!r} must be in a file of its name: rename one", variant.position)
+            raise ModelError(
+                f"the variant {variant.name!r} must be in a file of its name: rename one", variant.position
+            )
     return variants
 
 

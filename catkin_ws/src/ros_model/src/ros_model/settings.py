@@ -140,9 +140,18 @@ def _broken_links(settings: Settings) -> Iterator[ModelError]:
             yield _no_such(settings, objective["function"], "functions", "objectives", name, "function")
     for name, entry in content["quality_attributes"].items():
         yield from _ascending(settings, entry.get("range"), "quality_attributes", name, "range")
+    seen: set[str] = set()
     for number, entry in enumerate(content["observers"]):
+        name = entry["name"] if isinstance(entry, dict) else entry
+        if name in seen:
+            yield settings.error(f"{name!r} stands twice: take one out", "observers", number)
+        seen.add(name)
         if isinstance(entry, dict):
             yield from _ascending(settings, entry["range"], "observers", number, "range")
+            if "outputs" in entry and "plugin" not in entry:
+                yield settings.error(
+                    "is for an observer that exists: name it as plugin", "observers", number, "outputs"
+                )
 
 
 def _unknown_qas(settings: Settings) -> Iterator[ModelError]:

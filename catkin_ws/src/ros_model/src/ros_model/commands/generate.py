@@ -79,6 +79,8 @@ def generate(what: str, models: str | None, output: str | None, as_packages: boo
     for name in _ordered(generators) if what == ALL else [what]:
         written = generators[name](project, package)
         click.echo(f"{name}: {len(written)} file{'s' * (len(written) != 1)} in {_common(written, output)}")
+        if name == "observer":
+            _tell_exports(project, package)
 
 
 def _ordered(generators: dict[str, Generator]) -> list[str]:
@@ -99,6 +101,14 @@ def _placed(project: Project, output: Path, as_packages: bool) -> tuple[Project,
             "or give the folder around models/ with -o"
         )
     return replace(project, packages_folder=output if as_packages else None), package
+
+
+def _tell_exports(project: Project, package: Path) -> None:
+    from ros_model.generators.observer import missing_exports
+    from ros_model.observers import described_observers
+
+    for line in missing_exports(described_observers(project), package):
+        click.echo(f"  add to {package / 'package.xml'}: {line}")
 
 
 def _generate_launch_file(path: Path, output: Path) -> None:
