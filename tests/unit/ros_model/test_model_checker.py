@@ -29,7 +29,7 @@ def test_sound_model_has_no_findings():
 @pytest.mark.parametrize(
     ("text", "finding"),
     [
-        (TALK.replace("'talker.out'", "'listener.in'"), "m:4:24: error: connection 'chat': 'listener.in' is a sub"),
+        (TALK.replace("'talker.out'", "'listener.in'"), "m:4:54: error: connection 'chat': 'listener.in' is a sub"),
         (TALK.replace("'talker.out'", "'nobody.out'"), "'nobody.out' names no component"),
         (TALK.replace("'talker.out'", "'talker.loud'"), "'talker' has no port 'loud'"),
         (TALK.replace("'talker.out'", ""), "connection 'chat' has no source"),
@@ -47,10 +47,12 @@ def test_sound_model_has_no_findings():
         (component("RosPublishers { RosPublisher b { RefPublisher 'p.a.n' } }"), "is not package.artifact.node.name"),
         (parameter("type Integer value 1.5"), "the value 1.5 of 'p' is no Integer"),
         (parameter("type Integer value true"), "the value True of 'p' is no Integer"),
-        (parameter("type Double default fast"), "the value 'fast' of 'p' is no Double"),
+        (parameter("type Double default fast"), "the default 'fast' of 'p' is no Double"),
         (parameter("type List {Integer, String} value {1}"), "is no List"),
         (parameter("type Array {type Integer} value {1, a}"), "is no Array"),
         (parameter("type Struct {b Integer} value { {c {value 1}} }"), "is no Struct"),
+        (parameter("type Base64 value 'no base!'"), "is no Base64"),
+        (parameter("type Date value yesterday"), "is no Date"),
     ],
 )  # fmt: skip
 def test_fault_is_found(text, finding):
@@ -66,6 +68,10 @@ def test_fault_is_found(text, finding):
         "type List {Integer, String} value {1, a}",
         "type Struct {b Integer} value { {b {value 1}} }",
         "type Base64 value 'AAEC'",
+        "type Base64 value 0b0110",
+        "type Date value 2026-1-2T10:20:30",
+        "type Any value 1",
+        "type List value {1, a}",
     ],
 )
 def test_value_of_its_type_is_no_fault(inside):

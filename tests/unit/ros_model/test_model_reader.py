@@ -184,6 +184,10 @@ def test_value(text, value):
         ("Integer default 7", ParameterType("Integer", default=7)),
         ("Integer {default 7}", ParameterType("Integer", default=7)),
         ("Base64", ParameterType("Base64")),
+        ("List", ParameterType("List")),
+        ("Array default {1}", ParameterType("Array", default=[1])),
+        ("Struct", ParameterType("Struct")),
+        ("Struct { default Integer }", ParameterType("Struct", members=(("default", ParameterType("Integer")),))),
         ("List {Integer, String}", ParameterType("List", (ParameterType("Integer"), ParameterType("String")))),
         ("Array {type Integer default {1,2}}", ParameterType("Array", (ParameterType("Integer"),), default=[1, 2])),
         (

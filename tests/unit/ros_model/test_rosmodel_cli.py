@@ -41,23 +41,36 @@ def test_check_of_a_faulty_file_names_the_place(run, model):
     path = model(FAULTY)
     status, out, _ = run("check", path)
     assert status == 1
-    assert f"{path}:1:41: error: connection 't': 'a.b' names no component" in out
+    assert f"{path}:1:68: error: connection 't': 'a.b' names no component" in out
 
 
 def test_check_goes_on_after_a_file_that_can_not_be_read(run, model):
     status, out, err = run("check", model("RosSystem", "broken"), model(FAULTY))
-    assert status == 2
+    assert (status, err) == (2, "")
+    assert "broken:1:10: error: expected '{'" in out
     assert "connection 't'" in out
-    assert err.count("\n") == 1
-    assert "broken:1:10: expected '{'" in err
 
 
 @pytest.mark.parametrize("text", ["", "\x00\xff", "{" * 100_000, "RosSystem { Name 'x"])
-def test_bad_file_ends_with_one_line_and_status_2(run, model, text):
-    for command in (["check"], ["format"], ["show"]):
-        status, _, err = run(*command, model(text))
+def test_bad_file_ends_with_its_place_and_status_2(run, model, text):
+    path = model(text)
+    assert f"{path}:1:" in run("check", path)[1]
+    for command in (["format"], ["show"]):
+        status, _, err = run(*command, path)
         assert status == 2
-        assert err.count("\n") == 1
+        assert err.startswith(f"rosmodel: {path}:1:")
+        assert len(err) < 1000
+
+
+def test_errors_are_shown_in_their_lines(run, model):
+    path = model("RosSystem {\n\tName x\n\tColour red\n\tParameters { Parameter { nam y } }\n}\n")
+    status, _, err = run("show", path)
+    assert status == 2
+    lines = err.splitlines()
+    assert lines[0].startswith(f"rosmodel: {path}:3:2: expected ")
+    assert lines[1:3] == ["    \tColour red", "    \t^~~~~~"]
+    assert lines[3].endswith("near 'nam': did you mean 'name'?")
+    assert lines[4:] == ["    \tParameters { Parameter { nam y } }", "    \t                         ^~~"]
 
 
 def test_format_writes_the_canonical_form_once(run, model):

@@ -1,14 +1,20 @@
-"""What is wrong with a model that reads well: names that stand twice, connections that lead nowhere."""
+"""What is wrong with a system that reads well: in itself, and by what is known of its packages."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import base64
+import binascii
+import re
+from collections import defaultdict
 from typing import TYPE_CHECKING
 
-from ros_model.metamodel import ConnectionKind, PortKind
+from ros_model.findings import WARNING, Finding, sorted_by_place
+from ros_model.library import Library, Unknown, hint
+from ros_model.metamodel import ConnectionKind, PortKind, RosParameter
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
     from ros_model.metamodel import (
         Component,
         Connection,
@@ -16,10 +22,11 @@ if TYPE_CHECKING:
         Port,
         PortPath,
         Position,
-        RosParameter,
+        Reference,
         RosSystem,
         Value,
     )
+    from ros_model.packages import Node
 
 _ENDS = {
     ConnectionKind.TOPIC: (PortKind.PUBLISHER, PortKind.SUBSCRIBER),
@@ -37,96 +44,228 @@ _FITTING: dict[str, tuple[type, ...]] = {
     "Array": (list,),
     "Struct": (dict,),
 }
+_BINARY = re.compile(r"0[bB][01]+")  # how the published grammar writes Base64
+_DATE = re.compile(r"\d{4}-?\d{1,2}-?\d{1,2}T\d{1,2}:\d{1,2}:\d{1,2}")  # ISO 8601, as the grammar and XML-RPC write it
 
 
-@dataclass(frozen=True)
-class Finding:
-    """One thing that is wrong, and where."""
-
-    message: str
-    position: Position
-
-    def __str__(self) -> str:
-        """Return `file:line:column: error: message`."""
-        message = self.message.replace("\n", "\\n")  # names may span lines
-        return f"{self.position}: error: {message}"
-
-
-def check_system(system: RosSystem, whole: RosSystem | None = None) -> tuple[Finding, ...]:
+def check_system(
+    system: RosSystem, whole: RosSystem | None = None, library: Library | None = None
+) -> tuple[Finding, ...]:
     """Return what is wrong with a system, in the order of the file.
 
     Args:
         system: the system to check.
         whole: what its connections may lead to, where the system is a part (a variant); the system itself if None.
+        library: what is known of packages; without it, references are not followed.
     """
-    findings = [*_twice(system), *_references(system), *_values(system)]
+    whole = whole or system
+    findings = [*_twice(system), *_incomplete(system), *_values(system)]
+    if library:
+        findings += _followed(system, library)
+    elif library is not None:
+        findings += _not_followed(system)
     for connection in system.connections:
-        findings += _connection(connection, whole or system)
-    return tuple(sorted(findings, key=lambda finding: (finding.position.line, finding.position.column)))
+        problems = [*_connection(connection, whole)]
+        findings += problems or (_types(connection, whole, library) if library else ())
+    return sorted_by_place(findings)
+
+
+def check_family(variants: Sequence[RosSystem]) -> Iterator[Finding]:
+    """Yield where a variant lacks the value of a quality attribute that another variant of the family has."""
+    known = {name for variant in variants for name in _qualities(variant)}
+    for variant in variants:
+        missing = known - _qualities(variant)
+        for name in sorted(missing):
+            siblings = [sibling.name for sibling in variants if name in _qualities(sibling)]
+            text = f"variant '{variant.name}' has no value for '{name}', as {_listed(siblings)}: add one"
+            yield Finding(text, variant.position, "missing-quality")
+
+
+def families(systems: Iterable[RosSystem]) -> list[list[RosSystem]]:
+    """Return the systems that are variants of one another: they have the same components and parameters of these."""
+    found: dict[object, list[RosSystem]] = defaultdict(list)
+    for system in systems:
+        if system.components:
+            found[
+                tuple(
+                    (component.graph_name, str(component.executable), frozenset(p.key for p in component.parameters))
+                    for component in sorted(system.components, key=lambda component: component.graph_name)
+                )
+            ].append(system)
+    return [variants for variants in found.values() if len(variants) > 1]
+
+
+def fits(value: Value, declared: ParameterType) -> bool:
+    """Whether a value is one of a declared type."""
+    expected = _FITTING.get(declared.kind)
+    if expected is None:
+        return True
+    if not isinstance(value, expected) or (isinstance(value, bool) and bool not in expected):
+        return False
+    if isinstance(value, str):
+        return _well_written(value, declared.kind)
+    if isinstance(value, list):
+        return _elements_fit(value, declared)
+    members = dict(declared.members)
+    if not members or not isinstance(value, dict):
+        return True
+    return all(name in members and fits(item, members[name]) for name, item in value.items())
+
+
+def _elements_fit(values: list[Value], declared: ParameterType) -> bool:
+    if not declared.elements:
+        return True
+    if declared.kind == "Array":
+        return all(fits(value, declared.elements[0]) for value in values)
+    return len(values) == len(declared.elements) and all(map(fits, values, declared.elements))
+
+
+def misfit(name: str, value: Value | None, declared: ParameterType | None, position: Position) -> Iterator[Finding]:
+    """Yield that a value, or the default of its type, is none of the type."""
+    if declared is None:
+        return
+    for role, item in (("value", value), ("default", declared.default)):
+        if item is not None and not fits(item, declared):
+            place = declared.position if role == "default" and declared.position.line else position
+            yield Finding(f"the {role} {item!r} of '{name}' is no {declared.kind}", place, "value")
+
+
+def _well_written(value: str, kind: str) -> bool:
+    if kind == "Date":
+        return _DATE.fullmatch(value) is not None
+    if kind != "Base64" or _BINARY.fullmatch(value):
+        return True
+    try:
+        base64.b64decode("".join(value.split()), validate=True)
+    except (binascii.Error, ValueError):
+        return False
+    return True
 
 
 def _twice(system: RosSystem) -> Iterator[Finding]:
     names: set[str] = set()
     for component in system.components:
         if component.graph_name in names:
-            yield Finding(f"component '{component.graph_name}' stands twice", component.position)
+            yield Finding(f"component '{component.graph_name}' stands twice", component.position, "duplicate")
         names.add(component.graph_name)
         yield from _twice_inside(component)
-    globals_seen: set[tuple[str | None, str]] = set()
+    connections: set[tuple[ConnectionKind, str]] = set()
+    for connection in system.connections:
+        if (connection.kind, connection.name) in connections:
+            text = f"{connection.kind.value} connection '{connection.name}' stands twice: give all its ends to one"
+            yield Finding(text, connection.position, "duplicate", WARNING)
+        connections.add((connection.kind, connection.name))
+    globals_seen: dict[tuple[str | None, str], Value | None] = {}
     for parameter in system.parameters:
-        if (parameter.namespace, parameter.name) in globals_seen:
-            yield Finding(f"parameter '{parameter.name}' stands twice", parameter.position)
-        globals_seen.add((parameter.namespace, parameter.name))
+        identity = (parameter.namespace, parameter.name)
+        if identity in globals_seen:
+            yield _twice_parameter(parameter.name, globals_seen[identity] == parameter.value, parameter.position)
+        globals_seen[identity] = parameter.value
 
 
 def _twice_inside(component: Component) -> Iterator[Finding]:
     ports: set[tuple[PortKind, str]] = set()
     for port in component.ports:
         if (port.kind, port.name) in ports:
-            yield Finding(f"{port.kind.value} '{port.name}' of '{component.name}' stands twice", port.position)
+            text = f"{port.kind.value} '{port.name}' of '{component.name}' stands twice"
+            yield Finding(text, port.position, "duplicate")
         ports.add((port.kind, port.name))
     values: dict[tuple[str | None, str], Value | None] = {}
     for parameter in component.parameters:
         identity = (parameter.namespace, str(parameter.reference or parameter.name))
         if identity in values:
-            what = "has two values" if values[identity] != parameter.value else "stands twice"
-            yield Finding(f"parameter '{identity[1]}' {what}", parameter.position)
+            yield _twice_parameter(identity[1], values[identity] == parameter.value, parameter.position)
         values[identity] = parameter.value
 
 
-def _references(system: RosSystem) -> Iterator[Finding]:
+def _twice_parameter(name: str, same: bool, position: Position) -> Finding:
+    if same:
+        return Finding(f"parameter '{name}' stands twice", position, "duplicate")
+    return Finding(f"parameter '{name}' has two values", position, "two-values")
+
+
+def _incomplete(system: RosSystem) -> Iterator[Finding]:
+    rule = "incomplete-reference"
     for component in system.components:
         if component.node and not component.node.node:
-            yield Finding(f"reference '{component.node}' is not package.artifact.node", component.position)
-        elements: tuple[Port | RosParameter, ...] = (*component.ports, *component.parameters)
-        for element in elements:
+            text = f"reference '{component.node}' is not package.artifact.node"
+            yield Finding(text, _place(component.node, component.position), rule)
+        for element in _elements(component):
             if element.reference and not element.reference.name:
-                yield Finding(f"reference '{element.reference}' is not package.artifact.node.name", element.position)
+                text = f"reference '{element.reference}' is not package.artifact.node.name"
+                yield Finding(text, _place(element.reference, element.position), rule)
 
 
 def _values(system: RosSystem) -> Iterator[Finding]:
     for parameter in system.parameters:
-        for value in (parameter.value, parameter.type.default if parameter.type else None):
-            if parameter.type and value is not None and not _fits(value, parameter.type):
-                yield Finding(
-                    f"the value {value!r} of '{parameter.name}' is no {parameter.type.kind}", parameter.position
-                )
+        yield from misfit(parameter.name, parameter.value, parameter.type, parameter.position)
+    for stack in system.stacks:
+        for quality in stack.quality_attributes:
+            yield from misfit(quality.name, quality.value, quality.type, quality.position)
 
 
-def _fits(value: Value, declared: ParameterType) -> bool:
-    expected = _FITTING.get(declared.kind)
-    if expected is None:
-        return True
-    if not isinstance(value, expected) or (isinstance(value, bool) and bool not in expected):
-        return False
-    if isinstance(value, list) and declared.elements:
-        if declared.kind == "Array":
-            return all(_fits(item, declared.elements[0]) for item in value)
-        return len(value) == len(declared.elements) and all(map(_fits, value, declared.elements))
-    if isinstance(value, dict) and declared.members:
-        members = dict(declared.members)
-        return all(name in members and _fits(item, members[name]) for name, item in value.items())
-    return True
+# References
+
+
+def _not_followed(system: RosSystem) -> Iterator[Finding]:
+    for component in system.components:
+        if component.executable:
+            text = "no .ros model is known, so references are not followed: give the folder of some with --path"
+            yield Finding(text, _place(component.executable, component.position), "unknown-reference", WARNING)
+            return
+
+
+def _followed(system: RosSystem, library: Library) -> Iterator[Finding]:
+    """Yield the references that lead nowhere, or to something of another kind; of one fault in a node only one."""
+    for component in system.components:
+        told: set[str] = set()
+        if component.node and component.node.node:
+            yield from _unknown_node(component.node, component.position, library, told)
+        for element in _elements(component):
+            reference = element.reference
+            if reference is None or not reference.name:
+                continue
+            node = library.node(reference)
+            if isinstance(node, Unknown):
+                yield from _unknown_node(reference, element.position, library, told)
+            elif isinstance(element, RosParameter):
+                yield from _wrong_parameter(element, reference, node)
+            elif problem := _wrong_port(element.kind, reference, node):
+                text, rule = problem
+                yield Finding(text, _place(reference, element.position), rule)
+
+
+def _unknown_node(reference: Reference, position: Position, library: Library, told: set[str]) -> Iterator[Finding]:
+    found = library.node(reference)
+    if isinstance(found, Unknown) and found.message not in told:
+        told.add(found.message)
+        yield Finding(found.message, _place(reference, position), "unknown-reference", found.severity)
+
+
+def _wrong_port(kind: PortKind, reference: Reference, node: Node) -> tuple[str, str] | None:
+    """Return what is wrong with a reference to a port of a node, and the rule that says so."""
+    declared = [declaration for declaration in node.ports if declaration.name == reference.name]
+    where = f"'{reference.package}.{reference.artifact}.{reference.node}'"
+    if not declared:
+        known = [declaration.name for declaration in node.ports if declaration.kind is kind]
+        return f"{where} declares no {kind.value} '{reference.name}'{hint(reference.name, known)}", "unknown-reference"
+    if all(declaration.kind is not kind for declaration in declared):
+        return f"{where} declares '{reference.name}' as a {declared[0].kind.value}, not a {kind.value}", "wrong-kind"
+    return None
+
+
+def _wrong_parameter(parameter: RosParameter, reference: Reference, node: Node) -> Iterator[Finding]:
+    declared = next((known for known in node.parameters if known.name == reference.name), None)
+    if declared is None:
+        text = f"'{reference.package}.{reference.artifact}.{reference.node}' declares no parameter '{reference.name}'"
+        text += hint(reference.name, (known.name for known in node.parameters))
+        yield Finding(text, _place(reference, parameter.position), "unknown-reference")
+    elif parameter.value is not None and declared.type and not fits(parameter.value, declared.type):
+        text = f"the value {parameter.value!r} of '{reference.name}' is no {declared.type.kind}, as it is declared"
+        yield Finding(text, parameter.position, "value")
+
+
+# Connections
 
 
 def _connection(connection: Connection, whole: RosSystem) -> Iterator[Finding]:
@@ -136,19 +275,77 @@ def _connection(connection: Connection, whole: RosSystem) -> Iterator[Finding]:
         (target_kind, "target", connection.targets),
     ):
         if not ends:
-            yield Finding(f"connection '{connection.name}' has no {role}", connection.position)
+            yield Finding(f"connection '{connection.name}' has no {role}", connection.position, "connection")
         for end in ends:
             if problem := _end(end, kind, whole):
-                yield Finding(f"connection '{connection.name}': {problem}", connection.position)
+                text, rule = problem
+                place = end.position if end.position.line else connection.position
+                yield Finding(f"connection '{connection.name}': {text}", place, rule)
 
 
-def _end(end: PortPath, kind: PortKind, whole: RosSystem) -> str | None:
+def _end(end: PortPath, kind: PortKind, whole: RosSystem) -> tuple[str, str] | None:
     component = whole.component(end.component)
     if component is None:
-        return f"'{end}' names no component of this system"
+        known = hint(end.component, (component.name for component in whole.components))
+        return f"'{end}' names no component of this system{known}", "connection"
     kinds = {port.kind for port in component.ports if port.name == end.port}
     if not kinds:
-        return f"'{end.component}' has no port '{end.port}'"
+        known = hint(end.port, (port.name for port in component.ports if port.kind is kind))
+        return f"'{end.component}' has no port '{end.port}'{known}", "connection"
     if kind not in kinds:
-        return f"'{end}' is a {' and '.join(sorted(k.value for k in kinds))}, must be a {kind.value}"
+        found = " and ".join(sorted(k.value for k in kinds))
+        return f"'{end}' is a {found}, must be a {kind.value}", "wrong-kind"
     return None
+
+
+def _types(connection: Connection, whole: RosSystem, library: Library) -> Iterator[Finding]:
+    """Yield the ends that their nodes do not declare, and those whose type is not that of the first end with one."""
+    first: tuple[PortPath, str] | None = None
+    for ends, kind in zip((connection.sources, connection.targets), _ENDS[connection.kind], strict=True):
+        for end in ends:
+            port = _port(end, kind, whole)
+            node = library.node(port.reference) if port and port.reference else None
+            if port is None or port.reference is None or node is None or isinstance(node, Unknown):
+                continue
+            text = f"connection '{connection.name}': '{end}'"
+            place = end.position if end.position.line else connection.position
+            if problem := _wrong_port(kind, port.reference, node):
+                yield Finding(f"{text}: {problem[0]}", place, problem[1])
+            found = _type(kind, port.reference.name, node)
+            if found and first is None:
+                first = end, found
+            elif found and first and found.removesuffix("Action") != first[1].removesuffix("Action"):
+                yield Finding(f"{text} is {found}, but '{first[0]}' is {first[1]}", place, "type-mismatch")
+
+
+def _port(end: PortPath, kind: PortKind, whole: RosSystem) -> Port | None:
+    component = whole.component(end.component)
+    ports = component.ports if component else ()
+    return next((port for port in ports if port.name == end.port and port.kind is kind), None)
+
+
+def _type(kind: PortKind, name: str, node: Node) -> str:
+    """Return the type of a node's port, "" if it is not known; where it has the kind only otherwise, that one's."""
+    declared = [port for port in node.ports if port.name == name]
+    return next((port.type for port in sorted(declared, key=lambda port: port.kind is not kind)), "")
+
+
+# Helpers
+
+
+def _elements(component: Component) -> tuple[Port | RosParameter, ...]:
+    return (*component.ports, *component.parameters)
+
+
+def _place(reference: Reference, position: Position) -> Position:
+    return reference.position if reference.position.line else position
+
+
+def _qualities(system: RosSystem) -> set[str]:
+    return {p.name for p in system.parameters if p.name.startswith("qa_") and p.value is not None}
+
+
+def _listed(names: Sequence[str], most: int = 3) -> str:
+    shown = ", ".join(f"'{name}'" for name in names[:most])
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{shown}{more} {'has' if len(names) == 1 else 'have'}"

@@ -11,6 +11,7 @@ import click
 
 from ros_model.commands import BAD_INPUT
 from ros_model.errors import ModelError
+from ros_model.findings import caret_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,14 +27,15 @@ _COMMANDS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command; the end of every failure is one line on standard error."""
+    """Run the command; what is wrong is told on standard error, with the line of the file and a caret."""
     try:
         status = command.main(args=arguments, prog_name="rosmodel", standalone_mode=False)
     except click.ClickException as error:
         error.show()
         sys.exit(BAD_INPUT)
     except ModelError as error:
-        click.echo(f"rosmodel: {error}", err=True)
+        for found in error.all:
+            click.echo("\n".join([f"rosmodel: {found}", *caret_lines(found.position)]), err=True)
         sys.exit(BAD_INPUT)
     except (click.Abort, KeyboardInterrupt):
         sys.exit(130)

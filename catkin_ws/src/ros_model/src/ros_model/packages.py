@@ -61,6 +61,14 @@ class SpecKind(enum.Enum):
     ACTION = "action"
 
 
+PARTS = {
+    SpecKind.TOPIC: ("message",),
+    SpecKind.SERVICE: ("request", "response"),
+    SpecKind.ACTION: ("goal", "result", "feedback"),
+}
+"""The parts that a specification has, in their order."""
+
+
 @dataclass(frozen=True)
 class MessageField:
     """A field of a message, `float32[] data`, or a constant, `int8 OK=1`. Types of packages are `package/Type`."""

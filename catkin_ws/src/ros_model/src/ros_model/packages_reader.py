@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 from ros_model.files import read_text
 from ros_model.metamodel import PortKind
 from ros_model.packages import (
+    PARTS,
     Artifact,
     MessageField,
     Node,
@@ -24,13 +25,6 @@ from ros_model.syntax import Builder, Field, Language, split_name, text_of
 
 if TYPE_CHECKING:
     from lark import Token
-
-PARTS = {
-    SpecKind.TOPIC: ("message",),
-    SpecKind.SERVICE: ("request", "response"),
-    SpecKind.ACTION: ("goal", "result", "feedback"),
-}
-"""The parts that a specification has, in their order."""
 
 _TYPE_NAME = re.compile(r"(\w+)[./](?:(?:msg|srv|action)[./])?(.+)", re.DOTALL)
 

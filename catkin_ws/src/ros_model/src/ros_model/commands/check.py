@@ -3,42 +3,138 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from ros_model.checker import Finding, check_system
+from ros_model.checker import check_family, check_system, families
 from ros_model.commands import BAD_INPUT
 from ros_model.errors import ModelError
+from ros_model.findings import ERROR, FORMATS, Finding
+from ros_model.library import Library
 from ros_model.metamodel import compose
-from ros_model.project import FILE_NAME, load_project
-from ros_model.reader import read_system
+from ros_model.model_files import PACKAGES, SYSTEM, files_in, read_all
+from ros_model.packages import PackageSet
+from ros_model.packages_checker import check_packages
+from ros_model.settings import FILE_NAME
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from ros_model.metamodel import RosSystem
+    from ros_model.project import Project
 
 
 @click.command()
-@click.argument("files", nargs=-1, required=True, metavar="FILE...")
-def check(files: tuple[str, ...]) -> int:
-    """Check .rossystem files, or projects by their metacontrol.yaml or folder.
+@click.option(
+    "--path",
+    "folders",
+    multiple=True,
+    type=click.Path(),
+    metavar="FOLDER",
+    help="Where .ros models are that references lead to, in this folder or below; may be given several times.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(list(FORMATS)),
+    default="text",
+    show_default=True,
+    help="How findings are told: for people, for programs, as annotations of a GitHub workflow, as SARIF 2.1.0.",
+)
+@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path())
+def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
+    """Check .rossystem and .ros files, folders of them, or projects by their metacontrol.yaml or folder.
 
-    Exit status: 0 all is well, 1 something is wrong in a model, 2 a file can't be read.
+    References are followed to the .ros models that are checked, stand beside the files, or are found with --path.
+    Message types of installed ROS packages are known.
+
+    Exit status: 0 all is well or only warnings were given, 1 something is wrong in a model, 2 a file can't be read.
     """
-    findings: list[Finding] = []
-    unreadable = False
+    checked = _Check(folders)
     for file in files:
+        checked.add(Path(file))
+    findings = checked.findings()
+    if findings or form != "text":
+        click.echo(FORMATS[form](findings))
+    if checked.unreadable:
+        return BAD_INPUT
+    return int(any(finding.severity == ERROR for finding in findings))
+
+
+class _Check:
+    """Gathers what there is to check, then checks it by all that is known."""
+
+    def __init__(self, folders: Iterable[str]) -> None:
+        self.unreadable: list[Finding] = []
+        self._projects: list[Project] = []
+        self._systems: dict[Path, RosSystem] = {}
+        self._packages: dict[Path, PackageSet] = {}
+        self._beside: dict[Path, PackageSet] = {}
+        for folder in folders:
+            self._read(files_in(Path(folder), PACKAGES), self._beside)
+
+    def add(self, path: Path) -> None:
+        """Add a file, a project or a folder of files."""
+        if path.name == FILE_NAME or (path / FILE_NAME).is_file():
+            self._add_project(path)
+        elif path.is_dir():
+            found = [*files_in(path, PACKAGES), *files_in(path, SYSTEM)]
+            if not found:
+                self._refuse(ModelError(f"{path}: no model is in this folder: give one with .ros or .rossystem files"))
+            for file in found:
+                self._add_file(file)
+        else:
+            self._add_file(path)
+            self._read(sorted(path.parent.glob(f"*{PACKAGES}")), self._beside)
+
+    def findings(self) -> list[Finding]:
+        """Return all that is wrong, file by file."""
+        library = Library(p for known in {**self._beside, **self._packages}.values() for p in known.packages)
+        found = [*self.unreadable]
+        for packages in self._packages.values():
+            found += check_packages(packages, library)
+        for system in self._systems.values():
+            found += check_system(system, library=library)
+        for family in families(self._systems.values()):
+            found += check_family(family)
+        for project in self._projects:
+            found += _of_project(project, library)
+        return [*dict.fromkeys(found)]
+
+    def _add_project(self, path: Path) -> None:
+        from ros_model.project import load_project
+
         try:
-            findings += _check_file(Path(file))
+            project = load_project(path)
         except ModelError as error:
-            click.echo(f"rosmodel: {error}", err=True)
-            unreadable = True
-    for finding in findings:
-        click.echo(finding)
-    return BAD_INPUT if unreadable else int(bool(findings))
+            self._refuse(error)
+        else:
+            self._projects.append(project)
+            self._read(files_in(project.folder, PACKAGES), self._packages)
+
+    def _add_file(self, path: Path) -> None:
+        if path.suffix == PACKAGES:
+            self._read([path], self._packages)
+        else:
+            self._read([path], self._systems)
+
+    def _read(self, paths: Iterable[Path], into: dict[Path, PackageSet] | dict[Path, RosSystem]) -> None:
+        for path in paths:
+            if path not in into:
+                try:
+                    into[path] = read_all(path)  # type: ignore[assignment]
+                except ModelError as error:
+                    self._refuse(error)
+
+    def _refuse(self, error: ModelError) -> None:
+        known = {str(finding) for finding in self.unreadable}
+        self.unreadable += [found for found in map(Finding.of, error.all) if str(found) not in known]
 
 
-def _check_file(path: Path) -> tuple[Finding, ...]:
-    if not path.is_dir() and path.name != FILE_NAME:
-        return check_system(read_system(path))
-    project = load_project(path)
-    found = dict.fromkeys(check_system(project.base))
+def _of_project(project: Project, library: Library) -> Iterator[Finding]:
+    yield from check_system(project.whole_base, library=library)
     for variant in project.variants:
-        found |= dict.fromkeys(check_system(variant, compose(project.base, variant)))
-    return tuple(found)
+        # Where nothing is known of packages, the base has told so.
+        yield from check_system(variant, compose(project.base, variant), library or None)
+    yield from check_family(project.variants)

@@ -1,0 +1,55 @@
+"""Files of models: which language one is in, and where they are."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ros_model.errors import ModelError
+from ros_model.files import read_text
+from ros_model.packages_reader import parse_packages
+from ros_model.reader import parse_system
+
+if TYPE_CHECKING:
+    from ros_model.metamodel import RosSystem
+    from ros_model.packages import PackageSet
+
+PACKAGES = ".ros"
+SYSTEM = ".rossystem"
+"""The extensions of the languages' files."""
+
+_FIRST_WORD = re.compile(r"(?:\s|//[^\n]*|/\*.*?\*/)*(\w*)", re.DOTALL)
+
+
+def read_all(path: Path) -> RosSystem | PackageSet:
+    """Read a file of either language.
+
+    Raises:
+        ModelError: it can't be read or is not well-formed.
+    """
+    return parse_all(read_text(path), str(path))
+
+
+def parse_all(text: str, file: str) -> RosSystem | PackageSet:
+    """Read a text of either language: by the file's extension, else by its first word.
+
+    Raises:
+        ModelError: it is not well-formed.
+    """
+    suffix = Path(file).suffix
+    match = _FIRST_WORD.match(text)
+    in_packages = suffix == PACKAGES or (suffix != SYSTEM and match is not None and match[1] == "PackageSet")
+    return parse_packages(text, file) if in_packages else parse_system(text, file)
+
+
+def files_in(folder: Path, extension: str) -> list[Path]:
+    """Return the files with an extension in a folder and below, in order; hidden folders are passed over.
+
+    Raises:
+        ModelError: there is no such folder.
+    """
+    if not folder.is_dir():
+        raise ModelError(f"{folder}: no such folder: check the path")
+    found = folder.rglob(f"*{extension}")
+    return sorted(path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts))
