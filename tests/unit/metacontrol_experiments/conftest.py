@@ -14,6 +14,7 @@ from move_base_msgs.msg import MoveBaseActionGoal, MoveBaseActionResult
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosbags.rosbag1 import Writer
 from std_msgs.msg import Float32, Int32
+from visualization_msgs.msg import Marker, MarkerArray
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,6 +61,14 @@ class BagBuilder:
 
     def contacts(self, stamp, count):
         self.add(stamp, "/ground_truth/contacts", Int32(count))
+
+    def obstacles(self, stamp, *places):
+        markers = [Marker(action=Marker.DELETEALL)]
+        for number, (x, y) in enumerate(places):
+            marker = Marker(type=Marker.CUBE, id=number, text=f"obstacle_{number}")
+            marker.pose.position.x, marker.pose.position.y = x, y
+            markers.append(marker)
+        self.messages.append((stamp, "/ground_truth/obstacles", MarkerArray(markers)))
 
     def goal(self, stamp):
         self.add(stamp, "/move_base/goal", MoveBaseActionGoal(goal_id=GoalID(id=GOAL_ID)))

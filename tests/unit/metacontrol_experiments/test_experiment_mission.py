@@ -6,9 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from metacontrol_experiments import mission
-from metacontrol_experiments.mission import Action, GoalStatus, MissionError, Outcome, Plan
+from metacontrol_experiments.contingency import Contingency, Kind, Moment
+from metacontrol_experiments.mission import Action, GoalStatus, MissionError, Outcome, Plan, Strike
 
-PLAN = Plan(goal_x=10.0, goal_y=0.0, strike_at=0.4)
+KILL = Contingency(Kind.KILL, Moment(share=0.4), target="front_laser")
+PLAN = Plan(goal_x=10.0, goal_y=0.0, contingencies=(KILL,))
 
 
 @pytest.fixture
@@ -18,21 +20,37 @@ def driving():
 
 
 def test_perturbation_strikes_once_when_its_share_is_done(driving):
-    state, actions = mission.on_pose(PLAN, driving, 3.9, 0.0)
+    state, actions = mission.on_pose(PLAN, driving, 101.0, 3.9, 0.0)
     assert actions == () and state.share == pytest.approx(0.39)
-    state, actions = mission.on_pose(PLAN, state, 4.1, 0.0)
-    assert actions == (Action.STRIKE,)
-    assert mission.on_pose(PLAN, state, 4.2, 0.0)[1] == ()
-    back, _ = mission.on_pose(PLAN, state, 1.0, 0.0)
-    assert mission.on_pose(PLAN, back, 5.0, 0.0)[1] == ()
+    state, actions = mission.on_pose(PLAN, state, 102.0, 4.1, 0.0)
+    assert actions == (Strike(0),)
+    assert mission.on_pose(PLAN, state, 103.0, 4.2, 0.0)[1] == ()
+    back, _ = mission.on_pose(PLAN, state, 104.0, 1.0, 0.0)
+    assert mission.on_pose(PLAN, back, 105.0, 5.0, 0.0)[1] == ()
+
+
+def test_contingencies_strike_at_their_time_and_place_and_not_again_at_the_start():
+    clutter = Contingency(Kind.CLUTTER, count=7)
+    late = Contingency(Kind.POWER, Moment(time=20.0), value=1.6)
+    there = Contingency(Kind.LIGHT, Moment(place=(3.0, 2.0)), value=0.1)
+    plan = Plan(10.0, 0.0, (clutter, late, there))
+    state = mission.start(plan, 100.0, 0.0, 0.0)
+    state, actions = mission.on_pose(plan, state, 100.1, 0.1, 0.0)
+    assert actions == ()
+    state, actions = mission.on_pose(plan, state, 105.0, 3.0, 1.2)
+    assert actions == (Strike(2),)
+    state, _ = mission.on_goal_status(state, 119.0, GoalStatus.ACTIVE)
+    state, actions = mission.on_time(plan, state, 120.0)
+    assert actions == (Strike(1),)
+    assert mission.on_time(plan, state, 121.0)[1] == ()
 
 
 def test_mission_without_perturbation_never_strikes(driving):
-    assert mission.on_pose(Plan(10.0, 0.0, strikes=False), driving, 9.0, 0.0)[1] == ()
+    assert mission.on_pose(Plan(10.0, 0.0), driving, 101.0, 9.0, 0.0)[1] == ()
 
 
 def test_pose_that_is_not_finite_changes_nothing(driving):
-    assert mission.on_pose(PLAN, driving, math.nan, 0.0) == (driving, ())
+    assert mission.on_pose(PLAN, driving, 101.0, math.nan, 0.0) == (driving, ())
 
 
 def test_reached_goal_ends_the_mission(driving):
@@ -93,7 +111,7 @@ def test_time_out_cancels_the_goal(driving):
 def test_nothing_changes_a_mission_that_is_over(driving):
     over = mission.abort(driving, 110.0, "simulator gone")
     assert mission.interrupt(over, 111.0, "again") == over
-    assert mission.on_pose(PLAN, over, 5.0, 0.0) == (over, ())
+    assert mission.on_pose(PLAN, over, 111.0, 5.0, 0.0) == (over, ())
     assert mission.on_goal_result(over, 111.0, GoalStatus.SUCCEEDED, "") == (over, ())
     assert mission.on_time(PLAN, over, 999.0) == (over, ())
 
@@ -113,7 +131,7 @@ def test_whatever_the_way_the_perturbation_strikes_at_most_once(way):
     state = mission.start(PLAN, 0.0, 0.0, 0.0)
     strikes = 0
     for x, y in way:
-        state, actions = mission.on_pose(PLAN, state, x, y)
-        strikes += actions.count(Action.STRIKE)
+        state, actions = mission.on_pose(PLAN, state, 1.0, x, y)
+        strikes += actions.count(Strike(0))
         assert state.share >= 0.0
     assert strikes == (1 if any(PLAN.distance(x, y) <= 6.0 for x, y in way) else 0)

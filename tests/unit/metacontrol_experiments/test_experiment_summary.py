@@ -133,6 +133,12 @@ def test_goal_taken_up_again_after_a_bad_result_counts_as_reached(mission_bag, t
     assert summary["goals"] == {"sent": 1, "failed": 0} and summary["goal_reached"]
 
 
+def test_clutter_is_read_from_the_bag(mission_bag, tmp_path):
+    mission_bag.obstacles(9.0, (1.0, 2.0))
+    mission_bag.obstacles(15.0, (1.0, 2.0), (3.0, 4.0))
+    assert read_record(mission_bag.write(tmp_path / "clutter.bag")).obstacles == ((1.0, 2.0), (3.0, 4.0))
+
+
 def test_time_before_the_first_sample_is_left_out():
     samples = ((2.0, 1.0), (4.0, 0.0))
     assert share_above(samples, 0.5, 0.0, 6.0) == pytest.approx(0.5)

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from metacontrol_sim.geometry import Pose
 from metacontrol_sim.grid import FREE, OCCUPIED, UNKNOWN, cover
-from metacontrol_sim.messages import occupancy_grid, stamp
+from metacontrol_sim.grid_messages import GridMessageError, occupancy_grid, read_grid
+from metacontrol_sim.messages import stamp
 from metacontrol_sim.simulation import Settings, Simulation
 from metacontrol_sim.world import MAPPED_HEIGHT, WorldError, rasterise
 from metacontrol_sim.world_file import read_world
@@ -147,3 +148,14 @@ def test_robot_sees_and_touches_a_mapped_wall(make):
     assert simulation.pose.x == pytest.approx(2.0 - simulation.robot.length / 2.0, abs=0.01)
     assert (simulation.contacts, simulation.touching()) == (1, ("map",))
     simulation.close()
+
+
+def test_map_survives_its_message_and_a_bad_one_is_refused(make):
+    grid = rasterise(read_world(make(origin=[1.0, 2.0, 0.5])))
+    message = occupancy_grid(grid, stamp(1))
+    again = read_grid(message)
+    assert np.array_equal(again.cells, grid.cells)
+    assert (again.resolution, again.origin_x, again.origin_y, again.origin_yaw) == pytest.approx((0.1, 1.0, 2.0, 0.5))
+    message.info.width = 7
+    with pytest.raises(GridMessageError, match="map of 7 x 20 cells"):
+        read_grid(message)

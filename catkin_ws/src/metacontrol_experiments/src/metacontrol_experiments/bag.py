@@ -49,6 +49,7 @@ TOPICS = (
     "/ground_truth/safety",
     "/ground_truth/energy",
     "/ground_truth/contacts",
+    "/ground_truth/obstacles",
     "/tf",
     "/tf_static",
     "/map",
@@ -64,6 +65,9 @@ TOPICS = (
 
 _OCCUPIED = 50
 """Cells of an OccupancyGrid from this value on are drawn as obstacles (unknown is -1, free 0, occupied 100)."""
+
+_CUBE = 1
+"""Type of a visualization_msgs/Marker that shows clutter; people are cylinders."""
 
 
 class BagError(ValueError):
@@ -117,6 +121,7 @@ class _Builder:
         self._decisions: list[DecisionReport] = []
         self._goals: list[GoalReport] = []
         self._results: list[GoalReport] = []
+        self._obstacles: dict[tuple[str, float, float], None] = {}
         self._map: OccupancyMap | None = None
         self.handlers: dict[str, Callable[[float, Any], None]] = {
             "/mission/event": lambda t, m: self._events.append(messages.event(m, t)),
@@ -131,6 +136,7 @@ class _Builder:
             "/ground_truth/safety": lambda t, m: self._add_sample("safety", t, m),
             "/ground_truth/energy": lambda t, m: self._add_sample("energy", t, m),
             "/ground_truth/contacts": lambda t, m: self._add_sample("contacts", t, m),
+            "/ground_truth/obstacles": self._add_obstacles,
             "/map": self._take_map,
         }
 
@@ -148,6 +154,7 @@ class _Builder:
             decisions=tuple(self._decisions),
             goals=tuple(self._goals),
             results=tuple(self._results),
+            obstacles=tuple((x, y) for _, x, y in self._obstacles),
             map=self._map,
             first_stamp=first,
             last_stamp=last,
@@ -161,6 +168,12 @@ class _Builder:
     def _add_sample(self, name: str, received: float, message: Any) -> None:
         if math.isfinite(message.data):
             self._samples[name].append((received, float(message.data)))
+
+    def _add_obstacles(self, _received: float, message: Any) -> None:
+        for marker in message.markers:
+            place = marker.pose.position
+            if marker.action == 0 and marker.type == _CUBE and math.isfinite(place.x) and math.isfinite(place.y):
+                self._obstacles[marker.text, round(place.x, 1), round(place.y, 1)] = None
 
     def _take_map(self, _received: float, message: Any) -> None:
         info = message.info

@@ -10,14 +10,23 @@ from typing import Any
 
 import click
 import rospkg
-import yaml
 from rich.console import Console
 
 from metacontrol_experiments.bag import BagError, read_record
 from metacontrol_experiments.commit import current_commit
+from metacontrol_experiments.components import ComponentError, node_of, read_components
+from metacontrol_experiments.contingency import (
+    DEFAULT_SHARE,
+    Contingency,
+    ContingencyError,
+    Kind,
+    Moment,
+    parse_contingency,
+    read_contingencies,
+)
 from metacontrol_experiments.display import Display
 from metacontrol_experiments.metrics import DEFAULT_THRESHOLDS, MetricsError, summarise
-from metacontrol_experiments.mission import FAILURE_AT, TIMEOUT_S, Outcome
+from metacontrol_experiments.mission import TIMEOUT_S, Outcome
 from metacontrol_experiments.routes import RouteError, read_route
 from metacontrol_experiments.runner import BAG_NAME, RunError, run_mission
 from metacontrol_experiments.settings import Settings
@@ -46,19 +55,34 @@ class _Number(click.FloatRange):
 @metacontrol.command()
 @click.option("--no-metacontrol", is_flag=True, help="The baseline: everything but the reasoner.")
 @click.option("--seed", default=1, show_default=True, help="Of everything random in the simulation.")
-@click.option("--route", default="r1", show_default=True, help="One of metacontrol_sim's worlds/routes.yaml.")
+@click.option("--route", default="r1", show_default=True, help="One of the routes.")
 @click.option("--initial-configuration", default="f2_v2_r2", show_default=True, help="The variant deployed first.")
-@click.option("--failure", default="front_laser", show_default=True, help="Component whose node is killed, or none.")
 @click.option(
-    "--failure-at", type=_Number(0, 1), default=FAILURE_AT, show_default=True, help="Share of the way done at which."
+    "--failure", help="Component whose node is killed, or none.  [default: front_laser, without other contingencies]"
 )
 @click.option(
-    "--power-factor",
-    type=_Number(0),
-    default=1.0,
+    "--failure-at",
+    type=_Number(0, 1),
+    default=DEFAULT_SHARE,
     show_default=True,
-    help="Of the power load, from the same moment on.",
+    help="Share of the way done at which --failure and --power-factor strike.",
 )
+@click.option(
+    "--power-factor", type=_Number(0), default=1.0, show_default=True, help="Of the power load, from then on."
+)
+@click.option(
+    "--contingency",
+    "contingencies",
+    multiple=True,
+    metavar="KIND:WHAT[@WHEN]",
+    help="What goes wrong, any number of times: kill:, stop:, freeze: or thaw:COMPONENT, power:FACTOR, clutter:NUMBER, "
+    "light:0..1; at share:0..1 of the way, time:SECONDS or place:X,Y. Clutter lies there from the start.",
+)
+@click.option("--timeline", type=click.Path(path_type=Path), help="YAML file of contingencies.")
+@click.option(
+    "--world", type=click.Path(path_type=Path), help="World file, or a map's YAML file.  [default: the factory]"
+)
+@click.option("--routes", type=click.Path(path_type=Path), help="YAML file of routes.  [default: the factory's]")
 @click.option(
     "--real-time-factor",
     type=_Number(0),
@@ -98,7 +122,7 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
         summary = summarise(record)
         _write_summary(summary, output / SUMMARY_NAME)
         _draw(record, output / FIGURE_NAME)
-    except (RunError, RouteError, BagError, MetricsError, OSError) as error:
+    except (RunError, RouteError, ContingencyError, ComponentError, BagError, MetricsError, OSError) as error:
         _refuse(error)
     except KeyboardInterrupt:
         click.echo("metacontrol: interrupted; every process was ended", err=True)
@@ -146,8 +170,9 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
     """The mission that the options ask for.
 
     Raises:
-        RunError: metacontrol_sim is missing, or has no such configuration or component.
+        RunError: metacontrol_sim is missing, or has no such configuration, or there is no such world.
         RouteError: there is no such route.
+        ContingencyError, ComponentError: what is to go wrong makes no sense.
     """
     try:
         simulation = Path(rospkg.RosPack().get_path("metacontrol_sim"))
@@ -158,17 +183,19 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
     if name not in variants:
         known = ", ".join(variants) or "none generated yet"
         raise RunError(f"--initial-configuration: no configuration {name!r}; there are {known}")
-    failure = None if options["failure"] == "none" else options["failure"]
+    components = read_components(simulation / "models" / "metacontrol.yaml")
+    world = options["world"]
+    if world is not None and not world.is_file():
+        raise RunError(f"--world: {world} is no file; give the path of a world file or of a map's YAML file")
     return Settings(
-        route=read_route(simulation / "worlds" / "routes.yaml", options["route"]),
+        route=read_route(options["routes"] or simulation / "worlds" / "routes.yaml", options["route"]),
         output=output,
         metacontrol=not options["no_metacontrol"],
         seed=options["seed"],
         initial_configuration=name,
-        failure=failure,
-        failure_node=_node_of(failure, simulation / "models" / "metacontrol.yaml") if failure else "",
-        power_factor=options["power_factor"],
-        failure_at=options["failure_at"],
+        contingencies=_contingencies(options, components),
+        components=components,
+        world=world,
         real_time_factor=options["real_time_factor"],
         timeout_s=options["timeout"],
         thresholds={"safety": options["nfr_safety"], "energy": options["nfr_energy"]},
@@ -179,27 +206,26 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
     )
 
 
-def _node_of(component: str, path: Path) -> str:
-    """The node behind a component, as the project's metacontrol.yaml maps it.
+def _contingencies(options: dict[str, Any], components: dict[str, str]) -> tuple[Contingency, ...]:
+    """The contingencies of all options that ask for some.
 
     Raises:
-        RunError: the file cannot be read or maps no such component to a node.
+        ContingencyError: one of them makes no sense.
+        ComponentError: one hits a component that nobody knows.
     """
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as error:
-        raise RunError(f"{path}: cannot be read as YAML: {' '.join(str(error).split())}") from error
-    components = content.get("components") if isinstance(content, dict) else None
-    nodes = {
-        name: entry["node"]
-        for name, entry in (components.items() if isinstance(components, dict) else ())
-        if isinstance(entry, dict) and "node" in entry
-    }
-    if component not in nodes:
-        raise RunError(
-            f"--failure: {path} maps no component {component!r} to a node; there are {', '.join(nodes)}, none"
-        )
-    return str(nodes[component])
+    listed = read_contingencies(options["timeline"]) if options["timeline"] else ()
+    given = (*listed, *map(parse_contingency, options["contingencies"]))
+    failure = options["failure"] or ("none" if given else "front_laser")
+    when = Moment(share=options["failure_at"])
+    short: list[Contingency] = []
+    if failure != "none":
+        short.append(Contingency(Kind.KILL, when, target=failure))
+    if options["power_factor"] != 1.0:
+        short.append(Contingency(Kind.POWER, when, value=options["power_factor"]))
+    for contingency in (*given, *short):
+        if contingency.kind.hits_component:
+            node_of(contingency.target, components)
+    return (*given, *short)
 
 
 def _write_summary(summary: dict[str, Any], path: Path) -> None:

@@ -85,7 +85,11 @@ def _draw_map(axis: Axes, record: MissionRecord, summary: dict[str, Any]) -> Non
         first, last = np.searchsorted(poses[:, 0], (begin, until))
         span = poses[first : last + 1, 1:]
         axis.plot(span[:, 0], span[:, 1], color=colours[name], linewidth=3.5, solid_capstyle="round", zorder=3)
+    if record.obstacles:
+        axis.plot(*zip(*record.obstacles, strict=True), "s", color=_FAILURE, markersize=6, zorder=2)
     handles = [Line2D([], [], color=colour, linewidth=3.5, label=name) for name, colour in colours.items()]
+    if record.obstacles:
+        handles.append(Line2D([], [], color=_FAILURE, marker="s", linestyle="", label="clutter"))
     if len(poses):
         handles.append(_mark(axis, (poses[0, 1], poses[0, 2]), "o", "black", "start"))
     goal = _goal(record)

@@ -10,11 +10,10 @@ import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from metacontrol_experiments.contingency import Contingency, strikes_due
+
 TIMEOUT_S = 250.0
 """A run that lasts longer than this has failed (paper, section on D2)."""
-
-FAILURE_AT = 0.6
-"""Share of the way done when a contingency strikes (published tool: (d0 - d) / d0 > 0.6)."""
 
 ACKNOWLEDGE_S = 5.0
 """A goal that no status message lists after this time is sent again, under the same id."""
@@ -70,9 +69,15 @@ class Outcome(Enum):
 class Action(Enum):
     """What the shell has to do now."""
 
-    STRIKE = "strike"
     RESEND_GOAL = "resend_goal"
     CANCEL_GOAL = "cancel_goal"
+
+
+@dataclass(frozen=True)
+class Strike:
+    """The shell has to let one of the plan's contingencies strike now."""
+
+    index: int
 
 
 @dataclass(frozen=True)
@@ -82,15 +87,13 @@ class Plan:
     Attributes:
         goal_x: goal, m in the map frame.
         goal_y: goal, m in the map frame.
-        strikes: whether there is a perturbation at all.
-        strike_at: share of the way done (0..1, Euclidean) at which it strikes.
+        contingencies: what goes wrong on the way, and when.
         timeout_s: simulated seconds after which the mission has failed.
     """
 
     goal_x: float
     goal_y: float
-    strikes: bool = True
-    strike_at: float = FAILURE_AT
+    contingencies: tuple[Contingency, ...] = ()
     timeout_s: float = TIMEOUT_S
 
     def distance(self, x: float, y: float) -> float:
@@ -106,7 +109,9 @@ class State:
         started_s: when the goal was sent.
         initial_m: distance to the goal at the start.
         distance_m: distance to the goal now.
-        struck: whether the perturbation has struck.
+        x: position of the robot, m in the map frame.
+        y: position of the robot, m in the map frame.
+        struck: indices of the contingencies that have struck.
         stable: whether the manipulator reports every function as STABLE.
         stable_since_s: since when; the start of the mission if it always was.
         asked_s: when the goal was last sent.
@@ -120,7 +125,9 @@ class State:
     started_s: float
     initial_m: float
     distance_m: float
-    struck: bool = False
+    x: float
+    y: float
+    struck: frozenset[int] = frozenset()
     stable: bool = True
     stable_since_s: float = 0.0
     asked_s: float = 0.0
@@ -141,12 +148,12 @@ class State:
         return self.outcome is not None
 
 
-Step = tuple[State, tuple[Action, ...]]
+Step = tuple[State, tuple[Action | Strike, ...]]
 """The next state and what to do now."""
 
 
 def start(plan: Plan, now_s: float, x: float, y: float) -> State:
-    """The state of a mission whose goal is sent now.
+    """The state of a mission whose goal is sent now; the contingencies of the start have struck already.
 
     Args:
         plan: what the mission is to do.
@@ -165,17 +172,23 @@ def start(plan: Plan, now_s: float, x: float, y: float) -> State:
             f"goal ({plan.goal_x:.2f}, {plan.goal_y:.2f}) is {distance:.2f} m from the robot; "
             f"choose a route of at least {MIN_DISTANCE_M} m"
         )
-    return State(started_s=now_s, initial_m=distance, distance_m=distance, stable_since_s=now_s, asked_s=now_s)
+    return State(
+        started_s=now_s,
+        initial_m=distance,
+        distance_m=distance,
+        x=x,
+        y=y,
+        struck=frozenset(index for index, entry in enumerate(plan.contingencies) if entry.when.at_start),
+        stable_since_s=now_s,
+        asked_s=now_s,
+    )
 
 
-def on_pose(plan: Plan, state: State, x: float, y: float) -> Step:
-    """A new position of the robot (m, map frame); the perturbation strikes once its share of the way is done."""
+def on_pose(plan: Plan, state: State, now_s: float, x: float, y: float) -> Step:
+    """A new position of the robot (m, map frame); contingencies strike once their share or place is reached."""
     if state.over or not (math.isfinite(x) and math.isfinite(y)):
         return state, ()
-    state = replace(state, distance_m=plan.distance(x, y))
-    if plan.strikes and not state.struck and state.share >= plan.strike_at:
-        return replace(state, struck=True), (Action.STRIKE,)
-    return state, ()
+    return _strike(plan, replace(state, distance_m=plan.distance(x, y), x=x, y=y), now_s)
 
 
 def on_goal_status(state: State, now_s: float, status: GoalStatus | None) -> Step:
@@ -213,13 +226,17 @@ def on_configuration(state: State, now_s: float, stable: bool) -> Step:
 
 
 def on_time(plan: Plan, state: State, now_s: float) -> Step:
-    """Simulated time has gone on: time-out, goals that were never accepted or got lost."""
+    """Simulated time has gone on: time-out, contingencies, goals that were never accepted or got lost."""
     if state.over:
         return state, ()
     if now_s - state.started_s > plan.timeout_s:
         reason = f"goal not reached within {plan.timeout_s:g} s, {state.distance_m:.1f} m were left"
         return _end(state, now_s, Outcome.TIMEOUT, reason, (Action.CANCEL_GOAL,))
-    return _follow_goal(state, now_s) if state.stable else (state, ())
+    state, strikes = _strike(plan, state, now_s)
+    if state.stable:
+        state, actions = _follow_goal(state, now_s)
+        return state, (*strikes, *actions)
+    return state, strikes
 
 
 def interrupt(state: State, now_s: float, reason: str) -> State:
@@ -230,6 +247,14 @@ def interrupt(state: State, now_s: float, reason: str) -> State:
 def abort(state: State, now_s: float, reason: str) -> State:
     """The mission cannot go on, for instance because the simulator is gone."""
     return state if state.over else _end(state, now_s, Outcome.ABORTED, reason)[0]
+
+
+def _strike(plan: Plan, state: State, now_s: float) -> Step:
+    """Lets the contingencies strike whose moment has come."""
+    due = strikes_due(plan.contingencies, state.struck, state.share, now_s - state.started_s, state.x, state.y)
+    if not due:
+        return state, ()
+    return replace(state, struck=state.struck | set(due)), tuple(Strike(index) for index in due)
 
 
 def _follow_goal(state: State, now_s: float) -> Step:

@@ -5,13 +5,12 @@ Callbacks only queue what they got; one thread, the caller's, feeds the state ma
 
 from __future__ import annotations
 
-import http.client
 import math
-import os
 import queue
-import signal
 import time
 import xmlrpc.client
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeout
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -21,19 +20,21 @@ from actionlib_msgs.msg import GoalID, GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from metacontrol_msgs.msg import ActiveConfiguration, Decision, MissionEvent
-from metacontrol_sim.srv import IncreaseConsumptionFactor
+from metacontrol_sim.geometry import Pose
 from move_base_msgs.msg import MoveBaseActionGoal, MoveBaseActionResult
 
 from metacontrol_experiments import messages, mission
 from metacontrol_experiments.bag import TOPICS
-from metacontrol_experiments.mission import Action, GoalStatus
+from metacontrol_experiments.mission import Action, GoalStatus, Strike
 from metacontrol_experiments.processes import wait_until
 from metacontrol_experiments.record import CostReport, Event, QualityReport
+from metacontrol_experiments.striker import ImpatientTransport, StrikeError, Striker, serve
 from metacontrol_experiments.timeline import Timeline
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from metacontrol_experiments.contingency import Contingency
     from metacontrol_experiments.display import Display
     from metacontrol_experiments.mission import State
     from metacontrol_experiments.processes import ProcessTree
@@ -53,8 +54,8 @@ STANDSTILL_S = 20.0
 TAIL_S = 0.5
 """Simulated seconds that are still recorded after the mission's end."""
 
-_CALL_S = 2.0
-"""Wall seconds for a call to a node's own API."""
+_REQUEST_S = 30.0
+"""Wall seconds that a call of `contingency/strike` waits for the mission's thread."""
 
 
 class StartError(RuntimeError):
@@ -94,6 +95,8 @@ class MissionNode:
         self._master = rosgraph.Master("/mission")
         self._wait(self._simulated_time, "the ROS master with /use_sim_time")
         rospy.init_node("mission", disable_signals=True)
+        self._striker = Striker(settings.components, tree.owns)
+        self._service = serve(self._on_request, settings.seed)
         self._events = rospy.Publisher("mission/event", MissionEvent, queue_size=10)
         self._goals = rospy.Publisher("move_base/goal", MoveBaseActionGoal, queue_size=5)
         self._cancels = rospy.Publisher("move_base/cancel", GoalID, queue_size=5)
@@ -202,6 +205,7 @@ class MissionNode:
     def _begin(self) -> None:
         if self._position is None:
             raise RuntimeError("the robot's pose is not known yet")
+        struck = self._strike_at_start()
         now = rospy.Time.now()
         self._state = mission.start(self._plan, now.to_sec(), *self._position)
         self._goal = self._make_goal(now)
@@ -209,6 +213,8 @@ class MissionNode:
         self._display.start(now.to_sec())
         values = self._settings.describe() | {"goal_id": self._goal.goal_id.id}
         self._publish_event(now, MissionEvent.MISSION_START, self._settings.route.name, values)
+        for name, told in struck:
+            self._publish_event(now, MissionEvent.PERTURBATION, name, {"share": "0.0000"} | told)
         self._goals.publish(self._goal)
 
     def _loop(self) -> None:
@@ -242,45 +248,43 @@ class MissionNode:
     def _take(self, step: mission.Step) -> None:
         self._state, actions = step
         for action in actions:
-            if action is Action.STRIKE:
-                self._strike()
+            if isinstance(action, Strike):
+                self._strike(action.index)
             elif action is Action.RESEND_GOAL:
                 self._goals.publish(self._goal)
             elif action is Action.CANCEL_GOAL:
                 self._cancels.publish(self._goal_id)
 
-    def _strike(self) -> None:
-        """The perturbation: the component's node is killed, the power load rises."""
-        share = {"share": f"{self._mission.share:.4f}"}
-        settings = self._settings
+    def _strike(self, index: int) -> None:
+        """Lets a contingency of the plan happen; without it the mission is not the one asked for, and ends."""
         try:
-            if settings.failure:
-                node = rospy.resolve_name(settings.failure_node)
-                pid = self._pid_of(node)
-                now = rospy.Time.now()
-                os.kill(pid, signal.SIGKILL)
-                name = f"component:{settings.failure}"
-                self._publish_event(now, MissionEvent.PERTURBATION, name, share | {"node": node, "pid": str(pid)})
-            if settings.power_factor != 1.0:
-                rospy.ServiceProxy("increase_power_consumption", IncreaseConsumptionFactor)(settings.power_factor)
-                name = f"power:{settings.power_factor:g}"
-                self._publish_event(rospy.Time.now(), MissionEvent.PERTURBATION, name, share)
-        except (OSError, xmlrpc.client.Error, rosgraph.MasterException, rospy.ServiceException, LookupError) as error:
-            self._state = mission.abort(self._mission, rospy.get_time(), f"the perturbation could not strike: {error}")
+            self._strike_now(self._plan.contingencies[index])
+        except StrikeError as error:
+            self._state = mission.abort(self._mission, rospy.get_time(), f"a contingency could not strike: {error}")
 
-    def _pid_of(self, node: str) -> int:
-        """The process of a node, as its own API tells.
+    def _strike_now(self, contingency: Contingency) -> None:
+        values = self._striker.strike(contingency, self._way())
+        share = {"share": f"{self._state.share if self._state else 0.0:.4f}"}
+        self._publish_event(rospy.Time.now(), MissionEvent.PERTURBATION, contingency.event, share | values)
+
+    def _way(self) -> tuple[Pose, Pose] | None:
+        """Where the robot is and where it goes."""
+        if self._position is None:
+            return None
+        goal = self._settings.route.goal
+        return Pose(*self._position, 0.0), Pose(goal.x, goal.y, goal.yaw)
+
+    def _strike_at_start(self) -> list[tuple[str, dict[str, str]]]:
+        """Lets happen what is there before the goal is sent; returns the events' names and values.
 
         Raises:
-            LookupError: the process is none of this run's.
+            StartError: something could not happen.
         """
-        uri = self._master.lookupNode(node)
-        with xmlrpc.client.ServerProxy(uri, transport=_ImpatientTransport()) as proxy:
-            answer: Any = proxy.getPid("/mission")
-        pid = int(answer[2])
-        if not self._tree.owns(pid):
-            raise LookupError(f"{node} (pid {pid}) is not a process of this run")
-        return pid
+        due = [entry for entry in self._plan.contingencies if entry.when.at_start]
+        try:
+            return [(entry.event, self._striker.strike(entry, self._way())) for entry in due]
+        except StrikeError as error:
+            raise StartError(f"a contingency could not strike: {error}") from error
 
     def _make_goal(self, now: rospy.Time) -> MoveBaseActionGoal:
         pose = self._settings.route.goal
@@ -320,6 +324,27 @@ class MissionNode:
         except queue.Empty:
             return
 
+    def _on_request(self, contingency: Contingency) -> None:
+        """A call of the service: done in the mission's thread.
+
+        Raises:
+            StrikeError: it could not happen.
+        """
+        future: Future[None] = Future()
+
+        def work() -> None:
+            try:
+                self._strike_now(contingency)
+                future.set_result(None)
+            except StrikeError as error:
+                future.set_exception(error)
+
+        self._work.put(work)
+        try:
+            future.result(_REQUEST_S)
+        except FutureTimeout as error:
+            raise StrikeError(f"the mission did not answer within {_REQUEST_S:g} s") from error
+
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         position = message.pose.pose.position
         if not (math.isfinite(position.x) and math.isfinite(position.y)):
@@ -327,7 +352,7 @@ class MissionNode:
             return
         self._position = (position.x, position.y)
         if self._state is not None:
-            self._take(mission.on_pose(self._plan, self._mission, *self._position))
+            self._take(mission.on_pose(self._plan, self._mission, rospy.get_time(), *self._position))
             if not self._mission.over:
                 self._display.progress(self._mission.share, rospy.get_time(), self._mission.distance_m)
 
@@ -368,15 +393,6 @@ class MissionNode:
 
 def _topics_to(node: str) -> set[str]:
     """The topics of this node over which it is connected to a subscriber."""
-    with xmlrpc.client.ServerProxy(rospy.get_node_uri(), transport=_ImpatientTransport()) as proxy:
+    with xmlrpc.client.ServerProxy(rospy.get_node_uri(), transport=ImpatientTransport()) as proxy:
         answer: Any = proxy.getBusInfo(rospy.get_name())
     return {topic for _, subscriber, direction, _, topic, *_ in answer[2] if subscriber == node and direction == "o"}
-
-
-class _ImpatientTransport(xmlrpc.client.Transport):
-    """Calls that end after a time, since a hung node would never answer."""
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        connection = super().make_connection(host)
-        connection.timeout = _CALL_S
-        return connection

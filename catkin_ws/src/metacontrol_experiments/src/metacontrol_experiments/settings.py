@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from metacontrol_experiments.contingency import Contingency, Kind, with_seed
 from metacontrol_experiments.metrics import DEFAULT_THRESHOLDS
-from metacontrol_experiments.mission import FAILURE_AT, TIMEOUT_S, Plan
+from metacontrol_experiments.mission import TIMEOUT_S, Plan
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,10 +25,9 @@ class Settings:
         metacontrol: with the reasoner; without it is the baseline.
         seed: of everything random in the simulation.
         initial_configuration: name of the variant deployed first.
-        failure: component whose node is killed, None for none.
-        failure_node: that component's node in the graph.
-        power_factor: applied to the power load when the perturbation strikes; 1 is none.
-        failure_at: share of the way done (0..1) when the perturbation strikes.
+        contingencies: what goes wrong, and when.
+        components: name -> node, of what contingencies may hit.
+        world: file of the world or map; None for the factory.
         real_time_factor: simulated per wall second, 0 for as fast as it can.
         timeout_s: simulated seconds after which the mission has failed.
         thresholds: QA name -> level that must not be exceeded.
@@ -42,10 +42,9 @@ class Settings:
     metacontrol: bool = True
     seed: int = 1
     initial_configuration: str = "f2_v2_r2"
-    failure: str | None = "front_laser"
-    failure_node: str = "front_laser"
-    power_factor: float = 1.0
-    failure_at: float = FAILURE_AT
+    contingencies: tuple[Contingency, ...] = ()
+    components: dict[str, str] = field(default_factory=dict)
+    world: Path | None = None
     real_time_factor: float = 1.0
     timeout_s: float = TIMEOUT_S
     thresholds: dict[str, float] = field(default_factory=lambda: dict(DEFAULT_THRESHOLDS))
@@ -60,8 +59,7 @@ class Settings:
         return Plan(
             goal_x=self.route.goal.x,
             goal_y=self.route.goal.y,
-            strikes=self.failure is not None or self.power_factor != 1.0,
-            strike_at=self.failure_at,
+            contingencies=with_seed(self.contingencies, self.seed),
             timeout_s=self.timeout_s,
         )
 
@@ -79,6 +77,8 @@ class Settings:
             "seed": str(self.seed),
             "real_time_factor": repr(self.real_time_factor),
         }
+        if self.world is not None:
+            arguments["world"] = str(self.world.resolve())
         if self.metacontrol:
             arguments |= {f"nfr_{name}": repr(level) for name, level in self.thresholds.items()}
         pairs = [f"{name}:={value}" for name, value in arguments.items()]
@@ -87,6 +87,8 @@ class Settings:
     def describe(self) -> dict[str, str]:
         """The values of the event MISSION_START, from which the bag alone tells what was run."""
         goal = self.route.goal
+        broken = [entry for entry in self.contingencies if entry.kind.breaks_component]
+        power = [entry.value for entry in self.contingencies if entry.kind is Kind.POWER]
         return {
             "mission": "D2",
             "route": self.route.name,
@@ -94,10 +96,11 @@ class Settings:
             "metacontrol": _boolean(self.metacontrol),
             "seed": str(self.seed),
             "initial_configuration": self.initial_configuration,
-            "clutter": "0",
-            "failure": self.failure or "none",
-            "failure_at": repr(self.failure_at),
-            "power_factor": repr(self.power_factor),
+            "world": str(self.world) if self.world else "factory",
+            "clutter": str(sum(entry.obstacles for entry in self.contingencies)),
+            "failure": broken[0].target if broken else "none",
+            "power_factor": repr(power[-1] if power else 1.0),
+            "contingencies": " ".join(map(str, self.contingencies)),
             "real_time_factor": repr(self.real_time_factor),
             "timeout_s": repr(self.timeout_s),
             **{f"nfr_{name}": repr(level) for name, level in self.thresholds.items()},

@@ -113,7 +113,7 @@ def _event(report: Event) -> tuple[Entry, ...]:
     values = report.values
     if report.kind == "PERTURBATION":
         share = f" after {float(values['share']):.0%} of the way" if "share" in values else ""
-        pid = f", pid {values['pid']} killed" if "pid" in values else ""
+        pid = f", pid {values['pid']}: {values.get('how', 'kill')}" if "pid" in values else ""
         return (Entry(report.stamp, "!", f"{report.name} struck{share}{pid}", True),)
     if report.kind == "MISSION_START":
         return (Entry(report.stamp, "-", f"goal sent, route {values.get('route', '?')}"),)

@@ -44,13 +44,17 @@ class Grid:
         cos, sin = math.cos(self.origin_yaw), math.sin(self.origin_yaw)
         return self.origin_x + cos * along - sin * across, self.origin_y + sin * along + cos * across
 
-    def contains(self, x: float, y: float) -> bool:
-        """Tell whether a point of the map frame lies on the grid."""
+    def from_map(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Return coordinates along the grid's own axes (m from its origin) of points of the map frame (m)."""
         cos, sin = math.cos(self.origin_yaw), math.sin(self.origin_yaw)
         right, up = x - self.origin_x, y - self.origin_y
-        along, across = cos * right + sin * up, cos * up - sin * right
+        return cos * right + sin * up, cos * up - sin * right
+
+    def contains(self, x: float, y: float) -> bool:
+        """Tell whether a point of the map frame lies on the grid."""
+        along, across = self.from_map(x, y)
         length, width = self.size
-        return 0.0 <= along <= length and 0.0 <= across <= width
+        return bool(0.0 <= along <= length and 0.0 <= across <= width)
 
 
 def cover(occupied: NDArray[np.bool_]) -> NDArray[np.int64]:

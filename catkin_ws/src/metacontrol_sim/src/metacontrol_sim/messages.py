@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import genpy
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
-from nav_msgs.msg import OccupancyGrid, Odometry
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, Imu
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     import geometry_msgs.msg
 
     from metacontrol_sim.geometry import Pose
-    from metacontrol_sim.grid import Grid
     from metacontrol_sim.motion_sensors import Errors
     from metacontrol_sim.obstacles import Shown
     from metacontrol_sim.simulation import Simulation
@@ -99,20 +98,6 @@ class TransformWriter:
             transform.transform.translation.x, transform.transform.translation.y = pose.x, pose.y
             transform.transform.rotation.z, transform.transform.rotation.w = _half_angle(pose.yaw)
         return self._message
-
-
-def occupancy_grid(grid: Grid, now: genpy.Time) -> OccupancyGrid:
-    """Return the map."""
-    message = OccupancyGrid()
-    message.header.stamp = message.info.map_load_time = now
-    message.header.frame_id = MAP
-    message.info.resolution = grid.resolution
-    message.info.height, message.info.width = grid.cells.shape
-    message.info.origin.position.x, message.info.origin.position.y = grid.origin_x, grid.origin_y
-    orientation = message.info.origin.orientation
-    orientation.z, orientation.w = _half_angle(grid.origin_yaw)
-    message.data = grid.cells.ravel().tolist()
-    return message
 
 
 def localised_pose(pose: Pose, noise: float, now: genpy.Time) -> PoseWithCovarianceStamped:

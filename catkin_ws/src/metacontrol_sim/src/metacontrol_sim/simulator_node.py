@@ -22,6 +22,7 @@ from visualization_msgs.msg import MarkerArray
 
 from metacontrol_sim import messages, sensor_messages
 from metacontrol_sim.geometry import Pose
+from metacontrol_sim.grid_messages import occupancy_grid
 from metacontrol_sim.motion_sensors import REAL, Errors
 from metacontrol_sim.obstacles import CLUTTER_MASS, CLUTTER_SIZE, ObstacleError
 from metacontrol_sim.pacing import Pacer
@@ -134,7 +135,7 @@ class SimulatorNode:
         self._transform_writer = messages.TransformWriter()
         now = messages.stamp(self._simulation.time_ns)
         self._map = rospy.Publisher("map", OccupancyGrid, queue_size=1, latch=True)
-        self._map.publish(messages.occupancy_grid(rasterise(world), now))
+        self._map.publish(occupancy_grid(rasterise(world), now))
         self._light.publish(self._simulation.light)
 
     # Input: called in rospy's threads, done in the loop's
