@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -66,3 +67,32 @@ def _walk(node: yaml.Node, keys: Keys, file: str, places: dict[Keys, Position]) 
 
 def _position(node: yaml.Node, file: str) -> Position:
     return Position(file, node.start_mark.line + 1, node.start_mark.column + 1)
+
+
+def flow(value: Any) -> str:
+    """Return a value on one line of YAML."""
+    text: str = yaml.safe_dump(value, default_flow_style=True, sort_keys=False, width=math.inf, allow_unicode=True)
+    return text.removesuffix("\n").removesuffix("\n...")
+
+
+def with_entry(text: str, key: str, name: str | None, value: Any) -> str:
+    """Return the text of a mapping with one more entry in the list or mapping of a key; the rest stays as it is.
+
+    Args:
+        text: YAML with a mapping at its top.
+        key: whose list or mapping gets the entry; made if it is not there.
+        name: of the entry in a mapping; None for a list.
+        value: of the entry, written on one line.
+    """
+    entry = flow(value) if name is None else f"{flow(name)}: {flow(value)}"
+    document = yaml.compose(text, yaml.SafeLoader)
+    pairs = document.value if isinstance(document, yaml.MappingNode) else []
+    node = next((item for found, item in pairs if found.value == key), None)
+    if not isinstance(node, yaml.CollectionNode):
+        opening = "" if text.endswith("\n") or not text else "\n"
+        return f"{text}{opening}{key}:\n  {'- ' if name is None else ''}{entry}\n"
+    if node.flow_style:
+        at = node.end_mark.index - 1
+        return text[:at].rstrip() + (", " if node.value else "") + entry + text[at:]
+    at, indent = node.start_mark.index, " " * node.start_mark.column
+    return f"{text[:at]}{'- ' if name is None else ''}{entry}\n{indent}{text[at:]}"

@@ -211,7 +211,7 @@ def _remaps(component: Component, whole: RosSystem) -> Iterable[tuple[str, str]]
     seen: set[str] = set()
     for port in component.ports:
         inside = port.reference.name if port.reference and port.reference.name else port.name
-        topic = _topic(component, port, whole)
+        topic = topic_of(component, port, whole)
         if inside == topic or inside in seen:
             continue
         seen.add(inside)
@@ -222,7 +222,7 @@ def _remaps(component: Component, whole: RosSystem) -> Iterable[tuple[str, str]]
             yield inside + suffix, topic + suffix
 
 
-def _topic(component: Component, port: Port, whole: RosSystem) -> str:
+def topic_of(component: Component, port: Port, whole: RosSystem) -> str:
     """Return the topic, service or action that a port is connected to.
 
     It is the name of its connection, absolute where the component has a NameSpace; without a connection, its own.

@@ -1,0 +1,56 @@
+"""The topics of a system that an observer could listen to, with their message types."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ros_model.generators.launch import topic_of
+from ros_model.library import Library
+from ros_model.metamodel import PortKind
+from ros_model.model_files import PACKAGES, files_in
+from ros_model.packages import Node
+from ros_model.packages_reader import read_packages
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ros_model.metamodel import Port, RosSystem
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A topic and who publishes it; its type is "" where no model says it."""
+
+    topic: str
+    type: str
+    component: str
+
+
+def read_library(folder: Path) -> Library:
+    """Return what the `.ros` models of a folder declare.
+
+    Raises:
+        ModelError: one can't be read.
+    """
+    return Library(package for path in files_in(folder, PACKAGES) for package in read_packages(path).packages)
+
+
+def signals(system: RosSystem, library: Library) -> list[Signal]:
+    """Return the topics that the components of a system publish, each once, in their order."""
+    found: dict[str, Signal] = {}
+    for component in system.components:
+        for port in component.ports:
+            if port.kind is PortKind.PUBLISHER:
+                topic = topic_of(component, port, system)
+                found.setdefault(topic, Signal(topic, _type(port, library), component.graph_name))
+    return list(found.values())
+
+
+def _type(port: Port, library: Library) -> str:
+    node = library.node(port.reference) if port.reference else None
+    if port.reference is None or not isinstance(node, Node):
+        return ""
+    name = port.reference.name
+    declared = (p for p in node.ports if p.kind is port.kind and p.name.strip("/") == name.strip("/"))
+    return next((found.type for found in declared), "")
