@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
 _COMMANDS = {
     "check": "ros_model.commands.check:check",
+    "diff": "ros_model.commands.diff:diff",
     "format": "ros_model.commands.format:format_",
     "generate": "ros_model.commands.generate:generate",
+    "init": "ros_model.commands.init:init",
     "show": "ros_model.commands.show:show",
     "variants": "ros_model.commands.variants:variants",
 }

@@ -96,13 +96,14 @@ def _csv_rows(path: Path) -> list[Row]:
                 raise ModelError(f"has {len(cells)} cells, must have {len(columns)}, as line 1", where)
             row = dict(zip(columns, cells, strict=True))
             name = row.pop(NAME).strip()
-            rows.append(Row(name, {column: _typed(cell.strip()) for column, cell in row.items()}, where))
+            rows.append(Row(name, {column: typed_cell(cell.strip()) for column, cell in row.items()}, where))
     except csv.Error as error:
         raise ModelError(f"{error}: correct the line", Position(str(path), reader.line_num, 1)) from error
     return rows
 
 
-def _typed(cell: str) -> Value | None:
+def typed_cell(cell: str) -> Value | None:
+    """Return what a cell of a CSV file says: None, a boolean, a number, or the text itself."""
     if not cell:
         return None
     if cell in _BOOLEANS:
