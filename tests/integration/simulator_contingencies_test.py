@@ -1,0 +1,121 @@
+#!/usr/bin/env python3
+"""Contingencies happen at their moments, on demand, and never where they make no sense."""
+
+import math
+import threading
+import time
+import unittest
+
+import psutil
+import rospy
+import rostest
+from metacontrol_msgs.msg import MissionEvent
+from metacontrol_sim.srv import Contingency
+from move_base_msgs.msg import MoveBaseActionGoal
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Float32
+from visualization_msgs.msg import MarkerArray
+
+DEADLINE_S = 40.0
+
+
+class Heard:
+    """Keeps every message of a topic."""
+
+    def __init__(self, topic, kind):
+        self.messages = []
+        self._condition = threading.Condition()
+        self._subscriber = rospy.Subscriber(topic, kind, self._on_message)
+
+    def _on_message(self, message):
+        with self._condition:
+            self.messages.append(message)
+            self._condition.notify_all()
+
+    def wait(self, accept, since=0):
+        """Returns the first message from number `since` on that is accepted, None at the deadline."""
+        end = time.monotonic() + DEADLINE_S
+        with self._condition:
+            while True:
+                for message in self.messages[since:]:
+                    if accept(message):
+                        return message
+                left = end - time.monotonic()
+                if left <= 0.0 or not self._condition.wait(left):
+                    return None
+
+
+def died(pid):
+    end = time.monotonic() + DEADLINE_S
+    while psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE:
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+class ContingenciesTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("simulator_contingencies_test")
+        cls.obstacles = Heard("ground_truth/obstacles", MarkerArray)
+        cls.events = Heard("mission/event", MissionEvent)
+        cls.rear = Heard("rear/scan", LaserScan)
+        cls.light = Heard("simulator/light", Float32)
+        rospy.wait_for_service("contingency/strike", DEADLINE_S)
+        cls.strike = rospy.ServiceProxy("contingency/strike", Contingency)
+
+    def test_1_clutter_lies_there_from_the_start(self):
+        self.assertIsNotNone(
+            self.obstacles.wait(lambda m: sum(k.type == k.CUBE and k.action == 0 for k in m.markers) == 3)
+        )
+
+    def test_2_frozen_driver_is_silent_until_thawed(self):
+        self.assertIsNotNone(self.rear.wait(lambda _scan: True))
+        done = self.strike(kind="freeze", target="/rear_laser")
+        self.assertTrue(done.success, done.message)
+        event = self.events.wait(lambda e: e.name == "component:/rear_laser")
+        pid = int({pair.key: pair.value for pair in event.values}["pid"])
+        self.assertEqual(psutil.Process(pid).status(), psutil.STATUS_STOPPED)
+        count = len(self.rear.messages)
+        self.assertTrue(self.strike(kind="thaw", target="/rear_laser").success)
+        self.assertIsNotNone(self.rear.wait(lambda _scan: True, since=count))
+
+    def test_3_what_makes_no_sense_is_refused_with_a_reason(self):
+        for request, reason in (
+            ({"kind": "explode", "target": "camera"}, "no kind"),
+            ({"kind": "kill", "target": "warp_drive"}, "no component"),
+            ({"kind": "kill", "target": "/nobody"}, "nobody"),
+            ({"kind": "power", "value": math.nan}, "finite"),
+            ({"kind": "power", "value": -1.0}, "0 or more"),
+            ({"kind": "light", "value": 3.0}, "from 0"),
+            ({"kind": "clutter", "value": 1e6}, "whole number"),
+        ):
+            with self.subTest(request=request):
+                answer = self.strike(**request)
+                self.assertFalse(answer.success)
+                self.assertIn(reason, answer.message)
+
+    def test_4_timeline_begins_with_the_goal(self):
+        self.assertIsNone(next((e for e in self.events.messages if e.name == "component:front_laser"), None))
+        goals = rospy.Publisher("move_base/goal", MoveBaseActionGoal, queue_size=1, latch=True)
+        goal = MoveBaseActionGoal()
+        goal.goal.target_pose.pose.position.x = 5.0
+        goals.publish(goal)
+        struck = self.events.wait(lambda e: e.name == "component:front_laser")
+        self.assertIsNotNone(struck)
+        self.assertEqual(struck.kind, MissionEvent.PERTURBATION)
+        pid = int({pair.key: pair.value for pair in struck.values}["pid"])
+        self.assertTrue(died(pid))
+        self.assertEqual([message.data for message in self.light.messages], [1.0])  # the robot has not moved
+
+    def test_5_light_and_power_change_on_demand(self):
+        factor = Heard("power_consumption_factor", Float32)
+        self.assertTrue(self.strike(kind="power", value=1.5).success)
+        self.assertIsNotNone(factor.wait(lambda m: abs(m.data - 1.5) < 1e-6))
+        self.assertTrue(self.strike(kind="light", value=0.25).success)
+        self.assertIsNotNone(self.light.wait(lambda m: abs(m.data - 0.25) < 1e-6))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "simulator_contingencies_test", ContingenciesTest)
