@@ -49,26 +49,10 @@ def render(record: DecisionRecord, since: float = 0.0) -> Group:
     return Group(_heading(record, since), *_causes(record.reasons, record.causes), _candidates(record), _times(record))
 
 
-def why_not(candidate: CandidateRecord, chosen: CandidateRecord | None) -> str:
-    """Return why a candidate lost; empty for the chosen one."""
-    if candidate.chosen or candidate.refused_because:
-        return candidate.refused_because
-    if chosen is None:
-        return ""
-    if candidate.utility == chosen.utility:
-        return f"as useful as {chosen.name}, but a bigger change"
-    return f"less useful: {candidate.utility:g}, {chosen.name} has {chosen.utility:g}"
-
-
-def _chosen(record: DecisionRecord) -> CandidateRecord | None:
-    return next((candidate for candidate in record.candidates if candidate.chosen), None)
-
-
 def _ranking(record: DecisionRecord) -> str:
-    chosen = _chosen(record)
     texts = []
     for rank, candidate in enumerate(record.candidates[:_IN_LINE], 1):
-        reason = why_not(candidate, chosen) or ("chosen" if candidate.chosen else "")
+        reason = "chosen" if candidate.chosen else candidate.lost_because
         texts.append(f"{rank} {candidate.name} ({candidate.utility:g}{f': {reason}' if reason else ''})")
     more = len(record.candidates) - _IN_LINE
     return ", ".join(texts) + (f", and {more} more" if more > 0 else "")
@@ -103,14 +87,20 @@ def _candidates(record: DecisionRecord) -> Table:
     table = Table("", "function design", "utility", *qualities, "why not", header_style="dim")
     for column in (0, *range(2, 3 + len(qualities))):
         table.columns[column].justify = "right"
-    chosen = _chosen(record)
     for rank, candidate in enumerate(record.candidates, 1):
-        expected = dict(candidate.expected)
-        levels = [f"{expected[name]:.3g}" if name in expected else "-" for name in qualities]
-        reason = why_not(candidate, chosen)
-        cells = [str(rank), escape(candidate.name), f"{candidate.utility:g}", *levels]
-        table.add_row(*cells, "[green]chosen[/]" if candidate.chosen else escape(reason))
+        levels = [_level(candidate, name) for name in qualities]
+        reason = "[green]chosen[/]" if candidate.chosen else escape(candidate.lost_because)
+        table.add_row(str(rank), escape(candidate.name), f"{candidate.utility:g}", *levels, reason)
     return table
+
+
+def _level(candidate: CandidateRecord, quality: str) -> str:
+    """Return the level that counted, and where another one was expected, that too."""
+    expected = dict(candidate.expected).get(quality)
+    counted = dict(candidate.levels).get(quality, expected)
+    if expected is None or counted is None:
+        return "-"
+    return f"{counted:.3g}" if f"{counted:.3g}" == f"{expected:.3g}" else f"{counted:.3g} ({expected:.3g})"
 
 
 def _times(record: DecisionRecord) -> Text:

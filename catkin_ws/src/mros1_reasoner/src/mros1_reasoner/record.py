@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -13,13 +13,15 @@ _NANO = 1_000_000_000
 
 @dataclass(frozen=True)
 class CandidateRecord:
-    """A metacontrol_msgs/Candidate; `expected` holds pairs (quality, level)."""
+    """A metacontrol_msgs/Candidate; `expected` and `levels` hold pairs (quality, level)."""
 
     name: str
     expected: tuple[tuple[str, float], ...]
+    levels: tuple[tuple[str, float], ...]
     utility: float
     chosen: bool
     refused_because: str
+    lost_because: str
 
 
 @dataclass(frozen=True)
@@ -54,9 +56,11 @@ def record_of(decision: Decision) -> DecisionRecord:
         CandidateRecord(
             name=candidate.design.name,
             expected=tuple(sorted(candidate.design.expected.items())),
+            levels=tuple(sorted(candidate.levels.items())),
             utility=candidate.utility,
             chosen=candidate.chosen,
             refused_because=candidate.refused_because,
+            lost_because=candidate.lost_because,
         )
         for candidate in decision.candidates
     )
@@ -99,9 +103,11 @@ def fill_message(message: Any, record: DecisionRecord, time_of: Callable[[float]
                 types.Candidate(
                     name=candidate.name,
                     expected_qas=[types.ExpectedQA(name=name, value=level) for name, level in candidate.expected],
+                    levels=[types.ExpectedQA(name=name, value=level) for name, level in candidate.levels],
                     utility=candidate.utility,
                     chosen=candidate.chosen,
                     refused_because=candidate.refused_because,
+                    lost_because=candidate.lost_because,
                 )
                 for candidate in value
             ]
@@ -126,11 +132,17 @@ def seconds(time: Any) -> float:
 def _candidate(message: Any) -> CandidateRecord:
     return CandidateRecord(
         name=str(message.name),
-        expected=tuple((str(quality.name), float(quality.value)) for quality in message.expected_qas),
+        expected=_levels(message.expected_qas),
+        levels=_levels(getattr(message, "levels", ())),
         utility=float(message.utility),
         chosen=bool(message.chosen),
         refused_because=str(message.refused_because),
+        lost_because=str(getattr(message, "lost_because", message.refused_because)),
     )
+
+
+def _levels(messages: Iterable[Any]) -> tuple[tuple[str, float], ...]:
+    return tuple((str(quality.name), float(quality.value)) for quality in messages)
 
 
 def _cause(message: Any) -> Cause:
