@@ -10,10 +10,14 @@ from mros1_reasoner.knowledge_base import KnowledgeBase
 from mros1_reasoner.levels import Levels
 from mros1_reasoner.mape import Mape, Settings
 from mros1_reasoner.model import Design, Direction, Objective, Quality
-from mros1_reasoner.planner import Situation, difference, plan, utility_of
+from mros1_reasoner.planner import Situation, difference, plan
 
 D2 = Path(__file__).parents[3] / "catkin_ws" / "src" / "metacontrol_sim" / "models" / "d2.owl"
 ONSET, DURATION = 20.0, 300.0  # s: when the power consumption rises, and how long the mission is
+
+
+def use_of(design):
+    return design.expected.get("use", 0.0)
 
 
 @dataclass
@@ -151,7 +155,7 @@ def test_quality_where_higher_is_better_is_corrected_downwards():
     situation = Situation(
         {"reach": Quality(Direction.HIGHER_IS_BETTER)}, current="now", observed={"reach": 0.4}, factors={"reach": 0.5}
     )
-    outcome = plan(Objective("o", "f", {"reach": 0.6}), designs, situation, utility_of("use"), difference)
+    outcome = plan(Objective("o", "f", {"reach": 0.6}), designs, situation, use_of, difference)
     assert (outcome.choice, outcome.degraded) == ("far", False)
 
 
@@ -163,8 +167,8 @@ def test_degraded_design_stays_where_another_is_hardly_better():
     ]
     situation = Situation(current="now", observed={"load": 0.7}, factors={"load": 2.0}, worth=0.1)
     objective = Objective("o", "f", {"load": 0.5})
-    outcome = plan(objective, designs[:2], situation, utility_of("use"), difference)
+    outcome = plan(objective, designs[:2], situation, use_of, difference)
     assert (outcome.choice, outcome.degraded) == ("now", True)
     assert "other would violate them hardly less" in outcome.reason
-    assert plan(objective, designs, situation, utility_of("use"), difference).choice == "far"
-    assert plan(objective, designs[:2], replace(situation, worth=0.0), utility_of("use"), difference).choice == "other"
+    assert plan(objective, designs, situation, use_of, difference).choice == "far"
+    assert plan(objective, designs[:2], replace(situation, worth=0.0), use_of, difference).choice == "other"

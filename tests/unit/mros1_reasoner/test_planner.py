@@ -2,10 +2,11 @@ from dataclasses import replace
 
 import pytest
 from mros1_reasoner.model import Design, Direction, Objective, Quality
-from mros1_reasoner.planner import Situation, difference, plan, utility_of
+from mros1_reasoner.planner import Situation, difference, plan
+from mros1_reasoner.utility import quality as expected_level
 
 OBJECTIVE = Objective("o", "f", {"risk": 0.6, "power": 0.62})
-UTILITY = utility_of("use")
+UTILITY = expected_level("use", {"use": Quality(Direction.HIGHER_IS_BETTER)})
 
 
 def design(name, risk=0.1, power=0.1, use=0.5, components=()):
@@ -122,7 +123,7 @@ def test_no_designs():
 
 def test_utility_where_lower_is_better():
     result = choose(
-        design("a", power=0.1), design("b", power=0.5), utility=utility_of("power", Direction.LOWER_IS_BETTER)
+        design("a", power=0.1), design("b", power=0.5), utility=expected_level("power", {"power": Quality()})
     )
     assert result.choice == "a"
 

@@ -16,11 +16,12 @@ from mros1_reasoner import vocabulary as v
 from mros1_reasoner.decision import ADVISED, DECIDED, EXECUTED, FAILED, PROPOSED, Decision
 from mros1_reasoner.deliberation import Deliberation, Timing
 from mros1_reasoner.knowledge_base import KnowledgeBase
-from mros1_reasoner.model import Analysis, Direction, Facts, Objective, Quality
-from mros1_reasoner.planner import Distance, Utility, difference, utility_of
+from mros1_reasoner.model import Analysis, Facts, Objective
+from mros1_reasoner.planner import Distance, Utility, difference
 from mros1_reasoner.reasoner import Reasoner
 from mros1_reasoner.settings import Settings
 from mros1_reasoner.state import BUSY, RECONFIGURING, RECOVERING, STABLE, Component, State
+from mros1_reasoner.utility import make_utility
 
 __all__ = [
     "ADVISED",
@@ -65,21 +66,21 @@ class Mape:
             reasoner: what analyses.
             objectives: what is needed.
             settings: how to behave.
-            utility: of a design; else the expected level of the quality that the settings name.
+            utility: of a design; else as the settings say.
             distance: how big a change it is from one design to another.
             wall: wall clock that measures durations, s.
             clock: ROS time, for the stamps of what takes time within a step; without it, they are the step's.
             name: beginning of the decisions' ids.
+
+        Raises:
+            UtilityError: the utility function of the settings can't be made.
         """
         self._kb = knowledge_base
         self._reasoner = reasoner
         self.settings = settings or Settings()
         self._state = State(knowledge_base, objectives, self.settings)
-        named = self.settings.utility
-        kind = knowledge_base.qualities.get(named, Quality(Direction.HIGHER_IS_BETTER))
-        chosen = utility or utility_of(named, kind.direction)
-        self._deliberation = Deliberation(self._state, chosen, distance, wall, self._stamp, name)
-        self._utility = chosen
+        self._utility = utility or make_utility(self.settings.utility, knowledge_base.qualities)
+        self._deliberation = Deliberation(self._state, self._utility, distance, wall, self._stamp, name)
         self._wall = wall
         self._clock = clock
         self._pending: Decision | None = None

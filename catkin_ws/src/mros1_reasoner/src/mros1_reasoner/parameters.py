@@ -15,6 +15,7 @@ from ros_model.files import resolve
 from mros1_reasoner.knowledge_base import KnowledgeBase
 from mros1_reasoner.mape import Settings
 from mros1_reasoner.model import Direction, Objective
+from mros1_reasoner.utility import UtilityError, make_utility
 
 _log = logging.getLogger(__name__)
 
@@ -139,9 +140,11 @@ class Parameters:
         desired = str(self.values.get("desired_configuration") or "")
         if desired and desired not in knowledge_base.designs:
             raise ParameterError(f"parameter ~desired_configuration is {desired!r}: no FunctionDesign of the model")
-        utility = str(self.values.get("utility", defaults.utility))
-        if utility not in knowledge_base.qualities:
-            _log.warning("parameter ~utility: no QA is called %r: every design is as useful as another", utility)
+        utility = self.values.get("utility", defaults.utility)
+        try:
+            make_utility(utility, knowledge_base.qualities)
+        except UtilityError as error:
+            raise ParameterError(f"parameter ~utility: {error}") from error
         others: dict[str, Any] = {}
         for item in fields(Settings):
             default = getattr(defaults, item.name)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 
-from mros1_reasoner.model import Design, Direction, Objective, Quality
+from mros1_reasoner.model import Design, Objective, Quality
 
 Utility = Callable[[Design], float]
 Distance = Callable[[Design, Design], float]
@@ -138,15 +138,6 @@ def plan(
     chosen = replace(best, chosen=True, refused_because="")
     ranked = (chosen, *(replace(c, lost_because=_loss(c, best, degraded)) for c in others))
     return Plan(best.design.name, degraded, ranked, reason)
-
-
-def utility_of(quality: str, direction: Direction = Direction.HIGHER_IS_BETTER) -> Utility:
-    """Return the utility function that is the expected level of one quality attribute; 0 where none is expected."""
-
-    def utility(design: Design) -> float:
-        return -direction.sign * design.expected.get(quality, 0.0)
-
-    return utility
 
 
 def difference(first: Design, second: Design) -> float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,7 @@ class Settings:
         backoff_limit: the longest such wait.
         start_grace: so long after the first step the running configuration is waited for.
         busy_limit: so long a reconfiguration by somebody else is waited for.
-        utility: quality attribute whose expected level is the utility.
+        utility: quality attribute whose expected level is the utility, or a plug-in with its parameters.
         desired: configuration that is asked for where none runs.
         always_improve: adapt also when a clearly better design has become available, because a component works again
             or the operator has changed a limit; an objective may say otherwise.
@@ -39,7 +41,7 @@ class Settings:
     backoff_limit: float = 30.0
     start_grace: float = 15.0
     busy_limit: float = 60.0
-    utility: str = "performance"
+    utility: str | Mapping[str, Any] = "performance"
     desired: str = ""
     always_improve: bool = False
     improvement: float = 0.05
