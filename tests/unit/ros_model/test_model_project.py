@@ -252,6 +252,30 @@ def test_requirement_of_an_unknown_component_is_refused(load, settings):
         load()
 
 
+def test_level_of_an_unknown_quality_is_refused_at_its_row(load):
+    with pytest.raises(ModelError, match=r"qa\.csv:2:1: slow expects a level of 'saftey', which is none of quality_a"):
+        load(qa="name,saftey\nslow,0.2\nblind,0.9\n")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"components": {"safety": {"node": "x"}}}, "'safety' names a quality attribute and a component"),
+        ({"objectives": {"f_move": {"function": "f_move"}}}, "'f_move' names a function and an objective"),
+        ({"components": {"slow": {"node": "x"}}}, "'slow' names a component and a variant"),
+        (
+            {"quality_attributes": {q: {"direction": "lower_is_better"} for q in ("safety", "slow_safety")}},
+            "'slow_safety' names a quality attribute and an expected or required level",
+        ),
+    ],
+)
+def test_name_with_two_meanings_is_refused(load, settings, change, message):
+    settings.update(change)
+    with pytest.raises(ModelError) as caught:
+        load()
+    assert message in str(caught.value)
+
+
 def test_every_problem_of_the_settings_is_told_at_its_place(tmp_path):
     path = tmp_path / "metacontrol.yaml"
     path.write_text(

@@ -66,7 +66,7 @@ def application_model(project: Project, iri: str) -> str:
         levels = {q: level for q, level in variant.expected_qas.items() if q in settings["quality_attributes"]}
         links = {
             "tomasys:solvesF": [function],
-            "tomasys:requiresF": settings["functions"][function].get("requires", ()),
+            "tomasys:requiresF": project.required_functions(variant.name),
             "tomasys:hasQAestimation": [f"{variant.name}_{quality}" for quality in levels],
         }
         parts.append(_individual("FunctionDesign", variant.name, links))

@@ -125,6 +125,8 @@ def load_project(folder: str | Path) -> Project:
         by_table=frozenset(by_table),
     )
     _check_names(project)
+    _check_levels(project)
+    _check_one_meaning(project)
     return project
 
 
@@ -185,3 +187,39 @@ def _check_names(project: Project) -> None:
                     f"{component!r} is a component neither of the base nor of components: add it to one",
                     *("requires", parameter, value),
                 )
+
+
+def _check_levels(project: Project) -> None:
+    """Check that every expected level is of a quality attribute that is there."""
+    known = project.settings["quality_attributes"]
+    for variant in project.variants:
+        for parameter in variant.parameters:
+            quality = parameter.name.removeprefix("qa_")
+            if quality != parameter.name and quality not in known:
+                raise ModelError(
+                    f"{variant.name} expects a level of {quality!r}, which is none of quality_attributes: "
+                    f"{', '.join(sorted(known))}",
+                    parameter.position,
+                )
+
+
+def _check_one_meaning(project: Project) -> None:
+    """Check that no name means two things: in the ontology they would be one."""
+    settings, seen = project.settings, dict[str, str]()
+    values = [
+        *(f"{variant.name}_{quality}" for variant in project.variants for quality in variant.expected_qas),
+        *(f"{name}_{quality}" for name, entry in settings["objectives"].items() for quality in entry.get("nfrs", {})),
+    ]
+    meanings = {
+        "a function": settings["functions"],
+        "a quality attribute": settings["quality_attributes"],
+        "an objective": settings["objectives"],
+        "a component": {*settings["components"], *(component.name for component in project.base.components)},
+        "a variant": [variant.name for variant in project.variants],
+        "an expected or required level": values,
+    }
+    for meaning, names in meanings.items():
+        for name in names:
+            if name in seen:
+                raise project.source.error(f"{name!r} names {seen[name]} and {meaning}: rename one")
+            seen[name] = meaning
