@@ -261,6 +261,37 @@ class MoveBaseTest(unittest.TestCase):
         self.assertAlmostEqual(plan[-1].pose.position.x, 3.0)
         self.assertFalse(make_plan(pose(0.0, 0.0), pose(30.0, 2.0), 0.0).plan.poses)
 
+    def test_parameters_change_on_the_way_without_a_stop(self):
+        self.addCleanup(self.set_speed, 0.75)
+        self.set_speed(0.75)
+        self.send(4.0, 0.0)
+        wait_for(lambda: self.robot.command.linear.x > 0.6, "the robot is fast")
+        before = len(self.robot.commands)
+        self.set_speed(0.3)
+        wait_for(lambda: self.robot.command.linear.x <= 0.3, "the robot is slow")
+        wait_for(lambda: len(self.robot.commands) > before + 40, "it drives on")
+        speeds = [twist.linear.x for _, twist in self.robot.commands[before:]]
+        self.assertGreater(min(speeds), 0.0)
+        self.assertLessEqual(max(speeds[-10:]), 0.3)
+        self.assertEqual(rospy.get_param("move_base/TrajectoryPlannerROS/max_vel_x"), 0.3)
+        self.assertEqual(self.client.get_state(), GoalStatus.ACTIVE)
+        self.client.cancel_all_goals()
+
+    def test_parameters_that_do_not_fit_are_refused(self):
+        self.set_speed(0.05)  # less than min_vel_x
+        wait_for(lambda: any("Parameters refused" in line for line in self.log), "a warning")
+        self.assertNotEqual(rospy.get_param("move_base/TrajectoryPlannerROS/max_vel_x"), 0.05)
+
+    @staticmethod
+    def set_speed(speed):
+        """As an operator does it."""
+        server = "move_base/TrajectoryPlannerROS"
+        wait_for(
+            lambda: any(name == f"/{server}/parameter_updates" for name, _ in rospy.get_published_topics()), server
+        )
+        command = ["/usr/bin/rosrun", "dynamic_reconfigure", "dynparam", "set", server, "max_vel_x", str(speed)]
+        subprocess.run(command, check=True, timeout=DEADLINE_S)
+
     def test_bad_parameter_ends_the_node_with_its_name(self):
         rospy.set_param("other", {**rospy.get_param("move_base"), "controller_frequency": "fast"})
         process = subprocess.run(

@@ -146,20 +146,24 @@ class Costmap:
     """One costmap, built up from the layers of its parameters."""
 
     def __init__(self, parameters: CostmapParameters) -> None:
+        self.reconfigure(parameters)
+        self._static_layer = next((layer for layer in parameters.layers if layer.kind == "static"), None)
+        self._static: StaticMap | None = None
+        self._static_costs: NDArray[np.uint8] | None = None
+        self._static_placed: tuple[Geometry, Pose] | None = None
+        self.geometry = self._initial_geometry()
+        self._obstacles = np.zeros(self.geometry.shape, dtype=np.uint8)
+
+    def reconfigure(self, parameters: CostmapParameters) -> None:
+        """Takes another inflation, padding, rates; obstacles seen stay. Size, frame and other layers can't change."""
         self.parameters = parameters
         self._inflation = next((layer for layer in parameters.layers if layer.kind == "inflation"), None)
-        self._static_layer = next((layer for layer in parameters.layers if layer.kind == "static"), None)
         self._obstacle_layers = [layer for layer in parameters.layers if layer.kind == "obstacle"]
         padded = parameters.padded_footprint()
         self.inscribed_radius = inscribed_radius(padded)
         self.circumscribed_radius = float(np.hypot(*padded.T).max())
         self._footprint = np.array(parameters.footprint)
-        self._static: StaticMap | None = None
-        self._static_costs: NDArray[np.uint8] | None = None
-        self._static_placed: tuple[Geometry, Pose] | None = None
         self._cost_table, self._table_scale = self._make_cost_table()
-        self.geometry = self._initial_geometry()
-        self._obstacles = np.zeros(self.geometry.shape, dtype=np.uint8)
 
     @property
     def needs_map(self) -> bool:

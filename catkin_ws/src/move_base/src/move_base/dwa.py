@@ -108,11 +108,21 @@ class DwaController:
             padded_footprint: the same, padded.
             period: of control, s.
         """
+        self.reconfigure(parameters, footprint, padded_footprint, period)
+        self.reset()
+
+    def reconfigure(
+        self,
+        parameters: ControllerParameters,
+        footprint: NDArray[np.float64],
+        padded_footprint: NDArray[np.float64],
+        period: float,
+    ) -> None:
+        """Takes other parameters, as the constructor does, on the way."""
         self.parameters = parameters
         self._period = period
         padding = inscribed_radius(padded_footprint) - inscribed_radius(footprint)
         self._shapes = [_Shape(footprint, share * padding) for share in HARD_PADDING]
-        self.reset()
 
     def reset(self) -> None:
         """Forgets the last command, for a new goal."""

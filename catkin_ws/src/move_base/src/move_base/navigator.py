@@ -213,6 +213,24 @@ class Navigator:
         self._map_frame = ""
         self._work = _Work.begun(0.0)
 
+    def reconfigure(self, parameters: MoveBaseParameters) -> None:
+        """Takes other parameters on the way: goal, plan and obstacles stay, and so does the robot's speed.
+
+        Frames, sizes and sensors are the same as before (`move_base.reconfiguration` offers no others).
+        """
+        self.parameters = parameters
+        for area, new in ((self._global, parameters.global_costmap), (self._local, parameters.local_costmap)):
+            if new != area.parameters:
+                area.parameters = new
+                area.costmap.reconfigure(new)
+                area.updated = -math.inf
+        self._controller.reconfigure(
+            parameters.controller,
+            np.array(parameters.local_costmap.footprint),
+            parameters.local_costmap.padded_footprint(),
+            1.0 / parameters.controller_frequency,
+        )
+
     # -- what comes in ---------------------------------------------------------------------------------------------
 
     @property

@@ -30,16 +30,20 @@ from move_base.geometry import STOP, Pose, Velocity
 from move_base.global_planner import PlanningError
 from move_base.navigator import Navigator, Outcome
 from move_base.parameters import ParameterError, read_parameters
+from move_base.reconfiguration import changed, present_values, servers
 from move_base.sensors import SensorError, cloud_observation, scan_observation
 from move_base.takeover import TakeoverError, decode_parameter
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from actionlib.server_goal_handle import ServerGoalHandle
     from numpy.typing import NDArray
 
     from move_base.costmap import Snapshot
     from move_base.navigator import Result
     from move_base.parameters import CostmapParameters, MoveBaseParameters, ObservationSource
+    from move_base.reconfiguration import ServerDescription
 
 ACTION = "move_base"
 
@@ -105,8 +109,13 @@ class TfTransformer:
 class MoveBaseNode:
     """The node: callbacks fill the navigator, `run` steps it at controller_frequency."""
 
-    def __init__(self, parameters: MoveBaseParameters, resumed: MoveBaseActionGoal | None) -> None:
+    def __init__(
+        self, parameters: MoveBaseParameters, tree: dict[str, Any], resumed: MoveBaseActionGoal | None
+    ) -> None:
         self._parameters = parameters
+        self._tree = tree  # what they were read from
+        self._reconfigured: MoveBaseParameters | None = None  # to be taken on at the next tick
+        self._tree_lock = threading.Lock()
         self._navigator = Navigator(parameters)
         self._lock = threading.RLock()  # the navigator, and the last word on cmd_vel
         self._closing = False
@@ -134,6 +143,8 @@ class MoveBaseNode:
         self._server.start()
         rospy.Service("~make_plan", GetPlan, self._on_make_plan)
         rospy.Service("~clear_costmaps", Empty, self._on_clear_costmaps)
+        # Beside the control loop: the first command must not wait for a score of registrations.
+        threading.Thread(target=self._offer_reconfiguration, daemon=True).start()
 
     def run(self) -> None:
         """Steps until shutdown."""
@@ -141,6 +152,9 @@ class MoveBaseNode:
         rate = rospy.Rate(self._parameters.controller_frequency)
         last = 0.0
         while not rospy.is_shutdown():
+            if self._take_parameters():
+                period = 1.0 / self._parameters.controller_frequency
+                rate = rospy.Rate(self._parameters.controller_frequency)
             now = rospy.get_time()
             if now < last:
                 self._clock_set_back(now)
@@ -171,6 +185,39 @@ class MoveBaseNode:
             self._displays, (self._navigator.global_snapshot, self._navigator.local_snapshot), strict=True
         ):
             display.publish(now, snapshot, self._frames)
+
+    # -- parameters that change on the way -------------------------------------------------------------------------
+
+    def _offer_reconfiguration(self) -> None:
+        from move_base.reconfigure_node import offer  # not needed for the first command
+
+        with contextlib.suppress(rospy.ROSException, OSError):  # the node ends while it starts
+            offer(servers(self._parameters), self._present_values, self._reconfigure)
+
+    def _present_values(self, server: ServerDescription, names: Iterable[str]) -> dict[str, Any]:
+        with self._tree_lock:
+            return present_values(self._reconfigured or self._parameters, self._tree, server, names)
+
+    def _reconfigure(self, namespace: str, values: dict[str, Any]) -> str:
+        """Takes values at the next tick; returns why they do not fit, or an empty text."""
+        with self._tree_lock:
+            try:
+                self._tree, self._reconfigured = changed(self._tree, namespace, values)
+            except ParameterError as error:
+                return str(error)
+        return ""
+
+    def _take_parameters(self) -> bool:
+        with self._tree_lock:
+            parameters, self._reconfigured = self._reconfigured, None
+        if parameters is None:
+            return False
+        self._parameters = parameters
+        with self._lock:
+            self._navigator.reconfigure(parameters)
+        for display, costmap in zip(self._displays, (parameters.global_costmap, parameters.local_costmap), strict=True):
+            display.reconfigure(costmap)
+        return True
 
     # -- goals -----------------------------------------------------------------------------------------------------
 
@@ -392,6 +439,11 @@ class _CostmapDisplay:
         self._polygon = rospy.Publisher(f"~{name}/footprint", PolygonStamped, queue_size=1)
         self._published = -math.inf
 
+    def reconfigure(self, parameters: CostmapParameters) -> None:
+        """Takes other parameters."""
+        self._parameters = parameters
+        self._footprint = parameters.padded_footprint()
+
     def publish(self, now: float, snapshot: Snapshot | None, frames: TfTransformer) -> None:
         """Publishes what is due at `now` (s)."""
         p = self._parameters
@@ -413,12 +465,13 @@ def main() -> None:
     rospy.init_node("move_base")
     cv2.setNumThreads(1)  # the grids are small: threads cost more than they give
     tree = rospy.get_param("~", {})
+    tree = tree if isinstance(tree, dict) else {}
     try:
-        parameters = read_parameters(tree if isinstance(tree, dict) else {})
+        parameters = read_parameters(tree)
     except ParameterError as error:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
         sys.exit(2)
-    MoveBaseNode(parameters, _resumed_goal(tree.get("resume_goal"))).run()
+    MoveBaseNode(parameters, tree, _resumed_goal(tree.pop("resume_goal", None))).run()
 
 
 def _resumed_goal(value: object) -> MoveBaseActionGoal | None:
