@@ -5,18 +5,14 @@ import sys
 import time
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from mros1_reasoner import pellet as pellet_module
 from mros1_reasoner import vocabulary as v
 from mros1_reasoner.model import Facts, Objective
 from mros1_reasoner.owlready_reasoner import OwlreadyReasoner
-from mros1_reasoner.pellet import NoJavaError, PelletReasoner, make_reasoner
+from mros1_reasoner.pellet import ChildLostError, NoJavaError, PelletReasoner, SteadyReasoner, make_reasoner
 from mros1_reasoner.reasoner import Assertion, InconsistentError, ReasonerError
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
-LEVELS = st.sampled_from([0.1, 0.6, 0.61, 0.9])
-STATUSES = st.sampled_from(["TRUE", "FALSE", "RECOVERED"])
 DEADLINE_S = 20.0
 
 
@@ -25,31 +21,6 @@ def wait_for(condition):
     while not condition():
         assert time.monotonic() < until
         time.sleep(0.02)
-
-
-@settings(max_examples=4, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], derandomize=True)
-@given(
-    designs=st.dictionaries(
-        st.sampled_from("abcdefgh"),
-        st.tuples(st.just({}), st.lists(st.sampled_from(["laser", "camera", "base"]), unique=True, max_size=3)),
-        min_size=1,
-    ),
-    levels=st.dictionaries(st.tuples(st.just("o_move"), st.sampled_from(["safety", "energy"])), LEVELS),
-    statuses=st.dictionaries(st.sampled_from(["laser", "camera", "base"]), STATUSES, min_size=1),
-    broken=st.booleans(),
-)
-def test_child_infers_what_owlready2_infers(load, pellet, **drawn):
-    designs, levels, statuses = drawn["designs"], drawn["levels"], drawn["statuses"]
-    extra = "".join(f'<t:Component rdf:about="#{name}"/>' for name in ("laser", "camera", "base"))
-    knowledge_base = load(application(designs, extra))
-    facts = Facts(
-        (OBJECTIVE,), {"o_move": min(designs)}, levels, statuses, frozenset({"o_move"} if drawn["broken"] else ())
-    )
-    pellet.load(knowledge_base.ontology)
-    reference = OwlreadyReasoner()
-    reference.load(knowledge_base.ontology)
-    assertions = knowledge_base.assertions(facts)
-    assert pellet.infer(assertions, v.CONCLUSIONS) == reference.infer(assertions, v.CONCLUSIONS)
 
 
 def test_facts_of_one_analysis_do_not_stay_for_the_next(knowledge_base, reasoner):
@@ -118,6 +89,67 @@ def test_child_that_can_not_run_gives_way_to_owlready2_with_a_warning(monkeypatc
     monkeypatch.setattr(pellet_module.importlib.util, "find_spec", lambda name: None)
     assert isinstance(make_reasoner(), OwlreadyReasoner)
     assert "JPype1 is missing" in caplog.text
+
+
+class Broken:
+    """A child that can't be kept running."""
+
+    def __init__(self):
+        self.calls = 0
+
+    def load(self, ontology):
+        self.infer(ontology, ())
+
+    def infer(self, facts, properties):
+        self.calls += 1
+        raise ChildLostError("Pellet's process has died, twice in a row")
+
+
+def test_child_that_is_lost_gives_way_to_owlready2_and_is_tried_again_later(knowledge_base, caplog):
+    now = [0.0]
+    child = Broken()
+    steady = SteadyReasoner(child, clock=lambda: now[0])
+    steady.load(knowledge_base.ontology)
+    assert caplog.text.count("going on with a new JVM for every analysis") == 1
+    facts = Facts((OBJECTIVE,), components={"laser": "FALSE"})
+    result = knowledge_base.analyse(facts, steady)
+    assert set(result.unrealisable) == {name for name in DESIGNS if name.startswith("scan")}
+    assert child.calls == 1
+    now[0] = pellet_module.RETRY_AFTER
+    knowledge_base.analyse(facts, steady)
+    assert child.calls == 2
+
+
+def test_lost_child_that_works_again_gets_its_ontology_back(knowledge_base, pellet):
+    now = [0.0]
+    child = Broken()
+    steady = SteadyReasoner(child, clock=lambda: now[0])
+    steady.load(knowledge_base.ontology)
+    pellet.load("")
+    steady._child, now[0] = pellet, pellet_module.RETRY_AFTER
+    result = knowledge_base.analyse(Facts((OBJECTIVE,), components={"laser": "FALSE"}), steady)
+    assert len(result.unrealisable) == 3
+
+
+def test_child_that_runs_out_of_memory_is_replaced_and_then_given_up(load, caplog):
+    designs = {f"d{i}": ({}, ["laser"]) for i in range(3000)}
+    knowledge_base = load(application(designs))
+    reasoner = PelletReasoner(heap_mb=16)
+    try:
+        with pytest.raises(ChildLostError, match="has died, twice in a row"):
+            reasoner.load(knowledge_base.ontology)
+        assert "starting it again" in caplog.text
+    finally:
+        reasoner.close()
+
+
+def test_jvm_that_does_not_start_is_told(knowledge_base):
+    reasoner = PelletReasoner(heap_mb=0)  # -Xmx0m is refused
+    try:
+        with pytest.raises(ChildLostError, match=r"Pellet's process (does not start|has died)"):
+            reasoner.load(knowledge_base.ontology)
+    finally:
+        reasoner.close()
 
 
 def test_contradiction_is_an_error_of_its_own_and_the_next_analysis_works(knowledge_base, reasoner):

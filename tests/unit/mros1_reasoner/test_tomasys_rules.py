@@ -191,6 +191,7 @@ CAUSES = {
     "camera": {"components": {"camera": "FALSE"}},
     "recovered": {"components": {"spare": "RECOVERED"}},
     "broken": {"broken": frozenset({"o_move"})},
+    "task": {"failed": frozenset({"o_move"})},
 }
 CONCLUDED = {
     "safety": {v.IN_ERROR_NFR},
@@ -200,6 +201,7 @@ CONCLUDED = {
     "camera": set(),
     "recovered": {v.UPDATABLE},
     "broken": {v.IN_ERROR_COMPONENT},
+    "task": {v.IN_ERROR_NFR},
 }
 
 
@@ -208,11 +210,10 @@ def test_several_causes_at_once_stay_consistent_and_are_all_found(load, pellet, 
     knowledge_base = load(application(extra='<t:Component rdf:about="#spare"/>'))
     pellet.load(knowledge_base.ontology)
     for names in itertools.combinations(CAUSES, count):
-        levels, components, broken = {}, {}, frozenset()
+        known = {"levels": {}, "components": {}, "broken": frozenset(), "failed": frozenset()}
         for name in names:
-            levels |= CAUSES[name].get("levels", {})
-            components |= CAUSES[name].get("components", {})
-            broken |= CAUSES[name].get("broken", frozenset())
-        facts = replace(FACTS, levels=levels, components=components, broken=broken)
+            for kind, value in CAUSES[name].items():
+                known[kind] = known[kind] | value
+        facts = replace(FACTS, **known)
         result = knowledge_base.analyse(facts, pellet).objectives["o_move"]
         assert result.causes == set().union(*(CONCLUDED[name] for name in names)), names

@@ -5,27 +5,36 @@ from __future__ import annotations
 import importlib.util
 import json
 import logging
+import math
 import os
 import select
 import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from mros1_reasoner.owlready_reasoner import OwlreadyReasoner
 from mros1_reasoner.reasoner import Assertion, InconsistentError, Reasoner, ReasonerError
 
 _log = logging.getLogger(__name__)
 
+_Answer = TypeVar("_Answer")
+
 START_DEADLINE = 20.0  # s, wall: a JVM and its jars, on a loaded machine
+HEAP_MB = 256  # of the JVM; with it, node and child stay below 500 MB
+RETRY_AFTER = 300.0  # s, wall: so long the slow way is taken after the child could not be kept running
 NO_JAVA = "no Java runtime found: install openjdk-17-jre-headless"
 
 
 class NoJavaError(ReasonerError):
     """There is no Java runtime."""
+
+
+class ChildLostError(ReasonerError):
+    """The child could not be kept running, though it was started again."""
 
 
 def find_jvm() -> Path:
@@ -52,17 +61,18 @@ class PelletReasoner:
     the kernel ends the child with the thread that started it.
     """
 
-    def __init__(self, deadline: float = 20.0) -> None:
+    def __init__(self, deadline: float = 20.0, heap_mb: int = HEAP_MB) -> None:
         """Start the child; it gets ready while the caller goes on.
 
         Args:
             deadline: s, wall, for an answer; a child that takes longer is replaced.
+            heap_mb: memory of the JVM; a child that needs more ends, and is replaced.
 
         Raises:
             NoJavaError: there is no Java runtime.
             ReasonerError: JPype1 or owlready2's jars are missing.
         """
-        self._deadline = deadline
+        self._deadline, self._heap_mb = deadline, heap_mb
         self._jvm = find_jvm()
         if importlib.util.find_spec("jpype") is None:
             raise ReasonerError("the Python package JPype1 is missing: install requirements/python.txt")
@@ -105,7 +115,7 @@ class PelletReasoner:
         self._buffer.clear()
         self._greeted = False
         self._process = subprocess.Popen(
-            [sys.executable, "-P", str(child), str(os.getpid()), str(self._jvm), str(self._jars)],
+            [sys.executable, "-P", str(child), str(os.getpid()), str(self._jvm), str(self._jars), str(self._heap_mb)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL if not _log.isEnabledFor(logging.DEBUG) else None,
@@ -127,13 +137,15 @@ class PelletReasoner:
             return self._ask(request)
         except _ChildError as error:
             self.close()
-            raise ReasonerError(f"Pellet's process {error}, twice in a row") from error
+            raise ChildLostError(f"Pellet's process {error}, twice in a row") from error
 
     def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
         if self._process is None:
             raise _ChildError("is not running")
         if not self._greeted:
-            self._check(self._receive(time.monotonic() + START_DEADLINE))
+            greeting = self._receive(time.monotonic() + START_DEADLINE)
+            if not greeting["ok"]:
+                raise _ChildError(f"does not start ({greeting['message']})")
             self._greeted = True
         until = time.monotonic() + self._deadline
         data = json.dumps(request, separators=(",", ":")).encode("ascii")
@@ -179,6 +191,58 @@ class PelletReasoner:
             self._buffer += data
 
 
+class SteadyReasoner:
+    """Pellet in its child process; the slow way while that can't be kept running."""
+
+    def __init__(
+        self,
+        child: PelletReasoner,
+        slow: Callable[[], Reasoner] = OwlreadyReasoner,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Go by the child.
+
+        Args:
+            child: the fast way; it is closed with this.
+            slow: makes the other way.
+            clock: wall clock, s.
+        """
+        self._child, self._slow, self._clock = child, slow, clock
+        self._ontology = ""
+        self._retry_at = -math.inf
+
+    def load(self, ontology: str) -> None:
+        """See Reasoner.load."""
+        self._ontology = ontology
+        self._by_child(lambda: self._child.load(ontology), lambda _: None)
+
+    def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
+        """See Reasoner.infer."""
+        return self._by_child(lambda: self._child.infer(facts, properties), lambda slow: slow.infer(facts, properties))
+
+    def close(self) -> None:
+        """See Reasoner.close."""
+        self._child.close()
+
+    def _by_child(self, fast: Callable[[], _Answer], otherwise: Callable[[Reasoner], _Answer]) -> _Answer:
+        if self._clock() >= self._retry_at:
+            try:
+                if self._retry_at > -math.inf:  # the child has gone since it has loaded the ontology
+                    self._child.load(self._ontology)
+                    self._retry_at = -math.inf
+                return fast()
+            except ChildLostError as error:
+                self._retry_at = self._clock() + RETRY_AFTER
+                _log.warning(
+                    "%s; going on with a new JVM for every analysis, more than a second each; next try in %g s",
+                    error,
+                    RETRY_AFTER,
+                )
+        slow = self._slow()
+        slow.load(self._ontology)
+        return otherwise(slow)
+
+
 def make_reasoner(deadline: float = 20.0) -> Reasoner:
     """Return Pellet kept warm; where its child process can't run, owlready2's slow call of it, with a warning.
 
@@ -186,7 +250,7 @@ def make_reasoner(deadline: float = 20.0) -> Reasoner:
         NoJavaError: there is no Java runtime, without which neither runs.
     """
     try:
-        return PelletReasoner(deadline)
+        return SteadyReasoner(PelletReasoner(deadline))
     except NoJavaError:
         raise
     except (ReasonerError, OSError) as error:

@@ -17,8 +17,8 @@ from typing import Any, BinaryIO
 
 PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 MAX_FRAME = 256 * 1024 * 1024  # bytes; an ontology of 1,000 designs has about 1 MB
-# -Xrs: signals stay with Python. The heap limit keeps node and child together below 500 MB.
-JVM_OPTIONS = ("-Xrs", "-Xms64m", "-Xmx256m", "-XX:+UseSerialGC", "-XX:+ExitOnOutOfMemoryError", "-Xshare:auto")
+# -Xrs: signals stay with Python.
+JVM_OPTIONS = ("-Xrs", "-XX:+UseSerialGC", "-XX:+ExitOnOutOfMemoryError", "-Xshare:auto")
 
 
 def read_frame(stream: BinaryIO) -> dict[str, Any] | None:
@@ -52,10 +52,11 @@ def write_frame(stream: BinaryIO, message: dict[str, Any]) -> None:
 class Pellet:
     """Pellet in this process's JVM: one ontology that stays, facts that are added to a copy for each analysis."""
 
-    def __init__(self, jvm: str, jars: list[str]) -> None:
+    def __init__(self, jvm: str, jars: list[str], heap_mb: int) -> None:
         import jpype
 
-        jpype.startJVM(jvm, *JVM_OPTIONS, classpath=jars, convertStrings=False)
+        memory = (f"-Xms{min(heap_mb, 64)}m", f"-Xmx{heap_mb}m")
+        jpype.startJVM(jvm, *JVM_OPTIONS, *memory, classpath=jars, convertStrings=False)
         self._knowledge_base = jpype.JClass("org.mindswap.pellet.KnowledgeBase")
         self._loader = jpype.JClass("org.mindswap.pellet.jena.graph.loader.DefaultGraphLoader")
         self._models = jpype.JClass("com.hp.hpl.jena.rdf.model.ModelFactory")
@@ -140,8 +141,8 @@ def serve(pellet: Pellet, requests: BinaryIO, answers: BinaryIO) -> None:
 
 
 def main() -> None:
-    """Serve the process that started this one; arguments: its pid, the JVM's library, the folder of the jars."""
-    parent, jvm, folder = int(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
+    """Serve the process that started this one; arguments: its pid, the JVM's library, the folder of the jars, MB."""
+    parent, jvm, folder, heap_mb = int(sys.argv[1]), sys.argv[2], Path(sys.argv[3]), int(sys.argv[4])
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         sys.exit(1)  # it died before the request above could hold
@@ -150,7 +151,7 @@ def main() -> None:
     os.dup2(2, 1)  # what Java prints must not get between the frames
     jars = [str(path) for path in sorted(folder.glob("*.jar"))]
     try:
-        pellet = Pellet(jvm, jars)
+        pellet = Pellet(jvm, jars, heap_mb)
     except Exception as error:  # the parent tells its user
         write_frame(answers, {"ok": False, "inconsistent": False, "message": f"the JVM does not start: {error}"})
         sys.exit(1)
