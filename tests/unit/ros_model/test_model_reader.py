@@ -316,3 +316,66 @@ def test_published_files_are_read_and_survive_a_round_trip():
     for file in files:
         system = read_system(file)
         assert parse_system(write_system(system)) == system, file
+
+
+def test_spellings_of_older_files_are_read():
+    system = parse_system("""RosSystem { Name x
+        Components { RosComponent a NameSpace left RosComponent b }
+        TopicConnections { TopicConnection { From { 'a.x' } To { 'b.y' } } }
+        ServiceConnections { ServiceConnection s { From 'a.s' To ( b/t ) } } }""")
+    assert [component.graph_name for component in system.components] == ["left/a", "b"]
+    assert system.connections[0].name == "x"
+    assert system.connections[1].targets == (PortPath("b", "t"),)
+
+
+def test_end_with_slashes_is_split_where_its_component_ends():
+    text = """RosSystem { Name x RosComponents ( ComponentInterface { name move_base } )
+        TopicConnections { TopicConnection goal { From ( /joy/goal ) To ( move_base//move_base_simple/goal ) } } }"""
+    (connection,) = parse_system(text).connections
+    assert connection.targets == (PortPath("move_base", "/move_base_simple/goal"),)
+    assert connection.sources == (PortPath("", "/joy/goal"),)
+
+
+def test_stacks_group_components():
+    text = """RosSystem { Name x
+        RosComponentStacks ( ComponentStack { name drive
+            QualityAttributes { QualityAttribute safety { value 0.5 } }
+            RosComponents ( ComponentInterface { name base } ) } )
+        RosComponents ( ComponentInterface { name camera } ) }"""
+    system = parse_system(text)
+    assert [component.name for component in system.components] == ["camera", "base"]
+    assert (system.stacks[0].name, system.stacks[0].components) == ("drive", ("base",))
+    assert system.stacks[0].quality_attributes[0].value == 0.5
+    assert parse_system(write_system(system)) == system
+
+
+def test_section_may_stand_twice():
+    text = """RosSystem { Name x RosComponents ( ComponentInterface { name a } )
+        RosComponents ( ComponentInterface { name b
+            RosPublishers { RosPublisher c { } } RosPublishers { RosPublisher d { } } } ) }"""
+    system = parse_system(text)
+    assert [component.name for component in system.components] == ["a", "b"]
+    assert [port.name for port in system.components[1].ports] == ["c", "d"]
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("{ a {value 1}, {b {value 2}} }", {"a": 1, "b": 2}),
+        ("{ {a {value 1}} {b {value 2}} }", {"a": 1, "b": 2}),
+        ("{ a {value 1} }", {"a": 1}),
+        ("{ { {a {value 1}} }, { {a {value 2}} } }", [{"a": 1}, {"a": 2}]),
+        ("{ { {a {value 1}}, {b {value 2}} }, 3 }", [{"a": 1, "b": 2}, 3]),
+        ("{ {1, 2} {3} }", [[1, 2], [3]]),
+        ("ParameterStruct { value { ParameterStructMember a { value 1 } } }", {"a": 1}),
+        ("ParameterStruct { }", {}),
+        ("ParameterAny { value '5' }", "5"),
+        ("-.5", -0.5),
+        ("1.", 1.0),
+        ("2.5E+3", 2500.0),
+        ("0x1F", "0x1F"),
+        ("<xml/>", "<xml/>"),
+    ],
+)
+def test_value_in_a_lenient_form(text, value):
+    assert values(text) == value

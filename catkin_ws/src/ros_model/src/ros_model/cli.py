@@ -18,11 +18,13 @@ if TYPE_CHECKING:
 
 _COMMANDS = {
     "check": "ros_model.commands.check:check",
+    "extract": "ros_model.commands.extract:extract",
     "diff": "ros_model.commands.diff:diff",
     "format": "ros_model.commands.format:format_",
     "generate": "ros_model.commands.generate:generate",
     "init": "ros_model.commands.init:init",
     "show": "ros_model.commands.show:show",
+    "snapshot": "ros_model.commands.snapshot:snapshot",
     "variants": "ros_model.commands.variants:variants",
 }
 """Command -> where it is. A command's module is imported when it is run, so that the others' imports cost nothing."""

@@ -53,3 +53,17 @@ def files_in(folder: Path, extension: str) -> list[Path]:
         raise ModelError(f"{folder}: no such folder: check the path")
     found = folder.rglob(f"*{extension}")
     return sorted(path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts))
+
+
+def models_at(path: Path) -> list[Path]:
+    """Return a file itself, or the models in a folder and below.
+
+    Raises:
+        ModelError: the folder has none.
+    """
+    if not path.is_dir():
+        return [path]
+    found = [*files_in(path, PACKAGES), *files_in(path, SYSTEM)]
+    if not found:
+        raise ModelError(f"{path}: no model is in this folder: give one with .ros or .rossystem files")
+    return found

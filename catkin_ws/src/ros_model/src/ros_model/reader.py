@@ -122,10 +122,8 @@ class _Builder(Builder):
         )
 
     def named_component(self, items: list[Any]) -> Component:
-        keyword, name, *rest = items
-        return Component(
-            text_of(name), namespace=self.fields(rest, keyword).get("namespace"), position=self.at(keyword)
-        )
+        keyword, name, namespace = items
+        return Component(text_of(name), namespace=namespace[1] if namespace else None, position=self.at(keyword))
 
     def publishers(self, items: list[Any]) -> Field:
         return self._ports(PortKind.PUBLISHER, items)

@@ -29,7 +29,7 @@ MAX_NESTING = 64
 """Levels of lists and structs within each other that are read; published files have two."""
 MAX_ERRORS = 20
 """Errors of one file that are told."""
-_REPAIRABLE = 1_000_000  # characters that are read again, all in all, to find more errors than one
+_REPAIRABLE = 500_000  # characters of a text, and that are read again all in all, to find more errors than one
 
 _GRAMMARS = Path(__file__).parent / "grammar"
 _COMMENT = re.compile(r"\s*(?://(?P<line>[^\n]*)|/\*(?P<block>.*?)\*/)", re.DOTALL)
@@ -113,7 +113,7 @@ class Language:
                 if not recovery.is_consequence(offset):
                     errors.append(self._syntax_error(error, offset, text, file))
                 read += offset
-                if len(errors) >= MAX_ERRORS or read > _REPAIRABLE:
+                if len(errors) >= MAX_ERRORS or max(read, len(text)) > _REPAIRABLE:
                     return None
                 repaired = recovery.without(
                     offset, {word for name in _expected(error) for word in self._words.get(name, ())}

@@ -13,7 +13,7 @@ from ros_model.errors import ModelError
 from ros_model.findings import ERROR, FORMATS, Finding
 from ros_model.library import Library
 from ros_model.metamodel import compose
-from ros_model.model_files import PACKAGES, SYSTEM, files_in, read_all
+from ros_model.model_files import PACKAGES, files_in, models_at, read_all
 from ros_model.packages import PackageSet
 from ros_model.packages_checker import check_packages
 from ros_model.settings import FILE_NAME
@@ -78,15 +78,16 @@ class _Check:
         """Add a file, a project or a folder of files."""
         if path.name == FILE_NAME or (path / FILE_NAME).is_file():
             self._add_project(path)
-        elif path.is_dir():
-            found = [*files_in(path, PACKAGES), *files_in(path, SYSTEM)]
-            if not found:
-                self._refuse(ModelError(f"{path}: no model is in this folder: give one with .ros or .rossystem files"))
-            for file in found:
-                self._add_file(file)
         else:
-            self._add_file(path)
-            self._read(sorted(path.parent.glob(f"*{PACKAGES}")), self._beside)
+            try:
+                found = models_at(path)
+            except ModelError as error:
+                self._refuse(error)
+                return
+            for file in found:
+                self._read([file], self._packages if file.suffix == PACKAGES else self._systems)
+            if not path.is_dir():
+                self._read(sorted(path.parent.glob(f"*{PACKAGES}")), self._beside)
 
     def findings(self) -> list[Finding]:
         """Return all that is wrong, file by file."""
@@ -112,12 +113,6 @@ class _Check:
         else:
             self._projects.append(project)
             self._read(files_in(project.folder, PACKAGES), self._packages)
-
-    def _add_file(self, path: Path) -> None:
-        if path.suffix == PACKAGES:
-            self._read([path], self._packages)
-        else:
-            self._read([path], self._systems)
 
     def _read(self, paths: Iterable[Path], into: dict[Path, PackageSet] | dict[Path, RosSystem]) -> None:
         for path in paths:

@@ -3,39 +3,61 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ros_model.errors import ModelError
 from ros_model.files import read_text
-from ros_model.reader import parse_system
+from ros_model.model_files import models_at, parse_all
+from ros_model.packages import PackageSet
+from ros_model.packages_writer import write_packages
 from ros_model.syntax import comments_inside
 from ros_model.writer import write_system
+
+if TYPE_CHECKING:
+    from ros_model.metamodel import RosSystem
 
 
 @click.command("format")
 @click.option("--check", "only_check", is_flag=True, help="Write nothing; exit status 1 if a file would change.")
-@click.argument("files", nargs=-1, required=True, metavar="FILE...")
+@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path())
 def format_(only_check: bool, files: tuple[str, ...]) -> int:
-    """Write .rossystem files in the canonical form. Comments at their top stay; a file with others is refused."""
+    """Write .rossystem and .ros files, or all in a folder, in the canonical form.
+
+    Comments at the top of a file stay; a file with others is refused, as they would be lost.
+
+    Exit status: 0 all is well, 1 a file would change and --check is given, 2 a file can't be read or written.
+    """
     changed = False
-    for file in files:
-        path = Path(file)
-        text = read_text(path)
-        formatted = write_system(parse_system(text, file))
-        if lost := comments_inside(text, file):
-            raise ModelError("this comment would be lost: move it to the top of the file", lost[0])
-        if formatted == text:
-            continue
-        changed = True
-        click.echo(f"{'would change' if only_check else 'changed'} {file}")
-        if not only_check:
-            _replace(path, formatted)
+    errors: list[ModelError] = []
+    for path in (path for file in files for path in models_at(Path(file))):
+        try:
+            changed |= _format(path, only_check)
+        except ModelError as error:
+            errors += error.all
+    if errors:
+        raise ModelError(errors[0].message, errors[0].position, errors[1:])
     return int(changed and only_check)
 
 
-def _replace(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ModelError(f"{path}: {error.strerror or error}: check its permissions") from error
+def _format(path: Path, only_check: bool) -> bool:
+    """Bring a file to its canonical form; return whether it had another."""
+    text = read_text(path)
+    formatted = write(parse_all(text, str(path)))
+    if lost := comments_inside(text, str(path)):
+        raise ModelError("this comment would be lost: move it to the top of the file", lost[0])
+    if formatted == text:
+        return False
+    click.echo(f"{'would change' if only_check else 'changed'} {path}")
+    if not only_check:
+        try:
+            path.write_text(formatted, encoding="utf-8")
+        except OSError as error:
+            raise ModelError(f"{path}: {error.strerror or error}: check its permissions") from error
+    return True
+
+
+def write(model: RosSystem | PackageSet) -> str:
+    """Return the canonical form of a model of either language."""
+    return write_packages(model) if isinstance(model, PackageSet) else write_system(model)
