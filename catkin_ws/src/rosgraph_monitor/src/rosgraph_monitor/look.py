@@ -79,23 +79,20 @@ class Looker:
         self._closing = True
         self._requested.set()
         self._thread.join(timeout=2.0)
-        if not self._thread.is_alive():
-            self._client.close()
 
     def _run(self) -> None:
         due = time.monotonic()
-        while not self._closing:
+        while not (self._closing or self.lost):
             self._requested.clear()
             begin = time.monotonic()
             self._look(begin)
             self._on_look()
-            if self.lost:
-                return
             if begin >= due:
                 due = max(due + self._period, begin)
             if not self._requested.wait(max(due - time.monotonic(), 0.0)):
                 continue
             time.sleep(max(begin + _SHORTEST - time.monotonic(), 0.0))
+        self._client.close()
 
     def _look(self, begin: float) -> None:
         lives = self._watcher.lives()

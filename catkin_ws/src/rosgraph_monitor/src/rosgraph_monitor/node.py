@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import resource
 import socket
@@ -46,6 +47,7 @@ BAD_START = 2
 
 _MASTER_TIMEOUT = 1.2
 """Wall seconds for one answer of the master: with a tick of 0.5 s before it, its silence is told within 2 s."""
+_START_TIMEOUT = 5.0
 _MASTER_SILENCE = 10.0
 """Wall seconds without a useful answer after which the master counts as lost; if it is gone, that shows at once."""
 _COALESCE = 0.02
@@ -75,21 +77,6 @@ class MonitorNode:
             ParameterError: a parameter has the wrong type or range.
             ModelError: the base model can't be read.
         """
-        self._namespace = rospy.get_namespace()
-        self._variants = _text("~variants")
-        components = _components()
-        self._topic_specs = merged(components.topics, _topics())
-        patience = Patience(
-            startup=_number("~startup_grace", Patience.startup),
-            restart=_number("~restart_patience", Patience.restart),
-            ports=_number("~port_patience", Patience.ports),
-        )
-        self._monitor = GraphMonitor(components.of_node, scope=self._scope(), patience=patience)
-        base = _text("~desired_rossystem")
-        self._model = DesiredModel(read_system(resolve(base)) if base else None, self._read_variant)
-        self._metacontrol = _names("~metacontrol_nodes", _METACONTROL_NODES)
-        self._meter = UsageMeter(alone=frozenset({_LAUNCHER}))
-        self._usage_due = 0.0
         self._events = threading.Event()
         self._looked = threading.Event()
         self._silence_told = False
@@ -105,6 +92,25 @@ class MonitorNode:
             rospy.get_name(),
             self._on_look,
         )
+        rospy.on_shutdown(self._events.set)
+        # At once: rospy goes on trying to register for as long as nobody tells it that the master is lost.
+        self._watcher.start()
+        self._looker.start()
+        self._namespace = rospy.get_namespace()
+        self._variants = _text("~variants")
+        components = _components()
+        self._topic_specs = merged(components.topics, _topics())
+        patience = Patience(
+            startup=_number("~startup_grace", Patience.startup),
+            restart=_number("~restart_patience", Patience.restart),
+            ports=_number("~port_patience", Patience.ports),
+        )
+        self._monitor = GraphMonitor(components.of_node, scope=self._scope(), patience=patience)
+        base = _text("~desired_rossystem")
+        self._model = DesiredModel(read_system(resolve(base)) if base else None, self._read_variant)
+        self._metacontrol = _names("~metacontrol_nodes", _METACONTROL_NODES)
+        self._meter = UsageMeter(alone=frozenset({_LAUNCHER}))
+        self._usage_due = 0.0
         observers = dict.fromkeys((*_names("~observers", []), *load))
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
         self._observers = ObserverHost(self._diagnostics)
@@ -118,14 +124,11 @@ class MonitorNode:
         self._subscriber = rospy.Subscriber(
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, self._follow, queue_size=5
         )
-        rospy.on_shutdown(self._events.set)
 
     def run(self) -> None:
         """Evaluate after every look, and whenever a node or topic fails or returns, until node or master end."""
-        self._watcher.start()
-        self._looker.start()
         try:
-            while not rospy.is_shutdown() and not self._master_is_lost():
+            while not rospy.is_shutdown():
                 look = self._looker.latest
                 if look:
                     begin = time.monotonic()
@@ -134,8 +137,12 @@ class MonitorNode:
                     time.sleep(max(_COALESCE, time.monotonic() - begin))
                 self._wait()
         finally:
-            self._looker.close()
-            self._watcher.close()
+            self.close()
+
+    def close(self) -> None:
+        """Stop watching."""
+        self._looker.close()
+        self._watcher.close()
 
     def _scope(self) -> Scope:
         return Scope(
@@ -153,8 +160,25 @@ class MonitorNode:
         self._events.set()
 
     def _on_look(self) -> None:
-        self._looked.set()
+        if self._looker.lost:
+            _say(f"{self._looker.lost}: the monitor ends, start it again with the master")
+            rospy.signal_shutdown("the master is lost")
+        elif self._looker.silence:
+            self._bear_silence(*self._looker.silence)
+        else:
+            self._silence_told = False
+            self._looked.set()
         self._events.set()
+
+    def _bear_silence(self, since: float, error: SnapshotError) -> None:
+        """Say in one line that the master is silent, and end when that lasts."""
+        if not self._silence_told:
+            self._silence_told = True
+            _say(f"{error}: the monitor ends if it stays silent for {_MASTER_SILENCE:g} s")
+        if time.monotonic() - since >= _MASTER_SILENCE:
+            # To unregister, rospy would wait for an answer of this master for ever.
+            logging.shutdown()
+            os._exit(0)
 
     def _wait(self) -> None:
         """Wait until there is something to evaluate."""
@@ -164,25 +188,6 @@ class MonitorNode:
         self._events.clear()
         if not rospy.is_shutdown():
             self._looked.wait(_FRESH)
-
-    def _master_is_lost(self) -> bool:
-        """Say in one line that the master is lost, or that it is silent."""
-        lost, silence = self._looker.lost, self._looker.silence
-        if lost is None and silence is None:
-            self._silence_told = False
-            return False
-        if lost:
-            rospy.logfatal("%s: the monitor ends, start it again with the master", lost)
-            return True
-        since, error = silence  # type: ignore[misc]
-        if not self._silence_told:
-            self._silence_told = True
-            rospy.logerr("%s: the monitor ends if it stays silent for %g s", error, _MASTER_SILENCE)
-        if time.monotonic() - since < _MASTER_SILENCE:
-            return False
-        # A node unregisters when it ends: it must not wait for this master.
-        socket.setdefaulttimeout(_MASTER_TIMEOUT)
-        return True
 
     def _topics_changed(self) -> bool:
         states = {v.spec.name: v.message for v in self._topics.judge(self._excused_topics())}
@@ -257,8 +262,8 @@ def main() -> None:
     parser.add_argument("--load", nargs="+", default=[], metavar="NAME", help="observers to start")
     options = parser.parse_args(rospy.myargv()[1:])
     uri = rosgraph.get_master_uri()
-    if not rosgraph.is_master_online():
-        sys.stderr.write(f"rosgraph_monitor: no ROS master at {uri}: start roscore or set ROS_MASTER_URI\n")
+    if not _master_answers():
+        sys.stderr.write(f"rosgraph_monitor: no ROS master answers at {uri}: start roscore or set ROS_MASTER_URI\n")
         sys.exit(BAD_START)
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))  # a connection to each node
@@ -268,8 +273,26 @@ def main() -> None:
     except (ParameterError, ModelError, SnapshotError) as error:
         rospy.logfatal("%s", error)
         sys.exit(BAD_START)
+    except rospy.ROSException:
+        if not rospy.is_shutdown():
+            raise
+        return  # it was ended, or lost its master, while it started
     node.run()
     rospy.signal_shutdown("the monitor has ended")
+
+
+def _say(line: str) -> None:
+    """Write a line of its own: rospy's logging asks the master for a parameter, and would wait for it."""
+    sys.stderr.write(f"rosgraph_monitor: {line}\n")
+    sys.stderr.flush()
+
+
+def _master_answers() -> bool:
+    socket.setdefaulttimeout(_START_TIMEOUT)
+    try:
+        return bool(rosgraph.is_master_online())
+    finally:
+        socket.setdefaulttimeout(None)
 
 
 def _message(status: Status) -> DiagnosticStatus:
