@@ -1,8 +1,9 @@
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from mros1_reasoner.knowledge_base import KnowledgeBase
-from mros1_reasoner.model import Direction
+from mros1_reasoner.model import Direction, Quality
 from mros1_reasoner.tomasys_generator import generate
 from ros_model.generators import find_generators
 from ros_model.project import load_project
@@ -55,3 +56,18 @@ def test_objectives_and_directions_are_those_of_metacontrol_yaml(written):
     ]
     assert knowledge_base.qualities["performance"].direction is Direction.HIGHER_IS_BETTER
     assert knowledge_base.qualities["energy"].direction is Direction.LOWER_IS_BETTER
+
+
+def test_ranges_and_comparisons_are_those_of_metacontrol_yaml(project, tmp_path):
+    settings = {**project.settings, "quality_attributes": {**project.settings["quality_attributes"]}}
+    settings["quality_attributes"]["energy"] = {
+        "direction": "lower_is_better",
+        "range": [0.0, 2.5],
+        "reaching_violates": True,
+    }
+    settings["objectives"] = {"o_go": {"function": "f_navigate", "always_improve": True}}
+    (path,) = generate(replace(project, settings=settings), tmp_path)
+    knowledge_base = KnowledgeBase([path])
+    assert knowledge_base.qualities["energy"] == Quality(Direction.LOWER_IS_BETTER, True, 0.0, 2.5)
+    assert knowledge_base.qualities["safety"] == Quality(Direction.LOWER_IS_BETTER, False, 0.0, 1.0)
+    assert knowledge_base.objectives[0].always_improve is True

@@ -33,7 +33,7 @@ _DECIMAL = v.XSD + "decimal"
 _STRING = v.XSD + "string"
 # Statements that hold at one moment only. They come as facts of each analysis, so the ontology goes without them.
 _MOMENTARY = (*v.DERIVED_STATUSES, v.C_STATUS, v.FD_ERROR_LOG, v.SOLVES_O, v.TYPE_FD)
-_QUALITIES = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES, v.QA_MIN, v.QA_MAX)
+_COMPARISONS = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES)
 _LEVELS = (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION, v.HAS_VALUE, v.IS_QA_TYPE)
 
 
@@ -269,7 +269,9 @@ class KnowledgeBase:
         if operators:
             raise KnowledgeBaseError(f"{self._where}: {name} has several qa_comparison_operator: give it one")
         direction = Direction.HIGHER_IS_BETTER if signs == {-1.0} else Direction.LOWER_IS_BETTER
-        return replace(quality, direction=directions.get(name, direction if signs else quality.direction))
+        reaching = quality.reaching_violates or "true" in graph.literals_of(iri, v.QA_REACHING_VIOLATES)
+        direction = directions.get(name, direction if signs else quality.direction)
+        return replace(quality, direction=direction, reaching_violates=reaching)
 
     def _bound(self, graph: _Graph, quality: str, predicate: str) -> float | None:
         numbers = [_number(text) for text in graph.literals_of(quality, predicate)]
@@ -362,7 +364,7 @@ class KnowledgeBase:
             for predicate in (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION)
             for value in graph.objects(predicate)
         }
-        dropped = {*_MOMENTARY, *_LEVELS, *_QUALITIES}
+        dropped = {*_MOMENTARY, *_LEVELS, *_COMPARISONS}
 
         def stays(triple: Triple) -> bool:
             subject, predicate, value = triple

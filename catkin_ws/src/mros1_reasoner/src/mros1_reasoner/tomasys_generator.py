@@ -55,8 +55,11 @@ def application_model(project: Project, iri: str) -> str:
     parts = [_HEAD.format(iri=quoteattr(iri))]
     parts += [_individual("Function", function, {}) for function in settings["functions"]]
     for quality, entry in settings["quality_attributes"].items():
-        sign = Direction(entry["direction"]).sign
-        parts.append(_individual("QualityAttributeType", quality, {}, {"qa_sign": sign}))
+        numbers = {"qa_sign": Direction(entry["direction"]).sign}
+        if "range" in entry:
+            numbers["qa_min"], numbers["qa_max"] = entry["range"]
+        reaching = {"qa_reaching_violates": True} if entry.get("reaching_violates") else {}
+        parts.append(_individual("QualityAttributeType", quality, {}, numbers, reaching))
     required = project.required_components()
     for component in sorted(set(settings["components"]) | {name for names in required.values() for name in names}):
         designs = [variant.name for variant in project.variants if component in required[variant.name]]
@@ -75,7 +78,8 @@ def application_model(project: Project, iri: str) -> str:
         limits = objective.get("nfrs", {})
         values = [f"{name}_{quality}" for quality in limits]
         links = {"tomasys:typeF": [objective["function"]], "tomasys:hasNFR": values}
-        parts.append(_individual("Objective", name, links))
+        improves = {"o_always_improve": objective["always_improve"]} if "always_improve" in objective else {}
+        parts.append(_individual("Objective", name, links, flags=improves))
         parts += _levels(name, limits)
     return "\n".join([*parts, "</rdf:RDF>", ""])
 
@@ -88,7 +92,11 @@ def _levels(owner: str, levels: Mapping[str, float]) -> list[str]:
 
 
 def _individual(
-    class_name: str, name: str, links: Mapping[str, Iterable[str]], numbers: Mapping[str, float] | None = None
+    class_name: str,
+    name: str,
+    links: Mapping[str, Iterable[str]],
+    numbers: Mapping[str, float] | None = None,
+    flags: Mapping[str, bool] | None = None,
 ) -> str:
     lines = [f"  <tomasys:{class_name} rdf:about={quoteattr('#' + name)}"]
     resources = [(link, target) for link, targets in links.items() for target in targets]
@@ -96,6 +104,10 @@ def _individual(
     body += [
         f'    <tomasys:{number} rdf:datatype="{v.XSD}decimal">{Decimal(str(value)):f}</tomasys:{number}>'
         for number, value in (numbers or {}).items()
+    ]
+    body += [
+        f'    <tomasys:{flag} rdf:datatype="{v.XSD}boolean">{str(value).lower()}</tomasys:{flag}>'
+        for flag, value in (flags or {}).items()
     ]
     if not body:
         return lines[0] + "/>"
