@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 Value = bool | int | float | str | list["Value"] | dict[str, "Value"]
 
@@ -99,11 +99,12 @@ class Component:
 
     @property
     def executable(self) -> Reference | None:
-        """The node that the component runs: FromRosNode, else the first reference of a port or parameter."""
+        """The node that the component runs: FromRosNode, else that of the first reference of a port or parameter."""
         if self.node:
             return self.node
         references = [*(port.reference for port in self.ports), *(parameter.reference for parameter in self.parameters)]
-        return next((reference for reference in references if reference), None)
+        first = next((reference for reference in references if reference), None)
+        return replace(first, name="") if first else None
 
     @property
     def graph_name(self) -> str:
