@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import logging
 import math
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -338,22 +339,32 @@ class KnowledgeBase:
         return levels
 
     def _check_requirements(self) -> None:
-        needs: dict[str, set[str]] = {function: set() for function in self.functions}
+        """Refuse requirements that nothing can fulfil; tell of functions that no design solves."""
+        solving: dict[str, list[Design]] = {function: [] for function in self.functions}
         for design in self.designs.values():
-            for function in design.requires:
-                if function not in needs:
-                    raise KnowledgeBaseError(f"{self._where}: {design.name} requires {function}, which is no Function")
-                needs[design.function].add(function)
+            solving[design.function].append(design)
+        for function, designs in solving.items():
+            if not designs:
+                _log.warning("Function %s can't be fulfilled: no FunctionDesign solves it", function)
         finished: set[str] = set()
 
-        def visit(function: str, path: tuple[str, ...]) -> None:
-            if function in path:
-                cycle = " -> ".join((*path[path.index(function) :], function))
-                raise KnowledgeBaseError(f"{self._where}: functions require each other ({cycle}): break the cycle")
-            if function not in finished:
-                for needed in sorted(needs[function]):
-                    visit(needed, (*path, function))
-                finished.add(function)
+        def visit(function: str, path: tuple[tuple[str, str], ...]) -> None:
+            start = next((i for i, (above, _) in enumerate(path) if above == function), None)
+            if start is not None:
+                cycle = "".join(f"{above} -> ({design}) " for above, design in path[start:])
+                raise KnowledgeBaseError(
+                    f"{self._where}: functions require each other ({cycle}-> {function}): break the cycle"
+                )
+            if function in finished:
+                return
+            for design in solving[function]:
+                for needed in design.requires:
+                    if needed not in solving:
+                        raise KnowledgeBaseError(
+                            f"{self._where}: {design.name} requires {needed}, which is no Function"
+                        )
+                    visit(needed, (*path, (function, design.name)))
+            finished.add(function)
 
         for function in self.functions:
             visit(function, ())
@@ -492,12 +503,20 @@ def _read_all(own: Sequence[Path], others: Sequence[Path]) -> list[Triple]:
 
 
 def _find_import(iri: str, importer: Path) -> Path | None:
-    """Return the file beside the importing one that bears the last part of the IRI as its name."""
+    """Return the file beside the importing one that bears the last part of the IRI as its name, else the IRI itself."""
     name = local_name(iri)
+    folder = importer.resolve().parent
     for file_name in (name, f"{name}.owl", f"{name}.rdf"):
-        path = importer.resolve().parent / file_name
-        if file_name and path.is_file() and path.parent == importer.resolve().parent:
+        path = folder / file_name
+        if file_name and path.is_file() and path.parent == folder:
             return path
+    bears = re.compile(rf"Ontology[^>]*\b(?:about|ontologyIRI)=[\"']{re.escape(iri)}[#/]?[\"']".encode())
+    for path in sorted([*folder.glob("*.owl"), *folder.glob("*.rdf")]):
+        try:
+            if bears.search(path.read_bytes()):
+                return path
+        except OSError:
+            continue
     return None
 
 
