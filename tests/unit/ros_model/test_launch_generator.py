@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ros_model.errors import ModelError
 from ros_model.generators.launch import launch_file
+from ros_model.library import Library
 from ros_model.metamodel import (
     Component,
     Connection,
@@ -22,6 +23,7 @@ from ros_model.metamodel import (
     RosSystem,
     SystemParameter,
 )
+from ros_model.packages_reader import parse_packages
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
@@ -150,6 +152,21 @@ def test_value_that_is_none_of_its_type_is_refused(kind, value, more):
 def test_number_that_the_parameter_server_can_not_hold_is_refused(value):
     with pytest.raises(ModelError, match=r"^x\.rossystem:3:5: "):
         launch_file(of(RosParameter("a", None, value, position=HERE)))
+
+
+def test_type_that_the_model_of_the_node_declares_decides():
+    library = Library(
+        parse_packages(
+            "PackageSet { CatkinPackage drivers { Artifact laser { Node { name laser_node Parameters {"
+            " Parameter { name rate type Double }, Parameter { name key type Base64 },"
+            " Parameter { name gains type Array { type Double } } } } } } }"
+        ).packages
+    )
+    values = {"rate": 15, "key": "aGk=", "gains": [1, 2], "other": 3}
+    system = of(*(RosParameter(name, replace(NODE, name=name), value) for name, value in values.items()))
+    params = loaded_text(launch_file(system, library=library)).params
+    assert repr([params[f"/laser/{name}"].value for name in ("rate", "gains", "other")]) == "[15.0, [1.0, 2.0], 3]"
+    assert params["/laser/key"].value == Binary(b"hi")
 
 
 def test_struct_becomes_a_group_of_parameters():

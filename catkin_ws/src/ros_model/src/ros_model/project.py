@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ros_model.columns import Columns, parse_columns
 from ros_model.errors import ModelError
+from ros_model.library import Library
 from ros_model.metamodel import Position, RosSystem
+from ros_model.model_files import PACKAGES, files_in
+from ros_model.packages_reader import read_packages
 from ros_model.reader import read_system
 from ros_model.settings import FILE_NAME, Settings, locate, read_settings
 from ros_model.tables import read_table
@@ -16,6 +20,8 @@ from ros_model.variants import make_systems, without
 from ros_model.wiring import required_by_parameters, required_components
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from ros_model.columns import Where
     from ros_model.schema_check import Keys
 
@@ -47,6 +53,15 @@ class Project:
     whole_base: RosSystem = field(repr=False)
     by_table: frozenset[str] = frozenset()
     packages_folder: Path | None = None
+
+    @cached_property
+    def library(self) -> Library:
+        """What the `.ros` models beside metacontrol.yaml, and below, declare.
+
+        Raises:
+            ModelError: one can't be read.
+        """
+        return read_library(files_in(self.folder, PACKAGES))
 
     @property
     def package(self) -> str:
@@ -91,6 +106,15 @@ class Project:
             variant.name: required_components(self.base, variant) | required_by_parameters(variant, by_value)
             for variant in self.variants
         }
+
+
+def read_library(paths: Iterable[Path]) -> Library:
+    """Return what `.ros` models declare.
+
+    Raises:
+        ModelError: one can't be read.
+    """
+    return Library(package for path in paths for package in read_packages(path).packages)
 
 
 def load_project(folder: str | Path) -> Project:

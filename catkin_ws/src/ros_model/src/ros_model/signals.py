@@ -6,15 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ros_model.generators.launch import topic_of
-from ros_model.library import Library
 from ros_model.metamodel import PortKind
-from ros_model.model_files import PACKAGES, files_in
 from ros_model.packages import Node
-from ros_model.packages_reader import read_packages
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
+    from ros_model.library import Library
     from ros_model.metamodel import Port, RosSystem
 
 
@@ -25,15 +21,6 @@ class Signal:
     topic: str
     type: str
     component: str
-
-
-def read_library(folder: Path) -> Library:
-    """Return what the `.ros` models of a folder declare.
-
-    Raises:
-        ModelError: one can't be read.
-    """
-    return Library(package for path in files_in(folder, PACKAGES) for package in read_packages(path).packages)
 
 
 def signals(system: RosSystem, library: Library) -> list[Signal]:

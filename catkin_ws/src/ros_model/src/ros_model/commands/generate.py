@@ -113,11 +113,13 @@ def _tell_exports(project: Project, package: Path) -> None:
 
 def _generate_launch_file(path: Path, output: Path) -> None:
     from ros_model.generators.launch import launch_file
+    from ros_model.model_files import PACKAGES
+    from ros_model.project import read_library
     from ros_model.reader import read_system
 
-    system = read_system(path)
+    system, library = read_system(path), read_library(sorted(path.parent.glob(f"*{PACKAGES}")))
     name = safe_file_name(system.name, f"{system.position}: system")
-    written = write_file(output / "launch" / f"{name}.launch", launch_file(system), output)
+    written = write_file(output / "launch" / f"{name}.launch", launch_file(system, library=library), output)
     click.echo(f"launch: {written}")
 
 

@@ -16,7 +16,7 @@ from ros_model.observers import camel_case, described_observers, observer_model
 from ros_model.packages import SpecKind
 from ros_model.project import DIRECTIONS, load_project
 from ros_model.settings import FILE_NAME, problems_of
-from ros_model.signals import Signal, read_library, signals
+from ros_model.signals import Signal, signals
 from ros_model.yaml_file import flow, with_entry
 
 if TYPE_CHECKING:
@@ -39,13 +39,12 @@ def run_wizard(output: str | None = None) -> None:
         ModelError: a model can't be read, or a file not written.
     """
     project = _ask_project()
-    library = read_library(project.folder)
     settings = project.settings
     click.echo(f"Quality attributes so far: {', '.join(settings['quality_attributes'])}")
     quality = _ask("Quality attribute to observe", _checked(_quality, project))
     known = settings["quality_attributes"].get(quality)
     name = _ask("Class of the observer", _checked(_class, project), f"{camel_case(quality)}QualityObserver")
-    topics = _ask_topics(signals(project.whole_base, library), library)
+    topics = _ask_topics(signals(project.whole_base, project.library), project.library)
     rate = click.prompt("Evaluations per second", type=click.FloatRange(min=0, min_open=True, max=1000), default=10.0)
     direction = known["direction"] if known else _ask_direction()
     lowest = click.prompt("Value of your formula that is level 0", type=click.FloatRange(-1e9, 1e9), default=0.0)

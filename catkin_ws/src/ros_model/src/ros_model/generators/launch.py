@@ -15,11 +15,13 @@ from ros_model.errors import ModelError
 from ros_model.files import safe_file_name
 from ros_model.generators import variant_packages, write_files
 from ros_model.metamodel import ConnectionKind, PortKind, PortPath, compose
+from ros_model.packages import Node
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
+    from ros_model.library import Library
     from ros_model.metamodel import (
         Component,
         ParameterType,
@@ -64,7 +66,10 @@ def generate(project: Project, output: Path) -> list[Path]:
     Raises:
         ModelError: a model can't be launched, or a file can't be written.
     """
-    texts = {variant.name: launch_file(variant, compose(project.base, variant)) for variant in project.variants}
+    texts = {
+        variant.name: launch_file(variant, compose(project.base, variant), project.library)
+        for variant in project.variants
+    }
     if project.packages_folder:
         return variant_packages.write(project, texts)
     folder = output / "launch" / "variants"
@@ -73,12 +78,13 @@ def generate(project: Project, output: Path) -> list[Path]:
     )
 
 
-def launch_file(system: RosSystem, whole: RosSystem | None = None) -> str:
+def launch_file(system: RosSystem, whole: RosSystem | None = None, library: Library | None = None) -> str:
     """Return the text of a launch file that starts a system's components.
 
     Args:
         system: what to start.
         whole: the system whose connections hold, where `system` is a part of it; itself if None.
+        library: the models that declare the parameters' types; without one, a value's own type counts.
 
     Raises:
         ModelError: a component names no executable, a name is not fit for ROS, or a text holds `$(`, which roslaunch
@@ -87,17 +93,17 @@ def launch_file(system: RosSystem, whole: RosSystem | None = None) -> str:
     launch = ET.Element("launch")
     launch.append(ET.Comment(_COMMENT))
     for parameter in system.parameters:
-        value = _declared(parameter)
+        value = _sent(parameter, parameter.type)
         if value is not None:
             name = "/".join(part.strip("/") for part in (parameter.namespace, parameter.name) if part)
             launch.append(_param(_legal(name, parameter.position), value, parameter.position))
     for component in system.components:
-        launch.append(_node(component, whole or system))
+        launch.append(_node(component, whole or system, library))
     ET.indent(launch, "  ")
     return ET.tostring(launch, encoding="unicode") + "\n"
 
 
-def _node(component: Component, whole: RosSystem) -> ET.Element:
+def _node(component: Component, whole: RosSystem, library: Library | None) -> ET.Element:
     where = component.position
     executable = component.executable
     if executable is None or not executable.node:
@@ -112,9 +118,9 @@ def _node(component: Component, whole: RosSystem) -> ET.Element:
         attributes["ns"] = _legal(namespace, where)
     node = ET.Element("node", {**attributes, "cwd": "node", "respawn": "false", "output": "screen"})
     for parameter in component.parameters:
-        if parameter.value is not None:
-            name = _legal(_key(parameter), parameter.position)
-            node.append(_param(name, parameter.value, parameter.position))
+        value = None if parameter.value is None else _sent(parameter, _declared_type(parameter, library))
+        if value is not None:
+            node.append(_param(_legal(_key(parameter), parameter.position), value, parameter.position))
     for source, target in _remaps(component, whole):
         ET.SubElement(node, "remap", {"from": source, "to": target})
     return node
@@ -125,16 +131,23 @@ def _key(parameter: RosParameter) -> str:
     return f"{parameter.namespace.strip('/')}/{key}" if parameter.namespace else key
 
 
-def _declared(parameter: SystemParameter) -> Sent | None:
+def _declared_type(parameter: RosParameter, library: Library | None) -> ParameterType | None:
+    """Return the type that the node's model declares for a parameter; None where none does."""
+    node = library.node(parameter.reference) if library and parameter.reference else None
+    key = parameter.key.strip("/~")
+    declared = node.parameters if isinstance(node, Node) else ()
+    return next((found.type for found in declared if found.name.strip("/~") == key), None)
+
+
+def _sent(parameter: RosParameter | SystemParameter, declared: ParameterType | None) -> Sent | None:
     """Return the value of a parameter, or its declared default, as its declared type has it."""
-    declared = parameter.type
     if declared is None:
         return parameter.value
     value = declared.default if parameter.value is None else parameter.value
     return None if value is None else _converted(value, declared, parameter)
 
 
-def _converted(value: Value, declared: ParameterType, parameter: SystemParameter) -> Sent:
+def _converted(value: Value, declared: ParameterType, parameter: RosParameter | SystemParameter) -> Sent:
     """Return a value as its type has it on the parameter server: a Double is never an integer, Base64 is bytes."""
     converted: Sent | None = value
     if isinstance(value, list) and declared.elements:
