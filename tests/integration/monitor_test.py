@@ -10,7 +10,6 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
-from metacontrol_msgs.srv import ListObservers, LoadObserver, UnloadObserver
 from monitor_common import Diagnostics, end, start_node
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
@@ -170,29 +169,6 @@ class MonitorTest(unittest.TestCase):
         self.seen.forget()
         _, status = self.seen.wait_status("", "QA stale")
         self.assertEqual((status.values[0].key, status.level), ("safety", DiagnosticStatus.STALE))
-
-    def test_observers_load_and_unload_and_one_that_raises_stops_no_other(self):
-        load = rospy.ServiceProxy("/load_observer", LoadObserver)
-        active = rospy.ServiceProxy("/active_observers", ListObservers)
-        available = rospy.ServiceProxy("/list_observers", ListObservers)
-        unload = rospy.ServiceProxy("/unload_observer", UnloadObserver)
-        self.assertIn("SafetyQualityObserver", available().types)
-        name = "monitor_observers:FailingObserver"
-        self.assertTrue(load(name).ok)
-        self.assertFalse(load(name).ok)
-        self.assertFalse(load("NoSuchObserver").ok)
-        self.assertFalse(load("monitor_observers:BrokenObserver").ok)
-        self.assertIn(name, active().types)
-        rate = rospy.Publisher("failing/input", Float32, queue_size=1, latch=True)
-        rate.publish(Float32(1.0))
-        self.seen.wait(
-            "failure told", lambda s: s.hardware_id == "FailingObserver" and "ValueError" in s.values[0].value
-        )
-        self.seen.forget()
-        self.seen.wait("others go on", lambda s: s.hardware_id == "EnergyQualityObserver")
-        self.assertTrue(unload(name).ok)
-        self.assertFalse(unload(name).ok)
-        self.assertNotIn(name, active().types)
 
     def test_cost_of_the_monitor_is_measured(self):
         _, status = self.seen.wait_status("rosgraph_monitor", "CPU Usage")

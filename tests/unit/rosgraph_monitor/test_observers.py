@@ -4,13 +4,18 @@ import math
 
 import numpy as np
 import pytest
+import rospy
+from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from ros_model.metamodel import Component, Connection, ConnectionKind, RosParameter, RosSystem
 from rosgraph_monitor.frames import StaticFrames, rotation_translation
 from rosgraph_monitor.observer import TopicObserver
+from rosgraph_monitor.observers.cpu import CpuLoadQualityObserver
 from rosgraph_monitor.observers.energy import EnergyQualityObserver
+from rosgraph_monitor.observers.localization import LocalizationQualityObserver
+from rosgraph_monitor.observers.objective import ObjectiveErrorObserver
 from rosgraph_monitor.observers.safety import (
     CLOUD,
     ODOMETRY,
@@ -251,3 +256,119 @@ def test_chain_of_frames():
     assert tree.transform("lens", "base_link")[:3, 3] == pytest.approx([1.0, 1.0, 0.0])
     assert tree.transform("lens", "elsewhere") is None
     assert rotation_translation((0, 0, 0, 0), (0, 0, 0)) is None
+
+
+def test_sensor_topics_are_settings():
+    observer = SafetyQualityObserver()
+    observer.configure({"scan_topic": "laser", "odometry_topic": "odom"})
+    assert dict(observer.topics).keys() >= {"laser", "odom"}
+    for topic, msg in (("odom", odometry(0.4)), ("laser", scan(_0=0.25))):
+        observer.receive(topic, msg, 1.0)
+    assert risk(observer) == pytest.approx(0.75)
+
+
+def test_rate_of_a_topic_falls_while_it_is_silent():
+    observer = PublishedObserver("ComfortQualityObserver")
+    for i in range(11):
+        observer.receive("/speed", Float32(0.0), 0.1 * i)
+    assert observer.rate("/speed", 1.0) == pytest.approx(10.0)
+    assert observer.rate("/speed", 5.0) == pytest.approx(2.0)
+    assert observer.rate("/accel", 5.0) == 0.0
+
+
+def test_hysteresis_holds_the_level_until_it_has_moved_far_enough():
+    observer = EnergyQualityObserver()
+    observer.configure({"hysteresis": 0.05})
+    levels = [float(observer.qa_status(level).values[0].value) for level in (0.5, 0.54, 0.46, 0.56, 0.52)]
+    assert levels == [0.5, 0.5, 0.5, 0.56, 0.56]
+
+
+def test_rate_and_age_are_settings_of_every_observer():
+    observer = published()
+    observer.configure({"max_age": 9.0, "rate_hz": 2})
+    assert observer.rate_hz == 2.0
+    assert observer.evaluate(8.0)[0].message == "QA status"
+
+
+@pytest.mark.parametrize("settings", [{"rate_hz": 0}, {"max_age": -1}, {"hysteresis": "x"}, {"unknown": 1}])
+def test_bad_settings_of_any_observer_are_refused(settings):
+    with pytest.raises(ValueError, match="ComfortQualityObserver/"):
+        published().configure(settings)
+
+
+def test_truth_value_of_a_published_observer_is_no_stale_number():
+    class TaskObserver(TopicObserver):
+        def calculate_attr(self, msgs):
+            return DiagnosticStatus(message="QA status", values=[KeyValue("objetive_error", "True")])
+
+    (status,) = TaskObserver("TaskObserver", 1.0, []).evaluate(0.0)
+    assert status.message == "QA status"
+
+
+def pose(**variances):
+    msg = PoseWithCovarianceStamped()
+    covariance = [0.0] * 36
+    covariance[0], covariance[7] = variances.get("x", 0.0), variances.get("y", 0.0)
+    covariance[1] = covariance[6] = variances.get("xy", 0.0)
+    msg.pose.covariance = covariance
+    return msg
+
+
+@pytest.mark.parametrize(
+    ("variances", "level"),
+    [
+        ({}, 0.0),
+        ({"x": 0.0625, "y": 0.01}, 0.5),
+        ({"x": 1.0, "y": 0.1}, 1.0),
+        ({"x": 0.02, "y": 0.02, "xy": 0.0025}, 0.3),
+    ],
+)
+def test_localization(variances, level):
+    observer = LocalizationQualityObserver()
+    observer.receive("amcl_pose", pose(**variances), 0.0)
+    assert risk(observer, 0.5) == pytest.approx(level)
+
+
+@pytest.mark.parametrize("variances", [{"x": math.nan}, {"x": -1.0}, {"x": 0.01, "y": 0.01, "xy": 1.0}])
+def test_covariance_that_is_none_is_stale(variances):
+    observer = LocalizationQualityObserver()
+    observer.receive("amcl_pose", pose(**variances), 0.0)
+    assert observer.evaluate(0.5)[0].message == "QA stale"
+
+
+def test_cpu_load_is_a_level(monkeypatch):
+    class Times(tuple):
+        idle = property(lambda self: self[1])
+
+    times = iter([Times((10.0, 90.0)), Times((13.0, 91.0))])
+    monkeypatch.setattr("rosgraph_monitor.observers.cpu.psutil.cpu_times", lambda: next(times))
+    observer = CpuLoadQualityObserver()
+    assert observer.evaluate(0.0)[0].message == "QA stale"
+    assert risk(observer) == pytest.approx(0.75)
+
+
+def goals(*entries):
+    msg = GoalStatusArray()
+    for name, second, state in entries:
+        msg.status_list.append(GoalStatus(GoalID(rospy.Time(second), name), state, ""))
+    return msg
+
+
+def told(observer, msg):
+    observer.receive("move_base/status", msg, 0.0)
+    observer.evaluate(0.0)
+    return [sent.data for _, sent in observer.take_outputs()]
+
+
+def test_aborted_goal_is_an_objective_error_until_the_next_goal():
+    observer = ObjectiveErrorObserver()
+    assert told(observer, goals(("a", 1, GoalStatus.ACTIVE))) == []
+    assert told(observer, goals(("a", 1, GoalStatus.ABORTED))) == [True]
+    assert observer.evaluate(0.0)[0].level == DiagnosticStatus.ERROR
+    assert told(observer, goals(("a", 1, GoalStatus.ABORTED))) == []
+    assert told(observer, goals(("a", 1, GoalStatus.ABORTED), ("b", 2, GoalStatus.ACTIVE))) == [False]
+    assert told(observer, goals(("b", 2, GoalStatus.PREEMPTED))) == []
+
+
+def test_goal_that_had_failed_before_is_no_concern():
+    assert told(ObjectiveErrorObserver(), goals(("old", 1, GoalStatus.ABORTED))) == []

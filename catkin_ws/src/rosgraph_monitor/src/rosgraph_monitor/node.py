@@ -111,6 +111,7 @@ class MonitorNode:
         self._metacontrol = _names("~metacontrol_nodes", _METACONTROL_NODES)
         self._meter = UsageMeter(alone=frozenset({_LAUNCHER}))
         self._usage_due = 0.0
+        self._running_observers = 0
         observers = dict.fromkeys((*_names("~observers", []), *load))
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
         self._observers = ObserverHost(self._diagnostics)
@@ -212,6 +213,7 @@ class MonitorNode:
         if now >= self._usage_due:
             self._usage_due = now + _USAGE_PERIOD
             statuses.extend(self._meter.measure(self._metacontrol_pids(look), now))
+            self._running_observers = self._observers.supervise()
         return statuses
 
     def _metacontrol_pids(self, look: Look) -> dict[str, int]:

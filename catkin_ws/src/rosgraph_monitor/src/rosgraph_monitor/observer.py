@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from ros_model.metamodel import RosSystem
 
 Topics = list[tuple[str, type]]
+_ARRIVALS = 20
+"""Messages over which the rate of a topic is measured."""
 
 
 class StaleInputError(Exception):
@@ -33,6 +36,12 @@ class Observer:
 
     qa_name = ""
     """Name of the quality attribute. Left empty, it is the key of the observer's last status, or from its own name."""
+    max_age = 0.0
+    """Seconds of ROS time after which a message is stale; 0: three periods of the observer, at least 1 s."""
+    hysteresis = 0.0
+    """A level that has moved no further than this from the last one reported is reported as that one."""
+    defaults: Mapping[str, Any] = {}
+    """The observer's own settings with their default values, found in `self.settings`."""
 
     def __init__(self, name: str, rate_hz: float) -> None:
         """Name the observer and set its rate in Hz of ROS time."""
@@ -42,6 +51,8 @@ class Observer:
         self._name = name
         self._rate = float(rate_hz)
         self._last_qa_name = ""
+        self._reported: float | None = None
+        self.settings: dict[str, Any] = dict(self.defaults)
 
     @property
     def name(self) -> str:
@@ -64,7 +75,24 @@ class Observer:
         return []
 
     def configure(self, parameters: Mapping[str, Any]) -> None:
-        """Take the observer's own parameters (`~NAME/...` of the monitor). Raises ValueError for a bad one."""
+        """Take the observer's parameters (`~NAME/...` of the monitor): `rate_hz`, `max_age`, `hysteresis`, its own.
+
+        Raises:
+            ValueError: an unknown name, or a value of another type or out of range.
+        """
+        common = {"rate_hz": self._rate, "max_age": self.max_age, "hysteresis": self.hysteresis}
+        for key, value in parameters.items():
+            known = {**common, **self.defaults}
+            if key not in known:
+                raise ValueError(f"{self.name}/{key}: no such setting; there are {', '.join(known)}")
+            if not _fits(value, known[key]) or (key in common and value < 0) or (key == "rate_hz" and not value):
+                raise ValueError(f"{self.name}/{key}: {value!r} is no {_kind(known[key])}")
+            if key == "rate_hz":
+                self._rate = float(value)
+            elif key in common:
+                setattr(self, key, float(value))
+            else:
+                self.settings[key] = value
 
     def follow(self, system: RosSystem | None) -> None:
         """Learn which system is active, whenever that changes; None where no model says so."""
@@ -100,6 +128,19 @@ class Observer:
             values=[KeyValue(self.qa_name or self._last_qa_name or _qa_name(self._name), reason)],
         )
 
+    def qa_status(self, level: float) -> DiagnosticStatus:
+        """Return a "QA status" of this observer's quality attribute, with hysteresis."""
+        level = float(level)
+        if self._reported is None or not abs(level - self._reported) <= self.hysteresis:
+            self._reported = level
+        return DiagnosticStatus(
+            level=DiagnosticStatus.OK,
+            name=self._id,
+            message=QA_STATUS,
+            hardware_id=self._name,
+            values=[KeyValue(self.qa_name or _qa_name(self._name), repr(self._reported))],
+        )
+
     def _checked(self, status: object) -> DiagnosticStatus:
         if not isinstance(status, DiagnosticStatus):
             raise TypeError(f"observer {self._name} returned {type(status).__name__}, not a DiagnosticStatus")
@@ -114,14 +155,12 @@ class Observer:
 class TopicObserver(Observer):
     """An observer of topics, evaluated over the latest message of each."""
 
-    max_age = 0.0
-    """Seconds of ROS time after which a message is stale; 0: three periods of the observer, at least 1 s."""
-
     def __init__(self, name: str, rate_hz: float, topics: Sequence[tuple[str, type]]) -> None:
         """Name the observer, set its rate in Hz, and its (topic, message class) pairs."""
         super().__init__(name, rate_hz)
         self._topics: Topics = list(topics)
         self._latest: dict[str, tuple[float, Any]] = {}
+        self._arrivals: dict[str, deque[float]] = {}
 
     @property
     def topics(self) -> Topics:
@@ -131,10 +170,20 @@ class TopicObserver(Observer):
     def receive(self, topic: str, msg: Any, now: float) -> None:
         """Keep the latest message of each topic, with the time of its arrival."""
         self._latest[topic] = (now, msg)
+        self._arrivals.setdefault(topic, deque(maxlen=_ARRIVALS)).append(now)
 
     def reset(self) -> None:
         """Forget all messages."""
         self._latest.clear()
+        self._arrivals.clear()
+
+    def rate(self, topic: str, now: float) -> float:
+        """Return the rate of a topic in Hz, over its last messages; it falls while none come."""
+        arrivals = self._arrivals.get(topic) or deque[float]()
+        if len(arrivals) < 2:
+            return 0.0
+        elapsed = now - arrivals[0]
+        return (len(arrivals) - 1) / elapsed if elapsed > 0.0 else math.inf
 
     def latest(self, topic: str, now: float, max_age: float | None = None) -> Any:
         """Return the latest message of a topic.
@@ -158,16 +207,6 @@ class TopicObserver(Observer):
         """Return what `calculate_attr` makes of the latest messages."""
         return [self.calculate_attr([self.latest(topic, now) for topic, _ in self.topics])]
 
-    def qa_status(self, level: float) -> DiagnosticStatus:
-        """Return a "QA status" of this observer's quality attribute."""
-        return DiagnosticStatus(
-            level=DiagnosticStatus.OK,
-            name=self._id,
-            message=QA_STATUS,
-            hardware_id=self._name,
-            values=[KeyValue(self.qa_name or _qa_name(self._name), repr(float(level)))],
-        )
-
 
 def _qa_name(observer: str) -> str:
     """Return `safety` for `SafetyQualityObserver`, as the published names go."""
@@ -176,7 +215,18 @@ def _qa_name(observer: str) -> str:
 
 
 def _is_finite(text: str) -> bool:
+    """Say whether a value is a number, or a truth value as the observers of tasks write it."""
     try:
         return math.isfinite(float(text))
     except ValueError:
-        return False
+        return text.strip().lower() in ("true", "false")
+
+
+def _fits(value: Any, default: Any) -> bool:
+    if isinstance(default, (bool, str, list)):
+        return isinstance(value, type(default))
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _kind(default: Any) -> str:
+    return {bool: "truth value", str: "text", list: "list"}.get(type(default), "number in range")

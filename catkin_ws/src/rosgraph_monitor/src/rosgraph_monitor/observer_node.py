@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+import time
+from collections import deque
 from typing import TYPE_CHECKING, Any
 
 import rospy
@@ -19,13 +21,20 @@ from metacontrol_msgs.srv import (
 from rosgraph_monitor import plugins
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ros_model.metamodel import RosSystem
 
     from rosgraph_monitor.observer import Observer
 
 _LARGEST_MESSAGE = 1 << 24
 _WARNING_PERIOD = 10.0
-_ALL_SUBSCRIBED = "Observer"
+_INBOX = 100
+"""Messages that wait for an observer's next evaluation; of more, the oldest are dropped."""
+_PATIENCE = 5.0
+_PATIENCE_PERIODS = 5.0
+"""Wall s, and periods, that an evaluation may take before the observer counts as hung."""
+_BASE = "Observer"
 
 
 class ObserverHost:
@@ -58,7 +67,7 @@ class ObserverHost:
             except plugins.PluginError as error:
                 rospy.logerr("%s", error)
                 return False
-            except Exception as error:  # a plug-in is somebody else's code
+            except (Exception, SystemExit) as error:  # a plug-in is somebody else's code
                 rospy.logerr("observer %s can't start: %s: %s", name, type(error).__name__, error)
                 return False
         rospy.loginfo("observer %s at %g Hz", name, observer.rate_hz)
@@ -83,6 +92,16 @@ class ObserverHost:
         for runner in runners:
             runner.follow(system)
 
+    def supervise(self) -> int:
+        """Say of observers that hang that they do; call it now and then. Returns how many run."""
+        with self._lock:
+            runners = tuple(self._runners.values())
+        for runner in runners:
+            lasted = runner.hangs_for()
+            if lasted:
+                runner.say_stale(f"observer hangs: its evaluation has been going on for {lasted:.0f} s")
+        return len(runners)
+
     def _active(self) -> ListObserversResponse:
         with self._lock:
             running = {name: type(runner.observer).__mro__[1].__name__ for name, runner in self._runners.items()}
@@ -90,11 +109,15 @@ class ObserverHost:
 
     def _available(self) -> ListObserversResponse:
         found = plugins.available()
-        return ListObserversResponse(types=list(found), base_classes=[_ALL_SUBSCRIBED] * len(found))
+        return ListObserversResponse(types=list(found), base_classes=[_BASE] * len(found))
 
 
 class _Runner:
-    """Runs one observer until it is stopped."""
+    """Runs one observer until it is stopped.
+
+    The observer is touched by its own thread alone: whatever it does there, callbacks of topics that it shares with
+    others, and those who tell it something, only leave things for it to pick up.
+    """
 
     def __init__(self, observer: Observer, diagnostics: rospy.Publisher) -> None:
         self.observer = observer
@@ -103,7 +126,9 @@ class _Runner:
         self._publishers = {
             topic: rospy.Publisher(topic, message_class, queue_size=1) for topic, message_class in observer.outputs
         }
-        self._lock = threading.Lock()
+        self._inbox: deque[tuple[str, Any, float]] = deque(maxlen=_INBOX)
+        self._news: deque[RosSystem | None] = deque(maxlen=1)
+        self._busy_since: float | None = None
         self._stopped = threading.Event()
         self._subscribe()
         threading.Thread(target=self._run, name=f"observer {observer.name}", daemon=True).start()
@@ -111,18 +136,22 @@ class _Runner:
     def stop(self) -> None:
         """End the thread soon, and the subscriptions now."""
         self._stopped.set()
-        with self._lock:
-            for end in (*self._subscribers.values(), *self._publishers.values()):
-                end.unregister()
-            self._subscribers.clear()
+        for end in (*self._subscribers.copy().values(), *self._publishers.values()):
+            end.unregister()
 
     def follow(self, system: RosSystem | None) -> None:
         """Tell the observer which system is active."""
-        with self._lock:
-            try:
-                self.observer.follow(system)
-            except Exception as error:  # a plug-in is somebody else's code
-                self._warn(error)
+        self._news.append(system)
+
+    def hangs_for(self) -> float:
+        """Return for how many wall s its evaluation has been going on beyond all patience; 0 where it has not."""
+        since = self._busy_since
+        lasted = 0.0 if since is None else time.monotonic() - since
+        return lasted if lasted > max(_PATIENCE, _PATIENCE_PERIODS / self.observer.rate_hz) else 0.0
+
+    def say_stale(self, reason: str) -> None:
+        """Publish that the quality attribute is not known now."""
+        self._publish([self.observer.stale(reason)], [], rospy.Time.now())
 
     def _run(self) -> None:
         rate = rospy.Rate(self.observer.rate_hz, reset=True)
@@ -130,28 +159,40 @@ class _Runner:
             try:
                 rate.sleep()
             except rospy.exceptions.ROSTimeMovedBackwardsException:
-                with self._lock:
-                    self.observer.reset()
+                self._inbox.clear()
+                self._guarded(self.observer.reset)
                 rate = rospy.Rate(self.observer.rate_hz, reset=True)
                 continue
             except rospy.ROSInterruptException:
                 return
-            with self._lock:
-                if self._stopped.is_set():
-                    return
-                self._evaluate(rospy.Time.now())
+            if self._stopped.is_set():
+                return
+            self._busy_since = time.monotonic()
+            self._evaluate(rospy.Time.now())
+            self._busy_since = None
 
     def _evaluate(self, now: rospy.Time) -> None:
+        while self._news:
+            self._guarded(self.observer.follow, self._news.popleft())
+        while self._inbox:
+            self._guarded(self.observer.receive, *self._inbox.popleft())
         try:
             self._subscribe()
             statuses = self.observer.evaluate(now.to_sec())
             outputs = self.observer.take_outputs()
-            self._publish(statuses, outputs, now)
-        except Exception as error:  # a plug-in is somebody else's code: it must not end the monitor
-            if rospy.is_shutdown():
+            if not self._stopped.is_set():
+                self._publish(statuses, outputs, now)
+        except (Exception, SystemExit) as error:  # a plug-in is somebody else's code: it must not end the monitor
+            if rospy.is_shutdown() or self._stopped.is_set():
                 return
             self._warn(error)
-            self._publish([self.observer.stale(f"observer fails: {type(error).__name__}: {error}")], [], now)
+            self.say_stale(f"observer fails: {type(error).__name__}: {error}")
+
+    def _guarded(self, call: Callable[..., Any], *arguments: Any) -> None:
+        try:
+            call(*arguments)
+        except (Exception, SystemExit) as error:  # a plug-in is somebody else's code
+            self._warn(error)
 
     def _publish(self, statuses: list[DiagnosticStatus], outputs: list[tuple[str, Any]], now: rospy.Time) -> None:
         try:
@@ -162,7 +203,7 @@ class _Runner:
                 array.header.stamp = now
                 self._diagnostics.publish(array)
         except rospy.ROSException:
-            if not rospy.is_shutdown():
+            if not (rospy.is_shutdown() or self._stopped.is_set()):
                 raise
 
     def _subscribe(self) -> None:
@@ -171,7 +212,7 @@ class _Runner:
         for gone in self._subscribers.keys() - set(wanted):
             self._subscribers.pop(gone).unregister()
         for topic, message_class in wanted:
-            if (topic, message_class) not in self._subscribers:
+            if (topic, message_class) not in self._subscribers and not self._stopped.is_set():
                 self._subscribers[topic, message_class] = rospy.Subscriber(
                     topic,
                     message_class,
@@ -183,13 +224,9 @@ class _Runner:
                 )
 
     def _receive(self, msg: Any, topic: str) -> None:
-        with self._lock:
-            try:
-                self.observer.receive(topic, msg, rospy.get_time())
-            except Exception as error:  # a plug-in is somebody else's code
-                self._warn(error)
+        self._inbox.append((topic, msg, rospy.get_time()))
 
-    def _warn(self, error: Exception) -> None:
+    def _warn(self, error: BaseException) -> None:
         rospy.logwarn_throttle_identical(
             _WARNING_PERIOD, f"observer {self.observer.name} fails: {type(error).__name__}: {error}"
         )

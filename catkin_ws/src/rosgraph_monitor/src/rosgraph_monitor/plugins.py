@@ -47,6 +47,9 @@ def make(name: str) -> Observer:
         observer: Observer = constructor(match["name"])
     except PluginError:
         raise
-    except Exception as error:  # a plug-in is somebody else's code: whatever it raises must not end the monitor
+    except (
+        Exception,
+        SystemExit,
+    ) as error:  # a plug-in is somebody else's code: whatever it raises must not end the monitor
         raise PluginError(f"observer {name!r}: {target} fails: {type(error).__name__}: {error}") from error
     return observer

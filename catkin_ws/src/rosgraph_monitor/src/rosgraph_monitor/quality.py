@@ -106,3 +106,29 @@ def energy_level(load: float) -> float:
     if not math.isfinite(load):
         raise ValueError(f"power load {load} is not finite")
     return min(max((load - LOAD_IDLE) / LOAD_RANGE, 0.0), 1.0)
+
+
+def normalised(value: float, best: float, worst: float) -> float:
+    """Return a measured value as a level from 0 (at `best`, or better) to 1 (at `worst`, or worse).
+
+    Raises:
+        ValueError: the value is not finite, or the ends are the same.
+    """
+    if not math.isfinite(value) or best == worst:
+        raise ValueError(f"{value} can't be a level between {best} and {worst}")
+    return min(max((value - best) / (worst - best), 0.0), 1.0)
+
+
+def position_uncertainty(xx: float, xy: float, yy: float) -> float:
+    """Return the largest standard deviation in m of a position, from its covariance in m2.
+
+    Raises:
+        ValueError: the numbers are no covariance: not finite, or negative in some direction.
+    """
+    if not all(map(math.isfinite, (xx, xy, yy))):
+        raise ValueError(f"covariance ({xx}, {xy}, {yy}) is not finite")
+    mean, half = (xx + yy) / 2.0, (xx - yy) / 2.0
+    spread = math.hypot(half, xy)
+    if xx < 0.0 or yy < 0.0 or mean - spread < -1e-9 * max(mean, 1.0):
+        raise ValueError(f"({xx}, {xy}, {yy}) is no covariance")
+    return math.sqrt(mean + spread)

@@ -22,8 +22,6 @@ from rosgraph_monitor.quality import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from diagnostic_msgs.msg import DiagnosticStatus
     from numpy.typing import NDArray
     from ros_model.metamodel import RosSystem
@@ -31,8 +29,9 @@ if TYPE_CHECKING:
 ODOMETRY = "odometry/filtered"
 SCAN = "front/scan"
 CLOUD = "camera/depth/points"
-STATIC_FRAMES = "/tf_static"
 DISTANCE = "d_obstacle"
+"""Names as they are published; settings change them."""
+STATIC_FRAMES = "/tf_static"
 
 AT_REST = 0.01
 """m/s; slower than this the robot counts as standing, and there is no direction of motion."""
@@ -47,6 +46,9 @@ _DEFAULTS: dict[str, Any] = {
     "min_height": 0.05,  # m above the base frame: points of a cloud below are floor
     "max_height": 1.5,  # m: points above do not concern the robot
     "max_distance": 10.0,  # m, published where nothing is seen
+    "odometry_topic": ODOMETRY,
+    "scan_topic": SCAN,
+    "cloud_topic": CLOUD,
 }
 _DATA_TYPES = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
 
@@ -62,10 +64,10 @@ class SafetyQualityObserver(TopicObserver):
 
     qa_name = "safety"
     max_age = 0.5
+    defaults = _DEFAULTS
 
     def __init__(self, name: str = "SafetyQualityObserver") -> None:
-        super().__init__(name, 10.0, [(ODOMETRY, Odometry), (STATIC_FRAMES, TFMessage)])
-        self._settings = dict(_DEFAULTS)
+        super().__init__(name, 10.0, [])
         self._frames = StaticFrames()
         self._chosen: str | None = None
         self._need_cloud = False
@@ -74,38 +76,26 @@ class SafetyQualityObserver(TopicObserver):
     @property
     def topics(self) -> Topics:
         """Odometry, fixed frames, and the sensors in use: a camera may only work while somebody listens."""
-        sensors: Topics = []
-        if self._chosen in (None, SCAN):
-            sensors.append((SCAN, LaserScan))
-        if self._chosen == CLOUD or self._need_cloud:
-            sensors.append((CLOUD, PointCloud2))
-        return [*super().topics, *sensors]
+        scan, cloud = self.settings["scan_topic"], self.settings["cloud_topic"]
+        topics: Topics = [(self.settings["odometry_topic"], Odometry), (STATIC_FRAMES, TFMessage)]
+        if self._chosen in (None, scan):
+            topics.append((scan, LaserScan))
+        if self._chosen == cloud or self._need_cloud:
+            topics.append((cloud, PointCloud2))
+        return topics
 
     @property
     def outputs(self) -> Topics:
         """Distance of the closest obstacle in the direction of motion in m."""
         return [(DISTANCE, Float32)]
 
-    def configure(self, parameters: Mapping[str, Any]) -> None:
-        """Take settings; see the README for their names.
-
-        Raises:
-            ValueError: an unknown name, or a value of another type.
-        """
-        for key, value in parameters.items():
-            if key not in _DEFAULTS:
-                raise ValueError(f"{self.name}/{key}: no such setting; there are {', '.join(_DEFAULTS)}")
-            if isinstance(_DEFAULTS[key], str):
-                good = isinstance(value, str)
-            else:
-                good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-            if not good:
-                raise ValueError(f"{self.name}/{key}: {value!r} is no {type(_DEFAULTS[key]).__name__}")
-            self._settings[key] = value
-
     def follow(self, system: RosSystem | None) -> None:
         """Choose the sensor that the active system navigates by."""
-        self._chosen = None if system is None else navigation_sensor(system)
+        self._chosen = (
+            None
+            if system is None
+            else navigation_sensor(system, self.settings["scan_topic"], self.settings["cloud_topic"])
+        )
         self._need_cloud = False
 
     def receive(self, topic: str, msg: Any, now: float) -> None:
@@ -119,66 +109,67 @@ class SafetyQualityObserver(TopicObserver):
         """Return the distance, the sensor's range where nothing is seen, nothing while it is not known."""
         if math.isnan(self._distance):
             return []
-        return [(DISTANCE, Float32(min(self._distance, self._settings["max_distance"])))]
+        return [(DISTANCE, Float32(min(self._distance, self.settings["max_distance"])))]
 
     def generate_diagnostics(self, now: float) -> list[DiagnosticStatus]:
         """Return the risk."""
         self._distance = math.nan
-        twist = self.latest(ODOMETRY, now).twist.twist.linear
+        twist = self.latest(self.settings["odometry_topic"], now).twist.twist.linear
         if not (math.isfinite(twist.x) and math.isfinite(twist.y)):
-            raise StaleInputError(f"velocity on {ODOMETRY} is not finite")
+            raise StaleInputError(f"velocity on {self.settings['odometry_topic']} is not finite")
         speed = math.hypot(twist.x, twist.y)
         moving = speed > AT_REST
         direction = math.atan2(twist.y, twist.x) if moving else 0.0
         x, y = self._obstacles(now)
-        self._distance = closest_in_direction(x, y, direction, self._settings["half_angle"])
+        self._distance = closest_in_direction(x, y, direction, self.settings["half_angle"])
         return [self.qa_status(safety_risk(self._distance, self._braking(speed)) if moving else 0.0)]
 
     def _braking(self, speed: float) -> float:
-        if self._settings["max_deceleration"] > 0.0:
-            return physical_braking_distance(speed, self._settings["max_deceleration"], self._settings["reaction_time"])
-        return braking_distance(speed, self._settings["braking_gain"])
+        if self.settings["max_deceleration"] > 0.0:
+            return physical_braking_distance(speed, self.settings["max_deceleration"], self.settings["reaction_time"])
+        return braking_distance(speed, self.settings["braking_gain"])
 
     def _obstacles(self, now: float) -> Points:
         """Return obstacle points in the base's orientation, relative to the sensor or the centre."""
-        if self._chosen == CLOUD:
-            return self._from_cloud(self.latest(CLOUD, now))
+        scan_topic, cloud_topic = self.settings["scan_topic"], self.settings["cloud_topic"]
+        if self._chosen == cloud_topic:
+            return self._from_cloud(self.latest(cloud_topic, now))
         try:
-            scan = self.latest(SCAN, now)
+            scan = self.latest(scan_topic, now)
         except StaleInputError as silent:
-            if self._chosen == SCAN:
+            if self._chosen == scan_topic:
                 raise
             self._need_cloud = True
             try:
-                return self._from_cloud(self.latest(CLOUD, now))
+                return self._from_cloud(self.latest(cloud_topic, now))
             except StaleInputError as too:
                 raise StaleInputError(f"{silent}; {too}") from too
         return self._from_scan(scan)
 
     def _from_scan(self, scan: LaserScan) -> Points:
         x, y = scan_points(scan)
-        matrix = self._frames.transform(scan.header.frame_id, self._settings["base_frame"])
+        matrix = self._frames.transform(scan.header.frame_id, self.settings["base_frame"])
         if matrix is None:
             return x, y  # as published: the laser looks along the base's x
         px, py, _ = _moved(matrix, x, y, np.zeros_like(x))
         return self._from_origin(matrix, px, py)
 
     def _from_cloud(self, cloud: PointCloud2) -> Points:
-        matrix = self._frames.transform(cloud.header.frame_id, self._settings["base_frame"])
+        matrix = self._frames.transform(cloud.header.frame_id, self.settings["base_frame"])
         if matrix is None:
-            raise StaleInputError(f"no fixed transform from {cloud.header.frame_id} to {self._settings['base_frame']}")
+            raise StaleInputError(f"no fixed transform from {cloud.header.frame_id} to {self.settings['base_frame']}")
         x, y, z = _moved(matrix, *cloud_points(cloud))
-        kept = (z >= self._settings["min_height"]) & (z <= self._settings["max_height"])
+        kept = (z >= self.settings["min_height"]) & (z <= self.settings["max_height"])
         return self._from_origin(matrix, x[kept], y[kept])
 
     def _from_origin(self, matrix: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> Points:
-        if self._settings["measured_from"] == "centre":
+        if self.settings["measured_from"] == "centre":
             return x, y
         return x - matrix[0, 3], y - matrix[1, 3]
 
 
-def navigation_sensor(system: RosSystem) -> str | None:
-    """Return the topic of the obstacle sensor that a system navigates by, or None where the model does not say.
+def navigation_sensor(system: RosSystem, scan_topic: str = SCAN, cloud_topic: str = CLOUD) -> str | None:
+    """Return which of the two sensors' topics a system navigates by, or None where the model does not say.
 
     `observation_sources` decide, as they are what costmaps read; without them, a connection named like the topic.
     """
@@ -190,10 +181,10 @@ def navigation_sensor(system: RosSystem) -> str | None:
         for word in parameter.value.split()
     }
     wired = {connection.name.strip("/") for connection in system.connections}
-    if "scan" in sources or (not sources and SCAN in wired):
-        return SCAN
-    if "point_cloud" in sources or (not sources and CLOUD in wired):
-        return CLOUD
+    if "scan" in sources or (not sources and scan_topic.strip("/") in wired):
+        return scan_topic
+    if "point_cloud" in sources or (not sources and cloud_topic.strip("/") in wired):
+        return cloud_topic
     return None
 
 
