@@ -88,6 +88,15 @@ def test_generating_twice_gives_the_same_bytes(run, models, tmp_path):
     assert len(one) == 2 + 2 + 3 + 1
 
 
+def test_files_of_a_variant_that_is_gone_are_told_and_left(run, models, tmp_path):
+    assert run("generate", "all", models({"a": {"speed": 1}, "b": {"speed": 0.5}}), "-o", tmp_path)[0] == 0
+    (tmp_path / "launch/variants/mine.launch").write_text("<launch/>")
+    _, out, _ = run("generate", "all", models({"a": {"speed": 1}}), "-o", tmp_path)
+    told = [line.split()[0] for line in out.splitlines() if "delete it" in line]
+    assert told == [str(tmp_path / "models/variants/b.rossystem"), str(tmp_path / "launch/variants/b.launch")]
+    assert all(Path(path).is_file() for path in told)
+
+
 def test_hand_written_variants_are_left_alone_and_others_put_beside_them(run, models, tmp_path):
     folder = models({}, variants=[{}, {"files": ["arm.rossystem"]}])
     (folder / "arm.rossystem").write_text("RosSystem { Name one_arm }")
