@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 _COMMANDS = {
     "check": "ros_model.commands.check:check",
-    "extract": "ros_model.commands.extract:extract",
     "diff": "ros_model.commands.diff:diff",
+    "extract": "ros_model.commands.extract:extract",
     "format": "ros_model.commands.format:format_",
     "generate": "ros_model.commands.generate:generate",
     "init": "ros_model.commands.init:init",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
-from dataclasses import dataclass, field
+from collections import defaultdict
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from ros_model.extraction import plumbing
@@ -45,6 +45,7 @@ class End:
     kind: PortKind
     name: str
     type: str = ""
+    declared: str = ""  # its name in the source, where that is known
 
 
 @dataclass(frozen=True)
@@ -56,13 +57,14 @@ class Models:
 
 
 @dataclass
-class _Instance:
-    """A running node on its way into the models."""
+class Instance:
+    """A running node on its way into the models; `declared` is what its source says, where that is known."""
 
     name: str
     label: str
     namespace: str | None
     reference: Reference
+    declared: Node | None = None
     ends: list[End] = field(default_factory=list)
     parameters: list[tuple[str, Any]] = field(default_factory=list)  # relative to the node
 
@@ -88,15 +90,33 @@ def models_of(
     for end in ends:
         if end.node in instances:
             instances[end.node].ends.append(end)
-    unowned = _share_out(snapshot.parameters, instances)
+    unowned = share_out(snapshot.parameters, instances)
     if not everything:
         unowned = [(key, value) for key, value in unowned if not plumbing.is_roslaunch_parameter(key)]
-    components = tuple(_component(instance, remarks) for instance in instances.values())
-    parameters = tuple(_system_parameters(unowned, remarks))
-    connections = tuple(_connections(instances))
-    packages = _packages(instances.values())
-    header = "\n".join([*title, *remarks.lines()])
-    return Models(PackageSet(packages, header), RosSystem(name, components, connections, parameters, header))
+    return assemble(name, instances, unowned, [*title, *remarks.lines()])
+
+
+def assemble(
+    name: str, instances: Mapping[str, Instance], unowned: Sequence[tuple[str, Any]], lines: Sequence[str]
+) -> Models:
+    """Return the models of nodes.
+
+    Args:
+        name: name of the system.
+        instances: the nodes by their full names, with interfaces and parameters.
+        unowned: parameters of no node, by their full names without the leading slash.
+        lines: comments at the top of both models; values that can't be written are added to them.
+    """
+    unwritable: dict[str, str] = {}
+    system = RosSystem(
+        name,
+        tuple(_component(instance, unwritable) for instance in instances.values()),
+        tuple(_connections(instances)),
+        tuple(_system_parameters(unowned, unwritable)),
+    )
+    said = [f"Left out: the value of the parameter {name}: {why}." for name, why in sorted(unwritable.items())]
+    header = "\n".join([*lines, *said])
+    return Models(PackageSet(_packages(instances.values()), header), replace(system, header=header))
 
 
 def interfaces(snapshot: GraphSnapshot, details: Details) -> Iterator[End]:
@@ -144,27 +164,33 @@ def _action_ends(action: ActionState) -> Iterator[End]:
             yield End(node, kind, f"{action.name}/{suffix}", types[suffix])
 
 
-def _instances(names: Sequence[str], details: Details, remarks: _Remarks) -> dict[str, _Instance]:
+def _instances(names: Sequence[str], details: Details, remarks: _Remarks) -> dict[str, Instance]:
     """Give every node its label, unique in the system, and the reference to the executable that it runs."""
-    labels = Counter(split_name(name)[1] for name in names)
     found = {}
     for name in names:
-        namespace, label = split_name(name)
-        # The ends of connections have nothing but the label: where it is not unique, it is the whole name.
-        ambiguous = labels[label] > 1
-        shown = name.strip("/") if ambiguous else label
         origin = details.origins.get(name)
         package = origin.package if origin else NO_PACKAGE
-        artifact = executable_name(origin.executable) if origin else label
+        label = split_name(name)[1]
+        artifact = executable_name(origin.executable) if origin else executable_name(label)
         if origin and artifact != origin.executable:
             remarks.renamed[origin.executable] = artifact
-        found[name] = _Instance(
-            name, shown, None if ambiguous else namespace or None, Reference(package, artifact, executable_name(label))
-        )
+        reference = Reference(package, artifact, executable_name(label))
+        found[name] = Instance(name, *label_of(name, names), reference)
     return found
 
 
-def _share_out(tree: Mapping[str, Any], instances: Mapping[str, _Instance]) -> list[tuple[str, Any]]:
+def label_of(name: str, names: Sequence[str]) -> tuple[str, str | None]:
+    """Return a node's name and namespace in the model; the whole name where its last part is not unique among all.
+
+    The ends of connections have nothing but that name.
+    """
+    namespace, label = split_name(name)
+    if sum(split_name(other)[1] == label for other in names) > 1:
+        return name.strip("/"), None
+    return label, namespace or None
+
+
+def share_out(tree: Mapping[str, Any], instances: Mapping[str, Instance]) -> list[tuple[str, Any]]:
     """Give each node its private parameters; return the others, by their full names without the leading slash."""
     unowned = []
     for name, value in leaves(tree):
@@ -184,10 +210,10 @@ def _share_out(tree: Mapping[str, Any], instances: Mapping[str, _Instance]) -> l
     return unowned
 
 
-def _component(instance: _Instance, remarks: _Remarks) -> Component:
+def _component(instance: Instance, unwritable: dict[str, str]) -> Component:
     reference = instance.reference
     ports = tuple(
-        Port(name, end.kind, Reference(reference.package, reference.artifact, reference.node, name))
+        Port(name, end.kind, replace(reference, name=end.declared or name))
         for end in sorted(instance.ends, key=_order)
         for name in [as_seen_from(instance.name, end.name)]
     )
@@ -196,10 +222,9 @@ def _component(instance: _Instance, remarks: _Remarks) -> Component:
         try:
             _, value = typed(raw)
         except UnwritableValueError as error:
-            remarks.unwritable[f"{instance.name}/{key}"] = str(error)
+            unwritable[f"{instance.name}/{key}"] = str(error)
             value = None
-        full = Reference(reference.package, reference.artifact, reference.node, key)
-        parameters.append(RosParameter(key, full, value))
+        parameters.append(RosParameter(key, replace(reference, name=key), value))
     return Component(instance.label, reference, instance.namespace, ports, tuple(parameters))
 
 
@@ -207,7 +232,7 @@ def _order(end: End) -> tuple[int, str]:
     return list(PortKind).index(end.kind), end.name
 
 
-def _connections(instances: Mapping[str, _Instance]) -> Iterator[Connection]:
+def _connections(instances: Mapping[str, Instance]) -> Iterator[Connection]:
     """Connect what bears the same name: publishers and subscribers, action servers and clients."""
     for kind, source_kind, target_kind in (
         (ConnectionKind.TOPIC, PortKind.PUBLISHER, PortKind.SUBSCRIBER),
@@ -218,34 +243,38 @@ def _connections(instances: Mapping[str, _Instance]) -> Iterator[Connection]:
             yield Connection(name.lstrip("/"), kind, tuple(sources[name]), tuple(targets[name]))
 
 
-def _paths(instances: Iterable[_Instance], kind: PortKind) -> dict[str, list[PortPath]]:
+def _paths(instances: Iterable[Instance], kind: PortKind) -> dict[str, list[PortPath]]:
     found: dict[str, list[PortPath]] = defaultdict(list)
     for instance in instances:
         for end in instance.ends:
-            if end.kind is kind:
+            if end.kind is kind and "{" not in end.name:
                 found[end.name].append(PortPath(instance.label, as_seen_from(instance.name, end.name)))
     return found
 
 
-def _system_parameters(parameters: Iterable[tuple[str, Any]], remarks: _Remarks) -> Iterator[SystemParameter]:
+def _system_parameters(parameters: Iterable[tuple[str, Any]], unwritable: dict[str, str]) -> Iterator[SystemParameter]:
     for name, raw in parameters:
         try:
             kind, value = typed(raw)
         except UnwritableValueError as error:
-            remarks.unwritable[f"/{name}"] = str(error)
+            unwritable[f"/{name}"] = str(error)
             continue
         yield SystemParameter(name, kind, value)
 
 
-def _packages(instances: Iterable[_Instance]) -> tuple[Package, ...]:
+def _packages(instances: Iterable[Instance]) -> tuple[Package, ...]:
     """Declare what the instances refer to; instances of one node of one executable share its declaration."""
     declared: dict[str, dict[str, dict[str, _Declaration]]] = defaultdict(lambda: defaultdict(dict))
     for instance in instances:
         reference = instance.reference
         nodes = declared[reference.package][reference.artifact]
         declaration = nodes.setdefault(reference.node, _Declaration({}, {}))
+        for port in instance.declared.ports if instance.declared else ():
+            declaration.ports.setdefault((port.kind, port.name), port)
+        for parameter in instance.declared.parameters if instance.declared else ():
+            declaration.parameters.setdefault(parameter.name, parameter)
         for end in sorted(instance.ends, key=_order):
-            name = as_seen_from(instance.name, end.name)
+            name = end.declared or as_seen_from(instance.name, end.name)
             declaration.ports.setdefault((end.kind, name), PortDeclaration(name, end.kind, end.type))
         for key, raw in instance.parameters:
             try:
@@ -284,7 +313,6 @@ class _Remarks:
         self._snapshot = snapshot
         self._details = details
         self._everything = everything
-        self.unwritable: dict[str, str] = {}
         self.renamed: dict[str, str] = {}
 
     def lines(self) -> Iterator[str]:
@@ -300,8 +328,6 @@ class _Remarks:
                 yield f"Not known: the package and executable of {node}: {why}."
         if details.dead:
             yield f"Left out: {', '.join(sorted(details.dead))}: the master lists them, but nobody listens there."
-        for name, why in sorted(self.unwritable.items()):
-            yield f"Left out: the value of the parameter {name}: {why}."
         for executable, artifact in sorted(self.renamed.items()):
             yield f"The artifact {artifact} is the executable {executable}: a reference can't hold the dot."
         if not self._everything:

@@ -1,0 +1,551 @@
+"""C++ sources as syntax trees, and what texts and node handles in them are worth, as far as that shows."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tree_sitter_cpp
+from tree_sitter import Language, Node, Parser
+
+from ros_model.extraction.python_values import Const, Hole, Text, joined
+from ros_model.extraction.source import Remark, SourceError, read_source
+from ros_model.metamodel import Position
+
+MAX_DEPTH = 16
+MAX_VALUES = 16
+
+_LANGUAGE = Language(tree_sitter_cpp.language())
+_KNOWN_TEXTS = {"ros::this_node::getName": "~", "ros::this_node::getNamespace": ""}
+_SAME_TEXT = ("std::string", "string", "ros::names::resolve", "ros::names::remap")
+_HEADERS = (".h", ".hpp", ".hh", ".hxx")
+_ESCAPE = re.compile(r"\\(.)")
+_FUNCTION_HOMES = ("getNodeHandle", "getMTNodeHandle", "getPrivateNodeHandle", "getMTPrivateNodeHandle")
+
+
+@dataclass(frozen=True)
+class File:
+    """A source file: its path for people, its tree."""
+
+    shown: str
+    root: Node
+
+    def position(self, node: Node) -> Position:
+        """Return where a node stands."""
+        return Position(self.shown, node.start_point[0] + 1, node.start_point[1] + 1)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an expression stands: file, function (its definition, None outside), class ("" outside)."""
+
+    file: File
+    function: Node | None = None
+    owner: str = ""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A variable: its type, what it is made with (one value, or the arguments of a constructor), and where."""
+
+    type: str
+    values: tuple[Node, ...]
+    place: Place
+
+
+@dataclass
+class _Index:
+    functions: dict[str, list[tuple[Node, Place]]] = field(default_factory=lambda: defaultdict(list))
+    calls: dict[str, list[tuple[tuple[Node, ...], Place]]] = field(default_factory=lambda: defaultdict(list))
+    globals: dict[str, list[Declared]] = field(default_factory=lambda: defaultdict(list))
+    members: dict[tuple[str, str], list[Declared]] = field(default_factory=lambda: defaultdict(list))
+    macros: dict[str, str] = field(default_factory=dict)
+    aliases: dict[str, str] = field(default_factory=dict)
+
+
+class Program:
+    """The sources of an executable, with the headers of its package that they include."""
+
+    def __init__(self, sources: Sequence[Path], package_folder: Path) -> None:
+        """Read and index them.
+
+        Raises:
+            SourceError: none of the sources can be read. Others are remarks.
+        """
+        self.files: list[File] = []
+        self.remarks: list[Remark] = []
+        self._folder = package_folder
+        self._index = _Index()
+        self._locals: dict[int, dict[str, list[Declared]]] = {}
+        self._fills: dict[tuple[str, str], list[tuple[Node | str | None, Place, str]]] = defaultdict(list)
+        parser = Parser(_LANGUAGE)
+        todo, seen = list(sources), set()
+        while todo:
+            path = todo.pop(0)
+            if path.resolve() in seen:
+                continue
+            seen.add(path.resolve())
+            try:
+                self.files.append(self._read(path, parser))
+            except SourceError as error:
+                self.remarks.append(error.remark)
+                continue
+            todo += self._included(self.files[-1], path)
+        if not self.files and self.remarks:
+            raise SourceError(self.remarks[0])
+        for file in reversed(self.files):  # headers, which declare, before the sources that include them
+            self._index_file(file)
+
+    def expressions(self) -> Iterator[tuple[Node, Place]]:
+        """Yield every node with its place."""
+        for file in self.files:
+            yield from self._walk(file.root, Place(file))
+
+    def alias(self, type_name: str) -> str:
+        """Return a type with the names that `typedef` and `using` gave replaced by what they stand for."""
+        for _ in range(MAX_DEPTH):
+            base, bracket, rest = type_name.partition("<")
+            if base not in self._index.aliases:
+                return type_name
+            type_name = self._index.aliases[base] + bracket + rest
+        return type_name
+
+    def function(self, name: str, owner: str = "") -> tuple[Node, Place] | None:
+        """Return the definition of a function; the one in a class, where several have the name."""
+        found = self._index.functions.get(name.rpartition("::")[2], [])
+        wanted = name.rpartition("::")[0].rpartition("::")[2] or owner
+        of_class = [entry for entry in found if entry[1].owner == wanted] or found
+        defined = [entry for entry in of_class if entry[0].type == "function_definition"]
+        return next(iter(defined or of_class), None)
+
+    def note_fill(self, variable: Node, value: Node | str | None, place: Place, note: str) -> None:
+        """Note that a call like `param(name, variable, value)` fills a variable."""
+        owner = "" if self._is_local(text(variable), place) else place.owner
+        self._fills[owner or _key(place), text(variable)].append((value, place, note))
+
+    def declared(self, name: str, place: Place) -> list[Declared]:
+        """Return what a name may have been declared as: a local variable, a member, a global one."""
+        plain = name.removeprefix("this->")
+        if place.function is not None and (found := self._local(place).get(plain)):
+            return found
+        if place.owner and (found := self._index.members.get((place.owner, plain), [])):
+            return found
+        return self._index.globals.get(plain.rpartition("::")[2], [])
+
+    def texts(self, node: Node, place: Place, depth: int = 0) -> list[tuple[Const | Text, str]]:
+        """Return the texts that an expression may be, each with a note ("" for none); unknown parts are holes."""
+        unknown: list[tuple[Const | Text, str]] = [(Text((Hole(text(node)),)), "")]
+        if depth > MAX_DEPTH:
+            return unknown
+        found = self._texts(node, place, depth)
+        return found[:MAX_VALUES] if found else unknown
+
+    def handles(self, node: Node | None, place: Place, depth: int = 0) -> list[Const | Text]:
+        """Return the namespaces that a node handle may stand for: "" the node's own, "~" its private one."""
+        if node is None or depth > MAX_DEPTH:
+            return [Const("")] if node is None else [Text((Hole(text(node)),))]
+        found = self._handles(node, place, depth)
+        return found[:MAX_VALUES] or [Text((Hole(text(node)),))]
+
+    # --- texts
+
+    def _texts(self, node: Node, place: Place, depth: int) -> list[tuple[Const | Text, str]]:
+        children = node.named_children
+        found: list[tuple[Const | Text, str]] = []
+        match node.type:
+            case "string_literal":
+                found = [(Const(_literal(node)), "")]
+            case "concatenated_string":
+                found = [(Const("".join(map(_literal, children))), "")]
+            case "raw_string_literal":
+                found = [(Const("".join(text(n) for n in children if n.type == "raw_string_content")), "")]
+            case "number_literal" | "true" | "false":
+                found = [(Const(text(node)), "")]
+            case "parenthesized_expression" | "initializer_list" if len(children) == 1:
+                found = self.texts(children[0], place, depth + 1)
+            case "binary_expression" if text(node.child_by_field_name("operator")) == "+":
+                left, right = (self.texts(_child(node, side), place, depth + 1) for side in ("left", "right"))
+                found = [
+                    (joined([_as_text(one), _as_text(two)]), note or other)
+                    for one, note in left
+                    for two, other in right
+                ]
+            case "call_expression":
+                found = self._called_text(node, place, depth)
+            case "identifier" | "field_expression" | "qualified_identifier" | "field_identifier":
+                found = self._variable_texts(node, place, depth)
+        return found
+
+    def _called_text(self, node: Node, place: Place, depth: int) -> list[tuple[Const | Text, str]]:
+        function, arguments = _child(node, "function"), arguments_of(node)
+        name = text(function)
+        if name in _KNOWN_TEXTS:
+            return [(Const(_KNOWN_TEXTS[name]), "")]
+        if name in _SAME_TEXT and len(arguments) == 1:
+            return self.texts(arguments[0], place, depth + 1)
+        if function.type == "field_expression" and (found := self._method_text(function, arguments, place, depth)):
+            return found
+        if definition := self.function(name, place.owner):
+            body = definition[0].child_by_field_name("body")
+            returned = [n for n in walk(body) if n.type == "return_statement" and n.named_child_count] if body else []
+            if len(returned) == 1:
+                return self.texts(returned[0].named_children[0], definition[1], depth + 1)
+        return []
+
+    def _method_text(
+        self, function: Node, arguments: Sequence[Node], place: Place, depth: int
+    ) -> list[tuple[Const | Text, str]]:
+        method = text(_child(function, "field")).partition("<")[0]
+        if method in ("c_str", "str") and not arguments:
+            return self.texts(_child(function, "argument"), place, depth + 1)
+        if method == "resolveName" and arguments:
+            return self.texts(arguments[0], place, depth + 1)
+        if method == "param" and len(arguments) == 2:
+            note = f"the default of the parameter {text(arguments[0])}"
+            return [(value, note) for value, _ in self.texts(arguments[1], place, depth + 1)]
+        return []
+
+    def _variable_texts(self, node: Node, place: Place, depth: int) -> list[tuple[Const | Text, str]]:
+        name = text(node).removeprefix("this->")
+        last = name.rpartition("::")[2]
+        found: list[tuple[Const | Text, str]] = []
+        if last in self._index.macros:
+            return [(Const(self._index.macros[last]), "")]
+        for value, at, note in self._filled(name, place):
+            if isinstance(value, str):
+                found.append((Const(value), ""))
+            elif value is not None:
+                found += [(known, note) for known, _ in self.texts(value, at, depth + 1)]
+            else:
+                found.append((Text((Hole(name),)), ""))
+        if found:
+            return found
+        for declared in self.declared(name, place):
+            if len(declared.values) == 1:
+                found += self.texts(declared.values[0], declared.place, depth + 1)
+        if not found:
+            for argument, at in self._passed(name, place):
+                found += self.texts(argument, at, depth + 1)
+        return found
+
+    def _filled(self, name: str, place: Place) -> list[tuple[Node | str | None, Place, str]]:
+        keys = (_key(place), place.owner)
+        return next((self._fills[key, name] for key in keys if key and (key, name) in self._fills), [])
+
+    # --- node handles
+
+    def _handles(self, node: Node, place: Place, depth: int) -> list[Const | Text]:
+        name = text(node).lstrip("*&").removeprefix("this->")
+        if node.type in ("call_expression", "new_expression"):
+            called = name.partition("(")[0].partition("<")[0].removeprefix("new ").strip()
+            if called in _FUNCTION_HOMES:
+                return [Const("~" if "Private" in called else "")]
+            if called.endswith(("NodeHandle", "make_shared", "make_unique")):
+                return self._constructed(arguments_of(node), place, depth)
+            return []
+        if node.type in ("pointer_expression", "parenthesized_expression") and node.named_child_count:
+            return self._handles(node.named_children[-1], place, depth + 1)
+        found: list[Const | Text] = []
+        for declared in self.declared(name, place):
+            if "NodeHandle" not in declared.type:
+                continue
+            is_made = [v for v in declared.values if v.type in ("call_expression", "new_expression")]
+            if len(declared.values) == 1 and is_made:
+                found += self.handles(is_made[0], declared.place, depth + 1)
+            else:
+                found += self._constructed(declared.values, declared.place, depth)
+        if not found:
+            for argument, at in self._passed(name, place):
+                found += self.handles(argument, at, depth + 1)
+        return list(dict.fromkeys(found))
+
+    def _constructed(self, values: Sequence[Node], place: Place, depth: int) -> list[Const | Text]:
+        """Return what the arguments of a node handle's constructor make: nothing, a namespace, a parent and one."""
+        if not values:
+            return [Const("")]
+        first = values[0]
+        if _is_textual(first) or not self._is_handle(first, place):
+            return [value for value, _ in self.texts(first, place, depth + 1)]
+        parents = self.handles(first, place, depth + 1)
+        if len(values) == 1 or not (_is_textual(values[1]) or values[1].type == "identifier"):
+            return parents
+        inner = [value for value, _ in self.texts(values[1], place, depth + 1)]
+        return [in_namespace(parent, name) for parent in parents for name in inner]
+
+    def _is_handle(self, node: Node, place: Place) -> bool:
+        name = text(node).lstrip("*&").removeprefix("this->")
+        if "NodeHandle" in name:
+            return True
+        if any("NodeHandle" in declared.type for declared in self.declared(name, place)):
+            return True
+        parameter = _parameters(place.function).get(name) if place.function is not None else None
+        return parameter is not None and "NodeHandle" in parameter[1]
+
+    # --- parameters of functions
+
+    def _passed(self, name: str, place: Place) -> list[tuple[Node, Place]]:
+        """Return what the calls of a function pass for one of its parameters."""
+        if place.function is None or name not in (parameters := _parameters(place.function)):
+            return []
+        index, _, default = parameters[name]
+        called = _function_name(place.function).rpartition("::")[2]
+        found = []
+        for arguments, at in self._index.calls.get(called, ()):
+            if index < len(arguments):
+                found.append((arguments[index], at))
+            elif default is not None:
+                found.append((default, place))
+        return found
+
+    # --- the index
+
+    def _read(self, path: Path, parser: Parser) -> File:
+        shown = str(path.relative_to(self._folder)) if path.is_relative_to(self._folder) else str(path)
+        root = parser.parse(read_source(path, shown)).root_node
+        if root.has_error:
+            bad = next((node for node in walk(root) if node.is_error or node.is_missing), root)
+            position = Position(shown, bad.start_point[0] + 1, bad.start_point[1] + 1)
+            self.remarks.append(
+                Remark(position, "not read: this is no C++ that can be parsed; the rest of the file is")
+            )
+        return File(shown, root)
+
+    def _included(self, file: File, path: Path) -> Iterator[Path]:
+        for node in walk(file.root):
+            if node.type == "preproc_include":
+                name = text(_child(node, "path")).strip('<>"')
+                for folder in (path.parent, self._folder / "include", self._folder / "src"):
+                    header = folder / name
+                    if name.endswith(_HEADERS) and header.is_file() and header.resolve().is_relative_to(self._folder):
+                        yield header
+                        break
+
+    def _index_file(self, file: File) -> None:
+        for node, place in self._walk(file.root, Place(file)):
+            match node.type:
+                case "function_definition":
+                    self._index.functions[_function_name(node).rpartition("::")[2]].append((node, place))
+                    self._initialised(node, place)
+                case "preproc_def":
+                    value = text(node.child_by_field_name("value")).strip()
+                    if value.startswith('"') and value.endswith('"') and len(value) > 1:
+                        self._index.macros[text(_child(node, "name"))] = _ESCAPE.sub(r"\1", value[1:-1])
+                case "type_definition" | "alias_declaration":
+                    declarator = node.child_by_field_name("declarator") or node.child_by_field_name("name")
+                    self._index.aliases[text(declarator)] = type_text(_child(node, "type"))
+                case "declaration" | "field_declaration":
+                    self._index_declaration(node, place)
+                case "call_expression" | "new_expression":
+                    name = text(node.child_by_field_name("function") or node.child_by_field_name("type"))
+                    made = re.match(r"(?:\w+::)*make_(?:shared|unique)<(.*)>$", name)
+                    arguments = tuple(arguments_of(node))
+                    self._index.calls[_last(made[1] if made else name)].append((arguments, place))
+                case "assignment_expression":
+                    target = text(_child(node, "left")).removeprefix("this->")
+                    if place.owner and not self._is_local(target, place):
+                        kind = next((d.type for d in self._index.members.get((place.owner, target), ())), "")
+                        declared = Declared(kind, (_child(node, "right"),), place)
+                        self._index.members[place.owner, target].append(declared)
+
+    def _index_declaration(self, node: Node, place: Place) -> None:
+        if name := _function_name(node):
+            self._index.functions[name.rpartition("::")[2]].append((node, place))
+        for name, declared in _declarations(node, place):
+            if place.function is None and place.owner:
+                self._index.members[place.owner, name].append(declared)
+            elif place.function is None:
+                self._index.globals[name].append(declared)
+            self._index.calls[_last(declared.type)].append((declared.values, place))
+
+    def _initialised(self, function: Node, place: Place) -> None:
+        """Note what a constructor's initialisers give the members."""
+        for node in function.named_children:
+            if node.type != "field_initializer_list":
+                continue
+            for initialiser in node.named_children:
+                if initialiser.type != "field_initializer" or not initialiser.named_children:
+                    continue
+                name = text(initialiser.named_children[0])
+                values = tuple(initialiser.named_children[-1].named_children)
+                known = self._index.members.get((place.owner, name), [])
+                kind = next((d.type for d in known), "")
+                at = Place(place.file, function, place.owner)
+                self._index.members[place.owner, name] = [*(d for d in known if d.values), Declared(kind, values, at)]
+
+    def _walk(self, root: Node, start: Place) -> Iterator[tuple[Node, Place]]:
+        todo = [(root, start)]
+        while todo:
+            node, place = todo.pop()
+            inner = place
+            if node.type == "function_definition":
+                name = _function_name(node)
+                owner = name.rpartition("::")[0].rpartition("::")[2] or place.owner
+                inner = Place(place.file, node, owner)
+                place = Place(place.file, place.function, owner)
+            elif node.type in ("class_specifier", "struct_specifier") and node.child_by_field_name("body"):
+                inner = Place(place.file, None, text(node.child_by_field_name("name")))
+            yield node, inner if node.type == "function_definition" else place
+            todo += [(child, inner) for child in reversed(node.named_children)]
+
+    def _local(self, place: Place) -> dict[str, list[Declared]]:
+        function = place.function
+        if function is None:
+            return {}
+        if function.id not in self._locals:
+            found: dict[str, list[Declared]] = defaultdict(list)
+            for node in walk(function):
+                if node.type == "declaration":
+                    for name, declared in _declarations(node, place):
+                        found[name].append(declared)
+                elif node.type == "assignment_expression":
+                    target = text(_child(node, "left"))
+                    if target in found:
+                        value = (_child(node, "right"),)
+                        kept = [declared for declared in found[target] if declared.values]
+                        found[target] = [*kept, Declared(found[target][0].type, value, place)]
+            self._locals[function.id] = dict(found)
+        return self._locals[function.id]
+
+    def _is_local(self, name: str, place: Place) -> bool:
+        return place.function is not None and (name in self._local(place) or name in _parameters(place.function))
+
+
+def walk(root: Node | None) -> Iterator[Node]:
+    """Yield a node and all below it, in the order of the text."""
+    todo = [root] if root is not None else []
+    while todo:
+        node = todo.pop()
+        yield node
+        todo += reversed(node.named_children)
+
+
+def text(node: Node | None) -> str:
+    """Return a node's source on one line."""
+    return "" if node is None or node.text is None else " ".join(node.text.decode("utf-8", "replace").split())
+
+
+def type_text(node: Node | None) -> str:
+    """Return a type without spaces, `const` and references."""
+    return re.sub(r"\b(const|typename|static|struct|class)\b|[\s&*]", "", text(node))
+
+
+def arguments_of(node: Node) -> list[Node]:
+    """Return the arguments of a call, of `new`, of a declaration."""
+    arguments = node.child_by_field_name("arguments")
+    return [child for child in arguments.named_children if child.type != "comment"] if arguments else []
+
+
+def in_namespace(namespace: Const | Text, name: Const | Text) -> Const | Text:
+    """Return a name as a node handle of a namespace resolves it."""
+    shown = str(_as_text(name))
+    if shown.startswith(("/", "~")) or namespace == Const(""):
+        return name
+    between = "" if namespace == Const("~") or not shown else "/"
+    return joined([_as_text(namespace), Text((between,)), _as_text(name)])
+
+
+def template_arguments(type_name: str) -> list[str]:
+    """Return what stands between the outermost `<` and `>` of a type, taken apart at its commas."""
+    _, bracket, rest = type_name.partition("<")
+    if not bracket:
+        return []
+    parts, depth = [""], 0
+    for character in rest.rstrip().removesuffix(">"):
+        depth += {"<": 1, ">": -1}.get(character, 0)
+        if character == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return [part.strip() for part in parts]
+
+
+def parameter_types(function: Node) -> list[str]:
+    """Return the types of a function's parameters."""
+    return [kind for _, kind, _ in sorted(_parameters(function).values(), key=lambda item: item[0])]
+
+
+def _parameters(function: Node) -> dict[str, tuple[int, str, Node | None]]:
+    """Return place, type and default of a function's parameters by name."""
+    declarator = function
+    while declarator is not None and declarator.type not in ("function_declarator", "lambda_expression"):
+        following = declarator.child_by_field_name("declarator")
+        if following is None:
+            return {}
+        declarator = following
+    if declarator.type == "lambda_expression":
+        inner = declarator.child_by_field_name("declarator")
+        if inner is None:
+            return {}
+        declarator = inner
+    listed = declarator.child_by_field_name("parameters")
+    found = {}
+    number = 0
+    for node in listed.named_children if listed else ():
+        if node.type in ("parameter_declaration", "optional_parameter_declaration"):
+            name = text(node.child_by_field_name("declarator")).lstrip("*& ").partition("=")[0].strip()
+            found[name or f"#{number}"] = (
+                number,
+                type_text(node.child_by_field_name("type")),
+                node.child_by_field_name("default_value"),
+            )
+            number += 1
+    return found
+
+
+def _declarations(node: Node, place: Place) -> Iterator[tuple[str, Declared]]:
+    """Yield the variables that a declaration declares."""
+    kind = type_text(node.child_by_field_name("type"))
+    for declarator in node.children_by_field_name("declarator"):
+        value: tuple[Node, ...] = ()
+        name_node = declarator
+        if declarator.type == "init_declarator":
+            given = declarator.child_by_field_name("value")
+            name_node = _child(declarator, "declarator")
+            if given is not None:
+                is_list = given.type in ("argument_list", "initializer_list")
+                value = tuple(given.named_children) if is_list else (given,)
+        elif declarator.type == "function_declarator":
+            # `Type name(a, b);` may look like a function: its parameters are then the names of variables.
+            listed = declarator.child_by_field_name("parameters")
+            children = listed.named_children if listed else []
+            value = tuple(child.named_children[0] for child in children if child.named_children)
+            name_node = _child(declarator, "declarator")
+        default = node.child_by_field_name("default_value")
+        if default is not None:
+            is_list = default.type in ("argument_list", "initializer_list")
+            value = tuple(default.named_children) if is_list else (default,)
+        yield text(name_node).lstrip("*& "), Declared(kind, value, place)
+
+
+def _function_name(function: Node) -> str:
+    declarator: Node | None = function
+    while declarator is not None and declarator.type != "function_declarator":
+        declarator = declarator.child_by_field_name("declarator")
+    return text(declarator.child_by_field_name("declarator")) if declarator is not None else ""
+
+
+def _child(node: Node, name: str) -> Node:
+    return node.child_by_field_name(name) or node
+
+
+def _key(place: Place) -> str:
+    return f"{place.file.shown}:{place.function.start_byte}" if place.function is not None else ""
+
+
+def _last(name: str) -> str:
+    return name.partition("<")[0].rpartition("::")[2].rpartition(".")[2].rpartition("->")[2]
+
+
+def _is_textual(node: Node) -> bool:
+    return node.type in ("string_literal", "concatenated_string", "raw_string_literal", "binary_expression")
+
+
+def _literal(node: Node) -> str:
+    return _ESCAPE.sub(r"\1", text(node).partition('"')[2].removesuffix('"'))
+
+
+def _as_text(value: Const | Text) -> Text:
+    return value if isinstance(value, Text) else Text((str(value.value),))
