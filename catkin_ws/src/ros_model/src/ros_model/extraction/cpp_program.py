@@ -250,7 +250,7 @@ class Program:
             return self._handles(node.named_children[-1], place, depth + 1)
         found: list[Const | Text] = []
         for declared in self.declared(name, place):
-            if "NodeHandle" not in declared.type:
+            if "NodeHandle" not in declared.type and not any("NodeHandle" in text(value) for value in declared.values):
                 continue
             is_made = [v for v in declared.values if v.type in ("call_expression", "new_expression")]
             if len(declared.values) == 1 and is_made:
@@ -517,7 +517,7 @@ def _declarations(node: Node, place: Place) -> Iterator[tuple[str, Declared]]:
         if default is not None:
             is_list = default.type in ("argument_list", "initializer_list")
             value = tuple(default.named_children) if is_list else (default,)
-        yield text(name_node).lstrip("*& "), Declared(kind, value, place)
+        yield text(name_node).lstrip("*& ").partition("[")[0].strip(), Declared(kind, value, place)
 
 
 def _function_name(function: Node) -> str:

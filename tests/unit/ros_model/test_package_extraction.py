@@ -1,0 +1,277 @@
+"""Packages and launch files as a whole, with the command `rosmodel extract`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from ros_model.cli import main
+from ros_model.errors import ModelError
+from ros_model.extraction.catkin_package import find_packages, read_package
+from ros_model.extraction.cmake import commands
+from ros_model.extraction.launch_files import read_launch_file
+from ros_model.extraction.package_source import extract_package
+from ros_model.metamodel import ConnectionKind, PortKind
+from ros_model.packages import SpecKind
+from ros_model.packages_reader import read_packages
+from ros_model.reader import read_system
+
+TALKER = """#!/usr/bin/env python3
+import rospy
+from std_msgs.msg import String
+rospy.init_node("talker")
+rospy.Publisher(rospy.get_param("~topic", "chatter"), String, queue_size=1)
+rospy.Subscriber("heard", String, print)
+rospy.Service("~reset", rospy.x, print)
+"""
+
+
+def make_package(folder: Path, name: str = "demo", cmake: str = "") -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "package.xml").write_text(
+        f'<package format="2"><name>{name}</name><version>0.1.0</version><description>d</description>'
+        '<maintainer email="a@b.example">m</maintainer><license>MIT</license></package>'
+    )
+    (folder / "CMakeLists.txt").write_text(cmake or f"project({name})\n")
+    return folder
+
+
+def make_script(path: Path, text: str = TALKER, mode: int = 0o755) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    path.chmod(mode)
+    return path
+
+
+def run(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return int(ended.value.code or 0)
+
+
+def executables(folder: Path) -> dict[str, list[str]]:
+    found = read_package(folder).executables
+    return {e.name: [str(s.relative_to(folder)) for s in e.sources] for e in found}
+
+
+def test_installed_programs_and_executable_scripts_are_executables(tmp_path):
+    make_package(tmp_path, cmake="catkin_install_python(PROGRAMS nodes/a DESTINATION x)\n")
+    make_script(tmp_path / "nodes" / "a", mode=0o644)
+    make_script(tmp_path / "scripts" / "b.py")
+    make_script(tmp_path / "scripts" / "library.py", mode=0o644)
+    make_script(tmp_path / "cfg" / "Demo.cfg")
+    make_script(tmp_path / "test" / "check.py")
+    make_script(tmp_path / "setup.py")
+    make_script(tmp_path / "scripts" / "shell", "#!/bin/sh\n")
+    assert executables(tmp_path) == {"a": ["nodes/a"], "b.py": ["scripts/b.py"]}
+
+
+def test_compiled_executables_have_the_sources_of_the_libraries_they_link(tmp_path):
+    make_package(
+        tmp_path,
+        cmake="""
+        project(demo) # ${not_here}
+        set(SOURCES src/a.cpp "src/b.cpp")
+        file(GLOB REST src/lib/*.cpp)
+        add_library(${PROJECT_NAME}_lib ${REST})
+        add_executable(${PROJECT_NAME}_node ${SOURCES} src/gone.cpp ${elsewhere})
+        target_link_libraries(${PROJECT_NAME}_node PRIVATE ${PROJECT_NAME}_lib ${catkin_LIBRARIES})
+        set_target_properties(demo_node PROPERTIES OUTPUT_NAME node PREFIX "")
+        #[[ add_executable(commented src/a.cpp) ]]
+        """,
+    )
+    for name in ("a", "b", "lib/c"):
+        make_script(tmp_path / "src" / f"{name}.cpp", "int x;\n", 0o644)
+    assert executables(tmp_path) == {"node": ["src/a.cpp", "src/b.cpp", "src/lib/c.cpp"]}
+    said = [str(remark) for remark in read_package(tmp_path).remarks]
+    assert said == [
+        "CMakeLists.txt:6:1: the source src/gone.cpp of demo_node is not in the package",
+        "CMakeLists.txt:6:1: the source ${elsewhere} of demo_node is not in the package",
+    ]
+
+
+def test_paths_outside_the_package_are_refused(tmp_path):
+    make_package(
+        tmp_path / "demo",
+        cmake="catkin_install_python(PROGRAMS ../../etc/passwd /etc/passwd nodes/gone DESTINATION x)\n",
+    )
+    said = [str(remark) for remark in read_package(tmp_path / "demo").remarks]
+    assert [line.partition("the program ")[2] for line in said] == [
+        "../../etc/passwd is not in the package",
+        "/etc/passwd is not in the package",
+        "nodes/gone is not in the package",
+    ]
+
+
+@pytest.mark.parametrize("text", ["(" * 5000, '"', "set(A ${A}${A})" * 200, "a(b", ")))", "[[", "#[["])
+def test_broken_cmake_neither_hangs_nor_crashes(tmp_path, text):
+    assert all(command.name for command in commands(text, tmp_path))
+
+
+def test_messages_services_and_actions_are_specified(tmp_path):
+    make_package(tmp_path)
+    for kind, text in (
+        ("msg", "# a comment\nstring NAME=a # b\nint8 OK=1\nfloat32[3] data # x\nstd_msgs/Header header\n"),
+        ("srv", "int8 a\n---\nbool ok\n"),
+        ("action", "---\nint8 result\n---\n"),
+    ):
+        (tmp_path / kind).mkdir()
+        (tmp_path / kind / f"Thing.{kind}").write_text(text)
+    (tmp_path / "msg" / "Bad.msg").write_text("int8 a\nwhat is this\n")
+    extracted = extract_package(tmp_path)
+    specs = {spec.kind: dict(spec.parts) for spec in extracted.package.specs}
+    message = [(field.type, field.name, field.constant) for field in specs[SpecKind.TOPIC]["message"]]
+    assert message == [
+        ("string", "NAME", "a # b"),
+        ("int8", "OK", "1"),
+        ("float32[3]", "data", None),
+        ("std_msgs/Header", "header", None),
+    ]
+    assert [len(fields) for fields in specs[SpecKind.SERVICE].values()] == [1, 1]
+    assert [len(fields) for fields in specs[SpecKind.ACTION].values()] == [0, 1, 0]
+    assert [str(remark) for remark in extracted.unread] == [
+        "msg/Bad.msg:2:1: not read: 'what is this' is no field: expected a type and a name"
+    ]
+
+
+def test_packages_below_a_folder_are_found_through_links_but_not_in_circles(tmp_path):
+    make_package(tmp_path / "src" / "a" / "one", "one")
+    make_package(tmp_path / "elsewhere" / "two", "two")
+    make_package(tmp_path / "src" / "ignored" / "three", "three")
+    (tmp_path / "src" / "ignored" / "CATKIN_IGNORE").touch()
+    (tmp_path / "src" / "linked").symlink_to(tmp_path / "elsewhere" / "two")
+    (tmp_path / "src" / "a" / "circle").symlink_to(tmp_path / "src")
+    (tmp_path / "src" / "a" / "one" / "self").symlink_to(tmp_path / "src" / "a" / "one")
+    assert [path.name for path in find_packages(tmp_path / "src")] == ["one", "linked"]
+    assert executables(tmp_path / "src" / "a" / "one") == {}
+
+
+def test_command_writes_a_model_that_reads_back_and_checks(tmp_path, capsys):
+    folder = make_package(tmp_path / "demo")
+    make_script(folder / "nodes" / "talker.py")
+    assert run("extract", tmp_path, "-o", tmp_path / "out") == 0
+    written = read_packages(tmp_path / "out" / "demo.ros")
+    node = written.node("demo", "talker", "talker")
+    assert node and [(p.kind, p.name, p.type) for p in node.ports] == [
+        (PortKind.PUBLISHER, "chatter", "std_msgs/String"),
+        (PortKind.SUBSCRIBER, "heard", "std_msgs/String"),
+        (PortKind.SERVICE_SERVER, "~reset", ""),
+    ]
+    assert "nodes/talker.py:7:1: service server: its type is not known" in written.header
+    assert "artifact talker is the executable talker.py" in written.header
+    assert "1 nodes, 3 interfaces, 1 of them not fully known" in capsys.readouterr().out
+    assert run("check", tmp_path / "out" / "demo.ros") == 0
+
+
+def test_command_tells_of_a_file_that_is_not_read_with_its_place(tmp_path, capsys):
+    folder = make_package(tmp_path / "demo")
+    make_script(folder / "nodes" / "talker", "#!/usr/bin/python\nprint 'old'\n")
+    assert run("extract", folder, "-o", tmp_path / "out") == 1
+    assert f"rosmodel: {folder}/nodes/talker:2:1: not read: no Python 3" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "package.xml:1:1: "),
+        (b"<package>\n<name>", "package.xml:2:7: "),
+        (b"\0\1", "not read: it is no text but binary"),
+        (b"<package><name>\xff</name></package>", "not UTF-8"),
+        (b"<!DOCTYPE x [<!ENTITY a 'b'>]><package/>", "no DOCTYPE and no entities"),
+        (b"<package format='2'><name>x</name></package>", "must"),
+    ],
+    ids=["empty", "cut", "binary", "encoding", "entities", "incomplete"],
+)
+def test_bad_manifest_is_one_line_and_other_packages_are_read(tmp_path, capsys, content, said):
+    make_package(tmp_path / "good", "good")
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "package.xml").write_bytes(content)
+    assert run("extract", tmp_path, "-o", tmp_path / "out") == 2
+    error = capsys.readouterr().err
+    assert said in error and "Traceback" not in error and len(error.strip().splitlines()) == 1
+    assert (tmp_path / "out" / "good.ros").exists()
+
+
+def test_folder_without_packages_and_missing_paths_are_refused(tmp_path, capsys):
+    (tmp_path / "circle").symlink_to(tmp_path)
+    assert run("extract", tmp_path) == 2
+    assert "no package.xml here or below" in capsys.readouterr().err
+    assert run("extract", tmp_path / "gone") == 2
+    assert "no such folder" in capsys.readouterr().err
+    assert run("extract", tmp_path, "a:=b") == 2
+    assert "arguments are for a launch file" in capsys.readouterr().err
+
+
+def test_unwritable_output_is_told(tmp_path, capsys):
+    make_package(tmp_path / "demo")
+    (tmp_path / "file").touch()
+    assert run("extract", tmp_path / "demo", "-o", tmp_path / "file" / "x") == 2
+    assert "give a folder that can be written" in capsys.readouterr().err
+
+
+# --- launch files
+
+
+@pytest.fixture
+def launched(tmp_path, monkeypatch):
+    """Reads a launch file that may start nodes/talker of the package demo."""
+    folder = make_package(tmp_path / "src" / "demo")
+    make_script(folder / "nodes" / "talker")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path / 'src'}{os.pathsep}{os.environ.get('ROS_PACKAGE_PATH', '')}")
+
+    def read(text: str, *arguments: str):
+        path = tmp_path / "system.launch"
+        path.write_text(f"<launch>{text}</launch>")
+        return read_launch_file(path, arguments)
+
+    return read
+
+
+def test_launch_file_gives_components_wiring_and_parameters(launched, tmp_path, capsys):
+    launched(
+        """<arg name="side"/><param name="gain" value="2"/>
+        <group ns="$(arg side)"><node name="a" pkg="demo" type="talker"><param name="topic" value="said"/>
+        <remap from="heard" to="said_back"/></node></group>
+        <node name="b" pkg="demo" type="talker" args="heard:=left/said _topic:=left/said_back"/>
+        <node name="c" pkg="nowhere" type="thing" launch-prefix="nice"/>""",
+        "side:=left",
+    )
+    assert run("extract", tmp_path / "system.launch", "side:=left", "-o", tmp_path / "out") == 0
+    system = read_system(tmp_path / "out" / "system.rossystem")
+    assert [(c.graph_name, str(c.node)) for c in system.components] == [
+        ("left/a", "demo.talker.talker"),
+        ("b", "demo.talker.talker"),
+        ("c", "nowhere.thing.c"),
+    ]
+    assert {(c.kind, c.name, str(c.sources[0]), str(c.targets[0])) for c in system.connections} == {
+        (ConnectionKind.TOPIC, "left/said", "a.said", "b.left/said"),
+        (ConnectionKind.TOPIC, "left/said_back", "b.left/said_back", "a.said_back"),
+    }
+    assert [(p.key, p.value) for p in system.components[0].parameters] == [("topic", "said")]
+    assert [(p.name, p.value) for p in system.parameters] == [("gain", 2)]
+    assert "The interfaces of /c are not known: the package nowhere is not installed." in system.header
+    assert run("check", tmp_path / "out") == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "said"),
+    [
+        ("<node/>", (), "roslaunch refuses it"),
+        ("<param name='x' value='$(arg a)'/>", (), "roslaunch refuses it"),
+        ("<include file='$(find nowhere)/x.launch'/>", (), "roslaunch refuses it"),
+        ("<include file='/nonexistent.launch'/>", (), "roslaunch refuses it"),
+        ("<node", (), "roslaunch refuses it"),
+        ("", ("a",), "no NAME:=VALUE"),
+        ("\0", (), "binary"),
+        ("<param name='a' type='int' value='x'/>", (), "roslaunch refuses it"),
+        ("<rosparam>a: [</rosparam>", (), "roslaunch"),
+        ("<!DOCTYPE a>", (), "no DOCTYPE"),
+        ("<include file='$(dirname)/system.launch'/>", (), "roslaunch"),
+    ],
+)
+def test_launch_file_that_roslaunch_refuses_is_told_in_one_line(launched, text, arguments, said):
+    with pytest.raises(ModelError) as told:
+        launched(text, *arguments)
+    message = str(told.value).replace("is not NAME:=VALUE", "is no NAME:=VALUE")
+    assert said in message and "\n" not in message
