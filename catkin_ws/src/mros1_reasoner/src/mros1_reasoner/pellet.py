@@ -18,6 +18,8 @@ from typing import Any, TypeVar
 
 from mros1_reasoner.owlready_reasoner import OwlreadyReasoner
 from mros1_reasoner.reasoner import Assertion, InconsistentError, Reasoner, ReasonerError
+from mros1_reasoner.triples import TripleError, parse_ntriples, write_ntriples
+from mros1_reasoner.twins import Twins
 
 _log = logging.getLogger(__name__)
 
@@ -78,6 +80,7 @@ class PelletReasoner:
             raise ReasonerError("the Python package JPype1 is missing: install requirements/python.txt")
         self._jars = _jar_folder()
         self._ontology: str | None = None
+        self._twins = Twins(())
         self._process: subprocess.Popen[bytes] | None = None
         self._buffer = bytearray()
         self._greeted = False
@@ -91,13 +94,20 @@ class PelletReasoner:
     def load(self, ontology: str) -> None:
         """See Reasoner.load."""
         self._ontology = None
-        self._ask_twice({"op": "load", "ontology": ontology})
-        self._ontology = ontology
+        try:
+            twins = Twins(list(parse_ntriples(ontology)))
+        except TripleError as error:
+            raise ReasonerError(f"the ontology is no N-Triples: {error}") from error
+        reduced = write_ntriples(twins.reduced)
+        self._ask_twice({"op": "load", "ontology": ontology})  # the whole of it must be free of contradiction
+        self._ask_twice({"op": "load", "ontology": reduced})
+        self._ontology, self._twins = reduced, twins
 
     def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
         """See Reasoner.infer."""
-        answer = self._ask_twice({"op": "infer", "facts": [list(f) for f in facts], "properties": list(properties)})
-        return sorted({Assertion(*row) for row in answer["values"]})
+        added, expand = self._twins.split(facts)
+        answer = self._ask_twice({"op": "infer", "facts": [list(f) for f in added], "properties": list(properties)})
+        return sorted(expand(Assertion(*row) for row in answer["values"]))
 
     def close(self) -> None:
         """End the child."""
