@@ -43,6 +43,7 @@ def test_sound_model_has_no_findings():
                       "RosParameter c { RefParameter 'p.a.n.b' value 2 } }"),
             "parameter 'p.a.n.b' has two values",
         ),
+        (component("FromRosNode '/etc/passwd.a.n'"), "'/etc/passwd' is no name of a package"),
         (component("FromRosNode 'p.a'"), "reference 'p.a' is not package.artifact.node"),
         (component("RosPublishers { RosPublisher b { RefPublisher 'p.a.n' } }"), "is not package.artifact.node.name"),
         (parameter("type Integer value 1.5"), "the value 1.5 of 'p' is no Integer"),

@@ -229,6 +229,10 @@ def test_parameter_of_a_component_may_lack_its_name():
             "RosSystem { Name x } 'rest",
             "m.rossystem:1:22: expected the end of the file near a string that is never closed",
         ),
+        (
+            "RosSystem { Name 'x\n RosComponents ( ComponentInterface { name 'a' } ) }",
+            "near 'a': the string before it begins in line 1, is its quote missing?",
+        ),
         ("RosSystem { Name x /* }", "m.rossystem:1:20: this comment is never closed"),
         ("RosSystem { Name x\nName y }", "m.rossystem:2:1: second 'Name' in this RosSystem"),
         ("RosSystem { }", "m.rossystem:1:1: this RosSystem has no name"),

@@ -44,6 +44,7 @@ _FITTING: dict[str, tuple[type, ...]] = {
     "Array": (list,),
     "Struct": (dict,),
 }
+_PACKAGE = re.compile(r"[A-Za-z0-9_][\w.-]*", re.ASCII)  # and no path
 _BINARY = re.compile(r"0[bB][01]+")  # how the published grammar writes Base64
 _DATE = re.compile(r"\d{4}-?\d{1,2}-?\d{1,2}T\d{1,2}:\d{1,2}:\d{1,2}")  # ISO 8601, as the grammar and XML-RPC write it
 
@@ -185,15 +186,23 @@ def _twice_parameter(name: str, same: bool, position: Position) -> Finding:
 
 
 def _incomplete(system: RosSystem) -> Iterator[Finding]:
-    rule = "incomplete-reference"
     for component in system.components:
-        if component.node and not component.node.node:
-            text = f"reference '{component.node}' is not package.artifact.node"
-            yield Finding(text, _place(component.node, component.position), rule)
+        if component.node:
+            yield from _incomplete_reference(component.node, bool(component.node.node), "", component.position)
         for element in _elements(component):
-            if element.reference and not element.reference.name:
-                text = f"reference '{element.reference}' is not package.artifact.node.name"
-                yield Finding(text, _place(element.reference, element.position), rule)
+            if element.reference:
+                complete = bool(element.reference.name)
+                yield from _incomplete_reference(element.reference, complete, ".name", element.position)
+
+
+def _incomplete_reference(reference: Reference, complete: bool, more: str, position: Position) -> Iterator[Finding]:
+    place = _place(reference, position)
+    if not complete:
+        text = f"reference '{reference}' is not package.artifact.node{more}"
+        yield Finding(text, place, "incomplete-reference")
+    elif not _PACKAGE.fullmatch(reference.package):
+        text = f"reference '{reference}': '{reference.package}' is no name of a package"
+        yield Finding(text, place, "incomplete-reference")
 
 
 def _values(system: RosSystem) -> Iterator[Finding]:

@@ -139,7 +139,7 @@ class Language:
             position = Position(file, *line_and_column(text, len(text.rstrip())))
         elif isinstance(error, UnexpectedToken):
             near = f"'{short(str(error.token))}'"
-            hint = self._similar(str(error.token), names)
+            hint = _of_an_open_quote(text, offset) or self._similar(str(error.token), names)
         else:
             near = repr(short(text[offset:].split("\n", 1)[0]))
             if text[offset] in "'\"":
@@ -417,6 +417,16 @@ def _offset(error: UnexpectedInput, text: str) -> int:
     if isinstance(error, UnexpectedToken) and error.token.type != "$END":
         return int(error.token.start_pos or 0)
     return (error.pos_in_stream or 0) if isinstance(error, UnexpectedCharacters) else len(text)
+
+
+def _of_an_open_quote(text: str, offset: int) -> str:
+    """Return the hint that a quote is missing, where the string before an error goes on over the end of a line."""
+    last = None
+    for match in _SKIPPED.finditer(text, 0, offset if offset <= _REPAIRABLE else 0):
+        last = match
+    if last is None or last[0][0] not in "'\"" or "\n" not in last[0]:
+        return ""
+    return f": the string before it begins in line {line_and_column(text, last.start())[0]}, is its quote missing?"
 
 
 def _expected(error: UnexpectedInput) -> set[str]:
