@@ -50,6 +50,7 @@ from metacontrol_sim.srv import (
     SpawnObstacleResponse,
 )
 from metacontrol_sim.walking import SPEED, Walker
+from metacontrol_sim.window_node import PERIOD_STEPS, WindowView
 from metacontrol_sim.world import Box, World, WorldError, rasterise
 from metacontrol_sim.world_file import read_world
 
@@ -83,6 +84,7 @@ class SimulatorNode:
         self._changes = -1
         self._work: deque[Callable[[], None]] = deque()
         self._advertise(world)
+        self._view = WindowView(self._simulation) if self._simulation.settings.gui else None
         self._inputs = (
             rospy.Subscriber("cmd_vel", Twist, self._on_command, queue_size=10, tcp_nodelay=True),
             rospy.Subscriber("power_load", Float32, self._on_load, queue_size=1),
@@ -106,6 +108,8 @@ class SimulatorNode:
             self._simulation.step()
             step += 1
             self._publish(step)
+            if self._view is not None and step % PERIOD_STEPS == 0:
+                self._view.draw()
 
     def close(self) -> None:
         """Free the simulation."""

@@ -1,0 +1,61 @@
+"""Node rviz_text: configuration, quality levels and failed components as a text over the robot, for RViz."""
+
+from __future__ import annotations
+
+import threading
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from metacontrol_msgs.msg import ActiveConfiguration
+from visualization_msgs.msg import Marker
+
+from metacontrol_sim.status_text import StatusText
+
+_PERIOD_S = 0.5
+_HEIGHT_M = 2.0
+_SIZE_M = 0.5
+
+
+class RvizTextNode:
+    """Publishes rviz/text."""
+
+    def __init__(self) -> None:
+        """Connect."""
+        self._text = StatusText()
+        self._lock = threading.Lock()
+        self._marker = rospy.Publisher("rviz/text", Marker, queue_size=1, latch=True)
+        self._inputs = (
+            rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics),
+            rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration),
+        )
+        self._timer = rospy.Timer(rospy.Duration.from_sec(_PERIOD_S), lambda _event: self._publish(), reset=True)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        with self._lock:
+            self._text.take_diagnostics(message)
+
+    def _on_configuration(self, message: ActiveConfiguration) -> None:
+        with self._lock:
+            self._text.take_configuration(message)
+
+    def _publish(self) -> None:
+        with self._lock:
+            lines, alarm = self._text.lines(), self._text.alarm
+        if not lines:
+            return
+        marker = Marker(ns="status", type=Marker.TEXT_VIEW_FACING, text="\n".join(lines), frame_locked=True)
+        marker.header.frame_id = "base_link"
+        marker.pose.position.x, marker.pose.position.z = 1.2, _HEIGHT_M
+        marker.pose.orientation.w = 1.0
+        marker.scale.z = _SIZE_M
+        marker.color.r, marker.color.g, marker.color.b = (1.0, 0.35, 0.25) if alarm else (1.0, 1.0, 1.0)
+        marker.color.a = 1.0
+        self._marker.publish(marker)
+
+
+def main() -> int:
+    """Run the node and return its exit status."""
+    rospy.init_node("rviz_text")
+    RvizTextNode()
+    rospy.spin()
+    return 0

@@ -1,0 +1,144 @@
+"""The part of the node simulator that fills PyBullet's window; only there with `gui`."""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from metacontrol_msgs.msg import ActiveConfiguration
+from nav_msgs.msg import OccupancyGrid, Path
+from sensor_msgs.msg import LaserScan, PointCloud2
+
+from metacontrol_sim.geometry import ORIGIN, Pose
+from metacontrol_sim.status_text import StatusText
+from metacontrol_sim.window import (
+    BLUE,
+    GREEN,
+    PINK,
+    RED,
+    SKY,
+    Points,
+    Window,
+    cost_points,
+    cross_points,
+    path_points,
+    scan_points,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from metacontrol_sim.simulation import Simulation
+
+PERIOD_STEPS = 20
+"""Steps between two drawings: 5 Hz."""
+SENSORS = ("front/scan", "camera/depth/points")
+STALE_S = 1.0
+"""What a sensor that is silent for so many simulated seconds has seen is no longer shown."""
+_COST_HEIGHT, _PATH_HEIGHT = 0.02, 0.1
+
+
+class WindowView:
+    """Keeps the latest message of each topic, and draws the new ones between two steps."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        """Connect."""
+        self._simulation = simulation
+        self._window = Window(simulation.physics.client)
+        self._text = StatusText()
+        self._latest: dict[str, tuple[Callable[[Any], Points], Any]] = {}
+        self._drawn: dict[str, float] = {}  # topic -> simulated time of the last drawing
+        self._lock = threading.Lock()
+        topics: tuple[tuple[str, type, Callable[[Any], Points]], ...] = (
+            ("front/scan", LaserScan, self._scan),
+            ("camera/depth/points", PointCloud2, self._cloud),
+            ("move_base/local_costmap/costmap", OccupancyGrid, self._costmap),
+            ("move_base/NavfnROS/plan", Path, lambda path: self._path(path, GREEN)),
+            ("move_base/TrajectoryPlannerROS/local_plan", Path, lambda path: self._path(path, SKY)),
+            ("move_base/current_goal", PoseStamped, self._goal),
+        )
+        self._inputs = [
+            rospy.Subscriber(topic, kind, self._keep, (topic, convert), queue_size=1, buff_size=1 << 22)
+            for topic, kind, convert in topics
+        ]
+        self._inputs += [
+            rospy.Subscriber("/diagnostics", DiagnosticArray, self._take, self._text.take_diagnostics),
+            rospy.Subscriber(
+                "rosgraph_manipulator/active_configuration",
+                ActiveConfiguration,
+                self._take,
+                self._text.take_configuration,
+            ),
+        ]
+
+    def draw(self) -> None:
+        """Draw what has come since the last time (called by the loop)."""
+        with self._lock:
+            latest, self._latest = self._latest, {}
+            lines, alarm = self._text.lines(), self._text.alarm
+        for topic, (convert, message) in latest.items():
+            self._window.draw(topic, convert(message))
+            self._drawn[topic] = self._simulation.time
+        for topic in SENSORS:
+            if self._simulation.time - self._drawn.get(topic, math.inf) > STALE_S:
+                self._window.draw(topic, Points(np.empty((0, 3)), RED))
+                del self._drawn[topic]
+        self._window.write(lines, self._simulation.pose, alarm)
+
+    def _keep(self, message: Any, handled: tuple[str, Callable[[Any], Points]]) -> None:
+        topic, convert = handled
+        with self._lock:
+            self._latest[topic] = (convert, message)
+
+    def _take(self, message: Any, take: Callable[[Any], None]) -> None:
+        with self._lock:
+            take(message)
+
+    def _frame(self, name: str) -> Pose:
+        """Return where a frame lies on the map, as things truly are."""
+        simulation = self._simulation
+        robot = simulation.robot
+        if name.lstrip("/") == "map":
+            return ORIGIN
+        if name.lstrip("/") == "odom":
+            return simulation.pose @ simulation.odometry.filtered.inverse()
+        mounts = {part.mount.frame: part.mount for part in (robot.front_laser, robot.rear_laser, robot.camera)}
+        mount = mounts.get(name.lstrip("/"))
+        return simulation.pose @ Pose(mount.x, mount.y, mount.yaw) if mount else simulation.pose
+
+    def _scan(self, scan: LaserScan) -> Points:
+        ranges = np.asarray(scan.ranges, dtype=float)
+        height = self._simulation.robot.front_laser.mount.z
+        points = scan_points(ranges, scan.angle_min, scan.angle_increment, height)
+        return Points(points, RED, self._frame(scan.header.frame_id), 4)
+
+    def _cloud(self, cloud: PointCloud2) -> Points:
+        if cloud.point_step < 12 or len(cloud.data) % cloud.point_step:
+            return Points(np.empty((0, 3)), BLUE)
+        rows = np.frombuffer(cloud.data, dtype=np.uint8).reshape(-1, cloud.point_step)[:, :12]
+        points = np.ascontiguousarray(rows).view("<f4").astype(float)
+        points[:, 2] += self._simulation.robot.camera.mount.z
+        return Points(points[points[:, 2] > 0.05], BLUE, self._frame(cloud.header.frame_id), 2)
+
+    def _costmap(self, grid: OccupancyGrid) -> Points:
+        costs = np.array(grid.data, dtype=np.int8).reshape(grid.info.height, grid.info.width)
+        points, colours = cost_points(costs, grid.info.resolution, _COST_HEIGHT)
+        origin = grid.info.origin.position
+        corner = self._frame(grid.header.frame_id) @ Pose(origin.x, origin.y, 0.0)
+        return Points(points, colours, corner, 2)
+
+    def _path(self, path: Path, colour: tuple[float, float, float]) -> Points:
+        corners = np.array([(stamped.pose.position.x, stamped.pose.position.y) for stamped in path.poses])
+        points = path_points(corners.reshape(-1, 2), _PATH_HEIGHT)
+        return Points(points, colour, self._frame(path.header.frame_id), 4)
+
+    def _goal(self, goal: PoseStamped) -> Points:
+        position = goal.pose.position
+        if not (math.isfinite(position.x) and math.isfinite(position.y)):
+            return Points(np.empty((0, 3)), PINK)
+        return Points(cross_points(position.x, position.y), PINK, self._frame(goal.header.frame_id), 5)
