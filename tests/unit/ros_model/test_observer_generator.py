@@ -229,6 +229,10 @@ def test_messages_of_one_name_do_not_clash(package, generate, monkeypatch):
         ({"name": "../X"}, "must be the name of a Python class"),
         ({"topics": {'a"]); x(': "std_msgs/Header"}}, "must be a name of letters"),
         ({"topics": {"a": "std_msgs/Header; import os"}}, "must be a message type, PACKAGE/TYPE"),
+        (
+            {"topics": {"a": "std_msgs/Flot32"}},
+            "observers[0].topics.a: package 'std_msgs' declares no message 'Flot32'",
+        ),
         ({"topics": {}}, "must be a mapping of topics to message types"),
         ({"rate": 0}, "must be a number over 0"),
         ({"range": [1, 1]}, "the lower one first"),

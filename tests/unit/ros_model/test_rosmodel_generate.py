@@ -10,6 +10,7 @@ from ros_model.project import load_project
 from ros_model.reader import read_system
 from roslaunch.config import load_config_default
 
+SOURCES = Path(__file__).parents[3] / "catkin_ws" / "src"
 BASE = """RosSystem { Name base
     RosComponents (
         ComponentInterface { name robot FromRosNode 'p.robot.robot'
@@ -198,6 +199,69 @@ def test_link_that_leads_out_of_the_output_is_not_followed(run, models, tmp_path
     assert not any((tmp_path / "elsewhere").iterdir())
 
 
+@pytest.fixture
+def outside(tmp_path, monkeypatch):
+    """A package outside, found on ROS_PACKAGE_PATH, with a generator of this text."""
+
+    def write(text, function="poetry_by_{name}:write"):
+        name = f"p{abs(hash(tmp_path))}"
+        source = tmp_path / "outside" / "poetry"
+        source.mkdir(parents=True)
+        (source / "package.xml").write_text(
+            "<package format='2'><name>poetry</name><version>0.0.1</version><description>x</description>"
+            "<maintainer email='a@b.example'>a</maintainer><license>x</license><exec_depend>ros_model</exec_depend>"
+            f"<export><ros_model generator='poems' function='{function.format(name=name)}'/></export></package>"
+        )
+        (source / f"poetry_by_{name}.py").write_text(text)
+        monkeypatch.setenv("ROS_PACKAGE_PATH", f"{source.parent}:{SOURCES}")
+        monkeypatch.syspath_prepend(str(source))
+
+    return write
+
+
+def test_generator_from_outside_runs_with_all_others(run, models, outside, tmp_path):
+    outside(
+        "from ros_model.generators import write_file\n"
+        "def write(project, output):\n"
+        "    return [write_file(output / 'poem.txt', ' '.join(v.name for v in project.variants), output)]\n"
+    )
+    status, out, _ = run("generate", "all", models({"a": {"speed": 1}, "b": {"speed": 2}}), "-o", tmp_path)
+    assert status == 0
+    assert [line.partition(":")[0] for line in out.splitlines()] == [
+        "variants",
+        "launch",
+        "deployment",
+        "observer",
+        "poems",
+        "tomasys",
+    ]
+    assert (tmp_path / "poem.txt").read_text() == "a b"
+    assert "poems" in run("generate", "--help")[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "function", "message"),
+    [
+        ("def write(project, output):\n    return 1 / 0\n", "poetry_by_{name}:write", "fails: ZeroDivisionError"),
+        ("import nowhere_to_be_found\n", "poetry_by_{name}:write", "No module named 'nowhere_to_be_found'"),
+        ("", "poetry_by_{name}:write", "has no attribute 'write'"),
+        ("", "", "names no function"),
+        (
+            "from ros_model.generators import write_file\n"
+            "def write(project, output):\n    return [write_file(output / '..' / 'x', '', output)]\n",
+            "poetry_by_{name}:write",
+            "leaves the folder",
+        ),
+    ],
+)
+def test_broken_generator_from_outside_is_told_in_one_line(run, models, outside, tmp_path, text, function, message):
+    outside(text, function)
+    status, _, err = run("generate", "poems", models({"a": {"speed": 1}}), "-o", tmp_path / "out")
+    assert status == 2
+    assert err.count("\n") == 1
+    assert message in err
+
+
 def test_help_names_the_generators(run):
     status, out, _ = run("generate", "--help")
     assert status == 0
@@ -213,5 +277,4 @@ def test_names_of_generators_complete(run):
 
 
 def test_project_of_d2_loads_unchanged_through_its_file():
-    models = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim/models"
-    assert load_project(models).base_file == "d2.rossystem"
+    assert load_project(SOURCES / "metacontrol_sim" / "models").base_file == "d2.rossystem"

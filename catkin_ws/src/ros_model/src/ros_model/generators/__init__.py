@@ -73,6 +73,12 @@ def _load(package: str, name: str, function: str) -> Generator:
             found = getattr(importlib.import_module(module), attribute)
         except (ImportError, AttributeError, ValueError) as error:
             raise ModelError(f"package {package}: generator {name!r} names {function!r}: {error}") from error
-        return list(found(project, output))
+        try:
+            return list(found(project, output))
+        except ModelError:
+            raise
+        except Exception as error:  # a plug-in is somebody else's code
+            problem = f"{type(error).__name__}: {error}"
+            raise ModelError(f"package {package}: generator {name!r} fails: {problem}: tell its maintainer") from error
 
     return generate

@@ -10,8 +10,10 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
+from ros_model.findings import ERROR
 from ros_model.generators import write_files
 from ros_model.observers import described_observers, observer_packages, variables
+from ros_model.packages import SpecKind
 from ros_model.packages_writer import write_packages
 
 if TYPE_CHECKING:
@@ -30,10 +32,20 @@ def generate(project: Project, output: Path) -> list[Path]:
     """Write the model of the observers that metacontrol.yaml describes, and what is not there yet of their code.
 
     Raises:
-        ModelError: a file can't be written.
+        ModelError: a message type is not there, or a file can't be written.
     """
     observers = described_observers(project)
+    _check_types(project)
     return write_observers(observers, output) if observers else []
+
+
+def _check_types(project: Project) -> None:
+    for number, entry in enumerate(project.settings["observers"]):
+        for key in ("topics", "outputs") if isinstance(entry, dict) else ():
+            for topic, kind in entry.get(key, {}).items():
+                unknown = project.library.missing_type(SpecKind.TOPIC, kind)
+                if unknown and unknown.severity == ERROR:
+                    raise project.source.error(unknown.message, "observers", number, key, topic)
 
 
 def write_observers(observers: Iterable[ObserverModel], output: Path) -> list[Path]:
