@@ -12,6 +12,7 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
+import diagnostic_updater
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -85,10 +86,11 @@ class MonitorNode:
             probe_deadline=_number("~probe_deadline", Timing.probe_deadline),
         )
         self._watcher = Watcher(self._on_life, timing, rospy.get_name())
+        self._period = 1.0 / _number("~rate", 2.0)
         self._looker = Looker(
             MasterClient(rosgraph.get_master_uri(), rospy.get_name(), _MASTER_TIMEOUT),
             self._watcher,
-            1.0 / _number("~rate", 2.0),
+            self._period,
             rospy.get_name(),
             self._on_look,
         )
@@ -122,6 +124,9 @@ class MonitorNode:
         self._topic_states: dict[str, str] = {}
         self._follow_topics()
         self._batteries = BatteryListener(components.batteries, self._events.set)
+        self._updater = diagnostic_updater.Updater()
+        self._updater.setHardwareID("none")
+        self._updater.add("look at the graph", self._tell_look)
         self._subscriber = rospy.Subscriber(
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, self._follow, queue_size=5
         )
@@ -214,7 +219,21 @@ class MonitorNode:
             self._usage_due = now + _USAGE_PERIOD
             statuses.extend(self._meter.measure(self._metacontrol_pids(look), now))
             self._running_observers = self._observers.supervise()
+            self._updater.update()
         return statuses
+
+    def _tell_look(self, status: Any) -> Any:
+        """Tell how the monitor itself fares."""
+        look = self._looker.latest
+        if look is None or look.duration > self._period:
+            status.summary(DiagnosticStatus.WARN, "the master is slow")
+        else:
+            status.summary(DiagnosticStatus.OK, "in time")
+        if look:
+            status.add("seconds for a look", f"{look.duration:.3f}")
+            status.add("nodes", str(len(look.snapshot.nodes)))
+        status.add("observers", str(self._running_observers))
+        return status
 
     def _metacontrol_pids(self, look: Look) -> dict[str, int]:
         """Return the process ids of the meta-controller's nodes that run on this host."""
