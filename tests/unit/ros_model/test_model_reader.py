@@ -17,7 +17,7 @@ from ros_model.metamodel import (
     SystemParameter,
 )
 from ros_model.reader import parse_system, read_system
-from ros_model.syntax import MAX_NESTING, comments_inside
+from ros_model.syntax import MAX_NESTING
 from ros_model.writer import write_system
 
 CORPUS = os.environ.get("MROS_CORPUS")
@@ -294,11 +294,6 @@ def test_byte_order_mark_and_carriage_returns_are_read(tmp_path):
     path = tmp_path / "windows.rossystem"
     path.write_bytes(b"\xef\xbb\xbf" + WHOLE.replace("\n", "\r\n").encode())
     assert read_system(path) == parse_system(WHOLE)
-
-
-def test_comments_that_a_rewrite_would_lose_are_found():
-    text = "// top\nRosSystem { // one\n Name 'a//b' /* two */ }"
-    assert [(found.line, found.column) for found in comments_inside(text)] == [(2, 13), (3, 14)]
 
 
 @settings(max_examples=300, deadline=None)

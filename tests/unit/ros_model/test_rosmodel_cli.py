@@ -81,14 +81,6 @@ def test_format_writes_the_canonical_form_once(run, model):
     assert run("format", "--check", path) == (0, "", "")
 
 
-def test_format_refuses_to_lose_a_comment(run, model):
-    path = model("RosSystem{Name good // important\n}")
-    status, _, err = run("format", path)
-    assert status == 2
-    assert f"{path}:1:21: this comment would be lost" in err
-    assert "important" in path.read_text()
-
-
 def test_show_names_components_and_parameters(run, model):
     path = model(
         "RosSystem { Name s RosComponents ( ComponentInterface { name arm FromRosNode 'p.a.n' RosParameters {"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from lark import Lark, Transformer
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
+from ros_model.comments import header
 from ros_model.errors import ModelError, first_of
 from ros_model.files import MAX_SIZE
 from ros_model.metamodel import ParameterType, Position, Value
@@ -32,7 +33,6 @@ MAX_ERRORS = 20
 _REPAIRABLE = 500_000  # characters of a text, and that are read again all in all, to find more errors than one
 
 _GRAMMARS = Path(__file__).parent / "grammar"
-_COMMENT = re.compile(r"\s*(?://(?P<line>[^\n]*)|/\*(?P<block>.*?)\*/)", re.DOTALL)
 _SKIPPED = re.compile(
     r"""(?P<comment>//[^\n]*|/\*.*?\*/)|'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"|(?:(?!/\*)[^\s{}(),'"])+""", re.DOTALL
 )
@@ -369,32 +369,6 @@ def split_name(items: list[Any]) -> tuple[str | None, list[Field]]:
     if len(items) > 1 and not isinstance(items[1], tuple):
         return (None if items[1] is None else text_of(items[1])), items[2:]
     return None, items[1:]
-
-
-def header(text: str) -> str:
-    """Return the comments at the top of a file, without their marks."""
-    lines: list[str] = []
-    end = 0
-    while match := _COMMENT.match(text, end):
-        end = match.end()
-        if match["line"] is not None:
-            lines.append(match["line"].removeprefix(" ").rstrip())
-        else:
-            block = [line.strip().removeprefix("*").removeprefix(" ").rstrip() for line in match["block"].splitlines()]
-            lines += "\n".join(block).strip("\n").split("\n")
-    return "\n".join(lines)
-
-
-def comments_inside(text: str, file: str = "<text>") -> tuple[Position, ...]:
-    """Return where comments stand that are not at the top of the file, and so are no part of its model."""
-    start = 0
-    while match := _COMMENT.match(text, start):
-        start = match.end()
-    return tuple(
-        Position(file, *line_and_column(text, match.start()))
-        for match in _SKIPPED.finditer(text, start)
-        if match["comment"]
-    )
 
 
 def line_and_column(text: str, offset: int) -> tuple[int, int]:

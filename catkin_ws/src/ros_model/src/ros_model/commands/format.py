@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from ros_model.comments import with_comments
 from ros_model.errors import ModelError
 from ros_model.files import read_text
 from ros_model.model_files import models_at, parse_all
 from ros_model.packages import PackageSet
 from ros_model.packages_writer import write_packages
-from ros_model.syntax import comments_inside
 from ros_model.writer import write_system
-
-if TYPE_CHECKING:
-    from ros_model.metamodel import RosSystem
 
 
 @click.command("format")
@@ -25,7 +21,7 @@ if TYPE_CHECKING:
 def format_(only_check: bool, files: tuple[str, ...]) -> int:
     """Write .rossystem and .ros files, or all in a folder, in the canonical form.
 
-    Comments at the top of a file stay; a file with others is refused, as they would be lost.
+    Comments stay: those at the top of a file there, each of the others above the element that it is beside.
 
     Exit status: 0 all is well, 1 a file would change and --check is given, 2 a file can't be read or written.
     """
@@ -44,9 +40,7 @@ def format_(only_check: bool, files: tuple[str, ...]) -> int:
 def _format(path: Path, only_check: bool) -> bool:
     """Bring a file to its canonical form; return whether it had another."""
     text = read_text(path)
-    formatted = write(parse_all(text, str(path)))
-    if lost := comments_inside(text, str(path)):
-        raise ModelError("this comment would be lost: move it to the top of the file", lost[0])
+    formatted = formatted_text(text, str(path))
     if formatted == text:
         return False
     click.echo(f"{'would change' if only_check else 'changed'} {path}")
@@ -58,6 +52,12 @@ def _format(path: Path, only_check: bool) -> bool:
     return True
 
 
-def write(model: RosSystem | PackageSet) -> str:
-    """Return the canonical form of a model of either language."""
-    return write_packages(model) if isinstance(model, PackageSet) else write_system(model)
+def formatted_text(text: str, file: str) -> str:
+    """Return the canonical form of a text of either language, with its comments.
+
+    Raises:
+        ModelError: it is not well-formed.
+    """
+    model = parse_all(text, file)
+    formatted = write_packages(model) if isinstance(model, PackageSet) else write_system(model)
+    return with_comments(text, model, formatted, parse_all(formatted, file))
