@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +41,7 @@ def show(file: str, graph: str | None) -> None:
     from rich.console import Console  # slow to import, and only needed here
 
     tree = _packages(model, file) if isinstance(model, PackageSet) else _system(model)
-    width = None if click.get_text_stream("stdout").isatty() else _UNLIMITED
+    width = None if sys.stdout.isatty() else _UNLIMITED
     Console(highlight=False, width=width).print(tree)
 
 
