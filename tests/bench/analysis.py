@@ -1,4 +1,8 @@
-"""One analysis (R2), from facts to statuses, beside owlready2's own call of Pellet on the same knowledge base."""
+"""One analysis (R2), from facts to statuses, beside owlready2's own call of Pellet on the same knowledge base.
+
+`analysis_N` is of a model like D2's, in which many designs require the same components; in `analysis_N_unlike` no two
+do. `analysis_memory` is of the process that asks and of Pellet's together, at the largest model.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import psutil
 from mros1_reasoner.knowledge_base import KnowledgeBase
 from mros1_reasoner.model import Facts, Objective
 from mros1_reasoner.owlready_reasoner import run_pellet
@@ -21,17 +26,24 @@ _HEAD = """<rdf:RDF xml:base="http://example.org/bench" xmlns:rdf="http://www.w3
   xmlns:owl="http://www.w3.org/2002/07/owl#" xmlns:t="http://metacontrol.org/tomasys#" xmlns:m="http://ros/mros#">
 <owl:Ontology rdf:about="http://example.org/bench"/><t:Function rdf:about="#f"/>
 """
+MEMORY_LIMIT_MB = 500.0  # node and child together
 
 
 def run() -> list[dict]:
     """Measure at every size; times in s."""
-    return [_measure(count, samples) for count, samples in SIZES.items()]
+    entries = [_measure(f"analysis_{count}", count, samples)[0] for count, samples in SIZES.items()]
+    count, samples = max(SIZES.items())
+    unlike, memory = _measure(f"analysis_{count}_unlike", count, samples, unlike=True)
+    ratio = MEMORY_LIMIT_MB / memory
+    entry = {"name": "analysis_memory", "value": memory, "unit": "MB", "peer": "limit", "peer_value": MEMORY_LIMIT_MB}
+    return [*entries, unlike, {**entry, "ratio": ratio, "samples": 1}]
 
 
-def _measure(count: int, samples: int) -> dict:
+def _measure(name: str, count: int, samples: int, *, unlike: bool = False) -> tuple[dict, float]:
+    """Return the entry, and the memory in MB of this process and of the reasoner's."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.owl"
-        path.write_text(_model(count))
+        path.write_text(_model(count, unlike=unlike))
         knowledge_base = KnowledgeBase([path])
     reasoner = PelletReasoner()
     try:
@@ -39,6 +51,7 @@ def _measure(count: int, samples: int) -> dict:
         for i in range(WARM_UP):
             knowledge_base.analyse(_facts(i), reasoner)
         ours = [_timed(lambda i=i: knowledge_base.analyse(_facts(i), reasoner)) for i in range(samples)]
+        memory = sum(psutil.Process(pid).memory_info().rss for pid in (None, reasoner.pid)) / 1e6
     finally:
         reasoner.close()
     peers = []
@@ -47,8 +60,8 @@ def _measure(count: int, samples: int) -> dict:
         peers.append(_timed(lambda world=world: run_pellet(world)))
         world.close()
     value, peer = statistics.median(ours), statistics.median(peers)
-    return {
-        "name": f"analysis_{count}",
+    entry = {
+        "name": name,
         "value": value,
         "unit": "s",
         "peer": "owlready2 sync_reasoner_pellet",
@@ -56,6 +69,7 @@ def _measure(count: int, samples: int) -> dict:
         "ratio": peer / value,
         "samples": samples,
     }
+    return entry, memory
 
 
 def _timed(action: Callable[[], object]) -> float:
@@ -74,8 +88,11 @@ def _facts(i: int) -> Facts:
     )
 
 
-def _model(count: int) -> str:
-    """Return a model like D2's: every fifth design by camera, the others by laser, all by the base."""
+def _model(count: int, *, unlike: bool = False) -> str:
+    """Return a model like D2's: every fifth design by camera, the others by laser, all by the base.
+
+    Where they are unlike, each has a component of its own beside.
+    """
     parts = [_HEAD, *(f'<t:QualityAttributeType rdf:about="#{quality}"/>' for quality in QUALITIES)]
     for i in range(count):
         levels = "".join(
@@ -89,6 +106,7 @@ def _model(count: int) -> str:
         ("laser", [i for i in range(count) if i % 5]),
         ("camera", range(0, count, 5)),
         ("base", range(count)),
+        *((f"part{i}", [i]) for i in range(count if unlike else 0)),
     ):
         links = "".join(f'<m:requiredBy rdf:resource="#fd{i}"/>' for i in designs)
         parts.append(f'<t:Component rdf:about="#{name}">{links}</t:Component>')
