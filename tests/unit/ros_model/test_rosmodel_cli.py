@@ -62,6 +62,20 @@ def test_bad_file_ends_with_its_place_and_status_2(run, model, text):
         assert len(err) < 1000
 
 
+def test_hostile_names_break_no_line_and_command_no_terminal(run, model):
+    name = r"'a\n\u001b[2J\ud800'"
+    component = f"ComponentInterface {{ name {name} }}"
+    path = model(f"RosSystem {{ Name x RosComponents ( {component}, {component} ) }}")
+    status, out, _ = run("check", path)
+    assert status == 1
+    assert r"error: component 'a\n\x1b[2J\ud800' stands twice" in out
+    assert "\x1b" not in out
+    other = model("RosSystem { Name x }", "other.rossystem")
+    assert run("diff", path, other)[1] == "- component 'a\\n\\x1b[2J\\ud800'\n"
+    for form in ("github", "json", "sarif"):
+        assert "\x1b" not in run("check", "--format", form, path)[1]
+
+
 def test_errors_are_shown_in_their_lines(run, model):
     path = model("RosSystem {\n\tName x\n\tColour red\n\tParameters { Parameter { nam y } }\n}\n")
     status, _, err = run("show", path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ros_model.errors import printable
 from ros_model.notation import type_text, value_text
 from ros_model.packages import PackageSet
 
@@ -40,7 +41,7 @@ class Difference:
     def __str__(self) -> str:
         """Return the sign, the path, and what was and is there."""
         change = f": {self.before or 'nothing'} -> {self.after or 'nothing'}" if self.sign == CHANGED else ""
-        return f"{self.sign} {', '.join(self.path)}{change}".replace("\n", "\\n")
+        return printable(f"{self.sign} {', '.join(self.path)}{change}")
 
 
 def differences(first: RosSystem | PackageSet, second: RosSystem | PackageSet) -> tuple[Difference, ...]:

@@ -20,8 +20,7 @@ class ModelError(Exception):
     """
 
     def __init__(self, message: str, position: Position | None = None, others: Iterable[ModelError] = ()) -> None:
-        message = message.replace("\n", "\\n")  # what it quotes may span lines
-        super().__init__(message if position is None else f"{position}: {message}")
+        super().__init__(printable(message if position is None else f"{position}: {message}"))
         self.message = message
         self.position = position
         self.others = tuple(others)
@@ -30,6 +29,13 @@ class ModelError(Exception):
     def all(self) -> tuple[ModelError, ...]:
         """This error and the others, in the order of the file."""
         return (self, *self.others)
+
+
+def printable(text: str) -> str:
+    """Return a text on one line: what is quoted may span lines, command a terminal, or be no character at all."""
+    if text.isprintable():
+        return text
+    return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in text)
 
 
 def first_of(errors: Iterable[ModelError]) -> ModelError:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from ros_model.errors import ModelError
+from ros_model.errors import ModelError, printable
 from ros_model.files import read_text
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Finding:
     def __str__(self) -> str:
         """Return `file:line:column: severity: message`, on one line."""
         place = f"{self.position}: " if self.position else ""
-        return f"{place}{self.severity}: {_one_line(self.message)}"
+        return printable(f"{place}{self.severity}: {self.message}")
 
     @classmethod
     def of(cls, error: ModelError) -> Finding:
@@ -158,7 +158,7 @@ def _github(finding: Finding) -> str:
 
 
 def _escaped(text: str) -> str:
-    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return printable(text).replace("%", "%25")
 
 
 def _sarif_result(finding: Finding) -> dict[str, Any]:
@@ -173,10 +173,6 @@ def _sarif_result(finding: Finding) -> dict[str, Any]:
         location = {"artifactLocation": {"uri": quote(Path(finding.position.file).as_posix())}, "region": region}
         result["locations"] = [{"physicalLocation": location}]
     return result
-
-
-def _one_line(text: str) -> str:
-    return text.replace("\r", "\\r").replace("\n", "\\n")  # names may span lines
 
 
 def sorted_by_place(findings: Iterable[Finding]) -> tuple[Finding, ...]:
