@@ -3,6 +3,7 @@
 import pytest
 from mros1_reasoner import vocabulary as v
 from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED
+from mros1_reasoner.knowledge_base import KnowledgeBase
 from mros1_reasoner.mape import Mape, MapeError, Settings
 from mros1_reasoner.model import Objective
 from reasoner_helpers import HEAD, value
@@ -269,3 +270,16 @@ def test_feasible_heeds_requirements(make):
     assert core.feasible() == {"F0": ("FD2", "FD1"), "F1": ("FD1.1",), "F2": ("FD2.1", "FD2.2")}
     core.observe_component(1.0, "rgbd", "FALSE")
     assert core.feasible() == {"F0": ("FD2",), "F1": (), "F2": ()}
+
+
+def test_saved_knowledge_base_asks_for_the_root_only(one_arm, tmp_path):
+    one_arm.core.observe_task(one_arm.now, "o_F2", True)
+    one_arm.core.pause()
+    one_arm.run(seconds=1.0)
+    one_arm.core.save(tmp_path / "saved.owl")
+    again = KnowledgeBase([tmp_path / "saved.owl"])
+    assert again.objectives == (PICK_AND_PLACE,)
+    assert again.designs["FD1"].requires == ("F1",)
+    text = (tmp_path / "saved.owl").read_text()
+    assert "requiresO" in text
+    assert "IN_ERROR_NFR" in text

@@ -1,4 +1,6 @@
+import itertools
 import math
+from dataclasses import replace
 
 import pytest
 from mros1_reasoner import mape
@@ -217,6 +219,77 @@ def test_causes_at_once_are_all_told_and_the_first_is_the_trigger(core):
     assert decision.trigger == "qa:safety"
     assert len(decision.causes) == 2
     assert "component laser" in decision.causes[1]
+
+
+HAPPENINGS = {
+    "safety too high": "qa:safety",
+    "laser fails": "component:laser",
+    "base fails": "component:base",
+    "camera recovers": "component:camera",
+    "configuration fails": "component:scan_slow",
+    "task fails": "task:o_move",
+}
+
+
+def let_happen(core, happening, now):
+    match happening:
+        case "safety too high":
+            core.observe_level(now, "safety", 0.9, stamp=now - 3.0)
+        case "laser fails" | "base fails":
+            core.observe_component(now, happening.split()[0], "FALSE")
+        case "camera recovers":
+            core.observe_component(now, "camera", "FALSE")
+            core.observe_component(now, "camera", "TRUE")
+        case "configuration fails":
+            core.observe_active(now, "f_move", "scan_slow", "FAILED")
+        case "task fails":
+            core.observe_task(now, "o_move", True, message="goal aborted")
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_whatever_happens_at_once_is_told_in_one_decision(knowledge_base, counting, count):
+    for happenings in itertools.combinations(HAPPENINGS, count):
+        core = Mape(knowledge_base, counting, [OBJECTIVE], Settings())
+        core.observe_active(0.0, "f_move", "scan_slow", "STABLE")
+        core.step(0.0)
+        for happening in happenings:
+            let_happen(core, happening, 10.0)
+        (decision,) = core.step(10.0)
+        assert {cause.trigger for cause in decision.reasons} == {HAPPENINGS[happening] for happening in happenings}
+        assert len(decision.causes) == count
+        assert decision.trigger != "component:camera", "a recovery does not call for a change where something is wrong"
+
+
+def test_objective_may_want_what_the_settings_do_not(knowledge_base, counting):
+    for asks, settings, expected in ((True, False, 1), (False, True, 0), (None, False, 0), (None, True, 1)):
+        objective = replace(OBJECTIVE, always_improve=asks)
+        core = Mape(knowledge_base, counting, [objective], Settings(always_improve=settings))
+        core.observe_active(0.0, "f_move", "camera_slow", "STABLE")
+        core.observe_component(1.0, "laser", "FALSE")
+        core.step(1.0)
+        core.observe_component(2.0, "laser", "TRUE")
+        assert len(core.step(2.0)) == expected
+
+
+def test_improvement_waits_for_the_cool_down(knowledge_base, counting):
+    core = Mape(knowledge_base, counting, [OBJECTIVE], Settings(always_improve=True))
+    core.observe_active(0.0, "f_move", "scan_slow", "STABLE")
+    (decision,) = fail(core, 1.0, "laser")
+    core.report(2.0, decision.id, True)
+    core.observe_component(3.0, "laser", "TRUE")
+    assert core.step(3.0) == []
+    (second,) = core.step(core.due(3.0))
+    assert (second.to_configuration, second.stamp_analysed) == ("scan_slow", 2.0 + Settings().cool_down)
+
+
+def test_limit_that_the_operator_lifts_is_used_where_improving_is_wanted(knowledge_base, counting):
+    core = Mape(knowledge_base, counting, [OBJECTIVE], Settings(always_improve=True))
+    core.observe_active(0.0, "f_move", "scan_slow", "STABLE")
+    core.step(0.0)
+    core.set_nfr("o_move", "safety", 0.9)
+    core.set_nfr("o_move", "energy", None)
+    (decision,) = core.step(1.0)
+    assert (decision.trigger, decision.to_configuration) == ("operator", "scan_fast")
 
 
 def test_running_configuration_is_taken_over_without_a_request(knowledge_base, counting):

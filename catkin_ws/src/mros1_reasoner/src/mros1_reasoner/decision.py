@@ -9,6 +9,8 @@ from mros1_reasoner.planner import Candidate
 DECIDED, EXECUTED, FAILED = "DECIDED", "EXECUTED", "FAILED"  # Decision.msg
 PROPOSED = "PROPOSED"  # waits for an operator's approval
 ADVISED = "ADVISED"  # in a dry run: nothing follows
+RECOVERY = "compRecov"  # the rule by which the return of a component is a cause
+OPERATOR = "operator"
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,11 @@ class Cause:
     level: float = 0.0
     limit: float = 0.0
     excess: float = 0.0
+
+    @property
+    def is_chance(self) -> bool:
+        """Whether nothing is wrong, but a better design may have become available."""
+        return self.rules == RECOVERY or self.trigger == OPERATOR
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from mros1_reasoner import vocabulary as v
-from mros1_reasoner.decision import ADVISED, DECIDED, FAILED, Cause, Decision
+from mros1_reasoner.decision import ADVISED, DECIDED, FAILED, OPERATOR, RECOVERY, Cause, Decision
 from mros1_reasoner.model import Design, Direction, Objective
 from mros1_reasoner.planner import Distance, Plan, Situation, Utility, plan
 from mros1_reasoner.state import Running, State
@@ -59,8 +59,7 @@ class Deliberation:
             return None
         if self._state.waits(name, timing.now):
             return None
-        improves_only = all(cause.trigger in running.updatable for cause in causes)
-        running.updatable.clear()
+        improves_only = all(cause.is_chance for cause in causes)
         self._note_failure(name, timing.now)
         began = self._wall()
         level, outcome = self._choose(name, timing.now, climbs=not improves_only)
@@ -146,7 +145,8 @@ class Deliberation:
         return self._decision(name, causes, outcome, timing, words, plan_wall)
 
     def _is_news(self, running: Running, causes: list[Cause], outcome: Plan) -> bool:
-        refusal = (tuple(cause.trigger for cause in causes), outcome.choice, outcome.degraded)
+        errors = tuple(cause.trigger for cause in causes if not cause.is_chance)
+        refusal = (errors, outcome.choice, outcome.degraded)
         is_news, running.refusal = refusal != running.refusal, refusal
         return is_news
 
@@ -213,25 +213,28 @@ class Deliberation:
                 return []
             words = f"no configuration runs{f', which {requirers[0]} requires' if requirers else ''}"
             return [Cause(now, "initial", words)]
-        causes: list[Cause] = []
+        errors: list[Cause] = []
         if result and v.IN_ERROR_COMPONENT in result.causes:
-            causes += self._component_causes(name, now)
+            errors += self._component_causes(name, now)
         if result and v.IN_ERROR_NFR in result.causes:
-            causes += [self._violation(self._state.objectives[name], quality, now) for quality in result.violated]
+            errors += [self._violation(self._state.objectives[name], quality, now) for quality in result.violated]
         if running.task_failure:
             stamp, why = running.task_failure
-            words = f"the task failed{f': {why}' if why else ''}"
-            causes.append(Cause(stamp, f"task:{name}", words, "S9"))
-        always = self._state.objectives[name].always_improve
-        if not causes and (running.degraded or (self._state.settings.always_improve if always is None else always)):
-            if now >= running.calm_until:
-                causes = [
-                    Cause(min(stamp, now), trigger, words, "compRecov" if trigger != "operator" else "")
-                    for trigger, (stamp, words) in running.updatable.items()
-                ]
-        else:
-            running.updatable.clear()
-        return sorted(causes, key=lambda cause: (cause.stamp, cause.trigger))
+            errors.append(Cause(stamp, f"task:{name}", f"the task failed{f': {why}' if why else ''}", "S9"))
+        return [*sorted(errors, key=_by_time), *self._chances(name, now, has_errors=bool(errors))]
+
+    def _chances(self, name: str, now: float, *, has_errors: bool) -> list[Cause]:
+        """Return why a better design may have become available, where it would be taken or is planned for anyway."""
+        running, always = self._state.running[name], self._state.objectives[name].always_improve
+        heeds = running.degraded or (self._state.settings.always_improve if always is None else always)
+        if heeds and not has_errors and now < running.calm_until:
+            return []
+        found = [
+            Cause(min(stamp, now), trigger, words, "" if trigger == OPERATOR else RECOVERY)
+            for trigger, (stamp, words) in running.updatable.items()
+        ]
+        running.updatable.clear()
+        return sorted(found, key=_by_time) if heeds or has_errors else []
 
     def _component_causes(self, name: str, now: float) -> list[Cause]:
         running = self._state.running[name]
@@ -328,3 +331,7 @@ class Deliberation:
             for quality, factor in self.factors(name, now).items()
             if round(factor, 2) != 1.0
         )
+
+
+def _by_time(cause: Cause) -> tuple[float, str]:
+    return cause.stamp, cause.trigger

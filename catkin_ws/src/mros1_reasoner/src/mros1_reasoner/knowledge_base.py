@@ -33,7 +33,7 @@ _OWL_FOLDER = Path(__file__).resolve().parents[2] / "owl"
 _DECIMAL = v.XSD + "decimal"
 _STRING = v.XSD + "string"
 # Statements that hold at one moment only. They come as facts of each analysis, so the ontology goes without them.
-_MOMENTARY = (*v.DERIVED_STATUSES, v.C_STATUS, v.FD_ERROR_LOG, v.SOLVES_O, v.TYPE_FD)
+_MOMENTARY = (*v.DERIVED_STATUSES, v.O_UPDATABLE, v.C_STATUS, v.FD_ERROR_LOG, v.SOLVES_O, v.TYPE_FD, v.REQUIRES_O)
 _COMPARISONS = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES)
 _LEVELS = (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION, v.HAS_VALUE, v.IS_QA_TYPE)
 
@@ -67,7 +67,7 @@ class KnowledgeBase:
         designs: every design by name, with its expected levels.
         components: names of all components.
         qualities: how levels compare, of every quality attribute by name.
-        objectives: those that the models hold already.
+        objectives: those that the models hold already, but for those that a grounding requires.
         component_statuses: statuses that the models assert.
         ontology: vocabulary, rules and models as N-Triples, without what comes as facts.
     """
@@ -114,7 +114,9 @@ class KnowledgeBase:
         self.components = frozenset(self._components)
         self.qualities = {name: self._quality(graph, name, directions or {}) for name in sorted(self._quality_types)}
         self.designs = {name: self._design(graph, name) for name in sorted(self._designs)}
-        self.objectives = tuple(self._objective(graph, name) for name in sorted(self._objectives))
+        required = graph.objects(v.REQUIRES_O)
+        asked_for = [name for name, iri in sorted(self._objectives.items()) if iri not in required]
+        self.objectives = tuple(self._objective(graph, name) for name in asked_for)
         self.component_statuses = {
             self._component_name[subject]: str(value)
             for subject, value in graph.literals(v.C_STATUS)
@@ -418,6 +420,8 @@ class KnowledgeBase:
     def _statuses(self, facts: Facts, analysis: Analysis) -> Iterable[Assertion]:
         for name, objective in analysis.objectives.items():
             yield Assertion(self._objective_iri(name), v.O_STATUS, objective.status, _STRING)
+            updatable = "true" if v.UPDATABLE in objective.causes else "false"
+            yield Assertion(self._objective_iri(name), v.O_UPDATABLE, updatable, v.XSD + "boolean")
             if objective.grounding_status:
                 grounding = self._grounding_iri(name, facts.groundings[name])
                 yield Assertion(grounding, v.FG_STATUS, objective.grounding_status, _STRING)

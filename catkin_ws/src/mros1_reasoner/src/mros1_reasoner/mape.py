@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mros1_reasoner import vocabulary as v
-from mros1_reasoner.decision import ADVISED, DECIDED, EXECUTED, FAILED, PROPOSED, Decision
+from mros1_reasoner.decision import ADVISED, DECIDED, EXECUTED, FAILED, OPERATOR, PROPOSED, Decision
 from mros1_reasoner.deliberation import Deliberation, Timing
 from mros1_reasoner.knowledge_base import KnowledgeBase
 from mros1_reasoner.model import Analysis, Facts, Objective
@@ -323,7 +323,7 @@ class Mape:
         words = (
             f"the operator {'has lifted the limit' if limit is None else f'wants a limit of {limit:g}'} of {quality}"
         )
-        self._state.running[objective].updatable["operator"] = math.inf, words
+        self._state.running[objective].updatable[OPERATOR] = math.inf, words
         self._seen = None
 
     def feasible(self) -> dict[str, tuple[str, ...]]:
