@@ -4,8 +4,9 @@ import json
 
 import pytest
 from actionlib_msgs.msg import GoalStatus
+from geometry_msgs.msg import Twist
 from metacontrol_experiments.bag import BagError, read_record
-from metacontrol_experiments.metrics import MetricsError, configuration_at, mean, share_above, summarise
+from metacontrol_experiments.metrics import MetricsError, configuration_at, mean, periods_missed, share_above, summarise
 from metacontrol_experiments.record import Event, MissionRecord
 
 REQUIRED_KEYS = {
@@ -131,6 +132,23 @@ def test_goal_taken_up_again_after_a_bad_result_counts_as_reached(mission_bag, t
     mission_bag.result(14.5, GoalStatus.PREEMPTED)
     summary = summarise(read_record(mission_bag.write(tmp_path / "again.bag")))
     assert summary["goals"] == {"sent": 1, "failed": 0} and summary["goal_reached"]
+
+
+def test_periods_without_a_command_are_missed():
+    assert periods_missed([0.0, 0.1, 0.2, 0.3], 10.0) == 0.0
+    assert periods_missed([0.0, 0.12, 0.18, 0.31], 10.0) == 0.0  # jitter
+    assert periods_missed([0.0, 0.1, 0.4, 0.5], 10.0) == pytest.approx(2 / 5)
+    assert periods_missed([0.0], 10.0) is None
+
+
+def test_control_is_that_of_the_initial_configuration(bag, tmp_path):
+    bag.event(10.0, "MISSION_START", "r1", controller_hz=10.0)
+    bag.configuration(12.05, "b", "RECONFIGURING")
+    for stamp in (9.0, 10.1, 10.2, 10.5, 10.6, 12.5, 14.0):
+        bag.add(stamp, "/cmd_vel", Twist())
+    bag.event(16.0, "MISSION_END", "r1", outcome="aborted")
+    summary = summarise(read_record(bag.write(tmp_path / "control.bag")))
+    assert summary["control"] == {"rate_hz": 10.0, "periods_missed": 0.4}
 
 
 def test_clutter_is_read_from_the_bag(mission_bag, tmp_path):

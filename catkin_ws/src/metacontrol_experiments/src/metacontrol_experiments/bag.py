@@ -121,6 +121,7 @@ class _Builder:
         self._decisions: list[DecisionReport] = []
         self._goals: list[GoalReport] = []
         self._results: list[GoalReport] = []
+        self._commands: list[float] = []
         self._obstacles: dict[tuple[str, float, float], None] = {}
         self._map: OccupancyMap | None = None
         self.handlers: dict[str, Callable[[float, Any], None]] = {
@@ -136,6 +137,7 @@ class _Builder:
             "/ground_truth/safety": lambda t, m: self._add_sample("safety", t, m),
             "/ground_truth/energy": lambda t, m: self._add_sample("energy", t, m),
             "/ground_truth/contacts": lambda t, m: self._add_sample("contacts", t, m),
+            "/cmd_vel": lambda t, _: self._commands.append(t),
             "/ground_truth/obstacles": self._add_obstacles,
             "/map": self._take_map,
         }
@@ -154,6 +156,7 @@ class _Builder:
             decisions=tuple(self._decisions),
             goals=tuple(self._goals),
             results=tuple(self._results),
+            commands=tuple(self._commands),
             obstacles=tuple((x, y) for _, x, y in self._obstacles),
             map=self._map,
             first_stamp=first,

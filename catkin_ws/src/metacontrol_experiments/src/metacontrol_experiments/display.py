@@ -102,6 +102,7 @@ def _figures(summary: dict[str, Any]) -> Table:
     ]
     rows += [(f"time above the {name} threshold", _percent(share)) for name, share in above.items()]
     rows += [(f"mean {name}", _with_unit(level, "")) for name, level in mean.items()]
+    rows.append(("control periods missed", _percent(summary["control"]["periods_missed"])))
     rows.append(("simulated / wall time", _with_unit(summary["real_time_factor"], "")))
     for row in rows:
         table.add_row(*row)

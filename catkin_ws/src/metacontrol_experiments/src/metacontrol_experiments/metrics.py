@@ -9,6 +9,8 @@ Definitions
   report falls into) to the first report above the threshold of that violation; null where the ground truth was not
   above it then.
 - `decide_s`: from that diagnostic to the Decision DECIDED. `execute_s`: from DECIDED to EXECUTED.
+- `control` is of the initial configuration, until the first change: the rate that its controller was set to, and the
+  share of its periods in which no velocity command came: a gap of n periods between two commands has n - 1 of them.
 - `success` is the paper's: goal reached, mean safety risk < 0.4, risk below its threshold for more than 95 % of the
   time, energy below its threshold for more than 90 % of the time; and not longer than 250 s.
 """
@@ -89,6 +91,7 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
             "sent": len(goals),
             "failed": sum(status is not GoalStatus.SUCCEEDED for status in goals.values()),
         },
+        "control": _control(record, told, start, end),
         "cost": _cost(record, start, end),
         "real_time_factor": _real_time_factor(duration, closing),
         "outcome": closing.get("outcome", "unknown"),
@@ -271,6 +274,24 @@ def _observed(record: MissionRecord, name: str, limit: float, start: float, end:
         "time_above_threshold": _rounded(float(durations[values > limit].sum()) / fresh) if fresh > 0 else None,
         "stale_s": _rounded(float(durations[stale].sum())),
     }
+
+
+def periods_missed(stamps: Sequence[float], rate: float) -> float | None:
+    """Share of a controller's periods (rate in Hz) in which no command came; None with fewer than two commands."""
+    if len(stamps) < 2:
+        return None
+    periods = np.maximum(np.rint(np.diff(np.asarray(stamps)) * rate), 1.0)
+    return float((periods - 1.0).sum() / periods.sum())
+
+
+def _control(record: MissionRecord, told: dict[str, str], start: float, end: float) -> dict[str, float | None]:
+    """Rate of the initial configuration's controller, and the share of its periods that it missed."""
+    changes = [r.stamp for r in record.configurations if r.state != "STABLE" and start <= r.stamp <= end]
+    until = min(changes, default=end)
+    rate = _number(told, "controller_hz", 0.0)
+    stamps = [stamp for stamp in record.commands if start <= stamp <= until]
+    missed = periods_missed(stamps, rate) if rate > 0.0 else None
+    return {"rate_hz": rate or None, "periods_missed": _rounded(missed)}
 
 
 def _cost(record: MissionRecord, start: float, end: float) -> dict[str, dict[str, float | None]]:

@@ -212,6 +212,7 @@ class MissionNode:
         self._began_wall = time.monotonic()
         self._display.start(now.to_sec())
         values = self._settings.describe() | {"goal_id": self._goal.goal_id.id}
+        values["controller_hz"] = str(rospy.get_param("move_base/controller_frequency", 0.0))
         self._publish_event(now, MissionEvent.MISSION_START, self._settings.route.name, values)
         for name, told in struck:
             self._publish_event(now, MissionEvent.PERTURBATION, name, {"share": "0.0000"} | told)

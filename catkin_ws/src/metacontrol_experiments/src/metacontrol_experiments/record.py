@@ -111,6 +111,7 @@ class MissionRecord:
         poses: (n, 3) array of stamp, x, y: ground truth in the map frame.
         true_quality: QA name -> samples of its ground truth.
         contacts: samples of the running count of contact episodes.
+        commands: stamps of the velocity commands.
         obstacles: places (x, y, m in the map frame) of clutter that stood there at any time.
         first_stamp: of the first message in the bag.
         last_stamp: of the last message in the bag.
@@ -127,6 +128,7 @@ class MissionRecord:
     goals: tuple[GoalReport, ...] = ()
     results: tuple[GoalReport, ...] = ()
     costs: tuple[CostReport, ...] = ()
+    commands: tuple[float, ...] = ()
     obstacles: tuple[tuple[float, float], ...] = ()
     map: OccupancyMap | None = None
     first_stamp: float = 0.0
