@@ -47,10 +47,14 @@ def wait_for(condition, what, deadline=DEADLINE_S):
     return found
 
 
+def node_api(node):
+    """Return a node's own API."""
+    return xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node))
+
+
 def node_pid(node):
     """Return the process id of a node."""
-    uri = rosgraph.Master("/test").lookupNode(node)
-    return xmlrpc.client.ServerProxy(uri).getPid("/test")[2]
+    return node_api(node).getPid("/test")[2]
 
 
 def status(message, *values, level=0, name=""):

@@ -6,7 +6,7 @@
 | stale | quality |
 | component | component, status, stamp of the diagnostic |
 | binding | grounding, in error |
-| task | objective or its function, failed, message; a name that is neither stands for the only root objective |
+| task | objective or its function, failed, stamp, message; any other name stands for the only root objective |
 | active | function, configuration, state |
 | step | whether it is a heartbeat |
 | result | decision, whether it is carried out, message, whether the configuration is to blame |
@@ -145,8 +145,8 @@ _HANDLERS: dict[str, Callable[..., list[Decision] | None]] = {
         now, component, status, float(stamp)
     ),
     "binding": lambda core, now, grounding, in_error: core.observe_binding(now, grounding, in_error == _YES),
-    "task": lambda core, now, name, failed, message: core.observe_task(
-        now, _objective(core, name), failed == _YES, message
+    "task": lambda core, now, name, failed, stamp, message: core.observe_task(
+        now, _objective(core, name), failed == _YES, float(stamp), message
     ),
     "active": lambda core, now, function, configuration, state: core.observe_active(
         now, function, configuration, state

@@ -207,7 +207,7 @@ class ReasonerNode:
         self._queue(lambda: self._take_active(active))
 
     def _on_obj_error(self, message: Bool) -> None:
-        self._queue(lambda: self._take("task", "", message.data, "reported on obj_error"))
+        self._queue(lambda: self._take("task", "", message.data, 0.0, "reported on obj_error"))
 
     def _on_task_status(self, objective: str, action: str, statuses: GoalStatusArray) -> None:
         """Take in how the newest goal of an objective's action fares, where that is new."""
@@ -215,7 +215,7 @@ class ReasonerNode:
         if newest is None or self._goals.get(objective) == newest:
             return
         self._goals[objective] = newest
-        self._queue(lambda: self._take("task", objective, newest[1], f"a goal of {action} was aborted"))
+        self._queue(lambda: self._take("task", objective, newest[1], 0.0, f"a goal of {action} was aborted"))
 
     def _queue(self, work: Callable[[], object], at_most: float = math.inf) -> None:
         with self._wake:
@@ -265,7 +265,7 @@ class ReasonerNode:
                 case BindingFact():
                     self._take("binding", fact.grounding, fact.in_error)
                 case TaskFact():
-                    self._take("task", fact.name, fact.failed, "reported as a diagnostic")
+                    self._take("task", fact.name, fact.failed, stamp, "reported as a diagnostic")
 
     def _take_active(self, active: messages.ActiveConfiguration) -> None:
         for function in active.functions:
@@ -308,7 +308,7 @@ class ReasonerNode:
             self._report(decision.id, True)
             return
         if not self._client.wait_for_server(rospy.Duration(-1)):  # one look, without waiting
-            message = f"the manipulator's action server {self._client.ns} is not there"
+            message = f"the manipulator's action server {rospy.resolve_name(self._client.ns)} is not there"
             self._report(decision.id, False, message, blame=False)
             return
         self._request_ends = time.monotonic() + self._deadline

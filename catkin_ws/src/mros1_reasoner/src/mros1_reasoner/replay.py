@@ -203,8 +203,7 @@ def pairs(recording: Recording, replayed: Replayed) -> list[Pair]:
         if match is not None:
             own.remove(match)
         found.append(Pair(record.stamp_planned, record, match, _differences(record, match) if match else ()))
-    began = recording.start - _SAME_MOMENT
-    found += [Pair(record.stamp_planned, None, record) for record in own if record.stamp_planned >= began]
+    found += [Pair(record.stamp_planned, None, record) for record in own if record.stamp_planned >= recording.start]
     return sorted(found, key=lambda pair: pair.now)
 
 
@@ -240,4 +239,4 @@ def _entry_of(now: float, stamp: float, fact: Fact) -> Entry:
         case BindingFact():
             return entry(now, "binding", fact.grounding, fact.in_error)
         case TaskFact():
-            return entry(now, "task", fact.name, fact.failed, "reported as a diagnostic")
+            return entry(now, "task", fact.name, fact.failed, stamp, "reported as a diagnostic")

@@ -92,19 +92,20 @@ class Services:
         return services.FeasibleResponse(ok, message, found)
 
     def _save(self, request: Any) -> services.SaveKnowledgeBaseResponse:
-        path = (self._save_folder / (request.path or _SAVED)).resolve()
+        saved = []
 
         def work() -> None:
+            path = (self._save_folder / (request.path or _SAVED)).resolve()
             if not path.is_relative_to(self._save_folder) or path == self._save_folder:
-                raise MapeError(
-                    f"{request.path!r} is not in {self._save_folder}: give a file in it, or set ~save_folder"
-                )
+                say = f"{request.path!r} is not in {self._save_folder}: give a file in it, or set ~save_folder"
+                raise MapeError(say)
             if not path.parent.is_dir():
                 raise MapeError(f"{path.parent}: no such folder: make it first")
             self._node.core.save(path)
+            saved.append(str(path))
 
         ok, message = self._answer(work)
-        return services.SaveKnowledgeBaseResponse(ok, str(path) if ok else message)
+        return services.SaveKnowledgeBaseResponse(ok, saved[0] if ok else message)
 
     def _answer(self, work: Callable[[], None]) -> tuple[bool, str]:
         """Have the loop's thread work; return whether it went well, and why not."""
