@@ -4,7 +4,7 @@ from dataclasses import replace
 from xmlrpc.client import Binary
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from ros_model.errors import ModelError
 from ros_model.generators.launch import launch_file
@@ -71,6 +71,7 @@ TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"], ex
 SCALARS = st.booleans() | st.integers(-(2**31), 2**31 - 1) | st.floats(allow_nan=False, allow_infinity=False) | TEXTS
 
 
+@settings(deadline=None)
 @given(SCALARS | st.lists(SCALARS, max_size=4))
 def test_value_arrives_as_it_is_or_is_refused(value):
     try:
