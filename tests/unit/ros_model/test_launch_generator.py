@@ -138,6 +138,7 @@ def test_members_of_a_struct_have_their_declared_types():
         ("Integer", True, {}),
         ("Boolean", 1, {}),
         ("Double", "fast", {}),
+        ("Double", 10**400, {}),
         ("Base64", "no base!", {}),
         ("List", [1], {"elements": (WHOLE, WHOLE)}),
         ("Array", ["a"], {"elements": (WHOLE,)}),
@@ -177,6 +178,10 @@ def test_struct_becomes_a_group_of_parameters():
         "/laser/limits/speed": 0.5,
         "/laser/limits/axes": [1, 2],
     }
+
+
+def test_private_name_of_a_parameter_is_one_of_the_node():
+    assert list(loaded(of(RosParameter("rate", replace(NODE, name="~rate"), 1))).params) == ["/laser/rate"]
 
 
 def test_parameter_of_the_system_is_global():

@@ -24,6 +24,7 @@ _INTEGER = re.compile(r"[-+]?\d{1,18}")
 _DOUBLE = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?")
 _BOOLEANS = {"true": True, "True": True, "false": False, "False": False}
 _LARGEST_CELL = 100_000
+_LARGEST_NUMBER = 1e300  # NaN is not below it either, nor are integers that no double holds
 
 
 @dataclass(frozen=True)
@@ -137,9 +138,9 @@ def _yaml_rows(path: Path) -> list[Row]:
 
 def _value(value: object, column: str, where: Position) -> Value | None:
     """Return a value of YAML as a value of the language."""
-    if value is None or isinstance(value, (bool, int, str)):
+    if value is None or isinstance(value, (bool, str)):
         return value
-    if isinstance(value, float) and abs(value) < float("inf"):
+    if isinstance(value, (int, float)) and abs(value) < _LARGEST_NUMBER:
         return value
     if isinstance(value, list) and all(item is not None for item in value):
         return [item for entry in value if (item := _value(entry, column, where)) is not None]

@@ -1,0 +1,121 @@
+"""Parameters of launch files: values with their types, sent as the model says them, none of them evaluated."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import math
+import re
+import xml.etree.ElementTree as ET
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from ros_model.errors import ModelError
+
+if TYPE_CHECKING:
+    from ros_model.metamodel import ParameterType, Position, RosParameter, SystemParameter, Value
+
+Sent = bool | int | float | str | bytes | list[Any] | dict[str, Any]
+"""A value as the parameter server holds it."""
+
+_NO_XML = re.compile(r"[^\t\n\r\x20-\uD7FF\uE000-\uFFFD\U00010000-\U0010FFFF]")
+_SUBSTITUTION = re.compile(r"\$\(")
+
+
+class _Quoting(yaml.SafeDumper):
+    """Writes every text in quotes, since rosparam takes more for numbers than YAML does (`deg(90)`)."""
+
+
+_Quoting.add_representer(str, lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", text, style='"'))
+
+
+def sent(parameter: RosParameter | SystemParameter, declared: ParameterType | None) -> Sent | None:
+    """Return the value of a parameter, or its declared default, as its declared type has it."""
+    if declared is None:
+        return parameter.value
+    value = declared.default if parameter.value is None else parameter.value
+    return None if value is None else _converted(value, declared, parameter)
+
+
+def _converted(value: Value, declared: ParameterType, parameter: RosParameter | SystemParameter) -> Sent:
+    """Return a value as its type has it on the parameter server: a Double is never an integer, Base64 is bytes."""
+    converted: Sent | None = value
+    if isinstance(value, list) and declared.elements:
+        types = declared.elements * len(value) if declared.kind == "Array" else declared.elements
+        if len(types) == len(value):
+            return [_converted(item, kind, parameter) for item, kind in zip(value, types, strict=True)]
+        converted = None
+    elif isinstance(value, dict) and declared.members:
+        members = dict(declared.members)
+        if set(value) <= set(members):
+            return {name: _converted(item, members[name], parameter) for name, item in value.items()}
+        converted = None
+    elif declared.kind in _SCALARS:
+        converted = _SCALARS[declared.kind](value)
+    if converted is None:
+        raise ModelError(f"the value {value!r} of '{parameter.name}' is no {declared.kind}", parameter.position)
+    return converted
+
+
+def _as_double(value: Value) -> Sent | None:
+    try:
+        return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else None
+    except OverflowError:
+        return None
+
+
+def _as_text(value: Value) -> Sent | None:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str(value) if isinstance(value, (str, int, float)) else None
+
+
+def _as_bytes(value: Value) -> Sent | None:
+    try:
+        return base64.b64decode(value, validate=True) if isinstance(value, str) else None
+    except (binascii.Error, ValueError):
+        return None
+
+
+_SCALARS = {
+    "Integer": lambda value: value if isinstance(value, int) and not isinstance(value, bool) else None,
+    "Double": _as_double,
+    "Boolean": lambda value: value if isinstance(value, bool) else None,
+    "String": _as_text,
+    "Date": _as_text,
+    "Base64": _as_bytes,
+}
+
+
+def parameter_element(name: str, value: Sent, where: Position) -> ET.Element:
+    """Return a typed `<param>`, or `<rosparam>` for what that can not carry: lists, structs, bytes, outer blanks."""
+    _check_range(value, where)
+    for kind, word in ((bool, "bool"), (int, "int"), (float, "double"), (str, "str")):
+        if isinstance(value, kind) and not (isinstance(value, str) and value != value.strip()):
+            text = str(value).lower() if kind is bool else str(value)
+            return ET.Element("param", {"name": name, "type": word, "value": _harmless(text, where)})
+    element = ET.Element("rosparam", {"param": name, "subst_value": "false"})
+    text = yaml.dump(
+        value, Dumper=_Quoting, default_flow_style=True, sort_keys=False, width=math.inf, allow_unicode=True
+    )
+    element.text = _harmless(text.removesuffix("\n...\n").strip(), where)
+    return element
+
+
+def _check_range(value: Sent, where: Position) -> None:
+    if isinstance(value, (list, dict)):
+        for item in value.values() if isinstance(value, dict) else value:
+            _check_range(item, where)
+    elif isinstance(value, int) and not -(1 << 31) <= value < 1 << 31:
+        raise ModelError(f"the integer {value} has more than 32 bits, which the parameter server can't hold", where)
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise ModelError(f"the value {value} is no number: give a finite one", where)
+
+
+def _harmless(text: str, where: Position) -> str:
+    if _SUBSTITUTION.search(text):
+        raise ModelError(f"{text!r} holds '$(', which roslaunch would evaluate: take it out", where)
+    if bad := _NO_XML.search(text):
+        raise ModelError(f"{text!r} holds the character {bad[0]!r}, which XML can't: take it out", where)
+    return text
