@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 
 import psutil
 import pytest
+from metacontrol_experiments.bag import read_record
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 FACTOR = ("--real-time-factor", "2")
+CLUTTER = ("--contingency", "clutter:3", "--failure", "front_laser")
 LIMIT_S = 240.0
 
 
@@ -38,13 +40,13 @@ def metacontrol(*arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.fixture(scope="module")
 def adapted(tmp_path_factory):
     output = tmp_path_factory.mktemp("adapted")
-    return metacontrol("run", "--output", str(output), "--failure-at", "0.4", *FACTOR), output
+    return metacontrol("run", "--output", str(output), *CLUTTER, "--failure-at", "0.4", *FACTOR), output
 
 
 @pytest.fixture(scope="module")
 def baseline(tmp_path_factory):
     output = tmp_path_factory.mktemp("baseline")
-    arguments = ("--no-metacontrol", "--failure-at", "0.1", "--timeout", "60", *FACTOR)
+    arguments = ("--no-metacontrol", *CLUTTER, "--failure-at", "0.1", "--timeout", "60", *FACTOR)
     return metacontrol("run", "--output", str(output), *arguments), output
 
 
@@ -81,8 +83,15 @@ def test_baseline_stops_for_want_of_a_sensor(baseline):
     summary = json.loads((output / "summary.json").read_text())
     assert summary["goal_reached"] is False and summary["metacontrol"] is False
     assert summary["reconfigurations"] == []
-    assert [entry["name"] for entry in summary["perturbations"]] == ["component:front_laser"]
+    assert [entry["name"] for entry in summary["perturbations"]] == ["clutter:3", "component:front_laser"]
     assert (output / "mission.png").exists()
+
+
+def test_both_runs_meet_the_same_clutter(adapted, baseline):
+    places = [sorted(read_record(output / "mission.bag").obstacles) for _, output in (adapted, baseline)]
+    assert len(places[0]) == 3 and places[0] == places[1]
+    told = [json.loads((output / "summary.json").read_text())["contingency"] for _, output in (adapted, baseline)]
+    assert told[0] == told[1] == {"clutter": 3, "power": 1.0, "component": "front_laser"}
 
 
 @pytest.mark.parametrize("run", ["adapted", "baseline"])

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 import sys
+import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import rospkg
@@ -30,9 +31,15 @@ from metacontrol_experiments.mission import TIMEOUT_S, Outcome
 from metacontrol_experiments.routes import RouteError, read_route
 from metacontrol_experiments.runner import BAG_NAME, RunError, run_mission
 from metacontrol_experiments.settings import Settings
+from metacontrol_experiments.timeline import Timeline
+
+if TYPE_CHECKING:
+    from metacontrol_experiments.mission import State
+    from metacontrol_experiments.record import MissionRecord
 
 SUMMARY_NAME = "summary.json"
 FIGURE_NAME = "mission.png"
+LOG_NAME = "mission.log"
 
 _FAILED, _REFUSED, _INTERRUPTED = 1, 2, 130
 
@@ -53,6 +60,13 @@ class _Number(click.FloatRange):
 
 
 @metacontrol.command()
+@click.option(
+    "--engine",
+    type=click.Choice(["ros", "lockstep"]),
+    default="ros",
+    show_default=True,
+    help="lockstep: in one process without ROS, as fast as it can, the same bytes for a seed; the baseline only.",
+)
 @click.option("--no-metacontrol", is_flag=True, help="The baseline: everything but the reasoner.")
 @click.option("--seed", default=1, show_default=True, help="Of everything random in the simulation.")
 @click.option("--route", default="r1", show_default=True, help="One of the routes.")
@@ -106,7 +120,7 @@ class _Number(click.FloatRange):
 @click.option("--gui", is_flag=True, help="Show the simulator's window.")
 @click.option("--rviz", is_flag=True, help="Show RViz.")
 @click.option("--quiet", is_flag=True, help="Say nothing but errors.")
-def run(quiet: bool, output: Path, **options: Any) -> None:
+def run(quiet: bool, output: Path, engine: str, **options: Any) -> None:
     """Run a mission and leave its bag, summary and figure in a folder.
 
     Exit status: 0 the goal was reached, 1 it was not, 2 bad input or a system that did not start, 130 interrupted.
@@ -117,8 +131,11 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
         for name in (SUMMARY_NAME, FIGURE_NAME):  # those of an earlier run
             (output / name).unlink(missing_ok=True)
         with Display(console, quiet) as display:
-            state = run_mission(settings, display)
-        record = read_record(output / BAG_NAME)
+            if engine == "lockstep":
+                state, record = _run_lockstep(settings, display)
+            else:
+                state = run_mission(settings, display)
+                record = read_record(output / BAG_NAME)
         summary = summarise(record)
         _write_summary(summary, output / SUMMARY_NAME)
         _draw(record, output / FIGURE_NAME)
@@ -128,7 +145,7 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
         click.echo("metacontrol: interrupted; every process was ended", err=True)
         sys.exit(_INTERRUPTED)
     display.summary(summary)
-    for name in (BAG_NAME, SUMMARY_NAME, FIGURE_NAME):
+    for name in (LOG_NAME if engine == "lockstep" else BAG_NAME, SUMMARY_NAME, FIGURE_NAME):
         display.say(str(output / name))
     sys.exit(0 if state.outcome is Outcome.REACHED else _FAILED)
 
@@ -204,6 +221,30 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
         port=options["port"],
         commit=current_commit(),
     )
+
+
+def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionRecord]:
+    """Runs a mission in lockstep and leaves its log.
+
+    Raises:
+        RunError: it cannot be run in lockstep.
+    """
+    from metacontrol_experiments import lockstep  # PyBullet and navigation take a while to import
+    from metacontrol_experiments.mission import MissionError
+
+    began = time.monotonic()
+    try:
+        outcome = lockstep.Lockstep(settings).run()
+    except (lockstep.LockstepError, MissionError) as error:
+        raise RunError(str(error)) from error
+    settings.output.mkdir(parents=True, exist_ok=True)
+    (settings.output / LOG_NAME).write_text(outcome.log, encoding="utf-8")
+    told = Timeline(settings.thresholds)
+    display.start(outcome.state.started_s)
+    for event in outcome.record.events:
+        for entry in told.tell(event):
+            display.entry(entry)
+    return outcome.state, lockstep.with_wall_time(outcome.record, time.monotonic() - began)
 
 
 def _contingencies(options: dict[str, Any], components: dict[str, str]) -> tuple[Contingency, ...]:

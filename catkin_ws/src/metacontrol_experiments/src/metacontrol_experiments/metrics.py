@@ -65,7 +65,7 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
     return {
         "schema_version": SCHEMA_VERSION,
         "commit": told.get("commit", "unknown"),
-        "engine": "ros",
+        "engine": told.get("engine", "ros"),
         "mission": told.get("mission", "D2"),
         "route": told.get("route", "unknown"),
         "contingency": {

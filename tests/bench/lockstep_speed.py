@@ -1,0 +1,46 @@
+"""Simulated seconds per wall second of D2 in lockstep, one process: the whole mission on route r1, the baseline.
+
+Front laser 10 Hz x 361 rays, controller, planner and costmaps at the variant's rates; rear laser and camera unused. The
+meta-controller is not in it yet.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import rospkg
+from metacontrol_experiments.lockstep import SETTLE_S, Lockstep
+from metacontrol_experiments.routes import read_route
+from metacontrol_experiments.settings import Settings
+
+_GAZEBO = 1.0  # the published system runs in real time at best
+_RUNS = 3
+
+
+def run() -> list[dict[str, Any]]:
+    """Return the entry `lockstep_speed`: the best of some runs, since others share the processor."""
+    package = Path(rospkg.RosPack().get_path("metacontrol_sim"))
+    route = read_route(package / "worlds" / "routes.yaml", "r1")
+    speeds = []
+    with tempfile.TemporaryDirectory(prefix="bench_") as folder:
+        for _ in range(_RUNS):
+            lockstep = Lockstep(Settings(route, Path(folder), metacontrol=False))
+            began = time.perf_counter()
+            state = lockstep.run().state
+            simulated = (state.ended_s or 0.0) - state.started_s + SETTLE_S
+            speeds.append(simulated / (time.perf_counter() - began))
+    value = max(speeds)
+    return [
+        {
+            "name": "lockstep_speed",
+            "value": value,
+            "unit": "s/s",
+            "peer": "Gazebo",
+            "peer_value": _GAZEBO,
+            "ratio": value / _GAZEBO,
+            "samples": len(speeds),
+        }
+    ]
