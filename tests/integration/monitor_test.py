@@ -129,9 +129,13 @@ class MonitorTest(unittest.TestCase):
         self.seen.forget()
         self.seen.wait_status("ROS Graph", "running OK")
 
-    def test_unknown_variant_keeps_the_last_good_model(self):
-        self.activate("../evil", FunctionGrounding.STABLE)
-        self.seen.wait("desired model", lambda s: s.name == "ROS Graph" and "desired model" in s.message)
+    def test_variant_that_is_unknown_or_does_not_parse_keeps_the_last_good_model(self):
+        for name, place in (("../evil", "configuration"), ("broken", "broken.rossystem:3")):
+            self.activate(name, FunctionGrounding.STABLE)
+            _, status = self.seen.wait(
+                f"problem of {name}", lambda s, place=place: "desired model" in s.message and place in s.message
+            )
+            self.assertEqual((status.name, status.level), ("ROS Graph", DiagnosticStatus.ERROR))
         self.activate("", "")
         self.seen.forget()
         self.seen.wait_status("ROS Graph", "running OK")

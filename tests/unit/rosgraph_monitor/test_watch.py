@@ -10,7 +10,8 @@ import pytest
 from rosgraph_monitor.liveness import Life, Timing
 from rosgraph_monitor.watch import Watcher
 
-TIMING = Timing(probe_period=0.05, probe_deadline=0.3, connect_deadline=0.3, retry_period=0.05)
+TIMING = Timing(probe_period=0.05, probe_deadline=20.0, connect_deadline=20.0, retry_period=0.05)
+HASTY = Timing(probe_period=0.05, probe_deadline=0.3, connect_deadline=0.3, retry_period=0.05)
 
 
 class KeepAlive(SimpleXMLRPCRequestHandler):
@@ -61,16 +62,19 @@ def node(handler=KeepAlive, pid=4711):
 
 
 @pytest.fixture
-def watcher():
+def watcher(request):
     changed = threading.Event()
-    watcher = Watcher(changed.set, TIMING)
+    watcher = Watcher(changed.set, getattr(request, "param", TIMING))
     watcher.changed = changed
     watcher.start()
     yield watcher
     watcher.close()
 
 
-def wait_for(condition, deadline=2.0):
+hasty = pytest.mark.parametrize("watcher", [HASTY], indirect=True)
+
+
+def wait_for(condition, deadline=30.0):
     end = time.monotonic() + deadline
     while not condition():
         assert time.monotonic() < end, "condition not met in time"
@@ -95,20 +99,42 @@ def test_death_is_told_at_once(watcher):
         wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE)
         watcher.changed.clear()
         end()
-        assert watcher.changed.wait(0.5)
+        assert watcher.changed.wait(30.0)
         wait_for(lambda: watcher.lives()[("/n", uri)] is Life.DEAD)
 
 
-def test_silent_node_is_hung_and_does_not_delay_others(watcher):
-    with socket.create_server(("127.0.0.1", 0)) as silent, node() as (uri, _end):
+@hasty
+def test_silent_node_is_hung_until_it_answers(watcher):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
         hung = f"http://127.0.0.1:{silent.getsockname()[1]}/"
-        watcher.watch({"/hung": hung, "/n": uri, "/odd": "nonsense", "/port": "http://h:99999/"})
-        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE, deadline=0.25)
-        wait_for(lambda: watcher.lives()[("/hung", hung)] is Life.HUNG)
+        watcher.watch({"/hung": hung})
+        wait_for(lambda: watcher.lives().get(("/hung", hung)) is Life.HUNG)
+        connection, _ = silent.accept()
+        with connection:
+            connection.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok")
+            wait_for(lambda: watcher.lives()[("/hung", hung)] is Life.ALIVE)
+
+
+def test_nodes_that_hang_or_cannot_be_reached_delay_no_other(watcher):
+    with socket.create_server(("127.0.0.1", 0)) as silent, node() as (uri, end):
+        bad = {f"/unroutable_{i}": f"http://192.0.2.{i}:1234/" for i in range(1, 41)}
+        bad |= {"/hung": f"http://127.0.0.1:{silent.getsockname()[1]}/", "/odd": "nonsense", "/port": "http://h:99999/"}
+        watcher.watch(bad | {"/n": uri})
+        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE)
+        end()
+        wait_for(lambda: watcher.lives()[("/n", uri)] is Life.DEAD)
+        # All this while the others were still waited for.
+        assert watcher.lives()[("/hung", bad["/hung"])] is Life.UNKNOWN
         assert watcher.lives()[("/odd", "nonsense")] is Life.UNREACHABLE
-        assert watcher.lives()[("/n", uri)] is Life.ALIVE
 
 
+@hasty
+def test_unroutable_address_is_unreachable(watcher):
+    watcher.watch({"/n": "http://192.0.2.1:1234/"})
+    wait_for(lambda: list(watcher.lives().values()) == [Life.UNREACHABLE])
+
+
+@hasty
 def test_name_without_address_is_unreachable(watcher):
     watcher.watch({"/n": "http://no-such-host.invalid:1234/"})
     wait_for(lambda: list(watcher.lives().values()) == [Life.UNREACHABLE])

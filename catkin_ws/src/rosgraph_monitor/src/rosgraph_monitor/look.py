@@ -62,6 +62,7 @@ class Looker:
         self._requested = threading.Event()
         self._closing = False
         self.latest: Look | None = None
+        self.count = 0
         self.lost: MasterGoneError | None = None
         self.silence: tuple[float, SnapshotError] | None = None
         self._thread = threading.Thread(target=self._run, name="look", daemon=True)
@@ -105,6 +106,7 @@ class Looker:
             self.silence = (self.silence[0] if self.silence else begin, error)
             return
         self.silence = None
+        self.count += 1
         self.latest = Look(snapshot, lives, time.monotonic() - begin)
         nodes = {name: node.uri for name, node in snapshot.nodes.items() if name != self._own_name}
         self._watcher.watch(nodes | {MASTER: self._client.uri})

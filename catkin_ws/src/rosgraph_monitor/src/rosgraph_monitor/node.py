@@ -114,6 +114,7 @@ class MonitorNode:
         self._meter = UsageMeter(alone=frozenset({_LAUNCHER}))
         self._usage_due = 0.0
         self._running_observers = 0
+        self._evaluation = 0.0
         observers = dict.fromkeys((*_names("~observers", []), *load))
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
         self._observers = ObserverHost(self._diagnostics)
@@ -139,8 +140,9 @@ class MonitorNode:
                 if look:
                     begin = time.monotonic()
                     self._publish(self._evaluate(look))
+                    self._evaluation = time.monotonic() - begin
                     # Never more than half the time: hundreds of nodes may come or go together.
-                    time.sleep(max(_COALESCE, time.monotonic() - begin))
+                    time.sleep(max(_COALESCE, self._evaluation))
                 self._wait()
         finally:
             self.close()
@@ -230,7 +232,9 @@ class MonitorNode:
         else:
             status.summary(DiagnosticStatus.OK, "in time")
         if look:
-            status.add("seconds for a look", f"{look.duration:.3f}")
+            status.add("seconds for a look", f"{look.duration:.4f}")
+            status.add("seconds for an evaluation", f"{self._evaluation:.4f}")
+            status.add("looks", str(self._looker.count))
             status.add("nodes", str(len(look.snapshot.nodes)))
         status.add("observers", str(self._running_observers))
         return status
