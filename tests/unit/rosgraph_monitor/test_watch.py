@@ -23,6 +23,17 @@ class CloseAfterAnswer(SimpleXMLRPCRequestHandler):
 
 
 @contextlib.contextmanager
+def black_hole():
+    """An address at which no attempt to connect ever ends, as behind a router that drops what it gets."""
+    with socket.create_server(("127.0.0.1", 0), backlog=0) as server, contextlib.ExitStack() as stack:
+        for _ in range(8):  # more than its queue holds: from then on the kernel answers nobody
+            filler = stack.enter_context(socket.socket())
+            filler.setblocking(False)
+            filler.connect_ex(server.getsockname())
+        yield f"http://127.0.0.1:{server.getsockname()[1]}/"
+
+
+@contextlib.contextmanager
 def node(handler=KeepAlive, pid=4711):
     server = SimpleXMLRPCServer(("127.0.0.1", 0), requestHandler=handler, logRequests=False)
     server.register_function(lambda _caller: [1, "", pid], "getPid")
@@ -116,22 +127,24 @@ def test_silent_node_is_hung_until_it_answers(watcher):
 
 
 def test_nodes_that_hang_or_cannot_be_reached_delay_no_other(watcher):
-    with socket.create_server(("127.0.0.1", 0)) as silent, node() as (uri, end):
-        bad = {f"/unroutable_{i}": f"http://192.0.2.{i}:1234/" for i in range(1, 41)}
+    with socket.create_server(("127.0.0.1", 0)) as silent, node() as (uri, end), black_hole() as hole:
+        bad = {f"/unroutable_{i}": hole for i in range(40)}
         bad |= {"/hung": f"http://127.0.0.1:{silent.getsockname()[1]}/", "/odd": "nonsense", "/port": "http://h:99999/"}
         watcher.watch(bad | {"/n": uri})
         wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE)
         end()
         wait_for(lambda: watcher.lives()[("/n", uri)] is Life.DEAD)
         # All this while the others were still waited for.
+        assert watcher.lives()[("/unroutable_0", hole)] is Life.UNKNOWN
         assert watcher.lives()[("/hung", bad["/hung"])] is Life.UNKNOWN
         assert watcher.lives()[("/odd", "nonsense")] is Life.UNREACHABLE
 
 
 @hasty
 def test_unroutable_address_is_unreachable(watcher):
-    watcher.watch({"/n": "http://192.0.2.1:1234/"})
-    wait_for(lambda: list(watcher.lives().values()) == [Life.UNREACHABLE])
+    with black_hole() as hole:
+        watcher.watch({"/n": hole})
+        wait_for(lambda: list(watcher.lives().values()) == [Life.UNREACHABLE])
 
 
 @hasty
