@@ -11,9 +11,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.lark import from_lark
 from lark import Lark
+from ros_model.checker import check_system
 from ros_model.cli import main
+from ros_model.difference import differences
 from ros_model.errors import ModelError
 from ros_model.files import MAX_SIZE
+from ros_model.graph import dot
+from ros_model.library import Library
+from ros_model.packages import PackageSet
+from ros_model.packages_checker import check_packages
 from ros_model.packages_reader import parse_packages
 from ros_model.packages_writer import write_packages
 from ros_model.reader import parse_system
@@ -80,9 +86,20 @@ def check(text, parse, write):
             assert "\n" not in str(found)
         return error
     assert parse(write(model)) == model
+    assert differences(model, model) == ()
+    if isinstance(model, PackageSet):
+        check_packages(model, Library(model.packages))
+    else:
+        check_system(model, library=KNOWN)
+        dot(model)
     return None
 
 
+KNOWN = Library(
+    parse_packages("""PackageSet { CatkinPackage p { Artifact a { Node { name n
+        Publishers { Publisher { name x message 'std_msgs.String' } }
+        Parameters { Parameter { name x type Double } } } } } }""").packages
+)
 SLOW = settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much]
 )

@@ -207,6 +207,12 @@ def test_parameter_may_have_a_namespace():
     assert system.parameters == (SystemParameter("p", None, 1, "arm"),)
 
 
+def test_namespace_may_be_written_in_parts():
+    parameter = "Parameter { name p NameSpace GlobalNamespace { parts { a, b } } value 1 }"
+    system = parse_system(f"RosSystem {{ Name x Parameters {{ {parameter} }} }}")
+    assert system.parameters == (SystemParameter("p", None, 1, "/a/b"),)
+
+
 def test_parameter_of_a_component_may_lack_its_name():
     text = "RosSystem { Name x RosComponents ( ComponentInterface { name a RosParameters { "
     text += "RosParameter { RefParameter 'p.a.n.r' } } } ) }"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ros_model.errors import printable
+from ros_model.metamodel import Position
 from ros_model.notation import type_text, value_text
 from ros_model.packages import PackageSet
 
@@ -128,11 +129,9 @@ def _of_node(node: Node, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...
 
 
 def _parameter(declared: ParameterType | None, value: Value | None) -> Fact:
-    from ros_model.metamodel import Position
-
     texts = [type_text(declared, Position())] if declared else []
     if value is not None:
-        texts.append(value_text(value, Position()) if value != {} else "{ }")
+        texts.append(value_text(value, Position()))
     return Fact(" ".join(texts), (_comparable(declared.default) if declared else None, declared, _comparable(value)))
 
 

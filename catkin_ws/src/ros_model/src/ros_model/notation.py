@@ -19,6 +19,7 @@ _KEYWORDS = re.compile(  # of one grammar or the other, that may be names, too
     "[Nn]ame|type|value|default|ns|namespace|node|package|artifact|spec|dependency|sequence|parts|message|service|action"
     "|request|response|goal|result|feedback|publisher|subscriber|service(server|client)|action(server|client)|parameter"
     "|From|To|Node|Artifact|Package|Specs|Dependencies|Publishers?|Subscribers?|Parameters?|Header|true|false"
+    "|Parameter(Any|Struct|StructMember|StructTypeMember)|parameterstructypetmember|(Global|Relative|Private)Namespace"
     "|Integer|Double|String|Boolean|Base64|Date|Any|List|Array|Struct?"
 )
 _ESCAPES = {"\\": "\\\\", "'": "\\'", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
@@ -72,26 +73,20 @@ def value_text(value: Value, position: Position) -> str:
     """Return a value.
 
     Raises:
-        ModelError: it has no notation (infinite, not a number, an empty struct).
+        ModelError: it has no notation (infinite, not a number).
     """
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            raise ModelError(f"the value {value} has no notation: give a finite number", position)
-        return repr(value)
-    if isinstance(value, str):
-        return quoted(value)
+    if isinstance(value, dict):
+        members = (f"{{ {name_text(name)} {{ value {value_text(item, position)} }} }}" for name, item in value.items())
+        return f"{{ {', '.join(members)} }}" if value else "ParameterStruct { }"  # braces alone are an empty list
     if isinstance(value, list):
         return f"{{ {', '.join(value_text(item, position) for item in value)} }}" if value else "{ }"
-    if not value:
-        raise ModelError("an empty struct has no notation: give it a member, or leave the value out", position)
-    members = ", ".join(
-        f"{{ {name_text(name)} {{ value {value_text(item, position)} }} }}" for name, item in value.items()
-    )
-    return f"{{ {members} }}"
+    if isinstance(value, str):
+        return quoted(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if not math.isfinite(value):
+        raise ModelError(f"the value {value} has no notation: give a finite number", position)
+    return repr(value)
 
 
 def name_text(text: str) -> str:

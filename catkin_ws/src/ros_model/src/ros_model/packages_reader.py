@@ -139,21 +139,6 @@ class _Builder(Builder):
             fields["name"], fields.get("type"), fields.get("value"), fields.get("namespace"), self.at(items[0])
         )
 
-    # Namespaces, written as ROS writes them: /global, relative, ~private
-
-    def namespace(self, items: list[Any]) -> Field:
-        keyword, name = items
-        return "namespace", name if type(name) is str else text_of(name), keyword
-
-    def global_namespace(self, items: list[Token | None]) -> str:
-        return f"/{_joined(items)}"
-
-    def relative_namespace(self, items: list[Token | None]) -> str:
-        return _joined(items)
-
-    def private_namespace(self, items: list[Token | None]) -> str:
-        return f"~{_joined(items)}"
-
     # Message specifications
 
     def specs(self, items: list[Any]) -> Field:
@@ -203,7 +188,3 @@ class _Builder(Builder):
             found[word] = fields
         parts = tuple((part, found[part]) for part in PARTS[kind] if part in found)
         return Spec(text_of(name), kind, parts, self.at(keyword))
-
-
-def _joined(parts: list[Token | None]) -> str:
-    return "/".join(text_of(part) for part in parts if part is not None)

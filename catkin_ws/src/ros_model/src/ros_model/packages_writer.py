@@ -43,7 +43,7 @@ def write_packages(packages: PackageSet) -> str:
     Ports are written by kind. A port whose type nobody knows has none.
 
     Raises:
-        ModelError: a value has no notation in the language (infinite, not a number, an empty struct).
+        ModelError: a value has no notation in the language (infinite, not a number).
     """
     lines = sequence(map(_package, packages.packages))
     return "\n".join([*comments(packages.header), "PackageSet {", *indented(lines), "}"]) + "\n"

@@ -95,9 +95,6 @@ class _Builder(Builder):
 
     # Fields
 
-    def namespace(self, items: list[Token]) -> Field:
-        return "namespace", text_of(items[1]), items[0]
-
     def node(self, items: list[Token]) -> Field:
         return "node", self._reference(items[1]), items[0]
 

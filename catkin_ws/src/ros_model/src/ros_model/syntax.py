@@ -54,10 +54,13 @@ _UNTOLD = {  # what could stand in a place, but nobody writes today
     "COMMENT",
     "_ANY_VALUE",
     "_ARTIFACTS",
+    "_GLOBAL",
     "_MEMBER",
     "_MEMBER_TYPE",
     "_NODE",
     "_PACKAGES",
+    "_PRIVATE",
+    "_RELATIVE",
     "_SEQUENCE",
     "_STRUCT_MEMBERS",
     "_STRUCT_VALUE",
@@ -189,6 +192,21 @@ class Builder(Transformer):
 
     def value_field(self, items: list[Any]) -> Field:
         return "value", self.plain(items[1]), items[0]
+
+    # Namespaces, written as ROS writes them: /global, relative, ~private
+
+    def namespace(self, items: list[Any]) -> Field:
+        keyword, name = items
+        return "namespace", name if type(name) is str else text_of(name), keyword
+
+    def global_namespace(self, items: list[Token | None]) -> str:
+        return f"/{_joined(items)}"
+
+    def relative_namespace(self, items: list[Token | None]) -> str:
+        return _joined(items)
+
+    def private_namespace(self, items: list[Token | None]) -> str:
+        return f"~{_joined(items)}"
 
     # Types
 
@@ -362,6 +380,10 @@ def text_of(token: Token) -> str:
         return str(token)
     text = token[1:-1]
     return _ESCAPE.sub(_unescape, text) if "\\" in text else text
+
+
+def _joined(parts: list[Token | None]) -> str:
+    return "/".join(text_of(part) for part in parts if part is not None)
 
 
 def split_name(items: list[Any]) -> tuple[str | None, list[Field]]:

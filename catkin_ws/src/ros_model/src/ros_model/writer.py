@@ -31,7 +31,7 @@ def write_system(system: RosSystem) -> str:
     Ports and connections are written by kind, in the order of PortKind and ConnectionKind.
 
     Raises:
-        ModelError: a value has no notation in the language (infinite, not a number, an empty struct).
+        ModelError: a value has no notation in the language (infinite, not a number).
     """
     stacked = {name for stack in system.stacks for name in stack.components}
     free = [component for component in system.components if component.name not in stacked]
