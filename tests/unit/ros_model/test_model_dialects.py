@@ -172,14 +172,14 @@ def in_2019(text):
     return re.sub(r"PackageDependency (\w+)", r"PackageDependency { package \1 }", text)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.integers(0, 10**6))
 def test_systems_are_read_from_any_hand(seed):
     text = Hand(Random(seed)).write(SYSTEM)
     assert replace(parse_system(text), header="") == parse_system(SYSTEM), text
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.integers(0, 10**6), st.booleans())
 def test_packages_are_read_from_any_hand(seed, old):
     text = Hand(Random(seed), old).write(in_2019(PACKAGES) if old else PACKAGES)

@@ -101,7 +101,7 @@ KNOWN = Library(
         Parameters { Parameter { name x type Double } } } } } }""").packages
 )
 SLOW = settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much]
+    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much]
 )
 
 

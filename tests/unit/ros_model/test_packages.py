@@ -358,7 +358,7 @@ PACKAGE = st.builds(
 PACKAGES = st.builds(PackageSet, st.lists(PACKAGE, max_size=2).map(tuple))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(PACKAGES)
 def test_what_is_written_reads_back_equal(packages):
     text = write_packages(packages)

@@ -84,7 +84,7 @@ def value_text(value: Value, position: Position) -> str:
         return quoted(value)
     if isinstance(value, bool):
         return "true" if value else "false"
-    if not math.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         raise ModelError(f"the value {value} has no notation: give a finite number", position)
     return repr(value)
 

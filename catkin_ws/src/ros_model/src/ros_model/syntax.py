@@ -36,7 +36,7 @@ _GRAMMARS = Path(__file__).parent / "grammar"
 _SKIPPED = re.compile(
     r"""(?P<comment>//[^\n]*|/\*.*?\*/)|'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"|(?:(?!/\*)[^\s{}(),'"])+""", re.DOTALL
 )
-_INTEGER = re.compile(r"[-+]?\d{1,4000}")
+_INTEGER = re.compile(r"[-+]?\d{1,300}")  # longer ones are no double either
 _DOUBLE = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _ESCAPE = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|(.))", re.DOTALL)
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "'": "'", '"': '"', "\\": "\\"}
