@@ -224,3 +224,14 @@ def test_executable_in_a_source_tree_belongs_to_the_package_around_it(tmp_path: 
     script.touch()
     (tmp_path / "demo" / "package.xml").write_text("<package><name>demo</name></package>")
     assert executable_of([str(script)], tmp_path, []) == Origin("demo", "talker")
+
+
+def test_executable_is_found_behind_a_module_that_runs_it(tmp_path: Path):
+    runner, script = tmp_path / "lib" / "host" / "run.py", tmp_path / "lib" / "demo" / "talker"
+    for path in (runner, script):
+        path.parent.mkdir(parents=True)
+        path.touch()
+    script.chmod(0o755)
+    arguments = ["/usr/bin/python3", str(runner), str(script), "__name:=x"]
+    assert executable_of(arguments, tmp_path, ["demo", "host"]) == Origin("demo", "talker")
+    assert executable_of(arguments[:2], tmp_path, ["demo", "host"]) == Origin("host", "run.py")

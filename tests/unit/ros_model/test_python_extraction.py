@@ -6,8 +6,13 @@ import textwrap
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from ros_model import extraction
 from ros_model.extraction.package_source import ExtractedPackage, extract_package
-from ros_model.extraction.source import NodeSource
+from ros_model.extraction.python_modules import Library
+from ros_model.extraction.python_source import read_python_node
+from ros_model.extraction.source import NodeSource, SourceError
 from ros_model.metamodel import PortKind
 
 MANIFEST = """<package format="2"><name>demo</name><version>0.1.0</version><description>d</description>
@@ -410,6 +415,35 @@ def test_recursive_and_circular_code_ends(node):
     )
     assert len(result.ports) == 4
     assert not any(port.is_resolved for port in result.ports)
+
+
+def test_modules_that_import_a_name_from_each_other_end(package):
+    result = package(
+        "import rospy\nfrom std_msgs.msg import String\nfrom demo.one import NAME\nrospy.Publisher(NAME, String)\n",
+        one="from demo.two import NAME\n",
+        two="from demo.one import NAME\n",
+    )
+    assert names(result.nodes["talker"]) == {"{NAME}@nodes/talker:5"}
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_source_that_was_cut_up_is_read_or_refused_without_a_traceback(tmp_path, data):
+    sources = sorted(Path(extraction.__file__).parents[4].glob("rosgraph_monitor/src/rosgraph_monitor/*_node.py"))
+    lines = data.draw(st.sampled_from(sources)).read_text().splitlines()
+    start = data.draw(st.integers(0, len(lines)))
+    length = data.draw(st.integers(0, 20))
+    moved = data.draw(st.integers(0, len(lines)))
+    piece = lines[start : start + length]
+    del lines[start : start + length]
+    lines[moved:moved] = piece
+    (tmp_path / "cut.py").write_text("\n".join(lines))
+    try:
+        result = read_python_node(tmp_path / "cut.py", Library([tmp_path], tmp_path))
+    except SourceError as error:
+        assert "cut.py:" in str(error)
+    else:
+        assert all(port.is_resolved or "@cut.py:" in port.name for port in result.ports)
 
 
 def test_hard_code_costs_no_more_than_a_bound(node):

@@ -211,7 +211,7 @@ class _Reader:
         kind = type_text(node.child_by_field_name("type"))
         for declarator in node.children_by_field_name("declarator"):
             name = text(declarator.child_by_field_name("declarator") or declarator).lstrip("*& ")
-            if "*" in text(declarator).partition(name)[0]:
+            if not name or "*" in text(declarator).partition(name)[0]:
                 continue  # a pointer: what it points to is made elsewhere
             own = [d for d in self._program.declared(name, place) if d.place.file is place.file and d.type == kind]
             values = next((list(d.values) for d in own if d.values), [])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import io
+import os
 import socket
 import xmlrpc.client
 from concurrent.futures import ThreadPoolExecutor
@@ -107,22 +108,27 @@ def executable_of(arguments: Sequence[str], folder: Path, packages: Iterable[str
     """Return the executable that a command line runs, if it is in a ROS package.
 
     Args:
-        arguments: the command line; an interpreter may come first.
+        arguments: the command line; an interpreter may come first, and a module that runs the executable.
         folder: its working folder.
         packages: names of the packages that are installed.
     """
     known = set(packages)
+    found: Origin | None = None
     for number, argument in enumerate(arguments):
-        if number and argument.startswith("-"):
-            continue
-        if ":=" in argument or (number == 0 and Path(argument).name.startswith("python")):
+        is_option = number and argument.startswith("-")
+        if not argument or is_option or ":=" in argument or (not number and Path(argument).name.startswith("python")):
             continue
         path = folder / argument
         if not path.is_file():
-            return None  # the program itself is the first file: later ones are its arguments
+            break
         package = path.parent.name if path.parent.name in known else rospkg.get_package_name(str(path))
-        return Origin(package, path.name) if package else None
-    return None
+        origin = Origin(package, path.name) if package else None
+        if origin and os.access(path, os.X_OK):
+            return origin
+        found = found or origin
+        if origin is None:
+            break  # the program is in no package: what follows are its arguments
+    return found
 
 
 def _service_addresses(master: str, services: Iterable[str], timeout: float) -> dict[str, str]:

@@ -89,7 +89,10 @@ class Evaluator(CallEvaluator):
         """Evaluate an expression as a question of its own, with a fresh budget."""
         self._total += self._steps
         self._steps = 0
-        return self.evaluate(node, frame, world or World())
+        try:
+            return self.evaluate(node, frame, world or World())
+        except RecursionError:
+            return [(Unknown(node), world or World())]
 
     def evaluate(self, node: ast.expr, frame: Frame, world: World) -> Results:
         """Return the values that an expression may have, each with the world in which it has it."""
@@ -188,6 +191,17 @@ class Evaluator(CallEvaluator):
         return results
 
     def _imported(self, source: str, name: str) -> Value:
+        key = ("import", source, name)
+        if key in self._active:  # modules that import a name from each other
+            self.unsettle()
+            return Unknown(name)
+        self._active.add(key)
+        try:
+            return self._import(source, name)
+        finally:
+            self._active.discard(key)
+
+    def _import(self, source: str, name: str) -> Value:
         module = self._library.module(source)
         if not name:
             return ModuleValue(module) if module else External(source)
