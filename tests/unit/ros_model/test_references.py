@@ -301,6 +301,19 @@ def test_folder_is_checked_with_all_its_models(check):
     assert [line.split(":")[0] for line in out.splitlines() if ": error: " in line] == ["bad.rossystem"]
 
 
+def test_packages_are_known_by_their_first_word(check, tmp_path):
+    (tmp_path / "arm.txt").write_text(PACKAGES)
+    assert check("arm.txt", "ok.rossystem") == (0, "")
+
+
+def test_variant_is_checked_with_the_base_of_its_project(check, tmp_path):
+    models = Path(__file__).parents[3] / "catkin_ws" / "src" / "metacontrol_sim" / "models"
+    assert check(str(models / "variants" / "f1_v1_r1.rossystem")) == (0, "")
+    text = (models / "variants" / "f1_v1_r1.rossystem").read_text()
+    (tmp_path / "alone.rossystem").write_text(text)
+    assert check("alone.rossystem")[0] == 1
+
+
 def test_broken_model_on_the_path_is_told_once(check, tmp_path):
     (tmp_path / "ros" / "broken.ros").write_text("PackageSet { CatkinPackage }")
     status, out = check("--path", "ros", "ok.rossystem", "ros")

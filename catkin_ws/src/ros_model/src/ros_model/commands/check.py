@@ -16,6 +16,7 @@ from ros_model.metamodel import compose
 from ros_model.model_files import PACKAGES, files_in, models_at, read_all
 from ros_model.packages import PackageSet
 from ros_model.packages_checker import check_packages
+from ros_model.packages_reader import read_packages
 from ros_model.settings import FILE_NAME
 
 if TYPE_CHECKING:
@@ -46,8 +47,8 @@ if TYPE_CHECKING:
 def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
     """Check .rossystem and .ros files, folders of them, or projects by their metacontrol.yaml or folder.
 
-    References are followed to the .ros models that are checked, stand beside the files, or are found with --path.
-    Message types of installed ROS packages are known.
+    References are followed to the .ros models that are checked, stand beside the files, belong to their project, or are
+    found with --path. Message types of installed ROS packages are known. A variant is checked with its project's base.
 
     Exit status: 0 all is well or only warnings were given, 1 something is wrong in a model, 2 a file can't be read.
     """
@@ -67,27 +68,29 @@ class _Check:
 
     def __init__(self, folders: Iterable[str]) -> None:
         self.unreadable: list[Finding] = []
-        self._projects: list[Project] = []
+        self._projects: dict[Path, Project] = {}
+        self._loaded: dict[Path, Project] = {}
         self._systems: dict[Path, RosSystem] = {}
+        self._wholes: dict[Path, RosSystem] = {}  # what a system that is a variant is part of
         self._packages: dict[Path, PackageSet] = {}
         self._beside: dict[Path, PackageSet] = {}
         for folder in folders:
-            self._read(files_in(Path(folder), PACKAGES), self._beside)
+            self._know(files_in(Path(folder), PACKAGES))
 
     def add(self, path: Path) -> None:
         """Add a file, a project or a folder of files."""
-        if path.name == FILE_NAME or (path / FILE_NAME).is_file():
-            self._add_project(path)
-        else:
-            try:
-                found = models_at(path)
-            except ModelError as error:
-                self._refuse(error)
+        try:
+            if path.name == FILE_NAME or (path / FILE_NAME).is_file():
+                self._add_project(path)
                 return
-            for file in found:
-                self._read([file], self._packages if file.suffix == PACKAGES else self._systems)
-            if not path.is_dir():
-                self._read(sorted(path.parent.glob(f"*{PACKAGES}")), self._beside)
+            found = models_at(path)
+        except ModelError as error:
+            self._refuse(error)
+            return
+        for file in found:
+            self._add_file(file)
+        if not path.is_dir():
+            self._know(sorted(path.parent.glob(f"*{PACKAGES}")))
 
     def findings(self) -> list[Finding]:
         """Return all that is wrong, file by file."""
@@ -95,30 +98,59 @@ class _Check:
         found = [*self.unreadable]
         for packages in self._packages.values():
             found += check_packages(packages, library)
-        for system in self._systems.values():
-            found += check_system(system, library=library)
+        for path, system in self._systems.items():
+            found += check_system(system, self._wholes.get(path), library)
         for family in families(self._systems.values()):
             found += check_family(family)
-        for project in self._projects:
+        for project in self._projects.values():
             found += _of_project(project, library)
         return [*dict.fromkeys(found)]
 
     def _add_project(self, path: Path) -> None:
-        from ros_model.project import load_project
+        project = self._load(path if path.is_dir() else path.parent)
+        self._projects[project.folder] = project
+        for file in files_in(project.folder, PACKAGES):
+            self._add_file(file)
 
+    def _add_file(self, path: Path) -> None:
         try:
-            project = load_project(path)
+            model = read_all(path)
         except ModelError as error:
             self._refuse(error)
-        else:
-            self._projects.append(project)
-            self._read(files_in(project.folder, PACKAGES), self._packages)
+            return
+        if isinstance(model, PackageSet):
+            self._packages[path] = model
+            return
+        self._systems[path] = model
+        project = self._project_around(path.resolve())
+        if project is not None:
+            self._know(files_in(project.folder, PACKAGES))
+            if path.resolve() != project.folder / project.settings["base"]:
+                self._wholes[path] = compose(project.base, model)
 
-    def _read(self, paths: Iterable[Path], into: dict[Path, PackageSet] | dict[Path, RosSystem]) -> None:
-        for path in paths:
-            if path not in into:
+    def _project_around(self, path: Path) -> Project | None:
+        """Return the project that a model belongs to, by the folder that it is in or the one above."""
+        for folder in path.parents[:2]:
+            if (folder / FILE_NAME).is_file():
                 try:
-                    into[path] = read_all(path)  # type: ignore[assignment]
+                    return self._load(folder)
+                except ModelError:  # it is told where the project itself is checked
+                    return None
+        return None
+
+    def _load(self, folder: Path) -> Project:
+        from ros_model.project import load_project
+
+        if folder not in self._loaded:
+            self._loaded[folder] = load_project(folder)
+        return self._loaded[folder]
+
+    def _know(self, paths: Iterable[Path]) -> None:
+        """Read packages that references may lead to."""
+        for path in paths:
+            if path not in self._beside and path not in self._packages:
+                try:
+                    self._beside[path] = read_packages(path)
                 except ModelError as error:
                     self._refuse(error)
 
