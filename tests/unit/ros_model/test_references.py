@@ -354,6 +354,11 @@ def test_github_annotations_escape_what_is_special(check):
     )
 
 
+@pytest.mark.parametrize("form", ["text", "github"])
+def test_no_findings_are_no_lines(check, form):
+    assert check("--format", form, "--path", "ros", "ok.rossystem") == (0, "")
+
+
 def test_sarif(check):
     _, out = check("--format", "sarif", "--path", "ros", "bad.rossystem")
     log = json.loads(out)

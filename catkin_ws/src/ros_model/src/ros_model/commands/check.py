@@ -56,8 +56,8 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
     for file in files:
         checked.add(Path(file))
     findings = checked.findings()
-    if findings or form != "text":
-        click.echo(FORMATS[form](findings))
+    if text := FORMATS[form](findings):
+        click.echo(text)
     if checked.unreadable:
         return BAD_INPUT
     return int(any(finding.severity == ERROR for finding in findings))
