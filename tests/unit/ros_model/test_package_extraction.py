@@ -91,6 +91,21 @@ def test_compiled_executables_have_the_sources_of_the_libraries_they_link(tmp_pa
     ]
 
 
+def test_library_that_no_executable_links_is_told(tmp_path):
+    make_package(tmp_path, cmake="add_library(nodelets src/a.cpp)\n")
+    make_script(tmp_path / "src" / "a.cpp", "int x;\n", 0o644)
+    assert ["library nodelets is linked by no executable" in str(r) for r in read_package(tmp_path).remarks] == [True]
+
+
+def test_script_that_never_starts_its_node_is_named_as_its_file(tmp_path):
+    make_package(tmp_path)
+    make_script(tmp_path / "nodes" / "a", TALKER.replace('rospy.init_node("talker")', ""))
+    make_script(tmp_path / "nodes" / "b", "#!/usr/bin/env python3\n")
+    extracted = extract_package(tmp_path)
+    assert [(a.name, a.nodes[0].name) for a in extracted.package.artifacts] == [("a", "a")]
+    assert "Executables that start no ROS node: b." in extracted.model().header
+
+
 def test_paths_outside_the_package_are_refused(tmp_path):
     make_package(
         tmp_path / "demo",
@@ -160,7 +175,7 @@ def test_command_writes_a_model_that_reads_back_and_checks(tmp_path, capsys):
     ]
     assert "nodes/talker.py:7:1: service server: its type is not known" in written.header
     assert "artifact talker is the executable talker.py" in written.header
-    assert "1 nodes, 3 interfaces, 1 of them not fully known" in capsys.readouterr().out
+    assert "1 node, 3 interfaces, 1 not fully known" in capsys.readouterr().out
     assert run("check", tmp_path / "out" / "demo.ros") == 0
 
 

@@ -61,8 +61,9 @@ def _packages(path: Path, output: str) -> int:
             click.echo(f"rosmodel: {folder}/{remark}", err=True)
             status = max(status, _INCOMPLETE)
         written = write_package_set(extracted.model(), output, extracted.package.name)
-        nodes = [node for node in extracted.nodes.values() if node.name]
+        nodes = [node for node in extracted.nodes.values() if node.is_node]
         ports = [port for node in nodes for port in node.ports]
         unknown = sum(not port.is_resolved or not port.type for port in ports)
-        click.echo(f"wrote {written}: {len(nodes)} nodes, {len(ports)} interfaces, {unknown} of them not fully known")
+        counts = f"{len(nodes)} node{'s' * (len(nodes) != 1)}, {len(ports)} interface{'s' * (len(ports) != 1)}"
+        click.echo(f"wrote {written}: {counts}, {unknown} not fully known")
     return status

@@ -142,6 +142,11 @@ class _Executables:
             output = self._outputs.get(name, name)
             every = tuple(dict.fromkeys([*sources, *linked]))
             self.executables[output] = Executable(output, every, False, Position(_CMAKE, line, 1))
+        used = {library for name in self._compiled for library in self._reachable(name)}
+        for library in sorted(self._libraries.keys() - used):
+            if self._libraries[library]:
+                text = f"the library {library} is linked by no executable here, and not looked at (a nodelet, perhaps)"
+                self.remarks.append(Remark(Position(_CMAKE, 1, 1), text))
         for script in _scripts(self._folder):
             relative = str(script.relative_to(self._folder))
             self.executables.setdefault(script.name, Executable(script.name, (script,), True, Position(relative, 1, 1)))

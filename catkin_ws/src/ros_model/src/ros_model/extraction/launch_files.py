@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -57,7 +58,7 @@ def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
         source = sources.node(node, tree)
         reference = Reference(node.package, executable_name(node.type), executable_name(split_name(node.name)[1]))
         instance = Instance(node.name, *label_of(node.name, names), reference)
-        if source is None or not source.name:
+        if source is None or not source.is_node:
             lines.append(f"The interfaces of {node.name} are not known: {sources.problem(node)}.")
         else:
             instance.reference = Reference(node.package, executable_name(node.type), named(source, node.type).name)
@@ -73,7 +74,8 @@ def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
         f"The system that {path.name}{given} starts. Written by rosmodel extract.",
         "A name with braces is not known from the source: in braces stands the expression, after the @ its place.",
     ]
-    return assemble(path.name.partition(".")[0], instances, unowned, [*title, *dict.fromkeys(lines)])
+    name = re.sub(r"[^A-Za-z0-9_-]", "_", path.name.partition(".")[0]) or "launch"
+    return assemble(name, instances, unowned, [*title, *dict.fromkeys(lines)])
 
 
 def load(path: Path, arguments: Sequence[str]) -> tuple[list[LaunchedNode], dict[str, Any]]:

@@ -39,9 +39,9 @@ class ExtractedPackage:
         renamed = [
             f"The artifact {executable_name(name)} is the executable {name}: a reference can't hold the dot."
             for name, node in self.nodes.items()
-            if node.name and executable_name(name) != name
+            if node.is_node and executable_name(name) != name
         ]
-        no_nodes = [name for name, node in self.nodes.items() if not node.name]
+        no_nodes = [name for name, node in self.nodes.items() if not node.is_node]
         lines = [f"The package {self.package.name}, from its source. Written by rosmodel extract.", *_LEGEND, *renamed]
         if no_nodes:
             lines.append(f"Executables that start no ROS node: {', '.join(no_nodes)}.")
@@ -75,7 +75,7 @@ def extract_package(folder: Path) -> ExtractedPackage:
     artifacts = tuple(
         Artifact(executable_name(name), (named(node, name).declared(),), position=node.position)
         for name, node in nodes.items()
-        if node.name
+        if node.is_node
     )
     model = Package(
         package.name,
@@ -91,7 +91,7 @@ def extract_package(folder: Path) -> ExtractedPackage:
 def read_executable(
     package: CatkinPackage, executable: Executable, library: Library, parameters: Parameters | None = None
 ) -> NodeSource:
-    """Return what an executable's source makes of a node; its name is "" where it starts none.
+    """Return what an executable's source makes of a node; it `is_node` where it is one.
 
     Raises:
         SourceError: it can't be read.

@@ -69,13 +69,18 @@ class FoundParameter:
 
 @dataclass(frozen=True)
 class NodeSource:
-    """What the code of one executable makes of it. `name` is "" where it starts no node."""
+    """What the code of one executable makes of it. `name` is "" where it calls nothing that starts a node."""
 
     name: str
     ports: tuple[FoundPort, ...] = ()
     parameters: tuple[FoundParameter, ...] = ()
     remarks: tuple[Remark, ...] = ()
     position: Position = field(default=Position())
+
+    @property
+    def is_node(self) -> bool:
+        """Whether it is a ROS node: it is started as one, or has interfaces."""
+        return bool(self.name or self.ports)
 
     def declared(self) -> Node:
         """Return the node of the metamodel: each interface and parameter once."""
