@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
 """The reasoner's services, approval, dry run, explanations and journal; bad input does not stop it."""
 
-import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
+from functools import partial
 from pathlib import Path
 
+import rosbag
 import rospy
 import rostest
-from metacontrol_msgs.msg import ExpectedQA
+from metacontrol_msgs.msg import Decision, ExpectedQA, ReasonerJournal
 from metacontrol_msgs.srv import (
     AddObjective,
     ApproveDecision,
@@ -20,12 +22,50 @@ from metacontrol_msgs.srv import (
     SetNfr,
 )
 from mros1_reasoner.knowledge_base import KnowledgeBase
-from reasoner_harness import DEADLINE_S, MODEL, NODE, Diagnostics, Manipulator, Reasoner, node_api, status, wait_for
+from reasoner_harness import DEADLINE_S, MODEL, NODE, Diagnostics, Manipulator, Reasoner, status, wait_for
 from rosgraph_msgs.msg import Log
-from roslib.packages import find_node
 from std_srvs.srv import Trigger
 
 PACKAGE = "metacontrol_tests"
+
+
+class Recorder:
+    """Writes a reasoner's decisions and journal into a bag, as `rosbag record` does, and knows what it has."""
+
+    def __init__(self, path, namespace):
+        self._bag = rosbag.Bag(str(path), "w")
+        self._lock = threading.Lock()
+        self._decisions, self._results = set(), set()
+        self._subscribers = [
+            rospy.Subscriber(f"{namespace}/mros1_reasoner/{name}", kind, partial(self._take, name))
+            for name, kind in (("decision", Decision), ("journal", ReasonerJournal))
+        ]
+        self._namespace = namespace
+
+    def __enter__(self):
+        wait_for(lambda: all(s.get_num_connections() for s in self._subscribers), "the recorder is connected")
+        return self
+
+    def __exit__(self, *_):
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        with self._lock:
+            self._bag.close()
+            self._bag = None
+
+    def holds(self, decision_id):
+        """Tell whether it has the whole of a decision."""
+        return decision_id in self._decisions and decision_id in self._results
+
+    def _take(self, name, message):
+        with self._lock:
+            if self._bag is None:
+                return
+            self._bag.write(f"{self._namespace}/mros1_reasoner/{name}", message, rospy.Time.now())
+            if name == "decision" and message.state == "EXECUTED":
+                self._decisions.add(message.id)
+            elif name == "journal":
+                self._results |= {item.values[0] for item in message.entries if item.kind == "result"}
 
 
 class OperatorTest(unittest.TestCase):
@@ -191,37 +231,26 @@ class OperatorTest(unittest.TestCase):
 
     def test_recorded_bag_explains_and_replays_what_was_decided(self):
         with tempfile.TemporaryDirectory() as folder:
-            bag = Path(folder) / "run.bag"
+            path = Path(folder) / "run.bag"
             manipulator, reasoner = self.system("/bag")
             with reasoner:
                 self.diagnostics.component("laser", "FALSE")  # before it is recorded
                 reasoner.listener.decided("EXECUTED")
-                topics = ["/bag/mros1_reasoner/decision", "/bag/mros1_reasoner/journal"]
-                (record,) = find_node("rosbag", "record")[:1]
-                recorder = subprocess.Popen([record, "-O", str(bag), *topics], stdout=subprocess.DEVNULL)
-                try:
-                    wait_for(lambda: self.records(reasoner, topics), "the recorder is connected")
+                with Recorder(path, "/bag") as recorder:
                     manipulator.result = 0
                     self.diagnostics.component("laser", "TRUE")
                     self.diagnostics.component("camera", "FALSE")
                     reasoner.listener.decided("FAILED")
                     manipulator.result = 1
-                    reasoner.listener.decided("EXECUTED", 2)
-                    self.assertIn("EXECUTED", self.command("explain", "--topic", topics[0]))
-                finally:
-                    recorder.send_signal(signal.SIGINT)
-                    recorder.wait(DEADLINE_S)
+                    last = reasoner.listener.decided("EXECUTED", 2)
+                    wait_for(lambda: recorder.holds(last.id), "the end of the story in the bag")
+                shown = self.command("explain", "--topic", "/bag/mros1_reasoner/decision", "--wait", str(DEADLINE_S))
+                self.assertIn(last.id, shown)
             count = len({decision.id for decision in reasoner.listener.decisions})
-            self.assertIn("requires camera, which does not work", self.command("explain", str(bag)))
-            output = self.command("replay", str(bag))
+            self.assertIn("requires camera, which does not work", self.command("explain", str(path)))
+            output = self.command("replay", str(path))
             self.assertEqual(output.count("the same"), count - 1, output)  # the first one was before
             self.assertNotIn("differs", output)
-
-    @staticmethod
-    def records(reasoner, topics):
-        """Tell whether a recorder is connected to the topics of a reasoner."""
-        connections = node_api(reasoner.node).getBusInfo("/test")[2]
-        return {c[4] for c in connections if "record" in c[1]} >= set(topics)
 
     def command(self, name, *arguments):
         done = subprocess.run(
