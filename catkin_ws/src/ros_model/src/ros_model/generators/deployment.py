@@ -85,4 +85,5 @@ def monitor(project: Project) -> dict[str, Any]:
         "variants": f"package://{project.package}/models/variants",
         "components": settings["components"],
         "observers": [entry["name"] if isinstance(entry, dict) else entry for entry in settings["observers"]],
+        **({"topics": settings["topics"]} if "topics" in settings else {}),
     }

@@ -1,0 +1,23 @@
+"""What metacontrol.yaml may say of components and topics, and what the monitor takes, are the same."""
+
+from ros_model.schema_check import load_schema, part_of, violations
+from rosgraph_monitor.components import parse_mapping
+from rosgraph_monitor.health import parse_topics
+
+SETTINGS = {
+    "components": {
+        "laser_resender": {"node": "front_laser", "topic": "front/scan", "min_rate": 5, "stuck_after": 50},
+        "camera": {"topic": "camera/depth/points", "max_age": 1.0},
+        "battery": {"topic": "battery_state", "below": 0.2, "above": 0.3},
+    },
+    "topics": {"odom": {"type": "nav_msgs/Odometry", "max_age": 0.5, "component": "base", "wall_time": True}},
+}
+
+
+def test_settings_pass_the_schema_and_the_monitor():
+    schema = part_of(load_schema("metacontrol"), "components", "topics")
+    assert [str(violation) for violation in violations(SETTINGS, schema)] == []
+    components = parse_mapping(SETTINGS["components"])
+    assert set(components.topics) == {"front/scan", "camera/depth/points"}
+    assert components.batteries[0].component == "battery"
+    assert parse_topics(SETTINGS["topics"])["odom"].max_age == 0.5
