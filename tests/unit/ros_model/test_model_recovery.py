@@ -1,5 +1,7 @@
 """Several errors of a file are told at once, and an error tells no consequences of another."""
 
+import re
+
 import pytest
 from ros_model.errors import ModelError
 from ros_model.packages_reader import parse_packages
@@ -58,6 +60,26 @@ def damaged(*changes):
 )  # fmt: skip
 def test_each_error_is_told_once_in_the_order_of_the_file(changes, lines):
     assert lines_of(damaged(*changes)) == lines
+
+
+@pytest.mark.parametrize("instead", ["Xyz", "", "Xyz Xyz"])
+def test_one_damaged_word_is_one_error(instead):
+    words = list(re.finditer(r"'[^']*'|[^\s{}(),']+", SYSTEM))
+    told = []
+    for word in words:
+        text = SYSTEM[: word.start()] + instead + SYSTEM[word.end() :]
+        try:
+            parse_system(text, "m")
+        except ModelError as error:
+            told.append(len(error.all))
+    assert len(told) > len(words) / 3
+    assert told.count(1) >= 0.95 * len(told)
+
+
+@pytest.mark.parametrize(("word", "parse"), [("RosSystem", parse_system), ("PackageSet", parse_packages)])
+def test_wrong_first_word_is_one_error(word, parse):
+    assert lines_of("Xyz { Name x }", parse) == [1]
+    assert lines_of(f"{word} {{\n Xyz a }} }}", parse) == [2]
 
 
 def test_only_the_first_error_is_told_where_brackets_do_not_match():

@@ -57,7 +57,7 @@ class Recovery:
         index = self._index(offset)
         if self._removed and self.is_consequence(offset):
             removed = self._grown(*self._removed)
-        elif index < len(self._tokens or ()):
+        elif self._is_inside(index):
             removed = self._rest(index, expected)
         else:
             return None
@@ -102,6 +102,11 @@ class Recovery:
                 high = middle
         return low
 
+    def _is_inside(self, index: int) -> bool:
+        """Whether a token is within the first bracket of the text: outside of it, nothing can be left out."""
+        first = next((number for number, token in enumerate(self._tokens or ()) if token.text in _CLOSED_BY), None)
+        return first is not None and first < index < self._partners[first]
+
     def _rest(self, index: int, expected: Set[str]) -> tuple[int, int] | None:
         """Return the range from a token to the end of its statement."""
         tokens = self._tokens or []
@@ -127,13 +132,18 @@ class Recovery:
         tokens = self._tokens or []
         head = self._head(start)
         if head < start:
-            return head, end
+            return head, self._with_comma(end)
         opening = head - 1
         while opening >= 0 and tokens[opening].text not in _CLOSED_BY:
             opening = self._partners.get(opening, opening) - 1
         if opening <= 0 or self._head(opening) == 0:
             return None
-        return self._head(opening), self._partners[opening] + 1
+        return self._head(opening), self._with_comma(self._partners[opening] + 1)
+
+    def _with_comma(self, end: int) -> int:
+        """Return the end of a range of whole statements, the comma after them included."""
+        tokens = self._tokens or []
+        return end + (end < len(tokens) and tokens[end].text == ",")
 
     def _head(self, index: int) -> int:
         """Return where the statement of a token begins: after the mark before it, be it a bracket or a comma."""

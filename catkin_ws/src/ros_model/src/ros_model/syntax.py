@@ -128,8 +128,7 @@ class Language:
                 errors += [*self._builder.errors, error]
                 return None
             else:
-                missing = [] if errors else self._builder.missing  # it may be in what was left out
-                errors += [*self._builder.errors, *missing]
+                errors += [*self._builder.errors, *(() if errors else self._builder.doubtful)]
                 return model
 
     def _syntax_error(self, error: UnexpectedInput, offset: int, text: str, file: str) -> ModelError:
@@ -171,7 +170,7 @@ class Builder(Transformer):
     def __init__(self) -> None:
         super().__init__()
         self.errors: list[ModelError] = []
-        self.missing: list[ModelError] = []
+        self.doubtful: list[ModelError] = []  # that may come from what was left out
         self._file = ""
         self.header = ""
         self._depth = 0
@@ -179,8 +178,7 @@ class Builder(Transformer):
     def begin(self, file: str, header: str) -> None:
         """Get ready for the next file."""
         self._file, self.header, self._depth = file, header, 0
-        self.errors = []
-        self.missing = []
+        self.errors, self.doubtful = [], []
 
     # Fields
 
@@ -259,7 +257,7 @@ class Builder(Transformer):
         if not members:
             return _Value([self.plain(entry) for entry in entries])
         if len(members) < len(entries):
-            self.refuse("members of a struct and values of a list are mixed here", opening)
+            self._doubt("members of a struct and values of a list are mixed here", opening)
         return _Value(self._struct(members))
 
     def member(self, items: list[Any]) -> _Member:
@@ -286,6 +284,11 @@ class Builder(Transformer):
         if len(self.errors) < MAX_ERRORS:
             self.errors.append(ModelError(message, self.at(token)))
 
+    def _doubt(self, message: str, token: Token) -> None:
+        """Note an error that is none where something was left out."""
+        if len(self.doubtful) < MAX_ERRORS:
+            self.doubtful.append(ModelError(message, self.at(token)))
+
     def fields(
         self, fields: Iterable[Field], keyword: Token, *, needs_name: bool = False, name: str | None = None
     ) -> dict[str, Any]:
@@ -306,7 +309,7 @@ class Builder(Transformer):
             else:
                 self.refuse(f"second '{token}' in this {keyword}: keep one", token)
         if needs_name and "name" not in found:
-            self.missing.append(ModelError(f"this {keyword} has no name: add one", self.at(keyword)))
+            self._doubt(f"this {keyword} has no name: add one", keyword)
             found["name"] = ""
         return found
 
