@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 DEADLINE = 40.0
 NODES = Path(__file__).with_name("nodes.py")
+NAIVE = "one call per node, service and parameter"
 NODE = "import rospy, sys; rospy.init_node(sys.argv[1], disable_rosout=True); rospy.spin()"
 
 
@@ -102,6 +103,19 @@ class Stand:
     def _registered(self, topic: str) -> bool:
         state = self.proxy.getSystemState("/bench")[2]
         return any(topic == name for part in state[:2] for name, _ in part)
+
+
+def naive_snapshot(uri: str) -> int:
+    """Take the graph the way that tools which ask one thing at a time do; return the number of answers."""
+    caller, proxy = "/bench", xmlrpc.client.ServerProxy(uri)
+    state: Any = proxy.getSystemState(caller)
+    names = {node for part in state[2] for _, nodes in part for node in nodes}
+    answers = [proxy.lookupNode(caller, name) for name in names]
+    answers += [proxy.lookupService(caller, name) for name, _ in state[2][2]]
+    answers.append(proxy.getTopicTypes(caller))
+    parameters: Any = proxy.getParamNames(caller)
+    answers += [proxy.getParam(caller, name) for name in parameters[2]]
+    return len(answers)
 
 
 @contextlib.contextmanager
