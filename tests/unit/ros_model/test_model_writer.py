@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ros_model.errors import ModelError
 from ros_model.metamodel import (
@@ -79,7 +79,7 @@ SYSTEM = st.builds(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(SYSTEM)
 def test_what_is_written_reads_back_equal(system):
     text = write_system(system)

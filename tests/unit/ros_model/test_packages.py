@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ros_model.errors import ModelError
 from ros_model.metamodel import ParameterType, PortKind
@@ -358,7 +358,7 @@ PACKAGE = st.builds(
 PACKAGES = st.builds(PackageSet, st.lists(PACKAGE, max_size=2).map(tuple))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(PACKAGES)
 def test_what_is_written_reads_back_equal(packages):
     text = write_packages(packages)
@@ -367,7 +367,7 @@ def test_what_is_written_reads_back_equal(packages):
     assert write_packages(again) == text
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.sampled_from([NEW, OLD]),
     st.integers(0, len(OLD)),
