@@ -5,10 +5,13 @@ from ros_model.metamodel import RosSystem, SystemParameter
 from rosgraph_monitor.health import TopicHealth, TopicSpec, merged, model_topics, parse_topics, verdict_statuses
 from rosgraph_monitor.status import Level
 
+BEGIN = 1e-9
+"""s. A time of 0 means that the clock has not begun."""
+
 
 def health(grace=5.0, **limits):
     followed = TopicHealth(grace)
-    followed.follow({"scan": TopicSpec("scan", **limits)}, 0.0, 0.0)
+    followed.follow({"scan": TopicSpec("scan", **limits)}, BEGIN, BEGIN)
     return followed
 
 
@@ -81,7 +84,7 @@ def test_excused_topic_is_fine_and_begins_anew():
 def test_time_is_ros_time_unless_wall_time_is_asked_for():
     followed = TopicHealth(5.0)
     specs = {"clock": TopicSpec("clock", max_age=1.0, wall_time=True), "scan": TopicSpec("scan", max_age=1.0)}
-    followed.follow(specs, 0.0, 0.0)
+    followed.follow(specs, BEGIN, BEGIN)
     followed.arrived("clock", 1.0, 1.0)
     followed.arrived("scan", 1.0, 1.0)
     messages = {v.spec.name: v.message for v in followed.judge(ros=1.5, wall=9.0)}
@@ -91,8 +94,19 @@ def test_time_is_ros_time_unless_wall_time_is_asked_for():
 def test_jump_of_time_begins_anew():
     followed = health(max_age=1.0)
     followed.arrived("scan", 100.0, 100.0)
-    followed.reset(2.0)
+    assert said(followed, 100.5) == [""]
+    assert said(followed, 2.0) == [""]
     assert said(followed, 3.0) == [""]
+    followed.arrived("scan", 3.0, 3.0)
+    assert said(followed, 4.5) == ["Silent topic"]
+
+
+def test_grace_begins_with_the_clock():
+    followed = TopicHealth(5.0)
+    followed.follow({"scan": TopicSpec("scan", max_age=1.0)}, 0.0, 0.0)
+    assert said(followed, 0.0) == [""]
+    assert said(followed, 1000.0) == [""]
+    assert said(followed, 1005.1) == ["Silent topic"]
 
 
 def test_followed_topics_keep_their_history_and_others_are_forgotten():

@@ -19,6 +19,8 @@ DEFAULT_MAX_AGE = 2.0
 _SHORTEST_WINDOW = 2.0
 _PERIODS_IN_WINDOW = 5.0
 """The rate is measured over so many periods of the expected rate, but at least 2 s: jitter evens out."""
+_JUMP = 1.0
+"""s of ROS time backwards that count as a jump: a restarted simulation, a bag played again."""
 _LIMITS = ("min_rate", "max_age", "stuck_after")
 
 
@@ -155,6 +157,7 @@ class TopicHealth:
         self._grace = grace
         self._specs: dict[str, TopicSpec] = {}
         self._seen: dict[str, _Seen] = {}
+        self._last_ros = 0.0
 
     def follow(self, specs: Mapping[str, TopicSpec], ros: float, wall: float) -> None:
         """Follow these topics from now on, and forget others. Times in s."""
@@ -175,17 +178,18 @@ class TopicHealth:
         if spec.min_rate:
             seen.arrivals.append(now)
 
-    def reset(self, ros: float) -> None:
-        """Begin anew: ROS time has jumped."""
-        for name, spec in self._specs.items():
-            if not spec.wall_time:
-                self._seen[name] = _Seen(ros)
-
     def judge(self, ros: float, wall: float, excused: Collection[str] = ()) -> list[Verdict]:
-        """Return a verdict on each topic; an excused one is fine, and begins anew when the excuse ends."""
+        """Return a verdict on each topic; an excused one is fine, and begins anew when the excuse ends.
+
+        All begin anew when ROS time has jumped back, or has begun: it is 0 until a simulation's first clock.
+        """
+        jumped = ros < self._last_ros - _JUMP
+        self._last_ros = ros
         verdicts = []
         for name, spec in self._specs.items():
             now = wall if spec.wall_time else ros
+            if not spec.wall_time and (jumped or self._seen[name].since <= 0.0):
+                self._seen[name] = _Seen(now)
             if name in excused:
                 self._seen[name] = _Seen(now)
                 verdicts.append(Verdict(spec, heard=False))

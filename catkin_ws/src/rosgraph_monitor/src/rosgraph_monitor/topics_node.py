@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from rosgraph_monitor.health import TopicSpec
 
 _LARGEST_MESSAGE = 1 << 24
-_JUMP = 1.0
-"""s of ROS time backwards that count as a jump: a restarted simulation, a bag played again."""
 _SEQ_AND_STAMP = 12
 """Bytes of a serialised Header before its frame."""
 
@@ -38,7 +36,6 @@ class TopicListener:
         self._hashed: frozenset[str] = frozenset()
         self._has_header: dict[str, bool] = {}
         self._lock = threading.Lock()
-        self._last_ros = 0.0
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -60,12 +57,8 @@ class TopicListener:
 
     def judge(self, excused: Collection[str] = ()) -> list[Verdict]:
         """Return a verdict on each topic."""
-        ros = rospy.get_time()
         with self._lock:
-            if ros < self._last_ros - _JUMP:
-                self._health.reset(ros)
-            self._last_ros = ros
-            return self._health.judge(ros, time.monotonic(), excused)
+            return self._health.judge(rospy.get_time(), time.monotonic(), excused)
 
     def _receive(self, msg: Any, topic: str) -> None:
         digest = self._digest(msg) if topic in self._hashed else None
