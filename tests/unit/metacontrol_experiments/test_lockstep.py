@@ -11,6 +11,7 @@ from metacontrol_experiments import cli
 from metacontrol_experiments.contingency import parse_contingency
 from metacontrol_experiments.lockstep import Lockstep, LockstepError, navigation_parameters
 from metacontrol_experiments.lockstep_frames import KEPT_S, Frames
+from metacontrol_experiments.lockstep_manager import RESTART
 from metacontrol_experiments.metrics import summarise
 from metacontrol_experiments.mission import Outcome
 from metacontrol_experiments.routes import Pose, Route
@@ -20,11 +21,12 @@ from metacontrol_sim.robot import Robot
 
 PACKAGE = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim"
 WAY = Route("short", Pose(-8.0, -8.0, 0.78), Pose(-5.0, -5.6, 0.0))
+FAR = Route("far", Pose(-8.0, -8.0, 0.78), Pose(5.4, 6.0, 0.0))
 
 
 def settings(tmp_path, *texts, **changes):
     usual = {"metacontrol": False, "contingencies": tuple(map(parse_contingency, texts)), "timeout_s": 60.0}
-    return Settings(WAY, tmp_path, **(usual | changes))
+    return Settings(**({"route": WAY, "output": tmp_path} | usual | changes))
 
 
 def test_frames_answer_as_tf_does():
@@ -82,6 +84,33 @@ def test_baseline_stands_still_when_its_laser_dies(tmp_path):
     assert np.ptp(late, axis=0).max() < 0.01
 
 
+def test_meta_controller_goes_on_with_the_camera_and_repeats_byte_for_byte(tmp_path):
+    asked = settings(tmp_path, "kill:front_laser@time:2", metacontrol=True)
+    one = Lockstep(asked, PACKAGE).run()
+    assert one.state.outcome is Outcome.REACHED
+    summary = summarise(one.record)
+    (change,) = [entry for entry in summary["reconfigurations"] if entry["trigger"] == "component:front_laser"]
+    assert change["to"].endswith("_k") and summary["final_configuration"].endswith("_k")
+    assert 0.0 < change["detect_s"] < 1.0 and 0.0 <= change["decide_s"] < 1.0 and 0.5 < change["execute_s"] < 5.0
+    assert one.log == Lockstep(asked, PACKAGE).run().log
+
+
+def test_energy_over_its_limit_is_answered_without_a_stop(tmp_path):
+    changes = {"route": FAR, "initial_configuration": "f3_v3_r1", "timeout_s": 12.0}
+    asked = settings(tmp_path, "power:2.5@time:1", metacontrol=True, **changes)
+    record = Lockstep(asked, PACKAGE).run().record
+    change = next(entry for entry in summarise(record)["reconfigurations"] if entry["trigger"] == "qa:energy")
+    assert change["execute_s"] < 1.0
+    began = record.start_stamp + change["stamp_s"]
+    during = record.poses[(record.poses[:, 0] > began) & (record.poses[:, 0] < began + 1.0), 1:]
+    assert np.hypot(*(during[-1] - during[0])) > 0.1
+
+
+def test_delays_have_their_median():
+    rng = np.random.default_rng(1)
+    assert np.median([RESTART.draw(rng) for _ in range(4000)]) == pytest.approx(RESTART.median, rel=0.03)
+
+
 def test_frozen_laser_that_thaws_is_waited_for(tmp_path):
     outcome = Lockstep(settings(tmp_path, "freeze:front_laser@time:2", "thaw:front_laser@time:6"), PACKAGE).run()
     assert outcome.state.outcome is Outcome.REACHED
@@ -95,7 +124,6 @@ def test_camera_variant_drives(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"metacontrol": True}, "does not run in lockstep yet; add --no-metacontrol"),
         ({"contingencies": (parse_contingency("kill:battery_load_control"),)}, "in lockstep there are only"),
         ({"route": Route("bad", Pose(-10.0, 0.0), Pose(0.0, 0.0))}, "puts the robot into"),
     ],
@@ -112,5 +140,5 @@ def test_command_leaves_log_summary_and_figure(tmp_path):
     result = CliRunner().invoke(cli.metacontrol, [*arguments, *files])
     assert result.exit_code == 0, result.output
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"mission.log", "summary.json", "mission.png"}
-    refused = CliRunner().invoke(cli.metacontrol, ["run", "--engine", "lockstep", *files, "--route", "short"])
-    assert refused.exit_code == 2 and "add --no-metacontrol" in refused.output
+    refused = CliRunner().invoke(cli.metacontrol, [*arguments, *files, "--contingency", "kill:simulator"])
+    assert refused.exit_code == 2 and "in lockstep there are only" in refused.output

@@ -36,6 +36,7 @@ from metacontrol_experiments.timeline import Timeline
 if TYPE_CHECKING:
     from metacontrol_experiments.mission import State
     from metacontrol_experiments.record import MissionRecord
+    from metacontrol_experiments.timeline import Report
 
 SUMMARY_NAME = "summary.json"
 FIGURE_NAME = "mission.png"
@@ -65,7 +66,7 @@ class _Number(click.FloatRange):
     type=click.Choice(["ros", "lockstep"]),
     default="ros",
     show_default=True,
-    help="lockstep: in one process without ROS, as fast as it can, the same bytes for a seed; the baseline only.",
+    help="lockstep: in one process without ROS, as fast as it can, the same bytes for a seed.",
 )
 @click.option("--no-metacontrol", is_flag=True, help="The baseline: everything but the reasoner.")
 @click.option("--seed", default=1, show_default=True, help="Of everything random in the simulation.")
@@ -241,10 +242,13 @@ def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionR
     (settings.output / LOG_NAME).write_text(outcome.log, encoding="utf-8")
     told = Timeline(settings.thresholds)
     display.start(outcome.state.started_s)
-    for event in outcome.record.events:
-        for entry in told.tell(event):
+    record = outcome.record
+    reports: list[Report] = [*record.events, *record.components, *record.configurations]
+    reports += [*record.decisions, *record.observed]
+    for report in sorted(reports, key=lambda report: report.stamp):
+        for entry in told.tell(report):
             display.entry(entry)
-    return outcome.state, lockstep.with_wall_time(outcome.record, time.monotonic() - began)
+    return outcome.state, lockstep.with_wall_time(record, time.monotonic() - began)
 
 
 def _contingencies(options: dict[str, Any], components: dict[str, str]) -> tuple[Contingency, ...]:

@@ -1,7 +1,7 @@
-"""Lockstep: simulation, sensor drivers, navigation and mission stepped together in one process, without ROS.
+"""Lockstep: simulation, drivers, navigation, observers, reasoner and mission stepped together in one process, no ROS.
 
-Deterministic: the same settings give the same log, byte for byte. The meta-controller is not in it yet, so it runs the
-baseline. What differs from ROS: messages take no time, and nothing ever waits for a processor.
+Deterministic: the same settings give the same log, byte for byte. What differs from ROS: messages take no time, nothing
+ever waits for a processor, and detection and reconfiguration take times drawn at random (`lockstep_manager`).
 """
 
 from __future__ import annotations
@@ -46,8 +46,18 @@ from ros_model.reader import read_system
 from metacontrol_experiments import mission
 from metacontrol_experiments.contingency import Kind
 from metacontrol_experiments.lockstep_frames import Frames
+from metacontrol_experiments.lockstep_manager import Manager, ManagerError
 from metacontrol_experiments.mission import GoalStatus, Strike
-from metacontrol_experiments.record import ConfigurationReport, Event, GoalReport, MissionRecord, OccupancyMap
+from metacontrol_experiments.record import (
+    ComponentReport,
+    ConfigurationReport,
+    DecisionReport,
+    Event,
+    GoalReport,
+    MissionRecord,
+    OccupancyMap,
+    QualityReport,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -89,6 +99,8 @@ class Outcome:
 class Drivers:
     """The front laser's and the camera's driver; one that does not run is silent."""
 
+    TOPICS = ("front/scan", "camera/depth/points")
+
     def __init__(self, simulation: Simulation, seed: int) -> None:
         """Start both, with the random numbers that the nodes have."""
         self._simulation = simulation
@@ -99,13 +111,9 @@ class Drivers:
         self.silent: dict[str, Kind] = {}  # component -> what made it so
 
     def message(self, topic: str, stamp: Any) -> Any | None:
-        """Return a driver's message, a ROS one so that navigation takes it as it does on ROS; None where it is silent.
-
-        Raises:
-            LockstepError: no driver publishes the topic.
-        """
+        """Return a driver's message, a ROS one so that navigation takes it as on ROS; None where it is silent."""
         robot = self._simulation.robot
-        if topic.strip("/") == "front/scan":
+        if topic == "front/scan":
             if "front_laser" in self.silent:
                 return None
             laser = robot.front_laser
@@ -130,8 +138,6 @@ class Lockstep:
         Raises:
             LockstepError: something of it is not there in lockstep, or cannot be used.
         """
-        if settings.metacontrol:
-            raise LockstepError("the meta-controller does not run in lockstep yet; add --no-metacontrol")
         package = simulation_package or Path(rospkg.RosPack().get_path("metacontrol_sim"))
         self._settings = settings
         self._plan = settings.plan
@@ -147,14 +153,17 @@ class Lockstep:
             raise LockstepError(str(error)) from error
         self._frames = Frames(self._simulation.robot)
         self._drivers = Drivers(self._simulation, settings.seed)
+        self._package = package
         self._parameters = navigation_parameters(package, settings.initial_configuration)
-        self._navigator = Navigator(self._parameters)
-        map_message = occupancy_grid(self._grid, _stamp(0.0))
-        info = map_message.info
-        origin = (self._grid.origin_x, self._grid.origin_y, self._grid.origin_yaw)
-        self._navigator.set_map(
-            StaticMap.create(map_message.data, info.width, info.height, info.resolution, origin), "map"
-        )
+        self._navigator: Navigator | None = self._new_navigator()
+        self._manager = None
+        if settings.metacontrol:
+            robot, configuration = self._simulation.robot, settings.initial_configuration
+            try:
+                self._manager = Manager(package, robot, configuration, settings.thresholds, settings.seed)
+            except ManagerError as error:
+                self._simulation.close()
+                raise LockstepError(str(error)) from error
         self._steps = 0
         self._next_tick = 0.0
         self._state: State | None = None
@@ -177,6 +186,11 @@ class Lockstep:
             self._end()
         finally:
             self._simulation.close()
+            if self._manager is not None:
+                self._manager.close()
+        if self._manager is not None:
+            self._memory.decisions, self._memory.observed = self._manager.decisions, self._manager.observed
+            self._memory.components = self._manager.components
         return Outcome(self._mission, self._memory.record(self._map()), "\n".join(self._memory.lines) + "\n")
 
     @property
@@ -197,8 +211,7 @@ class Lockstep:
         self._memory.event(Event(now, "MISSION_START", self._settings.route.name, told))
         for name, values in struck:
             self._memory.event(Event(now, "PERTURBATION", name, {"share": "0.0000"} | values))
-        goal = self._settings.route.goal
-        self._navigator.set_goal(geometry.Pose(goal.x, goal.y, goal.yaw), now)
+        self._set_goal(now)
         self._memory.goals.append(GoalReport(now, _GOAL_ID))
         self._memory.configurations.append(
             ConfigurationReport(now, "f_navigate", self._settings.initial_configuration, "STABLE")
@@ -223,18 +236,67 @@ class Lockstep:
         if now >= self._next_tick - 1e-9:
             self._next_tick = max(self._next_tick, now - STEP) + 1.0 / self._parameters.controller_frequency
             self._navigate(now)
+        self._manage(now)
         self._memory.sample(simulation, self._steps, started=self._state is not None)
         if self._state is not None:
             self._follow(now)
 
     def _sense(self, now: float) -> None:
-        for source in self._navigator.sources:
-            message = self._drivers.message(source.topic, _stamp(now))
-            if message is not None:
-                convert = scan_observation if source.data_type == "LaserScan" else cloud_observation
-                self._navigator.observe(convert(message, source), now)
+        """Let the drivers measure that somebody listens to, and hand it on."""
+        sources = {source.topic: source for source in self._navigator.sources} if self._navigator else {}
+        heard = self._manager.wanted_topics if self._manager else set()
+        for topic in Drivers.TOPICS:
+            if topic not in sources and topic not in heard:
+                continue
+            message = self._drivers.message(topic, _stamp(now))
+            if message is None:
+                continue
+            if self._manager is not None:
+                self._manager.hear(topic, message, now)
+            if self._navigator is not None and topic in sources:
+                convert = scan_observation if sources[topic].data_type == "LaserScan" else cloud_observation
+                self._navigator.observe(convert(message, sources[topic]), now)
+
+    def _manage(self, now: float) -> None:
+        """Let the meta-controller do its part, and deploy what it has decided."""
+        if self._manager is None or self._state is None:
+            return
+        change = self._manager.step(now, self._steps, self._simulation, _stamp(now))
+        if change is None:
+            return
+        configuration, state = change
+        new = navigation_parameters(self._package, configuration)
+        restarts = _sources(new) != _sources(self._parameters)
+        self._memory.configurations.append(ConfigurationReport(now, self._manager.function, configuration, state))
+        self._memory.lines.append(f"{now:.2f} {configuration} {state}")
+        self._state, _ = mission.on_configuration(self._mission, now, state == "STABLE")
+        if state != "STABLE":
+            if restarts:
+                self._navigator = None  # its process is stopped first
+            return
+        self._parameters = new
+        if self._navigator is None:
+            self._navigator = self._new_navigator()
+            self._set_goal(now)
+        else:
+            self._navigator.reconfigure(new)
+
+    def _new_navigator(self) -> Navigator:
+        navigator = Navigator(self._parameters)
+        message = occupancy_grid(self._grid, _stamp(0.0))
+        info = message.info
+        origin = (self._grid.origin_x, self._grid.origin_y, self._grid.origin_yaw)
+        navigator.set_map(StaticMap.create(message.data, info.width, info.height, info.resolution, origin), "map")
+        return navigator
+
+    def _set_goal(self, now: float) -> None:
+        goal = self._settings.route.goal
+        if self._navigator is not None:
+            self._navigator.set_goal(geometry.Pose(goal.x, goal.y, goal.yaw), now)
 
     def _navigate(self, now: float) -> None:
+        if self._navigator is None:
+            return
         odometry = self._simulation.odometry
         velocity = geometry.Velocity(*odometry.velocity[:2], odometry.turn_rate)
         result = self._navigator.step(now, self._frames, velocity)
@@ -282,6 +344,8 @@ class Lockstep:
                 self._drivers.silent[contingency.target] = kind
             elif self._drivers.silent.get(contingency.target) is Kind.FREEZE:
                 del self._drivers.silent[contingency.target]
+            if self._manager is not None:
+                self._manager.component_changed(simulation.time, contingency.target, kind is Kind.THAW)
             return {"how": kind.value}
         if kind is Kind.POWER:
             simulation.set_consumption_factor(contingency.value)
@@ -321,6 +385,9 @@ class _Memory:
         self.goals: list[GoalReport] = []
         self.results: list[GoalReport] = []
         self.configurations: list[ConfigurationReport] = []
+        self.decisions: list[DecisionReport] = []
+        self.observed: list[QualityReport] = []
+        self.components: list[ComponentReport] = []
         self._events: list[Event] = []
         self._poses: list[tuple[float, float, float]] = []
         self._safety: list[tuple[float, float]] = []
@@ -356,6 +423,9 @@ class _Memory:
             true_quality={"safety": tuple(self._safety), "energy": tuple(self._energy)},
             contacts=tuple(self._contacts),
             configurations=tuple(self.configurations),
+            decisions=tuple(self.decisions),
+            observed=tuple(self.observed),
+            components=tuple(self.components),
             goals=tuple(self.goals),
             results=tuple(self.results),
             commands=tuple(self.commands),
@@ -402,6 +472,10 @@ def _values(component: Any) -> Iterator[tuple[str, Any]]:
     for parameter in component.parameters:
         if parameter.value is not None:
             yield parameter.key, parameter.value
+
+
+def _sources(parameters: MoveBaseParameters) -> tuple[str, ...]:
+    return tuple(source.topic for source in parameters.global_costmap.sources)
 
 
 def _check_target(contingency: Contingency) -> None:
