@@ -1,7 +1,7 @@
 """Simulated seconds per wall second of D2 in lockstep, one process: the whole mission on route r1, the baseline.
 
-Front laser 10 Hz x 361 rays, controller, planner and costmaps at the variant's rates; rear laser and camera unused. What
-the meta-controller analyses is done by another process and not counted: this is the baseline.
+Front laser 10 Hz x 361 rays, controller, planner and costmaps at the variant's rates; rear laser and camera unused. The
+baseline: what the meta-controller analyses would be done by another process.
 """
 
 from __future__ import annotations
