@@ -8,6 +8,7 @@ from rosgraph_monitor.liveness import (
     Liveness,
     Timing,
     due,
+    due_at,
     on_answer,
     on_broken,
     on_closed,
@@ -104,3 +105,16 @@ def test_lack_of_sockets_says_nothing_of_the_node():
     assert state.life is Life.ALIVE
     assert due(state, 0.4, TIMING)[1] is Action.NONE
     assert due(state, 0.5, TIMING)[1] is Action.CONNECT
+
+
+def test_nothing_is_due_before_its_time():
+    connecting, _ = due(Liveness(), 0.0, TIMING)
+    waiting = alive(1.0)
+    asked, _ = due(waiting, 2.0, TIMING)
+    for state in (connecting, waiting, asked):
+        at = due_at(state, TIMING)
+        assert due(state, at - 0.01, TIMING) == (state, Action.NONE)
+        assert due(state, at, TIMING) != (state, Action.NONE)
+    hung, _ = due(asked, 9.0, TIMING)
+    assert due(hung, 99.0, TIMING) == (hung, Action.NONE)
+    assert due_at(hung, TIMING) > 99.0

@@ -111,6 +111,18 @@ def test_node_that_ends_cleanly_has_its_own_words_and_one_that_died_keeps_its():
     assert ("front_laser", "Missing node", Life.DEAD.value) in said(cleaned_up)
 
 
+def test_what_changes_between_looks_is_found_though_the_graph_is_the_same():
+    watched = monitor()
+    for now, known in ((0.0, Life.ALIVE), (0.1, Life.DEAD), (0.2, Life.ALIVE)):
+        told = {message for _, message, _ in said(watched.evaluate(BOTH, ALIVE | lives(move_base=known), DESIRED, now))}
+        assert ("Missing node" in told) is (known is Life.DEAD)
+    other = Desired(RosSystem("other", components=(*SYSTEM.components, Component("camera"))))
+    watched.evaluate(BOTH, ALIVE, other, 0.3)
+    assert ("camera", "Missing node", "not registered with the master") in said(
+        watched.evaluate(BOTH, ALIVE, other, 9.0)
+    )
+
+
 def test_each_way_to_go_has_its_own_words():
     assert len({Life.DEAD.value, Life.HUNG.value, Life.UNREACHABLE.value, "ended", "not registered"}) == 5
 

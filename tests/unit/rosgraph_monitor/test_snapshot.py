@@ -187,6 +187,17 @@ def test_ten_thousand_parameters():
     assert graph.parameter("/group_99/parameter_99") == 99.0
 
 
+def test_snapshot_is_the_same_object_until_something_changes():
+    tree = {"speed": 1}
+    with master(**(answers([]) | {"getParam": lambda _caller, key: [1, "", tree]})) as uri:
+        client = MasterClient(uri)
+        first = client.snapshot()
+        assert client.snapshot() is first
+        tree["speed"] = True
+        assert client.snapshot().parameter("/speed") is True
+        client.close()
+
+
 def test_snapshot_compares_and_becomes_json(graph):
     assert graph == build_snapshot(STATE, TYPES, PARAMETERS, ADDRESSES)
     assert graph != build_snapshot(STATE, TYPES, {}, ADDRESSES)

@@ -122,6 +122,7 @@ class MasterClient:
         """
         self.uri = uri
         self._caller_id = caller_id
+        self._last: tuple[tuple[Any, ...], GraphSnapshot] | None = None
         try:
             self._proxy = xmlrpc.client.ServerProxy(uri, transport=TimedTransport(timeout))
         except (OSError, ValueError) as error:
@@ -132,7 +133,7 @@ class MasterClient:
         self._proxy("close")()
 
     def snapshot(self) -> GraphSnapshot:
-        """Take a snapshot in four calls.
+        """Take a snapshot in four calls. While nothing has changed, it is the same object as before.
 
         Raises:
             MasterGoneError: nobody listens at the master's address.
@@ -141,8 +142,11 @@ class MasterClient:
         state = self._call("getSystemState")
         types = self._call("getTopicTypes")
         parameters = self._call("getParam", "/")
-        names = _node_names(state, self.uri)
-        return build_snapshot(state, _topic_types(types, self.uri), parameters, self._addresses(names))
+        answers = state, types, parameters, self._addresses(_node_names(state, self.uri))
+        if self._last is None or not _identical(answers, self._last[0]):
+            graph = build_snapshot(state, _topic_types(types, self.uri), parameters, answers[3])
+            self._last = answers, graph
+        return self._last[1]
 
     def _addresses(self, names: Sequence[str]) -> dict[str, str]:
         """Look up all nodes in one request; nodes that have gone meanwhile are left out."""
@@ -286,6 +290,17 @@ def _nodes(
         name: NodeState(name, addresses[name], **{kind: tuple(names) for kind, names in kinds.items()})
         for name, kinds in ends.items()
     }
+
+
+def _identical(one: Any, other: Any) -> bool:
+    """Compare answers of the master; 1 and True, which are equal, are not identical."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(_identical(value, other[key]) for key, value in one.items())
+    if isinstance(one, (list, tuple)):
+        return len(one) == len(other) and all(map(_identical, one, other))
+    return bool(one == other)
 
 
 def _node_names(state: object, uri: str) -> list[str]:

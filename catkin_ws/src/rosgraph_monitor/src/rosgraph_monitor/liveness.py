@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import enum
 import errno
+import math
 from dataclasses import dataclass, replace
 
 
@@ -80,6 +81,15 @@ def due(state: Liveness, now: float, timing: Timing) -> tuple[Liveness, Action]:
             return replace(state, asked_at=now), Action.PROBE
         return replace(state, connecting_since=now), Action.CONNECT
     return state, Action.NONE
+
+
+def due_at(state: Liveness, timing: Timing) -> float:
+    """Return when `due` will have something to do, if nothing happens before."""
+    if state.connecting_since is not None:
+        return state.connecting_since + timing.connect_deadline
+    if state.asked_at is None:
+        return state.next_at
+    return math.inf if state.life is Life.HUNG else state.asked_at + timing.probe_deadline
 
 
 def on_connected(state: Liveness, now: float) -> Liveness:

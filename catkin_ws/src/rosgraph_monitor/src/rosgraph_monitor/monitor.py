@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ros_model.metamodel import PortKind
 
@@ -18,6 +18,7 @@ from rosgraph_monitor.status import Status, graph_ok, graph_problem
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from ros_model.metamodel import RosSystem
     from ros_model.snapshot import GraphSnapshot
 
     from rosgraph_monitor.desired import Desired
@@ -74,6 +75,7 @@ class GraphMonitor:
         self._tracker = ComponentTracker(component_of, patience.startup)
         self._told = _Told()
         self._publisher: dict[str, str] = {}
+        self._last: tuple[tuple[Any, ...], tuple[Finding, ...]] | None = None
 
     def evaluate(
         self,
@@ -144,15 +146,22 @@ class GraphMonitor:
         if desired.system is None:
             return [*wrong_topic_types(snapshot, self._scope.topic_types, self._scope.namespace)]
         dead = {name: (known.name.lower(), known.value) for name, known in life.items() if known not in _CONDITION}
-        findings = compare(
-            snapshot,
-            desired.system,
-            dead=dead,
-            excused=desired.excused | self._tracker.waited_for,
-            scope=self._scope,
-        )
+        excused = desired.excused | self._tracker.waited_for
+        findings = self._compared(snapshot, desired.system, dead, excused)
         settled = self._settled([f for f in findings if isinstance(f, PortFinding)], now)
         return [self._worded(f) for f in findings if not isinstance(f, PortFinding) or f in settled]
+
+    def _compared(
+        self, snapshot: GraphSnapshot, system: RosSystem, dead: dict[str, tuple[str, str]], excused: frozenset[str]
+    ) -> tuple[Finding, ...]:
+        """Compare, unless all is as it was the last time: most of the time, nothing changes."""
+        if self._last is not None:
+            (last_snapshot, last_system, *last), findings = self._last
+            if last_snapshot is snapshot and last_system is system and last == [dead, excused]:
+                return findings
+        findings = compare(snapshot, system, dead=dead, excused=excused, scope=self._scope)
+        self._last = (snapshot, system, dead, excused), findings
+        return findings
 
     def _settled(self, findings: Sequence[PortFinding], now: float) -> set[PortFinding]:
         """Return the findings that have lasted, on nodes that have had the time to start."""

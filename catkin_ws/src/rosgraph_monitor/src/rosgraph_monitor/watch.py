@@ -43,6 +43,7 @@ class _Target:
     socket: socket.socket | None = None
     received: bytearray = field(default_factory=bytearray)
     pid: int | None = None
+    due_at: float = 0.0
 
 
 class Watcher:
@@ -118,7 +119,8 @@ class Watcher:
             if now >= sweep_at:
                 sweep_at = now + _SWEEP
                 for target in list(self._targets.values()):
-                    self._step(target)
+                    if now >= target.due_at:
+                        self._step(target)
             for key, events in self._selector.select(max(sweep_at - time.monotonic(), 0.0)):
                 if key.data is None:
                     self._drain()
@@ -171,6 +173,7 @@ class Watcher:
     def _become(self, target: _Target, state: Liveness) -> None:
         changed = state.life is not target.state.life
         target.state = state
+        target.due_at = liveness.due_at(state, self._timing)
         if changed:
             with self._lock:
                 self._known[target.key] = (state.life, target.pid)
@@ -186,6 +189,7 @@ class Watcher:
             address = self._addresses.get(target.host)
         if not resolved:
             # The attempt goes on when the name has an address; the deadline of a connection holds for both.
+            target.due_at = 0.0
             self._resolve(target.host)
             return
         if address is None:
