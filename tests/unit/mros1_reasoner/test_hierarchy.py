@@ -153,6 +153,7 @@ def test_decision_that_climbs_names_what_failed_and_what_is_released(one_arm):
     (decision,) = core.step(1.0)
     assert (decision.objective, decision.to_configuration) == ("o_build", "FD2")
     assert decision.trigger == "component:rgbd"
+    assert decision.reasons[0].rules == "compError, compErrFG, S1a, S6b"
     assert decision.releases == ("o_F1", "o_F2")
     refused = {c.design.name: c.refused_because for c in decision.candidates}
     assert refused["FD1"] == "requires F1, which no design can provide now"

@@ -4,6 +4,7 @@ import socket
 import pytest
 from mros1_reasoner import vocabulary as v
 from mros1_reasoner.knowledge_base import KnowledgeBase, KnowledgeBaseError
+from mros1_reasoner.mape import Mape, Settings
 from mros1_reasoner.model import Direction, Facts
 from reasoner_helpers import HEAD, OBJECTIVE, application, value
 
@@ -99,6 +100,17 @@ def test_other_rules_of_a_model_stay(load, pellet):
     pellet.load(knowledge_base.ontology)
     result = knowledge_base.analyse(Facts((OBJECTIVE,)), pellet)
     assert result.objectives["o_move"].causes == {v.UPDATABLE}
+
+
+def test_error_that_a_rule_of_the_model_concludes_calls_for_a_change(load, pellet):
+    extra = RULE.format(label="strict", body="Objective", head="o_cause", value="IN_ERROR_NFR")
+    knowledge_base = load(application(extra=extra))
+    pellet.load(knowledge_base.ontology)
+    core = Mape(knowledge_base, pellet, [OBJECTIVE], Settings())
+    core.observe_active(0.0, "f_move", "scan_slow", "STABLE")
+    (decision,) = core.step(0.0)
+    assert decision.trigger == "qa:o_move"
+    assert decision.to_configuration == "scan_slower"
 
 
 def test_asserted_statuses_are_lifted(load, pellet):

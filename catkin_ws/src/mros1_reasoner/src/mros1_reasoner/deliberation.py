@@ -99,6 +99,9 @@ class Deliberation:
         self, name: str, level: str, outcome: Plan, causes: list[Cause], timing: Timing, began: float
     ) -> Decision | None:
         """Return the decision for the first thing to be done towards an outcome: the deepest requirement first."""
+        if level != name:
+            climbed = {"component": "S6b"}
+            causes = [replace(c, rules=f"{c.rules}, {climbed.get(c.trigger.split(':')[0], 'S6a')}") for c in causes]
         steps = self._missing(level, outcome, timing.now)
         objective, first = steps[0]
         locked = [o for o, _ in steps if o in self._state.locked]
@@ -221,6 +224,8 @@ class Deliberation:
         if running.task_failure:
             stamp, why = running.task_failure
             errors.append(Cause(stamp, f"task:{name}", f"the task failed{f': {why}' if why else ''}", "S9"))
+        elif result and v.IN_ERROR_NFR in result.causes and not result.violated and not self._inherits(running):
+            errors.append(Cause(now, f"qa:{name}", f"a rule of the model finds an error of quality in {name}"))
         return [*sorted(errors, key=_by_time), *self._chances(name, now, has_errors=bool(errors))]
 
     def _chances(self, name: str, now: float, *, has_errors: bool) -> list[Cause]:
@@ -236,6 +241,11 @@ class Deliberation:
         running.updatable.clear()
         return sorted(found, key=_by_time) if heeds or has_errors else []
 
+    def _inherits(self, running: Running) -> bool:
+        """Return whether something that the running design requires is in error."""
+        results = [self._state.analysis.objectives.get(o) for o in self._state.required(running.design)]
+        return any(result and result.in_error for result in results)
+
     def _component_causes(self, name: str, now: float) -> list[Cause]:
         running = self._state.running[name]
         causes = []
@@ -244,11 +254,7 @@ class Deliberation:
             words = f"component {component}, which {running.design} requires, does not work"
             stamp = known.stamp if known else now
             causes.append(Cause(stamp, f"component:{component}", words, "compError, compErrFG, S1a"))
-        inherited = any(
-            (result := self._state.analysis.objectives.get(o)) and result.in_error
-            for o in self._state.required(running.design)
-        )
-        if running.is_broken or not (causes or inherited):
+        if running.is_broken or not (causes or self._inherits(running)):
             words = f"configuration {running.design} does not run"
             causes.append(Cause(running.failed_stamp or now, f"component:{running.design}", words, "S1a"))
         return causes
