@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import os
+import signal
 import sys
 import threading
 import time
@@ -439,24 +440,40 @@ class _JournalTopic:
         return message
 
 
+class _Ended(BaseException):
+    """A signal asks the process to end."""
+
+
 def main() -> None:
     """Run the node; exit status 2 when it can't start."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _end)
+    node = None
     try:
-        rospy.init_node("reasoner")
+        rospy.init_node("reasoner", disable_signals=True)
         logger = logging.getLogger("mros1_reasoner")
         logger.setLevel(logging.INFO)
         logger.propagate = False
         logger.addHandler(_RosLog())
         node = ReasonerNode()
+        node.run()
     except (ParameterError, KnowledgeBaseError, ReasonerError, ModelError, rospy.ROSInitException) as error:
         sys.stderr.write(f"reasoner: {' '.join(str(error).split())}\n")
         sys.stderr.flush()
         rospy.signal_shutdown("it can't start")
         os._exit(2)  # rospy's threads would keep the process
-    try:
-        node.run()
+    except _Ended:
+        rospy.signal_shutdown("it was asked to end")
     finally:
-        node.close()
+        if node is not None:
+            node.close()
+
+
+def _end(*_: object) -> None:
+    """Unwind the main thread; rospy's own handler calls the master from here, and hangs where a call is under way."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    raise _Ended
 
 
 class _RosLog(logging.Handler):
