@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+import rospkg
 from ros_model.cli import main
 from ros_model.errors import ModelError
 from ros_model.extraction.catkin_package import find_packages, read_package
@@ -14,7 +15,8 @@ from ros_model.extraction.launch_files import read_launch_file
 from ros_model.extraction.package_source import extract_package
 from ros_model.metamodel import ConnectionKind, PortKind
 from ros_model.packages import SpecKind
-from ros_model.packages_reader import read_packages
+from ros_model.packages_reader import parse_packages, read_packages
+from ros_model.packages_writer import write_packages
 from ros_model.reader import read_system
 
 TALKER = """#!/usr/bin/env python3
@@ -223,6 +225,13 @@ def test_unwritable_output_is_told(tmp_path, capsys):
     (tmp_path / "file").touch()
     assert run("extract", tmp_path / "demo", "-o", tmp_path / "file" / "x") == 2
     assert "give a folder that can be written" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["metacontrol_msgs", "metacontrol_sim", "move_base", "rosgraph_manipulator"])
+def test_models_of_our_own_packages_read_back_as_written(name):
+    extracted = extract_package(Path(rospkg.RosPack().get_path(name)))
+    assert extracted.unread == ()
+    assert parse_packages(write_packages(extracted.model())) == extracted.model()
 
 
 # --- launch files

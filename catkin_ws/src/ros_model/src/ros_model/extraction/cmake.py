@@ -15,7 +15,9 @@ _TOKEN = re.compile(
 )
 _VARIABLE = re.compile(r"\$\{([A-Za-z0-9_./+-]+)\}")
 _MAX_WORDS = 10_000
-_MAX_DEPTH = 20
+_MAX_LENGTH = 100_000
+_MAX_DEPTH = 3
+"""Variables within variables' names, `${${PROJECT_NAME}_SOURCES}`; values are expanded when they are set."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ def _expanded(words: Sequence[tuple[str, bool]], variables: dict[str, str]) -> I
         text = word
         for _ in range(_MAX_DEPTH):
             replaced = _VARIABLE.sub(lambda match: variables.get(match[1], match[0]), text)
-            if replaced == text or len(replaced) > _MAX_WORDS * 100:
+            if replaced == text or len(replaced) > _MAX_LENGTH:
                 break
             text = replaced
         for part in [text] if is_quoted else text.split(";"):
