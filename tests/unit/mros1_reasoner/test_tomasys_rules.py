@@ -10,6 +10,7 @@ from mros1_reasoner import vocabulary as v
 from mros1_reasoner.knowledge_base import own_ontologies
 from mros1_reasoner.model import Facts
 from mros1_reasoner.reasoner import Assertion
+from mros1_reasoner.triples import read_triples
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
 FACTS = Facts(objectives=(OBJECTIVE,), groundings={"o_move": "scan_slow"})
@@ -57,6 +58,16 @@ def test_published_labels_are_there():
         "S11",
     ]
     assert sorted(labels) == sorted(expected)
+
+
+def test_everything_that_is_declared_has_a_label_and_a_comment():
+    owl, rdfs = "http://www.w3.org/2002/07/owl#", "http://www.w3.org/2000/01/rdf-schema#"
+    triples = [triple for path in own_ontologies() for triple in read_triples(path)]
+    kinds = {f"<{owl}{kind}>" for kind in ("Class", "ObjectProperty", "DatatypeProperty")}
+    declared = {s for s, p, o in triples if p == f"<{v.RDF_TYPE}>" and o in kinds and s.startswith("<")}
+    assert len(declared) > 40
+    for predicate in ("label", "comment"):
+        assert declared <= {s for s, p, _ in triples if p == f"<{rdfs}{predicate}>"}
 
 
 def test_nothing_wrong_is_in_progress(knowledge_base, reasoner):
