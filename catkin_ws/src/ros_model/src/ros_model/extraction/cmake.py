@@ -92,8 +92,8 @@ def _expanded(words: Sequence[tuple[str, bool]], variables: dict[str, str]) -> I
     for word, is_quoted in words:
         text = word
         for _ in range(_MAX_DEPTH):
-            replaced = _VARIABLE.sub(lambda match: variables.get(match[1], match[0]), text)
-            if replaced == text or len(replaced) > _MAX_LENGTH:
+            replaced = _replaced(text, variables)
+            if replaced == text:
                 break
             text = replaced
         for part in [text] if is_quoted else text.split(";"):
@@ -102,6 +102,18 @@ def _expanded(words: Sequence[tuple[str, bool]], variables: dict[str, str]) -> I
                 return
             if part or is_quoted:
                 yield part
+
+
+def _replaced(text: str, variables: dict[str, str]) -> str:
+    """Return a text with its variables replaced; the text as it is where that would be too long."""
+    parts, length, end = [], 0, 0
+    for match in _VARIABLE.finditer(text):
+        parts += [text[end : match.start()], variables.get(match[1], match[0])]
+        end = match.end()
+        length += len(parts[-2]) + len(parts[-1])
+        if length > _MAX_LENGTH:
+            return text
+    return "".join([*parts, text[end:]])
 
 
 def _glob(patterns: Sequence[str], folder: Path, *, recurse: bool) -> list[str]:
