@@ -284,3 +284,13 @@ def test_saved_knowledge_base_asks_for_the_root_only(one_arm, tmp_path):
     text = (tmp_path / "saved.owl").read_text()
     assert "requiresO" in text
     assert "IN_ERROR_NFR" in text
+
+
+def test_requirement_whose_configuration_has_failed_before_is_replaced_when_it_is_needed(make):
+    robot = make()
+    robot.core.observe_active(0.0, "F2", "FD2.1", "FAILED")
+    robot.core.observe_active(0.0, "F0", "FD1", "STABLE")
+    robot.core.observe_active(0.0, "F1", "FD1.1", "STABLE")
+    (decision,) = robot.core.step(5.0)
+    assert (decision.objective, decision.trigger, decision.to_configuration) == ("o_F2", "component:FD2.1", "FD2.2")
+    assert decision.stamp_monitored == 5.0

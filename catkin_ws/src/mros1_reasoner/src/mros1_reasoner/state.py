@@ -156,7 +156,7 @@ class State:
         if state in BUSY:
             running.busy_since = running.busy_since if running.state in BUSY else now
         if state != running.state and state == FAILED:
-            running.failed_stamp = now
+            running.failed_stamp = max(now, 0.0)  # 0: before anything was asked for
         running.state = state
         if state != RECONFIGURING and running.design != configuration:
             self.deployed(name, configuration, now)  # while it reconfigures, it may be the old or the new one
