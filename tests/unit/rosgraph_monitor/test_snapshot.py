@@ -198,6 +198,15 @@ def test_snapshot_is_the_same_object_until_something_changes():
         client.close()
 
 
+def test_answer_that_changes_every_time_makes_no_other_old():
+    count = iter(range(100))
+    with master(**(answers([]) | {"getParam": lambda _caller, key: [1, "", {"n": next(count)}]})) as uri:
+        client = MasterClient(uri)
+        assert [client.snapshot().parameter("/n") for _ in range(20)] == list(range(20))
+        assert client.snapshot().nodes.keys() == ADDRESSES.keys()
+        client.close()
+
+
 def test_snapshot_compares_and_becomes_json(graph):
     assert graph == build_snapshot(STATE, TYPES, PARAMETERS, ADDRESSES)
     assert graph != build_snapshot(STATE, TYPES, {}, ADDRESSES)

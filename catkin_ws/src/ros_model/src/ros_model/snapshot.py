@@ -23,6 +23,8 @@ _ACTION_SUFFIXES = ("goal", "cancel", "status", "feedback", "result")
 _FROM_CLIENT = frozenset({"goal", "cancel"})
 _GOAL_TYPE = "ActionGoal"
 _RPC_SUCCESS = 1
+_KEPT_ANSWERS = 8
+"""Twice what a snapshot needs."""
 
 ParameterTree = dict[str, Any]
 """Parameters as the master keeps them: nested dicts by name part."""
@@ -294,6 +296,8 @@ def _nodes(
 
 def _identical(one: Any, other: Any) -> bool:
     """Compare answers of the master; 1 and True, which are equal, are not identical."""
+    if one is other:
+        return True
     if type(one) is not type(other):
         return False
     if isinstance(one, dict):
@@ -329,17 +333,40 @@ def _topic_types(types: Any, uri: str) -> list[tuple[str, str]]:
 
 
 class TimedTransport(xmlrpc.client.Transport):
-    """A transport whose calls end after a time, be the answer slow to begin or slow to come."""
+    """A transport whose calls end after a time, be the answer slow to begin or slow to come.
+
+    An answer that came before, byte by byte, is not unpacked again but is the same object, which nobody may change:
+    of a graph that is looked at twice a second, little changes. So answers are not asked for compressed, which takes
+    both sides longer than it saves on a robot, and makes the same answer look different.
+    """
+
+    accept_gzip_encoding = False
 
     def __init__(self, timeout: float) -> None:
         super().__init__()
         self._timeout = timeout
         self._deadline = 0.0
+        self._unpacked: dict[bytes, Any] = {}
 
     def request(self, *arguments: Any, **options: Any) -> Any:
         """Call, within the time."""
         self._deadline = time.monotonic() + self._timeout
         return super().request(*arguments, **options)
+
+    def parse_response(self, response: Any) -> Any:
+        """Unpack an answer."""
+        body = response.read()
+        if body in self._unpacked:
+            answer = self._unpacked.pop(body)
+        else:
+            parser, unmarshaller = self.getparser()
+            parser.feed(body)
+            parser.close()
+            answer = unmarshaller.close()
+        self._unpacked[body] = answer  # at the end: the first is the one that was not seen for longest
+        if len(self._unpacked) > _KEPT_ANSWERS:
+            del self._unpacked[next(iter(self._unpacked))]
+        return answer
 
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
         """Return the kept connection, with the deadline of this call."""
