@@ -22,22 +22,20 @@ from ros_model.files import resolve, safe_file_name
 from ros_model.reader import read_system
 from ros_model.snapshot import MasterClient, SnapshotError
 
-from rosgraph_monitor.comparison import Scope
-from rosgraph_monitor.components import ComponentMap, parse_mapping
+from rosgraph_monitor import parameters_node
 from rosgraph_monitor.desired import DesiredModel, Grounding
-from rosgraph_monitor.health import TopicSpec, merged, model_topics, parse_topics
-from rosgraph_monitor.liveness import Life, Timing
+from rosgraph_monitor.health import merged, model_topics
+from rosgraph_monitor.liveness import Life
 from rosgraph_monitor.look import Look, Looker
-from rosgraph_monitor.monitor import GraphMonitor, Patience
-from rosgraph_monitor.names import IGNORED_NODES, IGNORED_PORTS, resolved
+from rosgraph_monitor.monitor import GraphMonitor
+from rosgraph_monitor.names import resolved
 from rosgraph_monitor.observer_node import ObserverHost
 from rosgraph_monitor.topics_node import BatteryListener, TopicListener
 from rosgraph_monitor.usage import UsageMeter
 from rosgraph_monitor.watch import Watcher
-from rosgraph_monitor.wiring import PortTypes, port_types
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     from ros_model.metamodel import RosSystem
 
@@ -61,10 +59,6 @@ _LAUNCHER = "rosgraph_launcher"
 _METACONTROL_NODES = ["rosgraph_monitor", "reasoner", "rosgraph_manipulator", _LAUNCHER]
 
 
-class ParameterError(Exception):
-    """A parameter of the node is not usable; the message names it."""
-
-
 class MonitorNode:
     """The node /rosgraph_monitor."""
 
@@ -81,12 +75,8 @@ class MonitorNode:
         self._events = threading.Event()
         self._looked = threading.Event()
         self._silence_told = False
-        timing = Timing(
-            probe_period=_number("~probe_period", Timing.probe_period),
-            probe_deadline=_number("~probe_deadline", Timing.probe_deadline),
-        )
-        self._watcher = Watcher(self._on_life, timing, rospy.get_name())
-        self._period = 1.0 / _number("~rate", 2.0)
+        self._watcher = Watcher(self._on_life, parameters_node.timing(), rospy.get_name())
+        self._period = 1.0 / parameters_node.number("~rate", 2.0)
         self._looker = Looker(
             MasterClient(rosgraph.get_master_uri(), rospy.get_name(), _MASTER_TIMEOUT),
             self._watcher,
@@ -99,24 +89,25 @@ class MonitorNode:
         self._watcher.start()
         self._looker.start()
         self._namespace = rospy.get_namespace()
-        self._variants = _text("~variants")
-        components = _components()
-        self._topic_specs = merged(components.topics, _topics())
-        patience = Patience(
-            startup=_number("~startup_grace", Patience.startup),
-            restart=_number("~restart_patience", Patience.restart),
-            ports=_number("~port_patience", Patience.ports),
+        self._variants = parameters_node.text("~variants")
+        components = parameters_node.components()
+        self._topic_specs = merged(components.topics, parameters_node.topics())
+        patience = parameters_node.patience()
+        self._monitor = GraphMonitor(
+            components.of_node, scope=parameters_node.scope(self._topic_specs), patience=patience
         )
-        self._monitor = GraphMonitor(components.of_node, scope=self._scope(), patience=patience)
-        base = _text("~desired_rossystem")
+        base = parameters_node.text("~desired_rossystem")
         self._model = DesiredModel(read_system(resolve(base)) if base else None, self._read_variant)
-        self._metacontrol = _names("~metacontrol_nodes", _METACONTROL_NODES)
+        self._metacontrol = parameters_node.names("~metacontrol_nodes", _METACONTROL_NODES)
         self._meter = UsageMeter(alone=frozenset({_LAUNCHER}))
         self._usage_due = 0.0
         self._running_observers = 0
         self._evaluation = 0.0
-        observers = dict.fromkeys((*_names("~observers", []), *load))
+        observers = dict.fromkeys((*parameters_node.names("~observers", []), *load))
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
+        self._updater = diagnostic_updater.Updater()
+        self._updater.setHardwareID("none")
+        self._updater.add("look at the graph", self._tell_look)
         self._observers = ObserverHost(self._diagnostics)
         self._observers.follow(self._model.current.system)
         for name in observers:
@@ -125,9 +116,6 @@ class MonitorNode:
         self._topic_states: dict[str, str] = {}
         self._follow_topics()
         self._batteries = BatteryListener(components.batteries, self._events.set)
-        self._updater = diagnostic_updater.Updater()
-        self._updater.setHardwareID("none")
-        self._updater.add("look at the graph", self._tell_look)
         self._subscriber = rospy.Subscriber(
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, self._follow, queue_size=5
         )
@@ -151,15 +139,6 @@ class MonitorNode:
         """Stop watching."""
         self._looker.close()
         self._watcher.close()
-
-    def _scope(self) -> Scope:
-        return Scope(
-            ignored_nodes=(*IGNORED_NODES, *_names("~ignore", [])),
-            ignored_ports=(*IGNORED_PORTS, *_names("~ignore_ports", [])),
-            types=_port_types(_names("~ros_models", [])),
-            topic_types={name: spec.type for name, spec in self._topic_specs.items() if spec.type},
-            namespace=self._namespace,
-        )
 
     def _on_life(self) -> None:
         """A node died or came back: look whether it has unregistered or has another address, then evaluate."""
@@ -295,7 +274,7 @@ def main() -> None:
     rospy.init_node("rosgraph_monitor")
     try:
         node = MonitorNode(options.load)
-    except (ParameterError, ModelError, SnapshotError) as error:
+    except (parameters_node.ParameterError, ModelError, SnapshotError) as error:
         rospy.logfatal("%s", error)
         sys.exit(BAD_START)
     except rospy.ROSException:
@@ -333,51 +312,3 @@ def _message(status: Status) -> DiagnosticStatus:
 def _is_local(uri: str) -> bool:
     host, _ = rosgraph.network.parse_http_host_and_port(uri)
     return bool(rosgraph.network.is_local_address(host))
-
-
-def _parameter(name: str, default: Any) -> Any:
-    return rospy.get_param(name, default)
-
-
-def _number(name: str, default: float) -> float:
-    value = _parameter(name, default)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0.0:
-        raise ParameterError(f"parameter {rospy.resolve_name(name)}: {value!r} is no positive number")
-    return float(value)
-
-
-def _text(name: str) -> str:
-    value = _parameter(name, "")
-    if not isinstance(value, str):
-        raise ParameterError(f"parameter {rospy.resolve_name(name)}: {value!r} is no text")
-    return value
-
-
-def _names(name: str, default: list[str]) -> list[str]:
-    value = _parameter(name, default)
-    if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
-        raise ParameterError(f"parameter {rospy.resolve_name(name)}: {value!r} is no list of names")
-    return value
-
-
-def _port_types(paths: Iterable[str]) -> PortTypes:
-    paths = list(paths)
-    if not paths:
-        return {}
-    from ros_model.packages_reader import read_packages  # grammars take a while to load: only where they are needed
-
-    return port_types(read_packages(resolve(path)) for path in paths)
-
-
-def _components() -> ComponentMap:
-    try:
-        return parse_mapping(_parameter("~components", {}))
-    except ValueError as error:
-        raise ParameterError(f"parameter {rospy.resolve_name('~components')}: {error}") from error
-
-
-def _topics() -> Mapping[str, TopicSpec]:
-    try:
-        return parse_topics(_parameter("~topics", {}))
-    except ValueError as error:
-        raise ParameterError(f"parameter {rospy.resolve_name('~topics')}: {error}") from error
