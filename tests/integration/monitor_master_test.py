@@ -144,14 +144,15 @@ class MonitorMasterTest(unittest.TestCase):
         reader = threading.Thread(target=lambda: [lines.put(line) for line in monitor.stderr], daemon=True)
         reader.start()
         proxy.mode = "garbage"
-        self.assertIn("garbage", lines.get(timeout=20.0))
+        while "garbage" not in lines.get(timeout=40.0):
+            pass
         proxy.mode = "pass"
         node = self.start("rosrun", "rosgraph_monitor", "monitor", "__name:=second")  # the first one goes on
         wait_for(lambda: any("/second" in entry[1] for entry in self.proxy.getSystemState("/test")[2][2]), 20.0)
         self.assertIsNone(monitor.poll())
         node.terminate()
         monitor.terminate()
-        self.assertEqual(monitor.wait(timeout=20.0), 0)
+        self.assertEqual(monitor.wait(timeout=40.0), 0)
         reader.join(timeout=40.0)
         self.assertTrue(lines.empty(), list(lines.queue))
 
