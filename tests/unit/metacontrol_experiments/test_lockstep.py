@@ -142,3 +142,5 @@ def test_command_leaves_log_summary_and_figure(tmp_path):
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"mission.log", "summary.json", "mission.png"}
     refused = CliRunner().invoke(cli.metacontrol, [*arguments, *files, "--contingency", "kill:simulator"])
     assert refused.exit_code == 2 and "in lockstep there are only" in refused.output
+    refused = CliRunner().invoke(cli.metacontrol, [*arguments, *files, "--rviz"])
+    assert refused.exit_code == 2 and "has no window" in refused.output

@@ -133,6 +133,8 @@ def run(quiet: bool, output: Path, engine: str, **options: Any) -> None:
             (output / name).unlink(missing_ok=True)
         with Display(console, quiet) as display:
             if engine == "lockstep":
+                if options["gui"] or options["rviz"]:
+                    raise RunError("--engine lockstep has no window; leave --gui and --rviz out")
                 state, record = _run_lockstep(settings, display)
             else:
                 state = run_mission(settings, display)

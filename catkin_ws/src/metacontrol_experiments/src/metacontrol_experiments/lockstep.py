@@ -173,7 +173,7 @@ class Lockstep:
         """Run the mission to its end.
 
         Raises:
-            LockstepError: a contingency of the start cannot happen.
+            LockstepError: a contingency of the start cannot happen, or an analysis failed.
             MissionError: the goal is no goal from here.
         """
         cv2.setNumThreads(1)  # as in navigation's own process
@@ -261,7 +261,10 @@ class Lockstep:
         """Let the meta-controller do its part, and deploy what it has decided."""
         if self._manager is None or self._state is None:
             return
-        change = self._manager.step(now, self._steps, self._simulation, _stamp(now))
+        try:
+            change = self._manager.step(now, self._steps, self._simulation, _stamp(now))
+        except ManagerError as error:
+            raise LockstepError(str(error)) from error
         if change is None:
             return
         configuration, state = change

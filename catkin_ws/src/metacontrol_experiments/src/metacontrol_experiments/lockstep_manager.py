@@ -121,7 +121,10 @@ class Manager:
         self._follow()
         config = yaml.safe_load((package / "config" / "reasoner.yaml").read_text(encoding="utf-8"))
         parameters = Parameters(config | {f"nfr_{name}": level for name, level in thresholds.items()})
-        self._reasoner = make_reasoner()
+        try:
+            self._reasoner = make_reasoner()
+        except ReasonerError as error:
+            raise ManagerError(str(error)) from error
         try:
             knowledge = parameters.knowledge_base()
             objectives = parameters.objectives(knowledge)
@@ -165,6 +168,9 @@ class Manager:
 
         Returns:
             A configuration and RECONFIGURING or STABLE where that has just begun or ended, else None.
+
+        Raises:
+            ManagerError: the analysis failed.
         """
         for due in [entry for entry in self._due if entry[0] <= now]:
             self._due.remove(due)
@@ -198,7 +204,16 @@ class Manager:
                     self.observed.append(QualityReport(now, pair.key, None))
 
     def _reason(self, now: float, *, heartbeat: bool) -> None:
-        for decision in self._core.step(now, heartbeat=heartbeat):
+        """Let the reasoner look at what is known.
+
+        Raises:
+            ManagerError: the analysis failed.
+        """
+        try:
+            decisions = self._core.step(now, heartbeat=heartbeat)
+        except ReasonerError as error:
+            raise ManagerError(str(error)) from error
+        for decision in decisions:
             if decision.state == DECIDED:
                 decided = now + DECIDE.draw(self._rng)
                 same = self._sensor(decision.from_configuration) == self._sensor(decision.to_configuration)
