@@ -215,6 +215,7 @@ def test_summary_and_figure_of_a_bag(mission_bag, tmp_path):
         ["run", "--real-time-factor", "nan"],
         ["run", "--timeout", "0"],
         ["run", "--seed", "one"],
+        ["run", "--seed", "-1"],
     ],
 )
 def test_bad_input_is_refused_with_status_2(arguments, tmp_path):

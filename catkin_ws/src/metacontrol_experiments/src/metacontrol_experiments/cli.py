@@ -69,7 +69,9 @@ class _Number(click.FloatRange):
     help="lockstep: in one process without ROS, as fast as it can, the same bytes for a seed.",
 )
 @click.option("--no-metacontrol", is_flag=True, help="The baseline: everything but the reasoner.")
-@click.option("--seed", default=1, show_default=True, help="Of everything random in the simulation.")
+@click.option(
+    "--seed", type=click.IntRange(0), default=1, show_default=True, help="Of everything random in the simulation."
+)
 @click.option("--route", default="r1", show_default=True, help="One of the routes.")
 @click.option("--initial-configuration", default="f2_v2_r2", show_default=True, help="The variant deployed first.")
 @click.option(
