@@ -1,16 +1,41 @@
 #!/usr/bin/env python3
-"""An unmodified actionlib server: a goal of 0 is pending until cancelled, any other succeeds at once."""
+"""An unmodified actionlib server: a goal of 0 is pending until cancelled, any other succeeds at once.
 
+Arguments make it misbehave: --exit-at-once, --hang, --stubborn, --die-after SECONDS, --port NUMBER.
+"""
+
+import argparse
+import os
+import signal
+import socket
 import sys
+import threading
+import time
 
 import actionlib
 import rospy
 from actionlib.msg import TestAction, TestResult
 
-if "--exit-at-once" in sys.argv:
-    sys.exit(1)
+parser = argparse.ArgumentParser()
+parser.add_argument("--exit-at-once", action="store_true")
+parser.add_argument("--hang", action="store_true")
+parser.add_argument("--stubborn", action="store_true")
+parser.add_argument("--die-after", type=float)
+parser.add_argument("--port", type=int)
+options = parser.parse_args(rospy.myargv()[1:])
 
-rospy.init_node("wait_server")
+if options.exit_at_once:
+    sys.exit(1)
+if options.stubborn:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+while options.hang:
+    time.sleep(1.0)
+if options.port:
+    socket.create_server(("127.0.0.1", options.port))
+
+rospy.init_node("wait_server", disable_signals=options.stubborn)
+sys.stdout.write("it writes to its log\n")
 
 
 def accept(handle):
@@ -21,4 +46,8 @@ def accept(handle):
 
 server = actionlib.ActionServer("wait", TestAction, accept, lambda handle: handle.set_canceled(), auto_start=False)
 server.start()
+if options.die_after:
+    threading.Timer(options.die_after, os._exit, [3]).start()
+while options.stubborn:
+    time.sleep(1.0)
 rospy.spin()

@@ -71,7 +71,7 @@ def parse_settings(parameters: Mapping[str, Any]) -> Settings:
         configurations={str(name): _configuration(str(name), entry) for name, entry in entries.items()},
         kill_nodes=tuple(kill_nodes),
         save_action=save_action.strip("/") if save_action else None,
-        action_type=_action_type(parameters.get("goal_msg_type")) if save_action else None,
+        action_type=action_type(parameters.get("goal_msg_type"), "goal_msg_type") if save_action else None,
         reconfiguration_action_name=str(
             parameters.get("reconfiguration_action_name") or Settings.reconfiguration_action_name
         ),
@@ -99,6 +99,8 @@ def _configuration(name: str, entry: object) -> Configuration:
         launch_file = resolve(uri)
     except ModelError as error:
         raise ConfigurationError(f"{where}: {error}") from error
+    if not launch_file.is_file() and "command" in entry:  # roslaunch finds a file anywhere in its package
+        launch_file = next(iter(sorted(launch_file.parents[1].rglob(launch_file.name))), launch_file)
     if not launch_file.is_file():
         raise ConfigurationError(f"{where}: there is no launch file {launch_file}: correct the name, or generate it")
     return Configuration(name, function, str(launch_file), tuple(args), tuple(topics))
@@ -119,12 +121,16 @@ def _parse_command(where: str, command: str) -> tuple[str, list[str]]:
     return f"package://{words[1]}/launch/{words[2]}", words[3:]
 
 
-def _action_type(text: object) -> str:
-    """Turn the published `PKG.msg.TYPEAction` (or `PKG/TYPEAction`) into `PKG/TYPEAction`."""
+def action_type(text: object, parameter: str) -> str:
+    """Turn the published `PKG.msg.TYPEAction` (or `PKG/TYPEAction`) into `PKG/TYPEAction`.
+
+    Raises:
+        ConfigurationError: it is neither.
+    """
     match = re.fullmatch(r"([a-z]\w*)(?:\.msg\.|/)([A-Z]\w*Action)", str(text))
     if not match:
         raise ConfigurationError(
-            f"parameter 'goal_msg_type' is '{text}': with save_action it must name the action's type, "
-            "e.g. move_base_msgs.msg.MoveBaseAction"
+            f"parameter '{parameter}' is '{text}': it must name an action's type, e.g. "
+            "move_base_msgs.msg.MoveBaseAction"
         )
     return f"{match[1]}/{match[2]}"

@@ -30,10 +30,10 @@ SERVICE = "/set_parameters"
 
 
 class RosFacts:
-    """What nodes describe, kept as long as the node has the same address."""
+    """What nodes describe, kept as long as the node has the same address and servers."""
 
     def __init__(self) -> None:
-        self._known: dict[str, tuple[str, Mapping[str, Adjustable]]] = {}
+        self._known: dict[str, tuple[object, Mapping[str, Adjustable]]] = {}
         self._pool = ThreadPoolExecutor(4, thread_name_prefix="dynamic_reconfigure")
 
     def adjustable(self, node: str) -> Mapping[str, Adjustable]:
@@ -41,14 +41,14 @@ class RosFacts:
         address = NodeApi.address(node)
         if address is None:
             return {}
+        try:
+            identity = (address, servers := _servers(node))
+        except MasterError as error:
+            rospy.logwarn("node %s is not asked for its parameters: %s", node, error)
+            return {}
         known = self._known.get(node)
-        if known is None or known[0] != address:
-            try:
-                known = (address, _ask(node))
-            except MasterError as error:
-                rospy.logwarn("node %s is not asked for its parameters: %s", node, error)
-                return {}
-            self._known[node] = known
+        if known is None or known[0] != identity:
+            self._known[node] = known = (identity, _ask(node, servers))
         return known[1]
 
     def set(self, server: str, values: Mapping[str, Any]) -> None:
@@ -70,12 +70,15 @@ class RosFacts:
                 raise DeploymentError(f"{server} has {name} = {taken.get(name)} where {value} is wanted")
 
 
-def _ask(node: str) -> dict[str, Adjustable]:
-    servers = [
+def _servers(node: str) -> list[str]:
+    return sorted(
         name.removesuffix(SERVICE)
         for name in services_of(node)
         if name.endswith(SERVICE) and (name == node + SERVICE or name.startswith(f"{node}/"))
-    ]
+    )
+
+
+def _ask(node: str, servers: list[str]) -> dict[str, Adjustable]:
     descriptions: dict[str, ConfigDescription] = {}
     complete = threading.Event()
 

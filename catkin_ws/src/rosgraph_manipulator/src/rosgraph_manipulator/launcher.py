@@ -119,6 +119,7 @@ class Launcher:
         self.configuration = ""
         self.state = STABLE
         self.message = ""
+        self.changes = 0  # so far
         self._options = options
         self._changed = changed
         self._log = log
@@ -166,11 +167,12 @@ class Launcher:
         """
         phases: dict[str, float] = {}
         began = time.monotonic()
+        self.changes += 1
         if not configuration:
             self.stop_all()
             return {"stop": time.monotonic() - began}
         launch, commands = self._look_up(launch_file, args, start)
-        self.state = CHANGING
+        self.state, self.message = CHANGING, ""
         self._changed()
         leaving = [name for name in self._nodes if name in start or name not in launch.system.nodes]
         self._ask_to_end(leaving)

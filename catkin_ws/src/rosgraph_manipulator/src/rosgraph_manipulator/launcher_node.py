@@ -110,8 +110,10 @@ class LauncherNode:
                 request.configuration, request.launch_file, list(request.args), list(request.start)
             )
         except LauncherError as error:
-            return ChangeConfigurationResponse(False, str(error), [])
-        return ChangeConfigurationResponse(True, "", [Phase(*phase) for phase in phases.items()])
+            return ChangeConfigurationResponse(ok=False, message=str(error), change=self._launcher.changes)
+        return ChangeConfigurationResponse(
+            ok=True, change=self._launcher.changes, phases=[Phase(*phase) for phase in phases.items()]
+        )
 
     def _publish(self) -> None:
         launcher = self._launcher if hasattr(self, "_launcher") else None
@@ -119,6 +121,7 @@ class LauncherNode:
             return  # it is being made, and nothing runs
         message = LauncherState(
             configuration=launcher.configuration,
+            change=launcher.changes,
             state=launcher.state,
             nodes=list(launcher.nodes),
             dead=list(launcher.dead),

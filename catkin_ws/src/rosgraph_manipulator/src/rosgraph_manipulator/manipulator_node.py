@@ -36,6 +36,7 @@ from rosgraph_manipulator.tactics import Plan, Tactic, TacticError, load_tactics
 
 KEYS = ("configurations", "kill_nodes", "save_action", "goal_msg_type", "reconfiguration_action_name")
 HEARTBEAT_PERIOD = 2.0  # s, wall
+ACQUAINTANCE_DELAY = 2.0  # s, wall, after a change: nodes may offer dynamic_reconfigure later than all else
 
 
 class Manipulator:
@@ -47,7 +48,8 @@ class Manipulator:
         self._tactics = tactics
         self._probation = number("~probation", get("~probation", 5.0), low=0.0)  # s, wall
         policy = choice("~concurrency", get("~concurrency", Policy.WAIT.value), [policy.value for policy in Policy])
-        self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        # No SimpleQueue: Python 3.11's waits for ever when a signal comes while it waits for a time.
+        self._work: queue.Queue[Callable[[], None]] = queue.Queue()
         self._requests = RequestQueue(Policy(policy))
         self._handles: dict[str, actionlib.ServerGoalHandle] = {}
         self._lock = threading.Lock()  # requests, handles, interruption
@@ -97,7 +99,7 @@ class Manipulator:
             self._settings,
             goal,
             ready_timeout=number("~ready_timeout", get("~ready_timeout", 15.0), low=0.1),
-            settle_time=number("~settle_time", get("~settle_time", 1.0), low=0.0),
+            settle_time=number("~settle_time", get("~settle_time", 0.5), low=0.0),
             launcher_timeout=launcher_timeout,
             on_state=lambda _state: self._work.put(self._follow_launcher),
         )
@@ -265,6 +267,9 @@ class Manipulator:
             self._previous, self._last_good = replaced, outcome.running
             self._deployed_at = time.monotonic()
             self._announce(outcome.running, FunctionGrounding.STABLE, outcome, phases)
+            acquaintance = threading.Timer(ACQUAINTANCE_DELAY, self._platform.get_to_know)
+            acquaintance.daemon = True
+            acquaintance.start()
         elif outcome.result is Result.GENERAL_ERROR:
             self._platform.stop_robot()
             self._announce(wanted, FunctionGrounding.FAILED, outcome, phases)

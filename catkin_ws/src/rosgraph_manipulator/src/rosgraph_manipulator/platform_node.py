@@ -15,10 +15,10 @@ from metacontrol_msgs.srv import ChangeConfiguration
 
 from rosgraph_manipulator.configuration import Configuration, Settings
 from rosgraph_manipulator.deployment import DeploymentError
-from rosgraph_manipulator.description import SystemDescription
+from rosgraph_manipulator.description import NodeDescription, SystemDescription
 from rosgraph_manipulator.facts_node import RosFacts
 from rosgraph_manipulator.goal_node import PendingGoal
-from rosgraph_manipulator.launch_files import LaunchFileError, read_launch_file
+from rosgraph_manipulator.launch_files import LaunchFileError, command_line, read_launch_file
 from rosgraph_manipulator.master import MasterError, NodeApi, advertised, publishers
 from rosgraph_manipulator.tactics import Plan
 
@@ -55,7 +55,7 @@ class RosPlatform:
             settings: configurations, nodes to end.
             goal: of the action that is kept over a change.
             ready_timeout: for a configuration to be ready, s, wall.
-            settle_time: a node that was started has to live this long before its configuration counts, s, wall.
+            settle_time: nodes that were started have to live this long after all was ready, s, wall.
             launcher_timeout: to find the launcher, s, wall.
             on_state: called with every state of the launcher, in a thread of its own.
         """
@@ -70,11 +70,12 @@ class RosPlatform:
         self._on_state = on_state
         self._wanted: Configuration | None = None
         self._doubtful: set[str] = set()  # nodes whose parameters may be between two configurations
-        self._death = ""  # of a node, since the change began
+        self._death: tuple[int, str] | None = None  # of a node: after which change, and how
+        self._change_number: int | None = None  # of the change that is being waited for
         self._stop_robot = False
         self._new_server = False
         self._started: tuple[str, ...] = ()
-        self._begun = self._called = 0.0
+        self._begun = 0.0
         self._news = threading.Condition()
         self._news_at = 0.0
         self._cmd_vel = rospy.Publisher("cmd_vel", Twist, queue_size=1)
@@ -89,7 +90,11 @@ class RosPlatform:
         configuration = self._settings.configurations.get(state.configuration) if state else None
         if state is None or configuration is None or state.state == LauncherState.FAILED:
             return SystemDescription()
-        whole = self.describe(configuration)
+        try:
+            whole = self._read(configuration)
+        except DeploymentError as error:  # its file was changed since: nothing is known of its nodes but their names
+            rospy.logwarn("%s", error)
+            return SystemDescription({name: NodeDescription(name, "", "", "") for name in state.nodes})
         # What changed behind a node's back has to be set anew: nothing is known of its parameters.
         return SystemDescription(
             {
@@ -104,12 +109,20 @@ class RosPlatform:
         """Return what a configuration's launch file starts.
 
         Raises:
-            DeploymentError: it can't be read.
+            DeploymentError: it can't be read, or names an executable that does not exist.
         """
+        system = self._read(configuration)
         try:
-            return read_launch_file(configuration.launch_file, configuration.args).system
+            for node in system.nodes.values():
+                command_line(node)
         except LaunchFileError as error:
-            raise DeploymentError(str(error)) from error
+            raise DeploymentError(f"{configuration.launch_file}: {error}") from error
+        return system
+
+    def get_to_know(self) -> None:
+        """Ask what runs for what it takes by dynamic_reconfigure, so that the next plan need not wait for that."""
+        for node in self.launcher.nodes if self.launcher else ():
+            self.facts.adjustable(node)
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
@@ -121,14 +134,12 @@ class RosPlatform:
 
     def set_parameters(self, server: str, values: Mapping[str, Any]) -> None:
         """Have a dynamic_reconfigure server take values."""
-        self.check()
         if self.launcher:
             self._doubtful |= {name for name in self.launcher.nodes if f"{server}/".startswith(f"{name}/")}
         self.facts.set(server, values)
 
     def change_processes(self, stop: tuple[str, ...], start: tuple[str, ...]) -> None:
         """Set the wanted configuration's parameters, stop nodes, wait until they are gone, start nodes."""
-        self.check()
         assert self._wanted is not None  # noqa: S101
         leaving = {*stop, *start}
         self._started = start
@@ -156,7 +167,7 @@ class RosPlatform:
 
     def wait_until_settled(self) -> None:
         """Wait until the nodes that were started have lived for the settling time."""
-        end = self._called + self._settle_time
+        end = time.monotonic() + self._settle_time
         while time.monotonic() < end:
             self._raise_if_broken()
             time.sleep(POLL_PERIOD)
@@ -189,7 +200,7 @@ class RosPlatform:
         state = self.launcher
         if state is None:
             return
-        self._begun, self._death = time.monotonic(), ""
+        self._begun, self._death, self._change_number = time.monotonic(), None, state.change
         self._wanted = self._settings.configurations.get(state.configuration)
         self._started = tuple(state.nodes)
         self.wait_until_ready()
@@ -208,13 +219,19 @@ class RosPlatform:
 
     # -- helpers --------------------------------------------------------------------------------------------------
 
+    @staticmethod
+    def _read(configuration: Configuration) -> SystemDescription:
+        try:
+            return read_launch_file(configuration.launch_file, configuration.args).system
+        except LaunchFileError as error:
+            raise DeploymentError(str(error)) from error
+
     def _prepare(self, wanted: Configuration) -> None:
-        self._wanted, self._death, self._started = wanted, "", ()
+        self._wanted, self._change_number, self._started = wanted, None, ()
         self._begun = time.monotonic()
         self._new_server = self._stop_robot = False
 
     def _call(self, wanted: Configuration | None, start: tuple[str, ...]) -> None:
-        self._called = time.monotonic()
         try:
             self._change.wait_for_service(self._launcher_timeout)
             answer = self._change(
@@ -228,14 +245,14 @@ class RosPlatform:
         if not answer.ok:
             raise DeploymentError(answer.message)
         self.launcher_phases = {phase.name: phase.duration for phase in answer.phases}
-        self._called = time.monotonic()
-        name = wanted.name if wanted else ""
+        self._change_number = answer.change
         with self._news:
-            self._news.wait_for(lambda: self._says(name), STATE_TIMEOUT)
+            self._news.wait_for(lambda: self._has_done(answer.change), STATE_TIMEOUT)
 
-    def _says(self, configuration: str) -> bool:
+    def _has_done(self, change: int) -> bool:
+        """Whether the launcher's topic has come as far as its answer."""
         state = self.launcher
-        return state is not None and state.configuration == configuration and state.state != LauncherState.CHANGING
+        return state is not None and state.change == change and state.state != LauncherState.CHANGING
 
     def _end_foreign_nodes(self) -> None:
         """End nodes of the same function that somebody else started."""
@@ -265,7 +282,7 @@ class RosPlatform:
         with self._news:
             self.launcher = state
             if state.state in BROKEN:
-                self._death = self._death or state.message
+                self._death = (state.change, state.message)
             gone = state.state == LauncherState.CHANGING and self._wanted and state.configuration == self._wanted.name
             if self._stop_robot and gone:
                 self._stop_robot = False
@@ -293,5 +310,5 @@ class RosPlatform:
         self.check()
         if rospy.is_shutdown():
             raise DeploymentError("the manipulator is shutting down")
-        if self._death:
-            raise DeploymentError(self._death)
+        if self._death and self._death[0] == self._change_number:
+            raise DeploymentError(self._death[1])

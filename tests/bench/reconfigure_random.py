@@ -1,0 +1,48 @@
+"""200 random requests in a row: no process left behind, no goal lost, descriptors and memory flat."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from metacontrol_experiments.processes import ProcessTree, free_port
+
+_REQUESTS = 200
+_INTEGRATION = Path(__file__).resolve().parents[1] / "integration"
+_TEST = "manipulator_changes_test.ChangesTest.test_many_random_requests_leave_nothing_behind_and_lose_no_goal"
+
+
+def run() -> list[dict[str, Any]]:
+    """Return the mean time of a request, s; it fails where the test does."""
+    port = free_port()
+    with tempfile.TemporaryDirectory() as folder:
+        own = {"ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": folder, "ROS_HOME": folder}
+        tree = ProcessTree(own)
+        try:
+            tree.start(["roscore", "-p", str(port)], Path(folder) / "master.log")
+            began = time.monotonic()
+            subprocess.run(
+                [sys.executable, "-m", "unittest", _TEST],
+                cwd=_INTEGRATION,
+                env={**os.environ, **own, "MROS_RANDOM_REQUESTS": str(_REQUESTS)},
+                check=True,
+            )
+            mean = (time.monotonic() - began) / _REQUESTS
+        finally:
+            tree.close()
+    return [
+        {
+            "name": "reconfigure_random",
+            "value": mean,
+            "unit": "s",
+            "peer": None,
+            "peer_value": None,
+            "ratio": None,
+            "samples": _REQUESTS,
+        }
+    ]

@@ -1,0 +1,212 @@
+"""Changes of D2's configuration, measured on the whole running system, at real-time factor 1."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import statistics
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from geometry_msgs.msg import Twist
+from metacontrol_experiments.processes import ProcessTree, free_port, wait_until
+from metacontrol_msgs.msg import ActiveConfiguration, MvpReconfigurationAction, MvpReconfigurationGoal
+from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
+from nav_msgs.msg import Odometry
+
+DEADLINE_S = 60.0
+PAPER_S = 4.3  # mean time of a reconfiguration in the paper
+PAPER = "published system (paper, another machine)"
+GOAL = (5.4, 6.0)  # far away, so that it stays pending
+
+
+@dataclass
+class Change:
+    """One change, times in s, wall.
+
+    Attributes:
+        accepted: from the request to the navigation goal being at work in the server that will pursue it.
+        result: from the request to the manipulator's result.
+        tactic: by which it was made.
+        phases: as the manipulator tells them.
+        slowest: least speed of the robot from the request to the result, m/s.
+    """
+
+    accepted: float
+    result: float
+    tactic: str
+    phases: dict[str, float] = field(default_factory=dict)
+    slowest: float = 0.0
+
+
+class System:
+    """D2 without the reasoner, with a navigation goal under way."""
+
+    def __init__(self) -> None:
+        self.navigation = actionlib.ActionClient("move_base", MoveBaseAction)
+        self._manipulator = actionlib.SimpleActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
+        self._condition = threading.Condition()
+        self._active: tuple[str, object, float] = ("", None, 0.0)  # goal, server's connection, time
+        self._configuration = ActiveConfiguration()
+        self._speed = 0.0
+        self._slowest = 0.0
+        rospy.Subscriber("move_base/status", GoalStatusArray, self._on_status)
+        rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)
+        rospy.Subscriber("odom", Odometry, self._on_odometry)
+        self._stop = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+        if not self._manipulator.wait_for_server(rospy.Duration(DEADLINE_S)):
+            raise RuntimeError("the manipulator did not come up")
+        if not wait_until(lambda: self._configuration.functions, DEADLINE_S):
+            raise RuntimeError("no configuration was deployed")
+        if not self.navigation.wait_for_server(rospy.Duration(DEADLINE_S)):
+            raise RuntimeError("navigation did not come up")
+        self.goal_id = self._send_goal()
+
+    def change(self, name: str) -> Change:
+        """Have a configuration deployed, and wait until the goal is at work in it and the robot moves."""
+        with self._condition:
+            server, self._slowest = self._active[1], self._speed
+        began = time.monotonic()
+        self._manipulator.send_goal(MvpReconfigurationGoal(name))
+        if not self._manipulator.wait_for_result(rospy.Duration(DEADLINE_S)):
+            raise RuntimeError(f"no result for {name} within {DEADLINE_S:g} s")
+        finished = time.monotonic()
+        if self._manipulator.get_result().result != 1:
+            raise RuntimeError(f"{name}: {self._manipulator.get_goal_status_text()}")
+        with self._condition:
+            slowest = self._slowest
+            deployed = self._condition.wait_for(
+                lambda: self._configuration.message and self._configuration.functions[0].configuration == name,
+                DEADLINE_S,
+            )
+            tactic = self._configuration.tactic
+            replaced = tactic in ("restart", "replace")
+            found = self._condition.wait_for(
+                lambda: self._active[0] == self.goal_id and (not replaced or self._active[1] is not server), DEADLINE_S
+            )
+            if not (found and deployed):
+                raise RuntimeError(f"{name}: the navigation goal was lost")
+            accepted = self._active[2] if replaced else finished
+            phases = {phase.name: phase.duration for phase in self._configuration.phases}
+        return Change(accepted - began, finished - began, tactic, phases, slowest)
+
+    def drives(self) -> bool:
+        """Wait until the robot drives."""
+        return bool(wait_until(lambda: self._speed > 0.1, DEADLINE_S))
+
+    def _send_goal(self) -> str:
+        goal = MoveBaseGoal()
+        goal.target_pose.header.frame_id = "map"
+        goal.target_pose.pose.position.x, goal.target_pose.pose.position.y = GOAL
+        goal.target_pose.pose.orientation.w = 1.0
+        self._handle = self.navigation.send_goal(goal)
+        goal_id = str(self._handle.comm_state_machine.action_goal.goal_id.id)
+        if not wait_until(lambda: self._active[0] == goal_id, DEADLINE_S):
+            raise RuntimeError("the navigation goal was not accepted")
+        return goal_id
+
+    def _on_status(self, message: GoalStatusArray) -> None:
+        connection = message._connection_header  # one object per connection, so another one is another server
+        with self._condition:
+            for entry in message.status_list:
+                known = self._active[0] == entry.goal_id.id and self._active[1] is connection
+                if entry.status == GoalStatus.ACTIVE and not known:
+                    self._active = (entry.goal_id.id, connection, time.monotonic())
+            self._condition.notify_all()
+
+    def _on_configuration(self, message: ActiveConfiguration) -> None:
+        with self._condition:
+            self._configuration = message
+            self._condition.notify_all()
+
+    def _on_odometry(self, message: Odometry) -> None:
+        twist = message.twist.twist
+        with self._condition:
+            self._speed = abs(twist.linear.x) + abs(twist.linear.y)
+            self._slowest = min(self._slowest, self._speed)
+
+
+@contextlib.contextmanager
+def running_system(profile: str, parameters: dict[str, Any] | None = None) -> Iterator[System]:
+    """Start D2 in a configuration, with parameters set before; end it."""
+    port = free_port()
+    os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
+    with tempfile.TemporaryDirectory() as folder:
+        logs = Path(folder)
+        tree = ProcessTree({"ROS_MASTER_URI": os.environ["ROS_MASTER_URI"], "ROS_LOG_DIR": folder, "ROS_HOME": folder})
+        try:
+            tree.start(["roscore", "-p", str(port)], logs / "master.log")
+            if not wait_until(_master_answers, DEADLINE_S):
+                raise RuntimeError("the master did not come up")
+            for name, value in (parameters or {}).items():
+                rospy.get_master().target.setParam("/bench", name, value)
+            command = ["roslaunch", "--wait", "metacontrol_sim", "MVP_metacontrol_world.launch"]
+            tree.start([*command, f"nav_profile:={profile}"], logs / "console.log")
+            rospy.init_node("bench_changes", disable_signals=True, anonymous=True)
+            yield System()
+        finally:
+            rospy.signal_shutdown("measured")
+            tree.close()
+
+
+def _master_answers() -> bool:
+    try:
+        return bool(rospy.get_master().getPid())
+    except OSError:
+        return False
+
+
+def changes(
+    configurations: tuple[str, str], count: int, parameters: dict[str, Any] | None = None, pause: float = 0.0
+) -> list[Change]:
+    """Change to and fro between two configurations while the robot drives.
+
+    Args:
+        configurations: the first one is deployed at the start.
+        count: of changes.
+        parameters: set before the system starts, by full name.
+        pause: from the robot driving again to the next change, s: failures do not come in salvos.
+    """
+    found = []
+    with running_system(configurations[0], parameters) as system:
+        for number in range(count):
+            if not system.drives():
+                raise RuntimeError("the robot does not drive")
+            time.sleep(pause)
+            found.append(system.change(configurations[(number + 1) % 2]))
+    return found
+
+
+def entries(
+    name: str,
+    values: list[float],
+    unit: str,
+    peer: str | None = None,
+    peer_value: float | None = None,
+    tail: bool = True,
+) -> list[dict[str, Any]]:
+    """Return what `./mros bench` writes: the median, and the 95th percentile as NAME_p95."""
+    figures = {name: statistics.median(values)}
+    if tail:
+        figures[f"{name}_p95"] = sorted(values)[math.ceil(0.95 * len(values)) - 1]
+    return [
+        {
+            "name": key,
+            "value": value,
+            "unit": unit,
+            "peer": peer,
+            "peer_value": peer_value,
+            "ratio": peer_value / value if peer_value else None,
+            "samples": len(values),
+        }
+        for key, value in figures.items()
+    ]

@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+"""Requests that cross each other or are taken back, at any moment."""
+
+import random
+import time
+
+import actionlib
+import rospy
+import rostest
+from actionlib_msgs.msg import GoalStatus
+from manipulator_harness import DEADLINE_S, PairTest, pid_of, wait_for
+from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
+
+
+class RequestsTest(PairTest):
+    manipulator_parameters = {"settle_time": 0.2, "probation": 0.0}
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.requests = actionlib.ActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
+        assert cls.requests.wait_for_server(rospy.Duration(DEADLINE_S))
+
+    def setUp(self):
+        self.assertEqual(self.request("slow"), 1, self.manipulator.said())
+        self.waiting.cancel_all_goals()
+
+    def restart_with(self, **parameters):
+        for name, value in parameters.items():
+            rospy.set_param(f"rosgraph_manipulator/{name}", value)
+        self.manipulator.end()
+        type(self).start_manipulator()
+        wait_for(lambda: pid_of("/rosgraph_manipulator") == self.manipulator.pid, "the manipulator is there")
+        # its requests are heard when it hears ours
+        wait_for(lambda: self.request_quickly("no_such_configuration") == -1, "it answers")
+
+    def request_quickly(self, name):
+        self.client.send_goal(MvpReconfigurationGoal(name))
+        return self.client.wait_for_result(rospy.Duration(1)) and self.client.get_result().result
+
+    def ask(self, name):
+        return self.requests.send_goal(MvpReconfigurationGoal(name))
+
+    @staticmethod
+    def finish(handle):
+        wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, "the request has a result")
+        return handle.get_goal_status(), handle.get_result() and handle.get_result().result
+
+    def test_requests_wait_for_their_turn(self):
+        self.restart_with(concurrency="wait")
+        first, second = self.ask("fast"), self.ask("slow")
+        self.assertEqual(self.finish(first), (GoalStatus.SUCCEEDED, 1))
+        self.assertEqual(self.finish(second), (GoalStatus.SUCCEEDED, 1))
+        self.wait_for_state("slow")
+
+    def test_waiting_request_can_be_taken_back(self):
+        self.restart_with(concurrency="wait")
+        first, second = self.ask("fast"), self.ask("slow")
+        second.cancel()
+        self.assertEqual(self.finish(second)[1], 0)
+        self.assertEqual(self.finish(first), (GoalStatus.SUCCEEDED, 1))
+        self.wait_for_state("fast")
+
+    def test_request_is_refused_while_another_one_runs(self):
+        self.restart_with(concurrency="refuse")
+        first = self.ask("fast")
+        wait_for(lambda: self.is_in("fast", "RECONFIGURING"), "the change has begun")
+        second = self.ask("slow")
+        self.assertEqual(self.finish(second)[0], GoalStatus.REJECTED)
+        self.assertEqual(self.finish(first), (GoalStatus.SUCCEEDED, 1))
+        self.wait_for_state("fast")
+
+    def test_request_replaces_the_one_that_runs(self):
+        self.restart_with(concurrency="replace")
+        goal_id, _ = self.send_goal()
+        hanging = self.ask("hangs")
+        wait_for(lambda: self.launcher_states[-1].configuration == "hangs", "it is being started")
+        server = self.server
+        better = self.ask("fast")
+        self.assertEqual(self.finish(hanging), (GoalStatus.PREEMPTED, 0))
+        self.assertEqual(self.finish(better), (GoalStatus.SUCCEEDED, 1))
+        self.wait_for_goal(goal_id, server)
+
+    def test_request_taken_back_at_any_moment_leaves_one_good_configuration(self):
+        self.restart_with(concurrency="wait")
+        goal_id, _ = self.send_goal()
+        generator = random.Random(6)
+        for number in range(5):
+            running = self.states[-1].functions[0].configuration
+            wanted = "slow" if running == "fast" else "fast"
+            handle = self.ask(wanted)
+            time.sleep(generator.uniform(0.0, 1.2))
+            handle.cancel()
+            status, result = self.finish(handle)
+            with self.subTest(number, status=status, result=result):
+                self.assertIn((status, result), [(GoalStatus.PREEMPTED, 0), (GoalStatus.SUCCEEDED, 1)])
+                self.wait_for_state(wanted if result == 1 else running)
+                wait_for(lambda: pid_of("/wait_server"), "a server runs")
+        wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the goal is still at work")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "manipulator_requests", RequestsTest)
