@@ -3,6 +3,7 @@
 import pytest
 from bag_helpers import Bag, Life
 from click.testing import CliRunner
+from mros1_reasoner import commands
 from mros1_reasoner.commands import explain, replay_command
 from mros1_reasoner.mape import Mape
 from mros1_reasoner.parameters import Parameters
@@ -19,6 +20,19 @@ PARAMETERS = {
 START = 100.0
 NAME = "reasoner-1"
 LASER_FAILS = (START + 5.0, "component", "laser", "FALSE", START + 5.0)
+
+
+class KeptWarm:
+    """The tests' reasoner, which a command must not end."""
+
+    def __init__(self, reasoner):
+        self.load, self.infer = reasoner.load, reasoner.infer
+        self.close = lambda: None
+
+
+@pytest.fixture(autouse=True)
+def warm(pellet, monkeypatch):
+    monkeypatch.setattr(commands, "make_reasoner", lambda: KeptWarm(pellet))
 
 
 def levels(quality, level, since, until):
@@ -120,6 +134,14 @@ def test_other_parameter_that_changes_nothing(life, bag):
     result = run(replay_command, bag(life()), "--set", "violation_window=3.0")
     assert result.exit_code == 0
     assert "would have decided the same" in result.output
+    assert "the same" in result.output.splitlines()[4]
+
+
+def test_other_choice_at_the_same_moment_stands_beside_the_recorded_one(life, bag):
+    result = run(replay_command, bag(life()), "--nfr", "energy=0.35")
+    (row,) = [row for row in result.output.splitlines() if "component:laser" in row]
+    assert "scan_slow -> camera_slow " in row
+    assert "scan_slow -> camera_slower" in row
 
 
 def test_what_an_operator_did_is_done_again(life, bag):

@@ -28,6 +28,7 @@ from mros1_reasoner.recording import Recording, RecordingError, Run, read_decisi
 from mros1_reasoner.replay import Pair, Replayed, pairs, replay, usual_duration, without_journal
 
 _DIFFERS, _REFUSED = 1, 2
+_OUTCOME = {"state", "objective", "from_configuration", "to_configuration", "degraded"}
 _WIDTH = 150  # characters, where the output is no terminal
 _ERRORS = (RecordingError, ParameterError, KnowledgeBaseError, ModelError, ReasonerError, ValueError, OSError)
 
@@ -189,7 +190,10 @@ def _print(
     for pair in beside:
         known = pair.replayed or pair.recorded
         assert known is not None  # noqa: S101 - a pair has one of them
-        verdict = "[green]the same[/]" if pair.is_equal else f"differs: {', '.join(pair.differences) or 'the decision'}"
+        does_same = is_changed and bool(pair.differences) and not set(pair.differences) & _OUTCOME
+        verdict = f"differs: {', '.join(pair.differences) or 'the decision'}"
+        if pair.is_equal or does_same:
+            verdict = "[green]the same[/]"
         at = f"{pair.now - recording.start:.2f} s"
         table.add_row(at, known.objective, known.trigger, _change(pair.recorded), _change(pair.replayed), verdict)
     console.print(table if beside else "no decisions, neither recorded nor replayed")

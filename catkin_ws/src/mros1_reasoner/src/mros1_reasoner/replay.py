@@ -194,15 +194,23 @@ def without_journal(recording: Recording, reader: DiagnosticsReader, initial: Se
 
 
 def pairs(recording: Recording, replayed: Replayed) -> list[Pair]:
-    """Put each recorded decision beside the replayed one that does the same at the same time, in the order of time."""
-    recorded = [record for _, record in first_messages(recording.decisions) if record.state not in (EXECUTED,)]
+    """Put each recorded decision beside the replayed one of the same time, in the order of time.
+
+    Those that do the same are put together first, then those that have the same reason.
+    """
+    recorded = [record for _, record in first_messages(recording.decisions) if record.state != EXECUTED]
     own = [record for _, record in first_messages(replayed.decisions)]
-    found = []
-    for record in recorded:
-        match = next((other for other in own if _is_same(record, other)), None)
-        if match is not None:
-            own.remove(match)
-        found.append(Pair(record.stamp_planned, record, match, _differences(record, match) if match else ()))
+    beside: dict[str, DecisionRecord] = {}
+    for alike in (("objective", "to_configuration"), ("objective", "trigger")):
+        for record in recorded:
+            match = next((other for other in own if _is_same(record, other, alike)), None)
+            if match is not None and record.id not in beside:
+                own.remove(match)
+                beside[record.id] = match
+    found = [
+        Pair(record.stamp_planned, record, match, _differences(record, match) if match else ())
+        for record, match in ((record, beside.get(record.id)) for record in recorded)
+    ]
     found += [Pair(record.stamp_planned, None, record) for record in own if record.stamp_planned >= recording.start]
     return sorted(found, key=lambda pair: pair.now)
 
@@ -215,12 +223,9 @@ def first_messages(decisions: Sequence[tuple[float, DecisionRecord]]) -> list[tu
     return list(first.values())
 
 
-def _is_same(first: DecisionRecord, second: DecisionRecord) -> bool:
-    return (
-        first.objective == second.objective
-        and first.to_configuration == second.to_configuration
-        and abs(first.stamp_planned - second.stamp_planned) <= _SAME_MOMENT
-    )
+def _is_same(first: DecisionRecord, second: DecisionRecord, alike: Sequence[str]) -> bool:
+    are_alike = all(getattr(first, name) == getattr(second, name) for name in alike)
+    return are_alike and abs(first.stamp_planned - second.stamp_planned) <= _SAME_MOMENT
 
 
 def _differences(first: DecisionRecord, second: DecisionRecord) -> tuple[str, ...]:
