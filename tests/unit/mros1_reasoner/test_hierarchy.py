@@ -294,3 +294,11 @@ def test_requirement_whose_configuration_has_failed_before_is_replaced_when_it_i
     (decision,) = robot.core.step(5.0)
     assert (decision.objective, decision.trigger, decision.to_configuration) == ("o_F2", "component:FD2.1", "FD2.2")
     assert decision.stamp_monitored == 5.0
+
+
+def test_locked_requirement_is_not_released_by_a_change_above(one_arm):
+    one_arm.core.lock("o_F2")
+    one_arm.core.observe_component(1.0, "rgbd", "FALSE")
+    assert one_arm.run(seconds=1.0) == [("o_F2", "", FAILED)]
+    one_arm.core.unlock("o_F2")
+    assert one_arm.run(seconds=1.0) == [("o_build", "FD2", EXECUTED)]

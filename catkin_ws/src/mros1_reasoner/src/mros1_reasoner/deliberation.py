@@ -104,8 +104,7 @@ class Deliberation:
             causes = [replace(c, rules=f"{c.rules}, {climbed.get(c.trigger.split(':')[0], 'S6a')}") for c in causes]
         steps = self._missing(level, outcome, timing.now)
         objective, first = steps[0]
-        locked = [o for o, _ in steps if o in self._state.locked]
-        if locked:
+        if self._state.locked & {name, *(o for o, _ in steps)}:
             reason = f"locked by the operator; {outcome.choice} would be taken: {outcome.reason}"
             return self._refuse(name, replace(outcome, reason=reason), causes, timing, self._wall() - began)
         self._state.wanted.update({o: plan.choice for o, plan in steps if plan.choice})
