@@ -117,6 +117,38 @@ def test_nothing_can_be_deployed():
     assert "base, laser" in result.reason
 
 
+def test_each_loser_has_its_reason():
+    result = choose(
+        design("best", use=0.9),
+        design("less", use=0.5),
+        design("far", use=0.9, power=0.4),
+        design("bad", risk=0.9),
+        design("now", use=0.1),
+        current="now",
+    )
+    assert {c.design.name: c.lost_because for c in result.candidates} == {
+        "best": "",
+        "far": "as useful as the choice, but a bigger change",
+        "less": "utility 0.5 is less than 0.9",
+        "now": "utility 0.1 is less than 0.9",
+        "bad": "risk 0.9 > 0.6",
+    }
+
+
+def test_losers_of_a_degraded_choice_say_how_much_they_violate():
+    result = choose(design("a", risk=0.9), design("b", risk=0.66))
+    assert [c.lost_because for c in result.candidates] == [
+        "",
+        "risk 0.9 > 0.6; violates limits by 0.5, the choice by 0.1",
+    ]
+
+
+def test_where_nothing_can_be_deployed_the_candidates_are_ranked():
+    result = choose(design("a", risk=0.9), design("b"), unrealisable={"a": ["laser"], "b": ["laser"]})
+    assert [c.design.name for c in result.candidates] == ["b", "a"]
+    assert all(c.lost_because for c in result.candidates)
+
+
 def test_no_designs():
     assert choose().choice is None
 

@@ -131,13 +131,12 @@ def plan(
         if not fresh:
             reason += ", and all were tried before"
     else:
-        return Plan(
-            None, False, tuple(replace(c, lost_because=c.refused_because) for c in candidates), _nothing(situation)
-        )
+        ranked = (replace(c, lost_because=c.refused_because) for c in sorted(candidates, key=by_violation))
+        return Plan(None, False, tuple(ranked), _nothing(situation))
     others = sorted((c for c in candidates if c is not best), key=lambda c: (bool(c.refused_because), *by_use(c)))
     chosen = replace(best, chosen=True, refused_because="")
-    ranked = (chosen, *(replace(c, lost_because=_loss(c, best, degraded)) for c in others))
-    return Plan(best.design.name, degraded, ranked, reason)
+    lost = (replace(c, lost_because=_loss(c, best, degraded)) for c in others)
+    return Plan(best.design.name, degraded, (chosen, *lost), reason)
 
 
 def difference(first: Design, second: Design) -> float:
