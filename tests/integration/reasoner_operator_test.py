@@ -34,13 +34,13 @@ class Recorder:
 
     def __init__(self, path, namespace):
         self._bag = rosbag.Bag(str(path), "w")
+        self._namespace = namespace
         self._lock = threading.Lock()
         self._decisions, self._results = set(), set()
         self._subscribers = [
             rospy.Subscriber(f"{namespace}/mros1_reasoner/{name}", kind, partial(self._take, name))
             for name, kind in (("decision", Decision), ("journal", ReasonerJournal))
         ]
-        self._namespace = namespace
 
     def __enter__(self):
         wait_for(lambda: all(s.get_num_connections() for s in self._subscribers), "the recorder is connected")

@@ -77,6 +77,13 @@ def test_timeline_tells_all_four_steps(adapted):
         assert f" {step} " in result.stdout
 
 
+def test_replay_of_the_bag_decides_the_same_again(adapted):
+    command = ["rosrun", "mros1_reasoner", "replay", str(adapted[1] / "mission.bag")]
+    replayed = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
+    assert replayed.returncode == 0, replayed.stdout + replayed.stderr
+    assert "the same" in replayed.stdout
+
+
 def test_summary_follows_from_the_bag_alone(adapted):
     _, output = adapted
     again = metacontrol("summary", str(output / "mission.bag"))
