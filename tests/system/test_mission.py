@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import time
@@ -117,6 +118,9 @@ def test_lockstep_tells_the_same_story_as_ros(adapted, lockstep):
     assert stepped["collisions"] == ros["collisions"] == 0
     names = [[entry["name"] for entry in summary["perturbations"]] for summary in (ros, stepped)]
     assert names[0] == names[1]
+    told = re.search(r"places=((?:-?[\d.]+,-?[\d.]+ ?)+)", (lockstep[1] / "mission.log").read_text())
+    places = sorted(tuple(round(float(n), 1) for n in place.split(",")) for place in told[1].split())
+    assert places == sorted(read_record(adapted[1] / "mission.bag").obstacles)
     # One seed of each: their ways differ as two runs on ROS do, so these are bounds, not a comparison of means.
     assert stepped["path_length_m"] == pytest.approx(ros["path_length_m"], rel=0.25)
     assert stepped["duration_s"] == pytest.approx(ros["duration_s"], rel=0.5)

@@ -359,11 +359,11 @@ class Lockstep:
         return self._clutter(contingency)
 
     def _clutter(self, contingency: Contingency) -> dict[str, str]:
-        goal = self._settings.route.goal
+        start, goal = self._settings.route.start, self._settings.route.goal
         places = tuple(Pose(x, y, 0.0) for x, y in contingency.places)
         try:
             if not places:
-                way = (self._simulation.localised, Pose(goal.x, goal.y, goal.yaw))
+                way = (Pose(start.x, start.y, start.yaw), Pose(goal.x, goal.y, goal.yaw))
                 places = scatter(self._grid, *way, contingency.count, contingency.seed or 0)
             for place in places:
                 box = Box("", "clutter", place.x, place.y, *CLUTTER_SIZE, place.yaw)

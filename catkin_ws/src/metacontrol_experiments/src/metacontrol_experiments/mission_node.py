@@ -268,12 +268,10 @@ class MissionNode:
         share = {"share": f"{self._state.share if self._state else 0.0:.4f}"}
         self._publish_event(rospy.Time.now(), MissionEvent.PERTURBATION, contingency.event, share | values)
 
-    def _way(self) -> tuple[Pose, Pose] | None:
-        """Where the robot is and where it goes."""
-        if self._position is None:
-            return None
-        goal = self._settings.route.goal
-        return Pose(*self._position, 0.0), Pose(goal.x, goal.y, goal.yaw)
+    def _way(self) -> tuple[Pose, Pose]:
+        """The route's ends; not where the robot is now, which differs a little from run to run."""
+        start, goal = self._settings.route.start, self._settings.route.goal
+        return Pose(start.x, start.y, start.yaw), Pose(goal.x, goal.y, goal.yaw)
 
     def _strike_at_start(self) -> list[tuple[str, dict[str, str]]]:
         """Lets happen what is there before the goal is sent; returns the events' names and values.
