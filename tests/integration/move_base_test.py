@@ -157,6 +157,13 @@ class MoveBaseTest(unittest.TestCase):
     def send(self, x, y, frame="map"):
         self.client.send_goal(MoveBaseGoal(target_pose=pose(x, y, frame)))
 
+    def is_taken(self, x, y):
+        self.send(x, y)
+        deadline = time.monotonic() + 2.0
+        while self.client.get_state() == GoalStatus.PENDING and time.monotonic() < deadline:
+            time.sleep(0.02)
+        return self.client.get_state() != GoalStatus.PENDING
+
     def finish(self):
         self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)), "the goal has no result")
         return self.client.get_state(), self.client.get_goal_status_text()
@@ -200,7 +207,8 @@ class MoveBaseTest(unittest.TestCase):
         self.stop()
         self.restart_with({"type": "move_base_msgs/MoveBaseActionGoal", "data": "?"})
         wait_for(lambda: any("resume_goal ignored" in line for line in self.log), "a warning")
-        self.send(0.6, 0.0)
+        # The goal's topic may not have found the new server yet, and holds nothing back for it.
+        wait_for(lambda: self.is_taken(0.6, 0.0), "the goal is taken")
         self.assertEqual(self.finish()[0], GoalStatus.SUCCEEDED)
 
     def test_silent_laser_stops_the_base_and_ends_the_goal_with_the_reason(self):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import logging
 import math
+import os
 import queue
 import sys
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import actionlib
 import cv2
@@ -55,6 +57,9 @@ FRAME_PATIENCE = 2.0
 
 FEEDBACK_PERIOD = 0.2
 """s; the action's status has the same rate."""
+
+EXIT_PATIENCE = 2.0
+"""How long the node's end waits until it is unregistered, s, wall: the master may be gone."""
 
 TF_CACHE = 10.0
 """Transforms kept, s: tf2's own default."""
@@ -471,7 +476,22 @@ def main() -> None:
     except ParameterError as error:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
         sys.exit(2)
+    unregistered = threading.Event()
+    rospy.core.add_shutdown_hook(lambda _reason: unregistered.set())  # comes after rospy's own, in their order
     MoveBaseNode(parameters, tree, _resumed_goal(tree.pop("resume_goal", None))).run()
+    _exit(unregistered)
+
+
+def _exit(unregistered: threading.Event) -> NoReturn:
+    """Ends the process at once when the master knows of its end: who replaces it waits for that.
+
+    Threads of actionlib and rospy would keep it for some tenths of a second more, asleep.
+    """
+    unregistered.wait(EXIT_PATIENCE)
+    logging.shutdown()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
 
 
 def _resumed_goal(value: object) -> MoveBaseActionGoal | None:
