@@ -128,6 +128,7 @@ class PairTest(unittest.TestCase):
                 "goal_msg_type": "actionlib.msg.TestAction",
                 "initial_configuration": "slow",
                 "ready_timeout": 30.0,
+                "launcher_timeout": 40.0,
                 **cls.manipulator_parameters,
             },
         )
@@ -187,10 +188,19 @@ class PairTest(unittest.TestCase):
     def send_goal(self):
         """Send a goal that stays pending; return its id and handle."""
         self.assertTrue(self.waiting.wait_for_server(rospy.Duration(DEADLINE_S)))
+        return wait_for(self.try_goal, "a goal is at work")
+
+    def try_goal(self):
+        """The goal's topic may not have found a new server yet, and holds nothing back for it."""
         handle = self.waiting.send_goal(TestGoal(0))
         goal_id = handle.comm_state_machine.action_goal.goal_id.id
-        wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the goal is at work")
-        return goal_id, handle
+        deadline = time.monotonic() + 3.0
+        while time.monotonic() < deadline:
+            if self.server_goals.get(goal_id) == GoalStatus.ACTIVE:
+                return goal_id, handle
+            time.sleep(0.02)
+        handle.cancel()
+        return None
 
     def wait_for_goal(self, goal_id, old_server):
         """Wait until another server works at the goal."""

@@ -9,8 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-MAX_AGE = 10.0
-"""Seconds after its last heartbeat at which a journal is history; a respawned manipulator is back within 2."""
+MAX_AGE = 30.0
+"""Seconds after its last heartbeat at which a journal is history: a respawned manipulator is back within 2, on a
+computer that is overloaded within 15."""
 
 
 @dataclass(frozen=True)
