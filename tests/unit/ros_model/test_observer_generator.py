@@ -10,8 +10,10 @@ import pytest
 import yaml
 from geometry_msgs.msg import Twist
 from ros_model.cli import main
+from ros_model.errors import ModelError
+from ros_model.generators.observer import write_observers
 from ros_model.metamodel import PortKind
-from ros_model.observers import camel_case, snake_case, variables
+from ros_model.observers import ObserverModel, camel_case, snake_case, variables
 from ros_model.packages_reader import read_packages
 from rosgraph_monitor.observer import TopicObserver
 from rosgraph_monitor.plugins import available, make
@@ -250,6 +252,16 @@ def test_description_that_can_not_be_is_refused_at_its_place(package, capsys, ch
     assert message in error
     assert "metacontrol.yaml:" in error
     assert not (folder / "src").exists()
+
+
+@pytest.mark.parametrize(
+    ("rate", "lowest", "highest"), [(float("nan"), 0, 1), (0, 0, 1), (1, 0, float("inf")), (1, float("nan"), 1)]
+)
+def test_numbers_that_python_can_not_say_are_never_written(tmp_path, rate, lowest, highest):
+    observer = ObserverModel("O", "p", "q", "lower_is_better", (("a", "std_msgs/Header"),), rate, lowest, highest)
+    with pytest.raises(ModelError, match="give finite numbers"):
+        write_observers([observer], tmp_path)
+    assert not any(tmp_path.iterdir())
 
 
 def test_names_turn_into_each_other():

@@ -106,6 +106,17 @@ def test_wrong_answers_are_asked_again(robot, answer):
     assert "topics: {imu: sensor_msgs/Imu, raw: std_msgs/Float32}" in result.output
 
 
+@pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
+def test_numbers_that_are_not_finite_are_asked_again(robot, answer, number):
+    result = answer(
+        *("models", "comfort", "Comf", "imu", number, "10", "lower_is_better", number, "0", number, "1", ".", "n")
+    )
+    assert result.exit_code == 0, result.output
+    assert result.output.count("Error:") == 3
+    assert "rate: 10.0, range: [0.0, 1.0]" in result.output
+    compile((robot / "src/robot_models/comf.py").read_text(), "comf.py", "exec")
+
+
 def test_direction_of_a_known_quality_is_not_asked_again(robot, answer):
     result = answer("", "safety", "", "3", "std_msgs/Float32", "", "", "", "", "y")
     assert result.exit_code == 0, result.output

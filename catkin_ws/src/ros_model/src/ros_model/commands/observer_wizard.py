@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
+from ros_model.commands.ranges import FiniteRange
 from ros_model.errors import ModelError
 from ros_model.files import read_text
 from ros_model.generators import write_file
@@ -45,11 +46,11 @@ def run_wizard(output: str | None = None) -> None:
     known = settings["quality_attributes"].get(quality)
     name = _ask("Class of the observer", _checked(_class, project), f"{camel_case(quality)}QualityObserver")
     topics = _ask_topics(signals(project.whole_base, project.library), project.library)
-    rate = click.prompt("Evaluations per second", type=click.FloatRange(min=0, min_open=True, max=1000), default=10.0)
+    rate = click.prompt("Evaluations per second", type=FiniteRange(min=0, min_open=True, max=1000), default=10.0)
     direction = known["direction"] if known else _ask_direction()
-    lowest = click.prompt("Value of your formula that is level 0", type=click.FloatRange(-1e9, 1e9), default=0.0)
+    lowest = click.prompt("Value of your formula that is level 0", type=FiniteRange(-1e9, 1e9), default=0.0)
     highest = click.prompt(
-        "Value of your formula that is level 1", type=click.FloatRange(lowest, 1e9, min_open=True), default=lowest + 1.0
+        "Value of your formula that is level 1", type=FiniteRange(lowest, 1e9, min_open=True), default=lowest + 1.0
     )
     entry = {"name": name, "quality_attribute": quality, "topics": topics, "rate": rate, "range": [lowest, highest]}
     folder = Path(output or click.prompt("Package to write into", default=str(_package_of(project))))

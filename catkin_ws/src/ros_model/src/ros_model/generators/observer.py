@@ -6,10 +6,12 @@ there: one that exists is left alone.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
 
+from ros_model.errors import ModelError
 from ros_model.findings import ERROR
 from ros_model.generators import write_files
 from ros_model.observers import described_observers, observer_packages, variables
@@ -52,9 +54,11 @@ def write_observers(observers: Iterable[ObserverModel], output: Path) -> list[Pa
     """Write the model of observers, and plug-in and test of each that has none; return the files written.
 
     Raises:
-        ModelError: a file can't be written.
+        ModelError: rate or range of one is none, or a file can't be written.
     """
     observers = tuple(observers)
+    for observer in observers:
+        _check_numbers(observer)
     texts = {output / MODEL: write_packages(observer_packages(observers, _HEADER))}
     for observer in observers:
         if observer.plugin:
@@ -67,6 +71,16 @@ def write_observers(observers: Iterable[ObserverModel], output: Path) -> list[Pa
         }
         texts |= {path: text for path, text in code.items() if not path.exists()}
     return write_files(texts, output)
+
+
+def _check_numbers(observer: ObserverModel) -> None:
+    """Refuse what no Python source can say, or what no level follows from."""
+    rate, lowest, highest = observer.rate, observer.lowest, observer.highest
+    if not (0 < rate < math.inf and -math.inf < lowest < highest < math.inf):
+        raise ModelError(
+            f"observer {observer.name}: rate {rate} and range [{lowest}, {highest}]: give finite numbers, "
+            "the rate over 0 and the lower end of the range first"
+        )
 
 
 def missing_exports(observers: Iterable[ObserverModel], output: Path) -> list[str]:
