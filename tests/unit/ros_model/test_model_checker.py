@@ -49,9 +49,16 @@ def test_sound_model_has_no_findings():
         (parameter("type Integer value 1.5"), "the value 1.5 of 'p' is no Integer"),
         (parameter("type Integer value true"), "the value True of 'p' is no Integer"),
         (parameter("type Double default fast"), "the default 'fast' of 'p' is no Double"),
-        (parameter("type List {Integer, String} value {1}"), "is no List"),
-        (parameter("type Array {type Integer} value {1, a}"), "is no Array"),
-        (parameter("type Struct {b Integer} value { {c {value 1}} }"), "is no Struct"),
+        (parameter("type List {Integer} value {1, 2}"), "value [1, 2] of 'p' has 2 members, List { Integer } has 1"),
+        (parameter("type List {Integer, String} value {1}"), "has 1 member, List { Integer, String } has 2"),
+        (parameter("type List {Integer} value {}"), "has 0 members, List { Integer } has 1"),
+        (parameter("type Array {type Integer} value {1, 2.5}"), "has member 2, 2.5, that is no Integer"),
+        (parameter("type Array {type Array {type Integer}} value {{1}, {2, a}}"),
+         "has member 2, [2, 'a'], that has member 2, 'a', that is no Integer"),
+        (parameter("type Struct {b Integer} value { {c {value 1}} }"),
+         "has member 'c', Struct { b Integer } has none of that name"),
+        (parameter("type Struct {b Integer} value { {b {value x}} }"), "has member 'b', 'x', that is no Integer"),
+        (parameter("type Integer value { 1 }"), "the value [1] of 'p' is no Integer"),
         (parameter("type Base64 value 'no base!'"), "is no Base64"),
         (parameter("type Date value yesterday"), "is no Date"),
     ],
@@ -59,6 +66,14 @@ def test_sound_model_has_no_findings():
 def test_fault_is_found(text, finding):
     (message,) = found(text)
     assert finding in message
+
+
+@pytest.mark.parametrize("value", ["fast", "{1, 2}", "{ {a {value 1}} }", "'fast'", "ParameterAny { value x }"])
+def test_caret_stands_under_the_value(value):
+    text = parameter(f"type Integer value {value}")
+    column = text.index("value") + len("value ") + 1
+    column += value.find("x }") if "Any" in value else 0
+    assert found(text)[0].startswith(f"m:1:{column}: error: the value ")
 
 
 @pytest.mark.parametrize(

@@ -86,8 +86,8 @@ def test_sound_system_has_no_findings():
             "'joints_in' as a subscriber, not a publisher",
         ),
         ("arm.rate'", "arm.speed'", "m:10:54: error: 'arm.arm_node.arm' declares no parameter 'speed'"),
-        ("value 5", "value fast", "m:10:21: error: the value 'fast' of 'rate' is no Double, as it is declared"),
-        ("arm.rate' value 5", "arm.axes' value {x}", "the value ['x'] of 'axes' is no List"),
+        ("value 5", "value fast", "m:10:84: error: the value 'fast' of 'rate' is no Double, as it is declared"),
+        ("arm.rate' value 5", "arm.axes' value {x}", "the value ['x'] of 'axes' has member 1, 'x', that is no Integer, as"),
         (
             "From ( 'a.joints' )",
             "From ( 'a.odom' )",
@@ -334,7 +334,7 @@ def test_json(check):
         {
             "file": "bad.rossystem",
             "line": 10,
-            "column": 21,
+            "column": 84,
             "severity": "error",
             "rule": "value",
             "message": "the value 'a,\\n%' of 'rate' is no Double, as it is declared",
@@ -349,7 +349,7 @@ def test_json_of_no_findings_is_an_empty_list(check):
 def test_github_annotations_escape_what_is_special(check):
     _, out = check("--format", "github", "--path", "ros", "bad.rossystem")
     assert out == (
-        "::error file=bad.rossystem,line=10,col=21,title=value::"
+        "::error file=bad.rossystem,line=10,col=84,title=value::"
         "the value 'a,\\n%25' of 'rate' is no Double, as it is declared\n"
     )
 
@@ -369,7 +369,7 @@ def test_sarif(check):
     assert result["level"] == "error"
     assert result["locations"][0]["physicalLocation"] == {
         "artifactLocation": {"uri": "bad.rossystem"},
-        "region": {"startLine": 10, "startColumn": 21},
+        "region": {"startLine": 10, "startColumn": 84},
     }
 
 

@@ -6,11 +6,14 @@ import base64
 import binascii
 import re
 from collections import defaultdict
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ros_model.findings import WARNING, Finding, sorted_by_place
 from ros_model.library import Library, Unknown, hint
 from ros_model.metamodel import ConnectionKind, PortKind, RosParameter
+from ros_model.notation import type_text
+from ros_model.syntax import short
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
         Position,
         Reference,
         RosSystem,
+        TypedParameter,
         Value,
     )
     from ros_model.packages import Node
@@ -96,39 +100,61 @@ def families(systems: Iterable[RosSystem]) -> list[list[RosSystem]]:
     return [variants for variants in found.values() if len(variants) > 1]
 
 
-def fits(value: Value, declared: ParameterType) -> bool:
-    """Whether a value is one of a declared type."""
+def fault(value: Value, declared: ParameterType) -> str | None:
+    """Return why a value is none of a declared type, as what follows `the value`; None if it is one."""
     expected = _FITTING.get(declared.kind)
     if expected is None:
-        return True
-    if not isinstance(value, expected) or (isinstance(value, bool) and bool not in expected):
-        return False
-    if isinstance(value, str):
-        return _well_written(value, declared.kind)
-    if isinstance(value, list):
-        return _elements_fit(value, declared)
-    members = dict(declared.members)
-    if not members or not isinstance(value, dict):
-        return True
-    return all(name in members and fits(item, members[name]) for name, item in value.items())
+        return None
+    wrong_type = not isinstance(value, expected) or (isinstance(value, bool) and bool not in expected)
+    if wrong_type or (isinstance(value, str) and not _well_written(value, declared.kind)):
+        return f"is no {declared.kind}"
+    if isinstance(value, list) and declared.elements:
+        return _fault_of_elements(value, declared)
+    if isinstance(value, dict) and declared.members:
+        return _fault_of_members(value, declared)
+    return None
 
 
-def _elements_fit(values: list[Value], declared: ParameterType) -> bool:
-    if not declared.elements:
-        return True
-    if declared.kind == "Array":
-        return all(fits(value, declared.elements[0]) for value in values)
-    return len(values) == len(declared.elements) and all(map(fits, values, declared.elements))
+def _fault_of_elements(values: list[Value], declared: ParameterType) -> str | None:
+    types = declared.elements * len(values) if declared.kind == "Array" else declared.elements
+    if len(values) != len(types):
+        return f"has {len(values)} member{'s' * (len(values) != 1)}, {_written(declared)} has {len(types)}"
+    faults = (
+        f"has member {number}, {short(repr(value))}, that {found}"
+        for number, (value, kind) in enumerate(zip(values, types, strict=True), start=1)
+        if (found := fault(value, kind))
+    )
+    return next(faults, None)
 
 
-def misfit(name: str, value: Value | None, declared: ParameterType | None, position: Position) -> Iterator[Finding]:
-    """Yield that a value, or the default of its type, is none of the type."""
+def _fault_of_members(values: dict[str, Value], declared: ParameterType) -> str | None:
+    types = dict(declared.members)
+    for name, value in values.items():
+        if name not in types:
+            return f"has member '{name}', {_written(declared)} has none of that name{hint(name, types)}"
+        if found := fault(value, types[name]):
+            return f"has member '{name}', {short(repr(value))}, that {found}"
+    return None
+
+
+def _written(declared: ParameterType) -> str:
+    return short(type_text(replace(declared, default=None), declared.position))
+
+
+def misfit(parameter: TypedParameter) -> Iterator[Finding]:
+    """Yield that a parameter's value, or the default of its type, is none of the type."""
+    declared = parameter.type
     if declared is None:
         return
-    for role, item in (("value", value), ("default", declared.default)):
-        if item is not None and not fits(item, declared):
-            place = declared.position if role == "default" and declared.position.line else position
-            yield Finding(f"the {role} {item!r} of '{name}' is no {declared.kind}", place, "value")
+    places = {"value": value_place(parameter), "default": _first(declared.position, parameter.position)}
+    for role, item in (("value", parameter.value), ("default", declared.default)):
+        if item is not None and (found := fault(item, declared)):
+            yield Finding(f"the {role} {item!r} of '{parameter.name}' {found}", places[role], "value")
+
+
+def value_place(parameter: TypedParameter | RosParameter) -> Position:
+    """Return where a parameter's value stands; where the parameter does, if its value comes from elsewhere."""
+    return _first(parameter.value_position, parameter.position)
 
 
 def _well_written(value: str, kind: str) -> bool:
@@ -207,10 +233,10 @@ def _incomplete_reference(reference: Reference, complete: bool, more: str, posit
 
 def _values(system: RosSystem) -> Iterator[Finding]:
     for parameter in system.parameters:
-        yield from misfit(parameter.name, parameter.value, parameter.type, parameter.position)
+        yield from misfit(parameter)
     for stack in system.stacks:
         for quality in stack.quality_attributes:
-            yield from misfit(quality.name, quality.value, quality.type, quality.position)
+            yield from misfit(quality)
 
 
 # References
@@ -269,9 +295,9 @@ def _wrong_parameter(parameter: RosParameter, reference: Reference, node: Node) 
         text = f"'{reference.package}.{reference.artifact}.{reference.node}' declares no parameter '{reference.name}'"
         text += hint(reference.name, (known.name for known in node.parameters))
         yield Finding(text, _place(reference, parameter.position), "unknown-reference")
-    elif parameter.value is not None and declared.type and not fits(parameter.value, declared.type):
-        text = f"the value {parameter.value!r} of '{reference.name}' is no {declared.type.kind}, as it is declared"
-        yield Finding(text, parameter.position, "value")
+    elif parameter.value is not None and declared.type and (found := fault(parameter.value, declared.type)):
+        text = f"the value {parameter.value!r} of '{reference.name}' {found}, as it is declared"
+        yield Finding(text, value_place(parameter), "value")
 
 
 # Connections
@@ -347,7 +373,11 @@ def _elements(component: Component) -> tuple[Port | RosParameter, ...]:
 
 
 def _place(reference: Reference, position: Position) -> Position:
-    return reference.position if reference.position.line else position
+    return _first(reference.position, position)
+
+
+def _first(known: Position, other: Position) -> Position:
+    return known if known.line else other
 
 
 def _qualities(system: RosSystem) -> set[str]:

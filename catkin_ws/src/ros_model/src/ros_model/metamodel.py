@@ -79,6 +79,7 @@ class RosParameter:
     value: Value | None = None
     namespace: str | None = None
     position: Position = field(default=Position(), compare=False)
+    value_position: Position = field(default=Position(), compare=False, repr=False)
 
     @property
     def key(self) -> str:
@@ -170,14 +171,20 @@ class ParameterType:
 
 
 @dataclass(frozen=True)
-class SystemParameter:
-    """A global parameter of a system; `qa_<name>` holds the expected level of a quality attribute."""
+class TypedParameter:
+    """A parameter with its declared type; `value_position` is where its value stands, where a file has one."""
 
     name: str
     type: ParameterType | None = None
     value: Value | None = None
     namespace: str | None = None
     position: Position = field(default=Position(), compare=False)
+    value_position: Position = field(default=Position(), compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class SystemParameter(TypedParameter):
+    """A global parameter of a system; `qa_<name>` holds the expected level of a quality attribute."""
 
 
 @dataclass(frozen=True)

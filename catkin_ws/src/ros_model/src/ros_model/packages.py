@@ -6,10 +6,10 @@ import enum
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ros_model.metamodel import Position
+from ros_model.metamodel import Position, TypedParameter
 
 if TYPE_CHECKING:
-    from ros_model.metamodel import ParameterType, PortKind, Value
+    from ros_model.metamodel import PortKind
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,8 @@ class PortDeclaration:
 
 
 @dataclass(frozen=True)
-class ParameterDeclaration:
+class ParameterDeclaration(TypedParameter):
     """A parameter that a node reads, with its declared type and default value."""
-
-    name: str
-    type: ParameterType | None = None
-    value: Value | None = None
-    namespace: str | None = None
-    position: Position = field(default=Position(), compare=False)
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ def _node(node: Node, library: Library) -> Iterator[Finding]:
                 f"{port.kind.value} '{port.name}': {problem.message}", port.position, "unknown-type", problem.severity
             )
     for parameter in node.parameters:
-        yield from misfit(parameter.name, parameter.value, parameter.type, parameter.position)
+        yield from misfit(parameter)
 
 
 def _spec(spec: Spec, package: str, library: Library) -> Iterator[Finding]:

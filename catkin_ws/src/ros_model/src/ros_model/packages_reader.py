@@ -133,11 +133,7 @@ class _Builder(Builder):
         return "parameters", tuple(items[1:]), items[0]
 
     def parameter(self, items: list[Any]) -> ParameterDeclaration:
-        name, rest = split_name(items)
-        fields = self.fields(rest, items[0], needs_name=True, name=name)
-        return ParameterDeclaration(
-            fields["name"], fields.get("type"), fields.get("value"), fields.get("namespace"), self.at(items[0])
-        )
+        return self.typed_parameter(ParameterDeclaration, items)
 
     # Message specifications
 

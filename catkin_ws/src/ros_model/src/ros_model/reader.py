@@ -87,11 +87,7 @@ class _Builder(Builder):
         return "qualities", tuple(items[1:]), items[0]
 
     def quality(self, items: list[Any]) -> SystemParameter:
-        name, rest = split_name(items)
-        fields = self.fields(rest, items[0], needs_name=True, name=name)
-        return SystemParameter(
-            fields["name"], fields.get("type"), fields.get("value"), fields.get("namespace"), self.at(items[0])
-        )
+        return self.typed_parameter(SystemParameter, items)
 
     # Fields
 
@@ -153,7 +149,14 @@ class _Builder(Builder):
 
     def ros_parameter(self, items: list[Any]) -> RosParameter:
         name, fields, position = self.port(items)
-        return RosParameter(name, fields.get("reference"), fields.get("value"), fields.get("namespace"), position)
+        return RosParameter(
+            name,
+            fields.get("reference"),
+            fields.get("value"),
+            fields.get("namespace"),
+            position,
+            fields.get("value_position", Position()),
+        )
 
     # Connections
 

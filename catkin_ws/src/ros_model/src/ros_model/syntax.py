@@ -10,7 +10,7 @@ import re
 import threading
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from lark import Lark, Transformer
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
@@ -18,7 +18,7 @@ from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedTok
 from ros_model.comments import header
 from ros_model.errors import ModelError, first_of
 from ros_model.files import MAX_SIZE
-from ros_model.metamodel import ParameterType, Position, Value
+from ros_model.metamodel import ParameterType, Position, TypedParameter, Value
 from ros_model.recovery import Recovery
 
 if TYPE_CHECKING:
@@ -69,6 +69,7 @@ _SPELLINGS = re.compile(r'^(\w+)(?:\.2)?: \(?((?:"[^"]+"(?: \| )?)+)\)?(?: _END)
 
 Field = tuple[str, Any, "Token"]
 """What a field of an element becomes: its key, its value, the word that opens it."""
+_Parameter = TypeVar("_Parameter", bound=TypedParameter)
 
 
 class Language:
@@ -189,7 +190,9 @@ class Builder(Transformer):
         return "type", items[1], items[0]
 
     def value_field(self, items: list[Any]) -> Field:
-        return "value", self.plain(items[1]), items[0]
+        keyword, value = items
+        first = value.token if isinstance(value, (_Value, _Members)) else value
+        return "value", (self.plain(value), self.at(first or keyword)), keyword
 
     # Namespaces, written as ROS writes them: /global, relative, ~private
 
@@ -242,23 +245,24 @@ class Builder(Transformer):
     # Values
 
     def any_value(self, items: list[Any]) -> _Value:
-        return _Value(text_of(items[-1]) if items and items[-1] is not None else "")
+        text = items[-1] if items else None
+        return _Value("" if text is None else text_of(text), text)
 
     def struct_value(self, items: list[Any]) -> _Value:
-        return _Value(self._struct([item for item in items if isinstance(item, _Member)]))
+        return _Value(self._struct([item for item in items if isinstance(item, _Member)]), items[0])
 
     def list_value(self, items: list[Any]) -> _Value | _Members:
         """Build a list, a struct, or the braces around a member of a struct, by what is inside."""
         opening, *entries = (item for item in items if item is not None)
         members = [entry for entry in entries if isinstance(entry, _Member)]
         if members and len(members) == len(entries) == 1:
-            return _Members(members)
+            return _Members(members, opening)
         members += [entry.members[0] for entry in entries if isinstance(entry, _Members)]
         if not members:
-            return _Value([self.plain(entry) for entry in entries])
+            return _Value([self.plain(entry) for entry in entries], opening)
         if len(members) < len(entries):
             self._doubt("members of a struct and values of a list are mixed here", opening)
-        return _Value(self._struct(members))
+        return _Value(self._struct(members), opening)
 
     def member(self, items: list[Any]) -> _Member:
         name, _, value = items
@@ -294,6 +298,8 @@ class Builder(Transformer):
     ) -> dict[str, Any]:
         """Return an element's fields by their keys; sections that stand twice are joined, other fields refused.
 
+        Beside a `value` is the `value_position`.
+
         Args:
             fields: the fields.
             keyword: the word that opens the element.
@@ -304,14 +310,29 @@ class Builder(Transformer):
         for key, value, token in fields:
             if key not in found:
                 found[key] = value
-            elif isinstance(value, tuple) and key not in {"From", "To"}:
+            elif isinstance(value, tuple) and key not in {"From", "To", "value"}:
                 found[key] += value
             else:
                 self.refuse(f"second '{token}' in this {keyword}: keep one", token)
         if needs_name and "name" not in found:
             self._doubt(f"this {keyword} has no name: add one", keyword)
             found["name"] = ""
+        if "value" in found:
+            found["value"], found["value_position"] = found["value"]
         return found
+
+    def typed_parameter(self, kind: type[_Parameter], items: list[Any]) -> _Parameter:
+        """Return the parameter that [keyword, optional name, field, ...] is."""
+        name, rest = split_name(items)
+        fields = self.fields(rest, items[0], needs_name=True, name=name)
+        return kind(
+            fields["name"],
+            fields.get("type"),
+            fields.get("value"),
+            fields.get("namespace"),
+            self.at(items[0]),
+            fields.get("value_position", Position()),
+        )
 
     def plain(self, item: Token | _Value | _Members) -> Value:
         """Return a value as Python has it."""
@@ -349,6 +370,7 @@ class _Value(NamedTuple):
     """A list or struct, told apart from tokens."""
 
     value: Value
+    token: Token | None  # the first
 
 
 class _Member(NamedTuple):
@@ -363,6 +385,7 @@ class _Members(NamedTuple):
     """Braces with one member in them: a struct by itself, a member of one within other braces."""
 
     members: list[_Member]
+    token: Token
 
 
 class _MemberType(NamedTuple):
