@@ -1,0 +1,189 @@
+"""Models that are extracted from demonstrator D2 as it runs, beside its own model and its source."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import rospkg
+from ros_model.extraction import plumbing
+from ros_model.extraction.catkin_package import find_packages
+from ros_model.extraction.graph import End, interfaces
+from ros_model.extraction.live import Details, look_at
+from ros_model.extraction.names import resolve
+from ros_model.extraction.package_source import ExtractedPackage, extract_package
+from ros_model.extraction.source import FoundPort
+from ros_model.metamodel import PortKind
+from ros_model.reader import read_system
+from ros_model.snapshot import GraphSnapshot, SnapshotError, take_snapshot
+
+START_S = 120.0
+SETTLED_S = 3.0
+PATIENCE_S = 10.0
+D2 = Path(rospkg.RosPack().get_path("metacontrol_sim"))
+KINDS = [kind for kind in PortKind if kind is not PortKind.SERVICE_CLIENT]  # a master knows no clients of services
+
+
+def free_port() -> int:
+    with closing(socket.socket()) as probe:
+        probe.bind(("localhost", 0))
+        return int(probe.getsockname()[1])
+
+
+def ends_of(uri: str) -> set[End]:
+    try:
+        return set(interfaces(take_snapshot(uri), Details()))
+    except SnapshotError:
+        return set()
+
+
+def wait_until_settled(uri: str, process: subprocess.Popen[bytes], log: Path) -> None:
+    """Wait until all of D2's components and the action server of navigation are there, and nothing is added."""
+    wanted = {f"/{c.graph_name}" for c in read_system(D2 / "models" / "d2.rossystem").components} | {"/reasoner"}
+    deadline, before, since = time.monotonic() + START_S, set[End](), time.monotonic()
+    while time.monotonic() < deadline and process.poll() is None:
+        now = ends_of(uri)
+        if now != before:
+            before, since = now, time.monotonic()
+        is_up = wanted <= {end.node for end in now} and (PortKind.ACTION_SERVER, "/move_base") in {
+            (end.kind, end.name) for end in now
+        }
+        if is_up and time.monotonic() - since > SETTLED_S:
+            return
+        time.sleep(0.2)
+    missing = wanted - {end.node for end in before}
+    pytest.fail(f"D2 is not up within {START_S:g} s, missing {missing}\n{log.read_text()[-4000:]}")
+
+
+@contextmanager
+def running_d2(folder: Path) -> Iterator[str]:
+    """Run D2, and give the address of its master."""
+    port = free_port()
+    uri = f"http://localhost:{port}"
+    environment = {
+        **os.environ,
+        "ROS_MASTER_URI": uri,
+        "ROS_HOSTNAME": "localhost",
+        "ROS_HOME": str(folder),
+        "ROS_LOG_DIR": str(folder / "log"),
+    }
+    log = folder / "console"
+    with log.open("wb") as console:
+        process = subprocess.Popen(
+            ["roslaunch", "-p", str(port), "metacontrol_sim", "metacontrol_sim_reasoner.launch"],
+            env=environment,
+            stdout=console,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+    try:
+        wait_until_settled(uri, process, log)
+        yield uri
+    finally:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(timeout=30.0)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What was seen of D2 while it ran."""
+
+    snapshot: GraphSnapshot
+    details: Details
+    command: subprocess.CompletedProcess[str]
+    folder: Path
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("d2")
+    with running_d2(folder) as uri:
+        command = rosmodel("snapshot", "--master", uri, "-o", folder / "models")
+        snapshot = take_snapshot(uri)
+        details = look_at(snapshot, uri, PATIENCE_S)
+    return Seen(snapshot, details, command, folder / "models")
+
+
+def rosmodel(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = ["rosmodel", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_snapshot_checks_and_lacks_no_component_of_the_models(seen):
+    assert seen.command.returncode == 0, seen.command.stdout + seen.command.stderr
+    checked = rosmodel("check", seen.folder / "snapshot.ros", seen.folder / "snapshot.rossystem")
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+    compared = rosmodel("diff", D2 / "models" / "d2.rossystem", seen.folder / "snapshot.rossystem")
+    assert compared.returncode == 1, compared.stdout + compared.stderr  # the snapshot has the meta-controller, too
+    lines = compared.stdout.splitlines()
+    assert [line for line in lines if re.fullmatch(r"- component '[^']*'", line)] == []
+    assert "+ component 'reasoner'" in lines  # so that a changed form of these lines is noticed
+    assert "who calls which service" in (seen.folder / "snapshot.rossystem").read_text()
+
+
+def test_source_has_every_interface_that_the_running_nodes_have(seen):
+    ours = {path.name for path in find_packages(D2.parent)}
+    packages = {origin.package for origin in seen.details.origins.values()} & ours
+    extracted = {name: extract_package(D2.parent / name) for name in sorted(packages)}
+    total, by_name, by_place, missing, said, own = Counter(), Counter(), Counter(), [], [], 0
+    ends = interfaces(seen.snapshot, seen.details)
+    for end in sorted(ends, key=lambda end: (end.node, end.kind.value, end.name)):
+        ports = ports_of(end, seen.details, extracted)
+        if ports is None:
+            continue  # a program of somebody else's package
+        if plumbing.is_plumbing(end):
+            own += 1
+            continue
+        total[end.kind] += 1
+        if any(explains(port, end) for port in ports if port.is_resolved):
+            by_name[end.kind] += 1
+        elif any(explains(port, end) for port in ports if not port.is_resolved):
+            by_place[end.kind] += 1
+            said.append(f"known only at run time: {end.node} {end.kind.value} {end.name}")
+        else:
+            missing.append(end)
+    said += [f"{kind.value}: {by_name[kind]} by name + {by_place[kind]} by place, of {total[kind]}" for kind in KINDS]
+    sys.stdout.write("\n".join([*said, f"made by rospy in every node: {own}", ""]))
+    assert missing == []
+    assert all(total[kind] for kind in KINDS)
+    assert sum(by_name.values()) > 0.8 * sum(total.values())
+
+
+def ports_of(end: End, details: Details, extracted: dict[str, ExtractedPackage]) -> tuple[FoundPort, ...] | None:
+    origin = details.origins.get(end.node)
+    if origin is None or origin.package not in extracted:
+        assert origin is not None or end.node in plumbing.NODES, details.unknown
+        return None
+    return extracted[origin.package].nodes[origin.executable].ports
+
+
+def explains(port: FoundPort, end: End) -> bool:
+    """Whether a port of the source is an end of the running graph. Goals of an action may be sent by a mere topic."""
+    ends = [(end.kind, end.name, end.type)]
+    if end.kind is PortKind.ACTION_CLIENT:
+        ends.append((PortKind.PUBLISHER, f"{end.name}/goal", f"{end.type}Goal"))
+    name = port.name.partition("@")[0] if not port.is_resolved else port.name
+    parts = re.split(r"\{.*?\}", name)
+    pattern = resolve(parts[0], end.node) if parts[0] or len(parts) == 1 else ""
+    expression = ".+".join(map(re.escape, [pattern, *parts[1:]]))
+    return any(
+        port.kind is kind
+        and re.fullmatch(expression, known)
+        and (not port.type or not type_name or port.type == type_name)
+        for kind, known, type_name in ends
+    )
