@@ -199,6 +199,59 @@ def test_wrong_table_is_refused_with_its_line(load, files, message):
     assert message in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("qa", "message"),
+    [
+        ("name,safety\nslow,7\nblind,0.9\n", "qa.csv:2:1: slow expects 7 of 'safety', whose range is [0, 1]"),
+        ("name,safety\nslow,-0.1\nblind,0.9\n", "qa.csv:2:1: slow expects -0.1 of 'safety', whose range is [0, 1]"),
+        (QA + "extra,0.5,measured\n", "qa.csv:4:1: 'extra' is none of the 2 variants: take the row out"),
+    ],
+)
+def test_level_that_no_variant_can_have_is_refused_at_its_row(load, qa, message):
+    with pytest.raises(ModelError) as caught:
+        load(qa=qa)
+    assert message in str(caught.value)
+
+
+def test_levels_at_the_ends_of_the_range_and_without_one_are_fine(load, settings):
+    load(qa="name,safety\nslow,0\nblind,1\n")
+    del settings["quality_attributes"]["safety"]["range"]
+    load(qa="name,safety\nslow,-5\nblind,7\n")
+
+
+def test_families_may_share_a_table_of_levels(load, settings, tmp_path):
+    (tmp_path / "more.csv").write_text("name,speed_mps,sensor\nfast,1.5,laser\n")
+    settings["variants"] = [settings["variants"], settings["variants"] | {"table": "more.csv"}]
+    project = load(qa=QA + "fast,0.8,estimated\n")
+    assert [variant.name for variant in project.variants] == ["slow", "blind", "fast"]
+
+
+def test_every_error_of_the_tables_is_told_in_order_and_none_as_unreadable(load, tmp_path):
+    with pytest.raises(ModelError) as caught:
+        load(
+            table="name,speed_mps,sensor\nslow,1\nblind,0.7,camera\nblind,0.7,camera\n",
+            qa="name,safety\nslow,0.2\nslow,0.9\nsl/ow,1\n",
+        )
+    assert [str(error).removeprefix(f"{tmp_path}/").split(" ")[0] for error in caught.value.all] == [
+        *("qa.csv:3:1:", "qa.csv:4:1:", "variants.csv:2:1:", "variants.csv:4:1:"),
+    ]
+    assert {error.rule for error in caught.value.all} == {"table"}
+
+
+def test_every_wrong_row_is_told_with_its_missing_level(load, tmp_path):
+    with pytest.raises(ModelError) as caught:
+        load(table="name,speed_mps,sensor\nslow,x,laser\nblind,1,sonar\n", qa="name,safety\nother,1\n")
+    assert [str(error).removeprefix(f"{tmp_path}/").split(":")[0] for error in caught.value.all] == [
+        *("qa.csv", "qa.csv", "variants.csv", "variants.csv"),
+    ]
+
+
+def test_no_more_errors_are_told_than_can_be_read(load):
+    with pytest.raises(ModelError) as caught:
+        load(table="name,speed_mps,sensor\n" + "slow,1\n" * 1000)
+    assert len(caught.value.all) == 20
+
+
 def test_wiring_to_what_the_base_does_not_publish_is_refused(load, settings):
     settings["variants"]["connections"]["sensor"]["camera"] = ["camera.image"]
     with pytest.raises(ModelError, match=r"metacontrol\.yaml:\d+:\d+: camera\.image is no publisher"):

@@ -1,5 +1,6 @@
 """The command rosmodel: exit status, and one line for every failure."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -49,6 +50,57 @@ def test_check_goes_on_after_a_file_that_can_not_be_read(run, model):
     assert (status, err) == (2, "")
     assert "broken:1:10: error: expected '{'" in out
     assert "connection 't'" in out
+
+
+@pytest.fixture
+def project(model):
+    settings = """package: p
+base: base.rossystem
+variants: {table: table.csv, qa: qa.csv}
+functions: {f: {designs: all}}
+quality_attributes: {safety: {direction: lower_is_better, range: [0, 1]}}
+utility: safety
+objectives: {o: {function: f}}
+"""
+    model(
+        "RosSystem { Name base RosComponents ( ComponentInterface { name nav FromRosNode 'p.nav.nav' } ) }",
+        "base.rossystem",
+    )
+    model("PackageSet { CatkinPackage p { Artifact nav { Node { name nav } } } }", "p.ros")
+    model("name,nav.speed\na,1\nb,2\n", "table.csv")
+    model("name,safety\na,0.1\nb,0.2\n", "qa.csv")
+    return model(settings, "metacontrol.yaml")
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "rule", "message"),
+    [
+        ("metacontrol.yaml", ("utility: safety", "utility: speed"), "settings", "'speed' is none of quality_attr"),
+        ("metacontrol.yaml", ("package: p", "packages: p"), "settings", "packages: unknown key"),
+        ("metacontrol.yaml", ("designs: all", "designs: [c]"), "settings", "'c' is none of the 2 variants"),
+        ("metacontrol.yaml", ("{table", "{component: arm, table"), "settings", "'arm' is no component"),
+        ("table.csv", ("nav.speed", "speed"), "table", "nothing says what column 'speed' sets"),
+        ("table.csv", ("b,2", "a,2"), "table", "name 'a' stands twice"),
+        ("qa.csv", ("b,0.2\n", ""), "table", "no row for b"),
+        ("qa.csv", ("b,0.2", "b,0.2\nc,0.3"), "table", "'c' is none of the 2 variants"),
+        ("qa.csv", ("0.2", "7"), "level", "b expects 7 of 'safety', whose range is [0, 1]"),
+    ],
+)
+def test_project_that_reads_well_but_is_wrong_ends_with_status_1(run, project, name, change, rule, message):
+    path = project.parent / name
+    path.write_text(path.read_text().replace(*change))
+    status, out, _ = run("check", "--format", "json", project.parent)
+    findings = json.loads(out)
+    assert status == 1
+    assert rule in {finding["rule"] for finding in findings if message in finding["message"]}
+
+
+@pytest.mark.parametrize(("name", "text"), [("metacontrol.yaml", "a: b: c"), ("qa.csv", 'name,"'), ("p.ros", "x")])
+def test_project_that_can_not_be_read_ends_with_status_2(run, project, name, text):
+    assert run("check", project.parent)[0] == 1  # its parameter is in no model
+    (project.parent / name).write_text(text)
+    status, out, _ = run("check", project.parent)
+    assert (status, f"{name}:1:" in out) == (2, True)
 
 
 @pytest.mark.parametrize("text", ["", "\x00\xff", "{" * 100_000, "RosSystem { Name 'x"])

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from ros_model.metamodel import Position
+
+
+_TOLD = 20
+"""Errors that are told at once, as many as of a model."""
 
 
 class ModelError(Exception):
@@ -17,13 +22,17 @@ class ModelError(Exception):
         message: what is wrong.
         position: where in a file, if it is known; it opens the text as `file:line:column: `.
         others: what else is wrong in the same file, in the order of the file.
+        rule: of `rosmodel check`, that the content of a readable file breaks; "": the file can't be read.
     """
 
-    def __init__(self, message: str, position: Position | None = None, others: Iterable[ModelError] = ()) -> None:
+    def __init__(
+        self, message: str, position: Position | None = None, others: Iterable[ModelError] = (), rule: str = ""
+    ) -> None:
         super().__init__(printable(message if position is None else f"{position}: {message}"))
         self.message = message
         self.position = position
         self.others = tuple(others)
+        self.rule = rule
 
     @property
     def all(self) -> tuple[ModelError, ...]:
@@ -40,9 +49,39 @@ def printable(text: str) -> str:
 
 def first_of(errors: Iterable[ModelError]) -> ModelError:
     """Return the error that comes first in the file, with the rest as its others; errors that say the same are one."""
-    ordered = sorted(
-        {str(error): error for error in errors}.values(),
-        key=lambda error: (error.position.line, error.position.column) if error.position else (0, 0),
-    )
-    first, *others = ordered
-    return ModelError(first.message, first.position, others)
+    first, *others = sorted({str(error): error for error in errors}.values(), key=_place)
+    return ModelError(first.message, first.position, others, first.rule)
+
+
+def _place(error: ModelError) -> tuple[str, int, int]:
+    where = error.position
+    return (where.file, where.line, where.column) if where else ("", 0, 0)
+
+
+class Gathered:
+    """Gathers errors of steps that do not need each other, to tell all of them at once."""
+
+    def __init__(self) -> None:
+        self._errors: list[ModelError] = []
+
+    @contextmanager
+    def step(self) -> Iterator[None]:
+        """Go on after an error."""
+        try:
+            yield
+        except ModelError as error:
+            self._errors += error.all
+
+    def add(self, errors: Iterable[ModelError]) -> None:
+        """Add errors that were not raised."""
+        self._errors += errors
+
+    def tell(self) -> None:
+        """Raise what was gathered, the first 20.
+
+        Raises:
+            ModelError: there is something.
+        """
+        if self._errors:
+            first = first_of(self._errors)
+            raise ModelError(first.message, first.position, first.others[: _TOLD - 1], first.rule)

@@ -33,6 +33,9 @@ RULES = {
     "duplicate": "A name stands once.",
     "two-values": "A parameter has one value.",
     "value": "A value fits its declared type.",
+    "settings": "metacontrol.yaml says what its schema allows, and names what is there.",
+    "table": "A table has the rows, columns and cells that its family needs.",
+    "level": "An expected level is of a quality attribute, and within its range.",
     "missing-quality": "A variant has a value for each quality attribute of its siblings.",
 }
 """What holds where a rule has found nothing, by its name."""
@@ -59,7 +62,7 @@ class Finding:
     @classmethod
     def of(cls, error: ModelError) -> Finding:
         """Return the finding that an error is."""
-        return cls(error.message, error.position, "syntax" if error.position else "unreadable")
+        return cls(error.message, error.position, error.rule or ("syntax" if error.position else "unreadable"))
 
 
 def as_text(findings: Sequence[Finding]) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ros_model.columns import Columns, parse_columns
-from ros_model.errors import ModelError
+from ros_model.errors import Gathered, ModelError
 from ros_model.library import Library
 from ros_model.metamodel import Position, RosSystem
 from ros_model.model_files import PACKAGES, files_in
@@ -20,10 +22,11 @@ from ros_model.variants import make_systems, without
 from ros_model.wiring import required_by_parameters, required_components
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from ros_model.columns import Where
     from ros_model.schema_check import Keys
+    from ros_model.tables import Table
 
 __all__ = ["DIRECTIONS", "FILE_NAME", "Project", "load_project"]
 
@@ -123,22 +126,28 @@ def load_project(folder: str | Path) -> Project:
     Variants come from the tables or files that it names; without one, from the `.rossystem` files of `variants/`.
 
     Raises:
-        ModelError: a file is missing or wrong; says which, and where.
+        ModelError: files are missing or wrong; says which, and where, of each table and each row.
     """
     source = read_settings(locate(folder))
     whole_base = read_system(source.inside("base"))
-    columns = {keys: parse_columns(family, position_within(source, keys)) for keys, family in source.families}
+    with _ruled(source):
+        columns = {keys: parse_columns(family, position_within(source, keys)) for keys, family in source.families}
     optional = frozenset().union(*(found.optional for found in columns.values()))
     base = without(whole_base, optional)
     variants: list[RosSystem] = []
     by_table: set[str] = set()
+    levels: list[Table] = []
+    wrong = Gathered()
     for keys, family in source.families:
-        if "table" in family:
-            found = _from_table(source, keys, whole_base, columns[keys])
-            by_table.update(variant.name for variant in found)
-        else:
-            found = _from_files(source, keys)
-        variants += found
+        with wrong.step():
+            if "table" in family:
+                found, expected = _from_table(source, keys, whole_base, columns[keys])
+                by_table.update(variant.name for variant in found)
+                levels += expected
+            else:
+                found = _from_files(source, keys)
+            variants += found
+    wrong.tell()
     project = Project(
         folder=source.path.parent.resolve(),
         settings=source.content,
@@ -148,9 +157,12 @@ def load_project(folder: str | Path) -> Project:
         whole_base=whole_base,
         by_table=frozenset(by_table),
     )
-    _check_names(project)
-    _check_levels(project)
-    _check_one_meaning(project)
+    wrong.add(_wrong_names(project))
+    wrong.add(_wrong_levels(project))
+    wrong.add(_levels_of_nothing(project, levels))
+    wrong.tell()
+    wrong.add(_two_meanings(project))
+    wrong.tell()
     return project
 
 
@@ -163,11 +175,30 @@ def position_within(source: Settings, keys: Keys) -> Where:
     return where
 
 
-def _from_table(source: Settings, keys: Keys, base: RosSystem, columns: Columns) -> list[RosSystem]:
+@contextmanager
+def _ruled(source: Settings) -> Iterator[None]:
+    """Say of errors in what was read that the settings, or a table, are wrong."""
+    try:
+        yield
+    except ModelError as error:
+        for found in error.all:
+            in_settings = found.position is None or found.position.file == str(source.path)
+            found.rule = found.rule or ("settings" if in_settings else "table")
+        raise
+
+
+def _from_table(source: Settings, keys: Keys, base: RosSystem, columns: Columns) -> tuple[list[RosSystem], list[Table]]:
+    """Return the variants of a family, and the table of their expected levels, where it has one."""
     family = dict(source.families)[keys]
-    table = read_table(source.inside(*keys, "table"))
-    levels = read_table(source.inside(*keys, "qa")) if "qa" in family else None
-    return [part for _, part in make_systems(base, columns, table, levels)]
+    tables: list[Table] = []
+    wrong = Gathered()
+    for key in ("table", "qa"):
+        if key in family:
+            with wrong.step():
+                tables.append(read_table(source.inside(*keys, key)))
+    wrong.tell()
+    with _ruled(source):
+        return [part for _, part in make_systems(base, columns, *tables)], tables[1:]
 
 
 def _from_files(source: Settings, keys: Keys) -> list[RosSystem]:
@@ -182,53 +213,78 @@ def _from_files(source: Settings, keys: Keys) -> list[RosSystem]:
     for path, variant in zip(paths, variants, strict=True):
         if path.parent.name == "variants" and path.stem != variant.name:
             raise ModelError(
-                f"the variant {variant.name!r} must be in a file of its name: rename one", variant.position
+                f"the variant {variant.name!r} must be in a file of its name: rename one",
+                variant.position,
+                rule="settings",
             )
     return variants
 
 
-def _check_names(project: Project) -> None:
+def _wrong_names(project: Project) -> Iterator[ModelError]:
     source = project.source
     known = [variant.name for variant in project.variants]
     if twice := sorted({name for name in known if known.count(name) > 1}):
-        raise source.error(f"two variants bear the name {twice[0]!r}: rename one", "variants")
+        yield source.error(f"two variants bear the name {twice[0]!r}: rename one", "variants")
     for name, function in project.settings["functions"].items():
         for number, design in enumerate(function["designs"] if function["designs"] != "all" else ()):
             if design not in known:
                 keys = ("functions", name, "designs", number)
-                raise source.error(f"{design!r} is none of the {len(known)} variants", *keys)
+                yield source.error(f"{design!r} is none of the {len(known)} variants", *keys)
         if isinstance(function.get("requires"), dict):
             solving = {design.name for design in project.designs(name)}
             for design in function["requires"]:
                 if design not in solving:
                     keys = ("functions", name, "requires", design)
-                    raise source.error(f"{design!r} is none of the designs of {name}", *keys)
+                    yield source.error(f"{design!r} is none of the designs of {name}", *keys)
     components = {component.name for component in project.whole_base.components} | set(project.settings["components"])
     for parameter, choices in project.settings["requires"].items():
         for value, component in choices.items():
             if component not in components:
-                raise source.error(
+                yield source.error(
                     f"{component!r} is a component neither of the base nor of components: add it to one",
                     *("requires", parameter, value),
                 )
 
 
-def _check_levels(project: Project) -> None:
-    """Check that every expected level is of a quality attribute that is there."""
+def _wrong_levels(project: Project) -> Iterator[ModelError]:
+    """Yield expected levels of no quality attribute that is there, and those outside its range."""
     known = project.settings["quality_attributes"]
     for variant in project.variants:
         for parameter in variant.parameters:
-            quality = parameter.name.removeprefix("qa_")
-            if quality != parameter.name and quality not in known:
-                raise ModelError(
-                    f"{variant.name} expects a level of {quality!r}, which is none of quality_attributes: "
-                    f"{', '.join(sorted(known))}",
+            quality, level = parameter.name.removeprefix("qa_"), parameter.value
+            if quality == parameter.name:
+                continue
+            if quality not in known:
+                wrong = f"which is none of quality_attributes: {', '.join(sorted(known))}"
+                yield ModelError(
+                    f"{variant.name} expects a level of {quality!r}, {wrong}", parameter.position, rule="level"
+                )
+                continue
+            lowest, highest = known[quality].get("range", (-math.inf, math.inf))
+            if isinstance(level, (int, float)) and not lowest <= level <= highest:
+                yield ModelError(
+                    f"{variant.name} expects {level:g} of {quality!r}, whose range is [{lowest:g}, {highest:g}]: "
+                    "correct one of them",
                     parameter.position,
+                    rule="level",
                 )
 
 
-def _check_one_meaning(project: Project) -> None:
-    """Check that no name means two things: in the ontology they would be one."""
+def _levels_of_nothing(project: Project, tables: Iterable[Table]) -> Iterator[ModelError]:
+    """Yield rows of expected levels, which families may share, that are no variant's."""
+    known = {variant.name for variant in project.variants}
+    for table in tables:
+        for row in table.rows:
+            if row.name not in known:
+                yield ModelError(
+                    f"{row.name!r} is none of the {len(known)} variants: take the row out, or add the variant",
+                    row.position,
+                    rule="table",
+                )
+
+
+def _two_meanings(project: Project) -> Iterator[ModelError]:
+    """Yield names that mean two things: in the ontology they would be one."""
     settings, seen = project.settings, dict[str, str]()
     values = [
         *(f"{variant.name}_{quality}" for variant in project.variants for quality in variant.expected_qas),
@@ -245,5 +301,5 @@ def _check_one_meaning(project: Project) -> None:
     for meaning, names in meanings.items():
         for name in names:
             if name in seen:
-                raise project.source.error(f"{name!r} names {seen[name]} and {meaning}: rename one")
+                yield project.source.error(f"{name!r} names {seen[name]} and {meaning}: rename one")
             seen[name] = meaning

@@ -40,7 +40,7 @@ class Settings:
 
     def error(self, message: str, *keys: str | int) -> ModelError:
         """Return an error about the value to which the keys lead."""
-        return ModelError(f"{dotted(keys) or 'the file'}: {message}", self.at(*keys))
+        return ModelError(f"{dotted(keys) or 'the file'}: {message}", self.at(*keys), rule="settings")
 
     def inside(self, *keys: str | int) -> Path:
         """Return the file that a value names, relative to this one.

@@ -5,11 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ros_model.errors import ModelError
+from ros_model.errors import Gathered, ModelError
 from ros_model.files import read_text, safe_file_name
 from ros_model.metamodel import Position, Value
 from ros_model.yaml_file import read_yaml
@@ -57,44 +57,56 @@ def read_table(path: Path) -> Table:
     Raises:
         ModelError: the file is no such table, or a name stands twice or can't name a file.
     """
+    wrong = Gathered()
     if path.suffix == ".csv":
-        rows = _csv_rows(path)
+        rows = _csv_rows(path, wrong)
     elif path.suffix in {".yaml", ".yml"}:
-        rows = _yaml_rows(path)
+        rows = _yaml_rows(path, wrong)
     else:
         raise ModelError(f"{path}: is neither .csv nor .yaml: a table of variants is one of these")
+    wrong.add(_wrong_names(rows))
+    wrong.tell()
     if not rows:
-        raise ModelError("no rows: add one for each variant", Position(str(path), 1, 1))
-    seen: set[str] = set()
-    for row in rows:
-        if row.name in seen:
-            raise ModelError(f"name {row.name!r} stands twice: rename one", row.position)
-        seen.add(row.name)
-        try:
-            safe_file_name(row.name, "variant")
-        except ModelError as error:
-            raise ModelError(error.message, row.position) from None
+        raise _fault("no rows: add one for each variant", Position(str(path), 1, 1))
     columns = dict.fromkeys(column for row in rows for column in row.cells)
     complete = (Row(row.name, {column: row.cells.get(column) for column in columns}, row.position) for row in rows)
     return Table(path, tuple(columns), tuple(complete))
 
 
-def _csv_rows(path: Path) -> list[Row]:
+def _wrong_names(rows: list[Row]) -> Iterator[ModelError]:
+    seen: set[str] = set()
+    for row in rows:
+        if row.name in seen:
+            yield _fault(f"name {row.name!r} stands twice: rename one", row.position)
+        seen.add(row.name)
+        try:
+            safe_file_name(row.name, "variant")
+        except ModelError as error:
+            yield _fault(error.message, row.position)
+
+
+def _fault(message: str, where: Position) -> ModelError:
+    """Return an error in the content of a table that can be read."""
+    return ModelError(message, where, rule="table")
+
+
+def _csv_rows(path: Path, wrong: Gathered) -> list[Row]:
     reader = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
     rows: list[Row] = []
     csv.field_size_limit(_LARGEST_CELL)
     try:
         columns = [column.strip() for column in next(reader, [])]
         if NAME not in columns:
-            raise ModelError(f"no column {NAME!r}: the first line must name the columns", Position(str(path), 1, 1))
+            raise _fault(f"no column {NAME!r}: the first line must name the columns", Position(str(path), 1, 1))
         if twice := [column for column in columns if columns.count(column) > 1 or not column]:
-            raise ModelError(f"column {twice[0]!r} is empty or stands twice", Position(str(path), 1, 1))
+            raise _fault(f"column {twice[0]!r} is empty or stands twice", Position(str(path), 1, 1))
         for cells in reader:
             where = Position(str(path), reader.line_num, 1)
             if not cells:
                 continue
             if len(cells) != len(columns):
-                raise ModelError(f"has {len(cells)} cells, must have {len(columns)}, as line 1", where)
+                wrong.add([_fault(f"has {len(cells)} cells, must have {len(columns)}, as line 1", where)])
+                continue
             row = dict(zip(columns, cells, strict=True))
             name = row.pop(NAME).strip()
             rows.append(Row(name, {column: typed_cell(cell.strip()) for column, cell in row.items()}, where))
@@ -114,7 +126,7 @@ def typed_cell(cell: str) -> Value | None:
     return float(cell) if _DOUBLE.fullmatch(cell) and abs(float(cell)) < float("inf") else cell
 
 
-def _yaml_rows(path: Path) -> list[Row]:
+def _yaml_rows(path: Path, wrong: Gathered) -> list[Row]:
     content, places = read_yaml(path)
     entries: list[tuple[Keys, object, object]]
     if isinstance(content, dict):
@@ -122,18 +134,22 @@ def _yaml_rows(path: Path) -> list[Row]:
     elif isinstance(content, list):
         entries = [((number,), row, None) for number, row in enumerate(content)]
     else:
-        raise ModelError("must be a list of rows, or a mapping of names to rows", Position(str(path), 1, 1))
+        raise _fault("must be a list of rows, or a mapping of names to rows", Position(str(path), 1, 1))
     rows = []
     for keys, entry, key in entries:
-        where = places.get(keys, Position(str(path), 1, 1))
-        if not isinstance(entry, dict) or not all(isinstance(column, str) for column in entry):
-            raise ModelError("a row must be a mapping of columns to values", where)
-        name = entry.get(NAME)
-        if not isinstance(name, str) or (key is not None and name != key):
-            raise ModelError(f"a row's name must be text, not {name!r}: put it in quotes", where)
-        cells = {column: _value(value, column, where) for column, value in entry.items() if column != NAME}
-        rows.append(Row(name, cells, where))
+        with wrong.step():
+            rows.append(_yaml_row(entry, key, places.get(keys, Position(str(path), 1, 1))))
     return rows
+
+
+def _yaml_row(entry: object, key: object, where: Position) -> Row:
+    if not isinstance(entry, dict) or not all(isinstance(column, str) for column in entry):
+        raise _fault("a row must be a mapping of columns to values", where)
+    name = entry.get(NAME)
+    if not isinstance(name, str) or (key is not None and name != key):
+        raise _fault(f"a row's name must be text, not {name!r}: put it in quotes", where)
+    cells = {column: _value(value, column, where) for column, value in entry.items() if column != NAME}
+    return Row(name, cells, where)
 
 
 def _value(value: object, column: str, where: Position) -> Value | None:
@@ -146,4 +162,4 @@ def _value(value: object, column: str, where: Position) -> Value | None:
         return [item for entry in value if (item := _value(entry, column, where)) is not None]
     if isinstance(value, dict) and value and all(isinstance(k, str) and v is not None for k, v in value.items()):
         return {name: item for name, entry in value.items() if (item := _value(entry, column, where)) is not None}
-    raise ModelError(f"column {column!r} is {value!r}: give a number, true or false, text, a list or a struct", where)
+    raise _fault(f"column {column!r} is {value!r}: give a number, true or false, text, a list or a struct", where)

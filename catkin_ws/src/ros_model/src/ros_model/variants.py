@@ -7,7 +7,7 @@ from decimal import Decimal
 from typing import TYPE_CHECKING
 
 from ros_model.columns import TARGET_OF, check_columns, outlet, with_implied
-from ros_model.errors import ModelError
+from ros_model.errors import Gathered, ModelError
 from ros_model.metamodel import (
     Component,
     Connection,
@@ -50,24 +50,26 @@ def make_systems(
         levels: a column for each quality attribute, and perhaps `source`.
 
     Raises:
-        ModelError: the base, the columns and the tables do not fit together; says where.
+        ModelError: the base, the columns and the tables do not fit together; says where, of every row.
     """
     check_columns(columns, base)
     columns = with_implied(columns, table, base)
     check_columns(columns, base)
     doubles = {column for column in table.columns if any(isinstance(row.cells[column], float) for row in table.rows)}
     found = []
+    wrong = Gathered()
     for given in table.rows:
         cells = {name: _double(cell) if name in doubles else cell for name, cell in given.cells.items()}
         row = replace(given, cells=cells)
-        expected = (*_expected(row, columns.expected), *_levels(row, levels))
-        absent = _absent(row, columns)
-        whole = _rewired(without(base, absent), columns, row)
-        components = tuple(_with_parameters(component, columns, row) for component in whole.components)
-        own = {parameter.name for parameter in expected}
-        inherited = tuple(parameter for parameter in base.parameters if parameter.name not in own)
-        whole = RosSystem(row.name, components, whole.connections, (*inherited, *expected), position=row.position)
-        found.append((whole, replace(_part(whole, columns.varied), parameters=expected)))
+        expected: list[SystemParameter] = []
+        with wrong.step():
+            expected += _expected(row, columns.expected)
+        with wrong.step():
+            expected += _levels(row, levels)
+        with wrong.step():
+            whole = _whole(base, columns, row, expected)
+            found.append((whole, replace(_part(whole, columns.varied), parameters=tuple(expected))))
+    wrong.tell()
     return tuple(found)
 
 
@@ -76,6 +78,15 @@ def make_variants(
 ) -> tuple[RosSystem, ...]:
     """Return the part of each variant; as make_systems."""
     return tuple(part for _, part in make_systems(base, columns, table, levels))
+
+
+def _whole(base: RosSystem, columns: Columns, row: Row, expected: list[SystemParameter]) -> RosSystem:
+    """Return the whole system that a row makes of the base."""
+    rewired = _rewired(without(base, _absent(row, columns)), columns, row)
+    components = tuple(_with_parameters(component, columns, row) for component in rewired.components)
+    own = {parameter.name for parameter in expected}
+    inherited = tuple(parameter for parameter in base.parameters if parameter.name not in own)
+    return RosSystem(row.name, components, rewired.connections, (*inherited, *expected), position=row.position)
 
 
 def without(system: RosSystem, names: Collection[str]) -> RosSystem:

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from ros_model.project import Project
 
 
+_UNREADABLE = ("syntax", "unreadable")  # rules that a file breaks which can't be read
+
+
 @click.command()
 @click.option(
     "--path",
@@ -58,7 +61,7 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
     findings = checked.findings()
     if text := FORMATS[form](findings):
         click.echo(text)
-    if checked.unreadable:
+    if any(finding.severity == ERROR and finding.rule in _UNREADABLE for finding in findings):
         return BAD_INPUT
     return int(any(finding.severity == ERROR for finding in findings))
 
@@ -67,7 +70,7 @@ class _Check:
     """Gathers what there is to check, then checks it by all that is known."""
 
     def __init__(self, folders: Iterable[str]) -> None:
-        self.unreadable: list[Finding] = []
+        self._refused: list[Finding] = []
         self._projects: dict[Path, Project] = {}
         self._loaded: dict[Path, Project] = {}
         self._systems: dict[Path, RosSystem] = {}
@@ -95,7 +98,7 @@ class _Check:
     def findings(self) -> list[Finding]:
         """Return all that is wrong, file by file."""
         library = Library(p for known in {**self._beside, **self._packages}.values() for p in known.packages)
-        found = [*self.unreadable]
+        found = [*self._refused]
         for packages in self._packages.values():
             found += check_packages(packages, library)
         for path, system in self._systems.items():
@@ -155,8 +158,8 @@ class _Check:
                     self._refuse(error)
 
     def _refuse(self, error: ModelError) -> None:
-        known = {str(finding) for finding in self.unreadable}
-        self.unreadable += [found for found in map(Finding.of, error.all) if str(found) not in known]
+        known = {str(finding) for finding in self._refused}
+        self._refused += [found for found in map(Finding.of, error.all) if str(found) not in known]
 
 
 def _of_project(project: Project, library: Library) -> Iterator[Finding]:
