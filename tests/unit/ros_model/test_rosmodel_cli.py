@@ -52,6 +52,22 @@ def test_check_goes_on_after_a_file_that_can_not_be_read(run, model):
     assert "connection 't'" in out
 
 
+def test_broken_file_that_was_not_asked_for_is_a_warning(run, model):
+    path = model(GOOD, "bom.rossystem")
+    other = model("PackageSet { CatkinPackage p { Colour red Artifact a { Node { nam n } } } }", "open.ros")
+    warning = f"warning: {other} can't be read: 2 errors; its packages are unknown: check it by itself\n"
+    assert run("check", path) == (0, warning, "")
+    assert run("check", "--path", path.parent, path) == (0, warning, "")
+
+
+@pytest.mark.parametrize("order", [("bom.rossystem", "open.ros"), ("open.ros", "bom.rossystem"), (".",)])
+def test_broken_file_that_was_asked_for_is_told_with_its_own_errors_only(run, model, order):
+    folder = model(GOOD, "bom.rossystem").parent
+    model("PackageSet {", "open.ros")
+    status, out, _ = run("check", *(folder / name for name in order))
+    assert (status, "open.ros:1:" in out, "warning" in out) == (2, True, False)
+
+
 @pytest.fixture
 def project(model):
     settings = """package: p

@@ -10,7 +10,7 @@ import click
 from ros_model.checker import check_family, check_system, families
 from ros_model.commands import BAD_INPUT
 from ros_model.errors import ModelError
-from ros_model.findings import ERROR, FORMATS, Finding
+from ros_model.findings import ERROR, FORMATS, WARNING, Finding
 from ros_model.library import Library
 from ros_model.metamodel import compose
 from ros_model.model_files import PACKAGES, files_in, models_at, read_all
@@ -71,6 +71,8 @@ class _Check:
 
     def __init__(self, folders: Iterable[str]) -> None:
         self._refused: list[Finding] = []
+        self._unknown: dict[Path, Finding] = {}  # what could not be read, though nobody asked to check it
+        self._asked: set[Path] = set()
         self._projects: dict[Path, Project] = {}
         self._loaded: dict[Path, Project] = {}
         self._systems: dict[Path, RosSystem] = {}
@@ -99,6 +101,7 @@ class _Check:
         """Return all that is wrong, file by file."""
         library = Library(p for known in {**self._beside, **self._packages}.values() for p in known.packages)
         found = [*self._refused]
+        found += [finding for path, finding in self._unknown.items() if path not in self._asked]
         for packages in self._packages.values():
             found += check_packages(packages, library)
         for path, system in self._systems.items():
@@ -116,6 +119,7 @@ class _Check:
             self._add_file(file)
 
     def _add_file(self, path: Path) -> None:
+        self._asked.add(path.resolve())
         try:
             model = read_all(path)
         except ModelError as error:
@@ -155,11 +159,18 @@ class _Check:
                 try:
                     self._beside[path] = read_packages(path)
                 except ModelError as error:
-                    self._refuse(error)
+                    self._unknown[path.resolve()] = _warning(path, error)
 
     def _refuse(self, error: ModelError) -> None:
         known = {str(finding) for finding in self._refused}
         self._refused += [found for found in map(Finding.of, error.all) if str(found) not in known]
+
+
+def _warning(path: Path, error: ModelError) -> Finding:
+    """Return what is told of a file that was not asked for: its own errors would hide those of the ones that were."""
+    count = f"{len(error.all)} error{'s' * (len(error.all) != 1)}"
+    message = f"{path} can't be read: {count}; its packages are unknown: check it by itself"
+    return Finding(message, None, "unreadable", WARNING)
 
 
 def _of_project(project: Project, library: Library) -> Iterator[Finding]:
