@@ -49,6 +49,8 @@ _MASTER_TIMEOUT = 1.2
 _START_TIMEOUT = 5.0
 _MASTER_SILENCE = 10.0
 """Wall seconds without a useful answer after which the master counts as lost; if it is gone, that shows at once."""
+_LONGEST_END = 5.0
+"""Wall seconds that the node may take to end after the master was lost."""
 _COALESCE = 0.02
 """Wall seconds between evaluations at least, for events that come in a bunch."""
 _FRESH = 0.15
@@ -149,6 +151,10 @@ class MonitorNode:
     def _on_look(self) -> None:
         if self._looker.lost:
             _say(f"{self._looker.lost}: the monitor ends, start it again with the master")
+            # Should rospy hang on to the master, as it may while it registers, the process ends all the same.
+            last_resort = threading.Timer(_LONGEST_END, os._exit, (0,))
+            last_resort.daemon = True
+            last_resort.start()
             rospy.signal_shutdown("the master is lost")
         elif self._looker.silence:
             self._bear_silence(*self._looker.silence)
@@ -277,8 +283,8 @@ def main() -> None:
     except (parameters_node.ParameterError, ModelError, SnapshotError) as error:
         rospy.logfatal("%s", error)
         sys.exit(BAD_START)
-    except rospy.ROSException:
-        if not rospy.is_shutdown():
+    except (rospy.ROSException, OSError):
+        if not rospy.is_shutdown() and _master_answers():
             raise
         return  # it was ended, or lost its master, while it started
     node.run()
