@@ -1,7 +1,12 @@
 """The checker: what is wrong in a model that reads well, and where."""
 
+from dataclasses import replace
+
 import pytest
 from ros_model.checker import check_system
+from ros_model.errors import ModelError
+from ros_model.generators.launch import launch_file
+from ros_model.metamodel import Reference
 from ros_model.reader import parse_system
 
 TALK = """RosSystem { Name talk RosComponents (
@@ -66,6 +71,34 @@ def test_sound_model_has_no_findings():
 def test_fault_is_found(text, finding):
     (message,) = found(text)
     assert finding in message
+
+
+@pytest.mark.parametrize(
+    ("text", "rule", "finding"),
+    [
+        (parameter("type String value x").replace("name p", "name 'a b'"), "name", "m:1:33: error: 'a b' is no name"),
+        (component("").replace("name a", "name 'nav\" args=\"x'"), "name", "m:1:36: error: 'nav\" args=\"x' is no"),
+        (component("NameSpace '$(env HOME)'"), "name", "m:1:36: error: '$(env HOME)' is no name of ROS"),
+        (component("RosParameters { RosParameter 'b c' { value 1 } }"), "name", "'b c' is no name of ROS"),
+        (component("RosPublishers { RosPublisher 'b c' { RefPublisher 'p.a.n.b' } }"), "name", "'b c' is no name of"),
+        (component("FromRosNode 'p.a;b.n'"), "name", "m:1:76: error: 'a;b' can't name a package or executable"),
+        (parameter("type String value '$(env HOME)'"), "substitution", "m:1:70: error: '$(env HOME)' holds"),
+        (parameter("type String default '$(env HOME)'"), "substitution", "holds '$(', which roslaunch would evaluate"),
+        (parameter("type List value {'$(env HOME)'}"), "substitution", "holds '$(', which roslaunch would evaluate"),
+        (component("RosParameters { RosParameter b { value '$(env HOME)' } }"), "substitution", "m:1:103: error: '$("),
+        (parameter("type Integer value 4294967296"), "value", "has more than 32 bits"),
+    ],
+)  # fmt: skip
+def test_what_generate_refuses_is_found(text, rule, finding):
+    system = parse_system(text, "m")
+    (told,) = check_system(system)
+    assert (told.rule, finding in str(told)) == (rule, True), told
+    with pytest.raises(ModelError):
+        launch_file(replace(system, components=tuple(map(_runnable, system.components))))
+
+
+def _runnable(runs):
+    return runs if runs.executable else replace(runs, node=Reference("p", "a", "n"))
 
 
 @pytest.mark.parametrize("value", ["fast", "{1, 2}", "{ {a {value 1}} }", "'fast'", "ParameterAny { value x }"])

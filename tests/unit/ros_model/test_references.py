@@ -87,7 +87,11 @@ def test_sound_system_has_no_findings():
         ),
         ("arm.rate'", "arm.speed'", "m:10:54: error: 'arm.arm_node.arm' declares no parameter 'speed'"),
         ("value 5", "value fast", "m:10:84: error: the value 'fast' of 'rate' is no Double, as it is declared"),
-        ("arm.rate' value 5", "arm.axes' value {x}", "the value ['x'] of 'axes' has 1 member, List { String, String } has 2, as"),
+        (
+            "arm.rate' value 5",
+            "arm.axes' value {x}",
+            "the value ['x'] of 'axes' has 1 member, List { String, String } has 2, as",
+        ),
         (
             "From ( 'a.joints' )",
             "From ( 'a.odom' )",

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ros_model.findings import WARNING, Finding, sorted_by_place
+from ros_model.launch_checker import check_launch
 from ros_model.library import Library, Unknown, hint
 from ros_model.metamodel import ConnectionKind, PortKind, RosParameter
 from ros_model.notation import type_text
@@ -64,7 +65,7 @@ def check_system(
         library: what is known of packages; without it, references are not followed.
     """
     whole = whole or system
-    findings = [*_twice(system), *_incomplete(system), *_values(system)]
+    findings = [*_twice(system), *_incomplete(system), *_values(system), *check_launch(system, whole, library)]
     if library:
         findings += _followed(system, library)
     elif library is not None:

@@ -36,6 +36,8 @@ RULES = {
     "settings": "metacontrol.yaml says what its schema allows, and names what is there.",
     "table": "A table has the rows, columns and cells that its family needs.",
     "level": "An expected level is of a quality attribute, and within its range.",
+    "name": "A name is one that ROS allows.",
+    "substitution": "A value holds nothing that a launch file would evaluate, as $(...), or can't hold.",
     "missing-quality": "A variant has a value for each quality attribute of its siblings.",
 }
 """What holds where a rule has found nothing, by its name."""

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         Position,
         RosParameter,
         RosSystem,
+        SystemParameter,
     )
     from ros_model.project import Project
 
@@ -77,8 +78,8 @@ def launch_file(system: RosSystem, whole: RosSystem | None = None, library: Libr
     for parameter in system.parameters:
         value = sent(parameter, parameter.type)
         if value is not None:
-            name = "/".join(part.strip("/") for part in (parameter.namespace, parameter.name) if part)
-            launch.append(parameter_element(_legal(name, parameter.position), value, parameter.position))
+            name = legal_name(global_name(parameter), parameter.position)
+            launch.append(parameter_element(name, value, parameter.position))
     for component in system.components:
         launch.append(_node(component, whole or system, library))
     ET.indent(launch, "  ")
@@ -92,28 +93,36 @@ def _node(component: Component, whole: RosSystem, library: Library | None) -> ET
         raise ModelError(f"component '{component.name}' names no executable: give it a FromRosNode", where)
     namespace, _, name = component.graph_name.rpartition("/")
     attributes = {
-        "name": _legal(name, where),
-        "pkg": _resource(executable.package, where),
-        "type": _resource(executable.artifact, where),
+        "name": legal_name(name, where),
+        "pkg": resource_name(executable.package, where),
+        "type": resource_name(executable.artifact, where),
     }
     if namespace:
-        attributes["ns"] = _legal(namespace, where)
+        attributes["ns"] = legal_name(namespace, where)
     node = ET.Element("node", {**attributes, "cwd": "node", "respawn": "false", "output": "screen"})
     for parameter in component.parameters:
-        value = None if parameter.value is None else sent(parameter, _declared_type(parameter, library))
+        value = None if parameter.value is None else sent(parameter, declared_type(parameter, library))
         if value is not None:
-            node.append(parameter_element(_legal(_key(parameter), parameter.position), value, parameter.position))
-    for source, target in _remaps(component, whole):
+            node.append(
+                parameter_element(legal_name(private_name(parameter), parameter.position), value, parameter.position)
+            )
+    for source, target in remaps(component, whole):
         ET.SubElement(node, "remap", {"from": source, "to": target})
     return node
 
 
-def _key(parameter: RosParameter) -> str:
+def global_name(parameter: SystemParameter) -> str:
+    """Return the name of a parameter of the system."""
+    return "/".join(part.strip("/") for part in (parameter.namespace, parameter.name) if part)
+
+
+def private_name(parameter: RosParameter) -> str:
+    """Return the name of a node's parameter, relative to the node."""
     key = parameter.key.strip("/~")
     return f"{parameter.namespace.strip('/')}/{key}" if parameter.namespace else key
 
 
-def _declared_type(parameter: RosParameter, library: Library | None) -> ParameterType | None:
+def declared_type(parameter: RosParameter, library: Library | None) -> ParameterType | None:
     """Return the type that the node's model declares for a parameter; None where none does."""
     node = library.node(parameter.reference) if library and parameter.reference else None
     key = parameter.key.strip("/~")
@@ -121,8 +130,12 @@ def _declared_type(parameter: RosParameter, library: Library | None) -> Paramete
     return next((found.type for found in declared if found.name.strip("/~") == key), None)
 
 
-def _remaps(component: Component, whole: RosSystem) -> Iterable[tuple[str, str]]:
-    """Yield (name in the node's code, topic) where the two differ, each once."""
+def remaps(component: Component, whole: RosSystem) -> Iterable[tuple[str, str]]:
+    """Yield (name in the node's code, topic) where the two differ, each once.
+
+    Raises:
+        ModelError: one is no name of ROS.
+    """
     seen: set[str] = set()
     for port in component.ports:
         inside = port.reference.name if port.reference and port.reference.name else port.name
@@ -130,8 +143,8 @@ def _remaps(component: Component, whole: RosSystem) -> Iterable[tuple[str, str]]
         if inside == topic or inside in seen:
             continue
         seen.add(inside)
-        _legal(inside, port.position)
-        _legal(topic, port.position)
+        legal_name(inside, port.position)
+        legal_name(topic, port.position)
         action = port.kind in {PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT}
         for suffix in (f"/{name}" for name in _ACTION_TOPICS) if action else ("",):
             yield inside + suffix, topic + suffix
@@ -149,13 +162,23 @@ def topic_of(component: Component, port: Port, whole: RosSystem) -> str:
     return port.name.removeprefix("/") if port.namespace is not None else port.name
 
 
-def _resource(text: str, where: Position) -> str:
+def resource_name(text: str, where: Position) -> str:
+    """Return the name of a package or executable.
+
+    Raises:
+        ModelError: it can't be one.
+    """
     if not _RESOURCE.fullmatch(text):
         raise ModelError(f"{text!r} can't name a package or executable: use letters, digits, '_', '-' and '.'", where)
     return text
 
 
-def _legal(name: str, where: Position) -> str:
+def legal_name(name: str, where: Position) -> str:
+    """Return a name in the graph.
+
+    Raises:
+        ModelError: ROS does not allow it.
+    """
     if not _GRAPH_NAME.fullmatch(name):
         raise ModelError(
             f"{name!r} is no name of ROS: begin with a letter, go on with letters, digits, '_', '/'", where

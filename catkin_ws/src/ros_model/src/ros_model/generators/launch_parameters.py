@@ -90,7 +90,7 @@ _SCALARS = {
 
 def parameter_element(name: str, value: Sent, where: Position) -> ET.Element:
     """Return a typed `<param>`, or `<rosparam>` for what that can not carry: lists, structs, bytes, outer blanks."""
-    _check_range(value, where)
+    check_range(value, where)
     for kind, word in ((bool, "bool"), (int, "int"), (float, "double"), (str, "str")):
         if isinstance(value, kind) and not (isinstance(value, str) and value != value.strip()):
             text = str(value).lower() if kind is bool else str(value)
@@ -103,10 +103,15 @@ def parameter_element(name: str, value: Sent, where: Position) -> ET.Element:
     return element
 
 
-def _check_range(value: Sent, where: Position) -> None:
+def check_range(value: Sent, where: Position) -> None:
+    """Check that the parameter server can hold a value's numbers.
+
+    Raises:
+        ModelError: it can't.
+    """
     if isinstance(value, (list, dict)):
         for item in value.values() if isinstance(value, dict) else value:
-            _check_range(item, where)
+            check_range(item, where)
     elif isinstance(value, int) and not -(1 << 31) <= value < 1 << 31:
         raise ModelError(f"the integer {value} has more than 32 bits, which the parameter server can't hold", where)
     elif isinstance(value, float) and not math.isfinite(value):
