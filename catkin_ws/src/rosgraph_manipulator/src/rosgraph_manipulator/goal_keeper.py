@@ -47,6 +47,11 @@ class GoalKeeper:
         """Goals that the server has at work though they are not pending: they were cancelled or replaced meanwhile."""
         return self._listed - {self.pending_id}
 
+    @property
+    def server_is_changing(self) -> bool:
+        """Whether the server is being replaced."""
+        return self._changing
+
     def adopt(self, goal: Any) -> None:
         """Take over a goal from an earlier keeper, until the server's status shows that it has ended meanwhile."""
         self._goal, self._doubted = copy.deepcopy(goal), True

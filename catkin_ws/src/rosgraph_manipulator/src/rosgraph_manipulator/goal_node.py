@@ -11,6 +11,7 @@ import binascii
 import contextlib
 import io
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -23,6 +24,7 @@ from rosgraph_manipulator.configuration import ConfigurationError
 from rosgraph_manipulator.goal_keeper import GoalKeeper
 
 QUEUE = 10
+SEND_PERIOD = 0.5  # s, wall, between two sendings of a goal that the new server does not have: it tells every 0.2 s
 
 
 class PendingGoal:
@@ -45,6 +47,7 @@ class PendingGoal:
         self._goal_type = action_type + "Goal"
         self._keeper = GoalKeeper()
         self._lock = threading.RLock()
+        self._sent_at = 0.0  # time.monotonic()
         self._stored: str | None = None  # id of the goal in the parameter
         self._server: object = None  # what stands for the present server's connection
         self._old_server: object = None
@@ -74,21 +77,40 @@ class PendingGoal:
             self._store(again=True)
 
     @property
+    def is_between_servers(self) -> bool:
+        """Whether a server was stopped, and `server_started` has not been called since."""
+        return self._keeper.server_is_changing
+
+    @property
     def server_is_new(self) -> bool:
         """Whether a server has published its status that is not the one of `server_stops`."""
         return self._server is not None and self._server is not self._old_server
 
     def server_started(self) -> None:
-        """Send the goal again where the server does not have it, and tell it what was cancelled meanwhile."""
+        """Note that a new server is there, and tell it what was cancelled meanwhile."""
         with self._lock:
             self._keeper.server_changes(False)
-            goal, strays = self._keeper.pending, self._keeper.strays
-            if goal is not None and not self._keeper.is_at_work:
-                rospy.loginfo("sending the pending goal %s to the new server of %s", goal.goal_id.id, self._action)
-                self._goal_publisher.publish(goal)
+            strays = self._keeper.strays
+            self._sent_at = 0.0
             self._store(again=True)  # the server may have taken it from there
         for goal_id in strays:
             self._cancel_publisher.publish(GoalID(id=goal_id))
+
+    def deliver(self) -> bool:
+        """Send the goal again while the new server does not have it; return whether it has, or there is none.
+
+        The server may say that it is there before it hears goals, and a topic holds nothing back: so it is sent more
+        than once, which a server that has it already ignores.
+        """
+        with self._lock:
+            goal = self._keeper.pending
+            if goal is None or self._keeper.is_at_work:
+                return True
+            if time.monotonic() - self._sent_at > SEND_PERIOD:
+                rospy.loginfo("sending the pending goal %s to the new server of %s", goal.goal_id.id, self._action)
+                self._goal_publisher.publish(goal)
+                self._sent_at = time.monotonic()
+        return False
 
     def _on_status(self, status: GoalStatusArray) -> None:
         # Each connection has a header of its own, so another one is another process.

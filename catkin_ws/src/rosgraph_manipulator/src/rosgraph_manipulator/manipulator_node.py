@@ -401,7 +401,7 @@ def main() -> None:
             known = ", ".join(sorted(settings.configurations))
             raise ConfigurationError(f"parameter '~initial_configuration' is '{initial}'; known are: {known}")
         manipulator = Manipulator(settings, load_tactics(), initial)
-    except (ConfigurationError, SettingError, TacticError, rospy.ROSInitException) as error:
+    except (ConfigurationError, SettingError, TacticError, rospy.ROSInitException, OSError) as error:
         sys.stderr.write(f"rosgraph_manipulator: {' '.join(str(error).split())}\n")
         sys.exit(2)
     manipulator.run()

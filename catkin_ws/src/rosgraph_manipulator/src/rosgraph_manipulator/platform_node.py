@@ -24,6 +24,7 @@ from rosgraph_manipulator.tactics import Plan
 
 POLL_PERIOD = 0.01  # s, wall
 STATE_TIMEOUT = 2.0  # s, wall, for the launcher's state to follow its answer
+DELIVERY_TIMEOUT = 5.0  # s, wall, for the new server to have the pending goal
 BROKEN = (LauncherState.RECOVERING, LauncherState.FAILED)
 
 
@@ -151,7 +152,8 @@ class RosPlatform:
 
     def wait_until_ready(self) -> None:
         """Wait until the started nodes answer, the topics are there, and the action's server, if it is a new one."""
-        if not self._started:
+        between_servers = self._goal is not None and self._goal.is_between_servers  # so an earlier manipulator left it
+        if not self._started and not between_servers:
             return
         deadline = self._begun + self._ready_timeout
         for node in self._started:
@@ -160,10 +162,12 @@ class RosPlatform:
         topics = {rospy.resolve_name(topic) for topic in self._wanted.topics}
         if topics:
             self._wait(lambda: topics <= advertised(), deadline, f"one of the topics {', '.join(topics)} is missing")
-        if self._goal is not None and self._new_server:
+        if self._goal is not None and (self._new_server or between_servers):
             goal = self._goal
             self._wait(lambda: goal.server_is_new, deadline, "its action server is not up")
             goal.server_started()
+            if not wait_until(goal.deliver, DELIVERY_TIMEOUT):
+                rospy.logwarn("the new server does not take the pending goal")
 
     def wait_until_settled(self) -> None:
         """Wait until the nodes that were started have lived for the settling time."""
