@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,13 +47,19 @@ def parse_all(text: str, file: str) -> RosSystem | PackageSet:
 def files_in(folder: Path, extension: str) -> list[Path]:
     """Return the files with an extension in a folder and below, in order; hidden folders are passed over.
 
+    A folder below that can't be listed is among them, so that reading it tells why.
+
     Raises:
         ModelError: there is no such folder.
     """
     if not folder.is_dir():
         raise ModelError(f"{folder}: no such folder: check the path")
-    found = folder.rglob(f"*{extension}")
-    return sorted(path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts))
+    found: list[Path] = []
+    tree = os.walk(folder, onerror=lambda error: found.append(Path(error.filename)))
+    for place, folders, files in tree:
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        found += [Path(place, name) for name in files if name.endswith(extension) and not name.startswith(".")]
+    return sorted(found)
 
 
 def models_at(path: Path) -> list[Path]:
@@ -63,7 +70,7 @@ def models_at(path: Path) -> list[Path]:
     """
     if not path.is_dir():
         return [path]
-    found = [*files_in(path, PACKAGES), *files_in(path, SYSTEM)]
+    found = [*dict.fromkeys([*files_in(path, PACKAGES), *files_in(path, SYSTEM)])]
     if not found:
         raise ModelError(f"{path}: no model is in this folder: give one with .ros or .rossystem files")
     return found
