@@ -153,7 +153,6 @@ def test_written_observer_is_stale_when_a_topic_is_silent_or_no_number(generated
 
 def run_generated_test(folder):
     paths = [
-        str(folder / "src"),
         *(str(SOURCES / name / "src") for name in ("rosgraph_monitor", "ros_model")),
         *sys.path,
     ]
@@ -194,6 +193,17 @@ def test_export_line_is_told_until_it_is_there(package, generate):
     assert f"add to {folder / 'package.xml'}: {line}" in generate(folder)
     (folder / "package.xml").write_text(MANIFEST.format(name=folder.name, export=line))
     assert "add to" not in generate(folder)
+
+
+def test_export_lines_leave_one_export_in_package_xml(package, generate):
+    folder = package(DESCRIPTION, {**DESCRIPTION, "name": "Other"})
+    tags = [
+        f'<rosgraph_monitor observer="{folder.name}.{target}"/>'
+        for target in ("comfort_quality_observer:ComfortQualityObserver", "other:Other")
+    ]
+    assert f"package.xml: <export>{''.join(tags)}</export>\n" in generate(folder)
+    (folder / "package.xml").write_text(MANIFEST.format(name=folder.name, export=f"<export>{tags[0]}</export>"))
+    assert f"package.xml: {tags[1]} inside its <export>\n" in generate(folder)
 
 
 def test_observer_that_exists_gets_its_model_only(package, generate):

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 from mros1_reasoner.knowledge_base import KnowledgeBase
+from ros_model.files import resolve
 from ros_model.project import load_project
+from rosgraph_monitor.plugins import available
 from roslaunch.config import load_config_default
 
 README = Path(__file__).parents[3] / "catkin_ws" / "src" / "ros_model" / "README.md"
@@ -18,7 +20,7 @@ README = Path(__file__).parents[3] / "catkin_ws" / "src" / "ros_model" / "README
 def robot(tmp_path_factory):
     section = README.read_text().split("## The six steps at design time")[1].split("\n## ")[0]
     blocks = re.findall(r"```bash\n(.*?)```", section, re.DOTALL)
-    assert len(blocks) == 8
+    assert len(blocks) == 9
     folder = tmp_path_factory.mktemp("tutorial")
     done = subprocess.run(
         ["bash", "-euo", "pipefail", "-c", "\n".join(blocks)],
@@ -49,7 +51,15 @@ def test_every_step_leaves_its_files(robot):
         "src/my_robot/comfort_quality_observer.py",
         "test/test_comfort_quality_observer.py",
         "models/d2.owl",
+        "package.xml",
+        "setup.py",
     }
+
+
+def test_package_can_be_found_with_its_models_and_its_observer(robot, monkeypatch):
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(robot.parent))
+    assert resolve("package://my_robot/models/d2.owl") == robot / "models/d2.owl"
+    assert available() == {"ComfortQualityObserver": "my_robot.comfort_quality_observer:ComfortQualityObserver"}
 
 
 def test_variants_load_with_their_values(robot):

@@ -63,9 +63,9 @@ class ObserverModel:
         return self.plugin or f"{self.python_package}.{self.module}:{self.name}"
 
     @property
-    def export(self) -> str:
-        """The line of package.xml by which the monitor finds it."""
-        return f'<export><rosgraph_monitor observer="{self.target}"/></export>'
+    def export_tag(self) -> str:
+        """What is in the <export> of package.xml for the monitor to find it."""
+        return f'<rosgraph_monitor observer="{self.target}"/>'
 
 
 def described_observers(project: Project) -> tuple[ObserverModel, ...]:

@@ -84,10 +84,13 @@ def _check_numbers(observer: ObserverModel) -> None:
 
 
 def missing_exports(observers: Iterable[ObserverModel], output: Path) -> list[str]:
-    """Return the lines that the package.xml of the output lacks for the monitor to find the observers."""
+    """Return the lines that the package.xml of the output, which may have one <export>, lacks for the monitor."""
     manifest = output / "package.xml"
     text = manifest.read_text(encoding="utf-8", errors="replace") if manifest.is_file() else ""
-    return [o.export for o in observers if not o.plugin and f'"{o.target}"' not in text]
+    tags = [o.export_tag for o in observers if not o.plugin and f'"{o.target}"' not in text]
+    if "<export>" in text:
+        return [f"{tag} inside its <export>" for tag in tags]
+    return [f"<export>{''.join(tags)}</export>"] if tags else []
 
 
 def plugin_text(observer: ObserverModel) -> str:
@@ -124,7 +127,7 @@ def _filled(template: str, observer: ObserverModel, **more: str) -> str:
         "module": f"{observer.python_package}.{observer.module}",
         "quality": observer.quality_attribute,
         "direction": _WORST[observer.direction],
-        "export": observer.export,
+        "export": f"<export>{observer.export_tag}</export>",
         "imports": "\n".join(f"import {package}.msg" for package in packages),
         "topics": topics,
         "rate": repr(observer.rate),
