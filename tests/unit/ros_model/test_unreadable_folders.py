@@ -1,4 +1,4 @@
-"""Folders that nobody may list are told, not passed over; what is around them is read."""
+"""Folders that may not be listed are told, not passed over; files that may not be written are not said to be."""
 
 import contextlib
 import os
@@ -53,3 +53,12 @@ def test_hidden_folder_is_passed_over(folder, capsys):
     with without_privileges(), pytest.raises(SystemExit) as done:
         main(["format", "--check", "."])
     assert (done.value.code, capsys.readouterr().out) == (1, "would change bad.rossystem\n")
+
+
+def test_file_that_can_not_be_written_is_not_told_as_changed(folder, capsys):
+    (folder / "bad.rossystem").chmod(0o444)
+    with without_privileges(), pytest.raises(SystemExit) as done:
+        main(["format", "bad.rossystem"])
+    told = capsys.readouterr()
+    assert (done.value.code, told.out) == (2, "")
+    assert told.err == "rosmodel: bad.rossystem: Permission denied: check its permissions\n"

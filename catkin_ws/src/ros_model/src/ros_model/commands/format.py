@@ -43,12 +43,12 @@ def _format(path: Path, only_check: bool) -> bool:
     formatted = formatted_text(text, str(path))
     if formatted == text:
         return False
-    click.echo(f"{'would change' if only_check else 'changed'} {path}")
     if not only_check:
         try:
             path.write_text(formatted, encoding="utf-8")
         except OSError as error:
             raise ModelError(f"{path}: {error.strerror or error}: check its permissions") from error
+    click.echo(f"{'would change' if only_check else 'changed'} {path}")
     return True
 
 
