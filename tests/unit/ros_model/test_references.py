@@ -377,6 +377,31 @@ def test_sarif(check):
     }
 
 
+@pytest.mark.parametrize("written", ["{here}/deep er/../bad.rossystem", "bad.rossystem", "./bad.rossystem"])
+def test_paths_below_the_working_folder_are_relative_to_it(check, tmp_path, written):
+    (tmp_path / "deep er").mkdir()
+    path = written.format(here=tmp_path)
+    assert "::error file=bad.rossystem,line=10," in check("--format", "github", "--path", "ros", path)[1]
+    assert _uri_of(check("--format", "sarif", "--path", "ros", path)) == "bad.rossystem"
+
+
+def test_paths_elsewhere_are_whole(check, tmp_path, monkeypatch):
+    (tmp_path / "deep er").mkdir()
+    (tmp_path / "deep er/bad.rossystem").write_text((tmp_path / "bad.rossystem").read_text())
+    monkeypatch.chdir(tmp_path / "ros")
+    path = f"{tmp_path}/deep er/bad.rossystem"
+    assert f"::error file={path},line=10," in check("--format", "github", "--path", ".", path)[1]
+    uri = Path(path).as_uri()
+    assert uri.startswith("file:///")
+    assert _uri_of(check("--format", "sarif", "--path", ".", path)) == uri
+    assert _uri_of(check("--format", "sarif", "--path", ".", "../deep er/bad.rossystem")) == uri
+
+
+def _uri_of(answer):
+    (result,) = json.loads(answer[1])["runs"][0]["results"]
+    return result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
+
+
 @pytest.mark.skipif(not CORPUS, reason="MROS_CORPUS names no folder of published models")
 def test_invalid_published_file_gives_its_errors_at_their_lines(check):
     status, out = check(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -157,7 +158,9 @@ def _place(position: Position | None) -> dict[str, Any]:
 def _github(finding: Finding) -> str:
     where = ""
     if finding.position:
-        file = _escaped(finding.position.file).replace(":", "%3A").replace(",", "%2C")
+        file = (
+            _escaped(_from_here(finding.position.file) or finding.position.file).replace(":", "%3A").replace(",", "%2C")
+        )
         where = f" file={file},line={finding.position.line},col={finding.position.column},title={finding.rule}"
     return f"::{finding.severity}{where}::{_escaped(finding.message)}"
 
@@ -175,9 +178,20 @@ def _sarif_result(finding: Finding) -> dict[str, Any]:
     }
     if finding.position:
         region = {"startLine": max(1, finding.position.line), "startColumn": max(1, finding.position.column)}
-        location = {"artifactLocation": {"uri": quote(Path(finding.position.file).as_posix())}, "region": region}
+        location = {"artifactLocation": {"uri": _uri(finding.position.file)}, "region": region}
         result["locations"] = [{"physicalLocation": location}]
     return result
+
+
+def _from_here(file: str) -> str | None:
+    """Return a path relative to the working folder, in which GitHub looks for it; None if it is not below that."""
+    path = Path(os.path.abspath(file))
+    return path.relative_to(Path.cwd()).as_posix() if path.is_relative_to(Path.cwd()) else None
+
+
+def _uri(file: str) -> str:
+    inside = _from_here(file)
+    return Path(os.path.abspath(file)).as_uri() if inside is None else quote(inside)
 
 
 def sorted_by_place(findings: Iterable[Finding]) -> tuple[Finding, ...]:
