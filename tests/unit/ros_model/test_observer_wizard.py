@@ -124,6 +124,17 @@ def test_direction_of_a_known_quality_is_not_asked_again(robot, answer):
     assert "higher is better" in (robot / "src/robot_models/safety_quality_observer.py").read_text()
 
 
+def test_plugin_that_is_kept_is_told(robot, answer):
+    kept = "kept src/robot_models/comf.py: its rate, topics and range are the old ones; delete it to have it made anew"
+    assert "kept" not in answer("", "comfort", "Comf", "1", "10", "", "0", "1", ".", "n").output
+    written = (robot / "src/robot_models/comf.py").read_bytes()
+    assert kept in answer("", "comfort", "Comf", "2", "5", "", "0", "2", ".", "n").output
+    assert (robot / "src/robot_models/comf.py").read_bytes() == written
+    (robot / "src/robot_models/comf.py").unlink()
+    assert "kept" not in answer("", "comfort", "Comf", "2", "5", "", "0", "2", ".", "n").output
+    assert (robot / "src/robot_models/comf.py").read_bytes() != written
+
+
 def test_second_observer_joins_the_first_in_the_model(robot, answer):
     assert answer("", "comfort", "", "1", "", "", "", "", "", "y").exit_code == 0
     result = answer("", "safety", "", "2", "", "", "", "", "y")

@@ -57,11 +57,15 @@ def run_wizard(output: str | None = None) -> None:
     _add_to_settings(project, entry, None if known else direction)
     observer = observer_model(entry, project.package, direction)
     others = [other for other in described_observers(project) if other.name != name]
+    plugin = folder / "src" / observer.python_package / f"{observer.module}.py"
+    is_old = plugin.exists()
     for path in write_observers([*others, observer], folder):
         click.echo(f"wrote {path}")
+    if is_old:
+        click.echo(f"kept {plugin}: its rate, topics and range are the old ones; delete it to have it made anew")
     for line in missing_exports([observer], folder):
         click.echo(f"add to {folder / 'package.xml'}: {line}")
-    click.echo(f"Now write calculate_attr in {folder / 'src' / observer.python_package / (observer.module + '.py')}")
+    click.echo(f"Now write calculate_attr in {plugin}")
 
 
 def _ask(text: str, check: Callable[[str], str], default: str | None = None) -> str:
