@@ -158,9 +158,8 @@ def _place(position: Position | None) -> dict[str, Any]:
 def _github(finding: Finding) -> str:
     where = ""
     if finding.position:
-        file = (
-            _escaped(_from_here(finding.position.file) or finding.position.file).replace(":", "%3A").replace(",", "%2C")
-        )
+        path = _from_here(finding.position.file) or finding.position.file
+        file = _escaped(path).replace(":", "%3A").replace(",", "%2C")
         where = f" file={file},line={finding.position.line},col={finding.position.column},title={finding.rule}"
     return f"::{finding.severity}{where}::{_escaped(finding.message)}"
 
