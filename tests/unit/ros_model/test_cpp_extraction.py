@@ -191,6 +191,72 @@ def test_handle_that_is_handed_in_has_the_namespaces_of_all_callers(node):
     }
 
 
+@pytest.mark.parametrize(
+    ("worker", "making"),
+    [
+        ('Worker() : pnh_("~") { USE } int rate_; ros::NodeHandle pnh_;', "Worker w;"),
+        ('Worker() : rate_(1), pnh_("~") { USE } int rate_; ros::NodeHandle nh_, pnh_;', "Worker w;"),
+        ('Worker() : pnh_{"~"} { USE } ros::NodeHandle pnh_{"other"};', "Worker w;"),
+        ('Worker() { pnh_ = ros::NodeHandle("~"); USE } ros::NodeHandle pnh_;', "Worker w;"),
+        ("Worker(ros::NodeHandle n, ros::NodeHandle p) : pnh_(p) { USE } ros::NodeHandle pnh_;", "Worker w(nh, pnh);"),
+        ("Worker(ros::NodeHandle p) : pnh_(p) { USE } ros::NodeHandle pnh_;", "auto w = new Worker(pnh);"),
+    ],
+    ids=["above", "second of several", "default member", "assigned", "passed", "passed to new"],
+)
+def test_inline_constructor_above_its_members_makes_them(node, worker, making):
+    use = 'pub_ = pnh_.advertise<std_msgs::String>("a", 1);'
+    result = node(making, f"class Worker {{ public: {worker.replace('USE', use)} ros::Publisher pub_; }};")
+    assert ("publisher", "~a", "std_msgs/String") in found(result)
+    assert ("publisher", "a", "std_msgs/String") not in found(result)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        'std::unique_ptr<ros::NodeHandle> q; q.reset(new ros::NodeHandle("~x"));',
+        'std::unique_ptr<ros::NodeHandle> q(new ros::NodeHandle("~x"));',
+        'std::unique_ptr<ros::NodeHandle> q = nullptr; q = std::make_unique<ros::NodeHandle>("~x");',
+        'ros::NodeHandlePtr q; q = boost::make_shared<ros::NodeHandle>(pnh, "x");',
+        'ros::NodeHandlePtr q = ros::NodeHandlePtr(new ros::NodeHandle("~x"));',
+        'ros::NodeHandle* q; q = new ros::NodeHandle("~x");',
+        'ros::NodeHandle x("~x"); ros::NodeHandle* q = &x;',
+        'auto x = std::make_unique<ros::NodeHandle>("~x"); std::unique_ptr<ros::NodeHandle> q = std::move(x);',
+    ],
+)
+def test_handle_behind_a_pointer_is_what_the_pointer_is_given(node, code):
+    assert found(node(code + 'q->advertise<std_msgs::String>("b", 1);')) == {("publisher", "~x/b", "std_msgs/String")}
+
+
+def test_pointers_that_are_members_or_global_are_followed_too(node):
+    before = """
+        std::shared_ptr<ros::NodeHandle> global;
+        class Worker {
+         public:
+          Worker() { inner_.reset(new ros::NodeHandle("~x")); inner_->advertise<std_msgs::String>("member", 1); }
+          std::unique_ptr<ros::NodeHandle> inner_;
+        };
+        """
+    code = 'global.reset(new ros::NodeHandle("~y")); global->advertise<std_msgs::String>("global", 1);'
+    assert {name for _, name, _ in found(node(code, before))} == {"~x/member", "~y/global"}
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "ros::NodeHandle* q; fill(q);",
+        "std::unique_ptr<ros::NodeHandle> q;",
+        "std::unique_ptr<ros::NodeHandle> q = nullptr; fill(q);",
+        "ros::NodeHandlePtr q = made();",
+        "std::unique_ptr<ros::NodeHandle> q; q.reset(made());",
+        "ros::NodeHandle* q = new ros::NodeHandle(nh, name());",
+    ],
+)
+def test_handle_whose_construction_is_not_known_is_never_the_root(node, code):
+    result = node(code + 'q->advertise<std_msgs::String>("b", 1);')
+    assert [(port.is_resolved, "b@main.cpp:6" in port.name) for port in result.ports] == [(False, True)]
+    assert "publisher: its name is not known" in remarks(result)
+
+
 def test_parameters_come_with_defaults(node):
     result = node(
         """

@@ -22,6 +22,7 @@ _LANGUAGE = Language(tree_sitter_cpp.language())
 _KNOWN_TEXTS = {"ros::this_node::getName": "~", "ros::this_node::getNamespace": ""}
 _SAME_TEXT = ("std::string", "string", "ros::names::resolve", "ros::names::remap")
 _HEADERS = (".h", ".hpp", ".hh", ".hxx")
+_NULL = ("nullptr", "NULL", "0")
 _ESCAPE = re.compile(r"\\(.)")
 _FUNCTION_HOMES = ("getNodeHandle", "getMTNodeHandle", "getPrivateNodeHandle", "getMTPrivateNodeHandle")
 
@@ -49,11 +50,15 @@ class Place:
 
 @dataclass(frozen=True)
 class Declared:
-    """A variable: its type, what it is made with (one value, or the arguments of a constructor), and where."""
+    """A variable: its type, what it is made with (one value, or the arguments of a constructor), and where.
+
+    `is_indirect`: it is declared as a pointer or a reference, so that without a value nothing is known of it.
+    """
 
     type: str
     values: tuple[Node, ...]
     place: Place
+    is_indirect: bool = False
 
 
 @dataclass
@@ -62,6 +67,7 @@ class _Index:
     calls: dict[str, list[tuple[tuple[Node, ...], Place]]] = field(default_factory=lambda: defaultdict(list))
     globals: dict[str, list[Declared]] = field(default_factory=lambda: defaultdict(list))
     members: dict[tuple[str, str], list[Declared]] = field(default_factory=lambda: defaultdict(list))
+    given: list[tuple[str, tuple[Node, ...], Place]] = field(default_factory=list)
     macros: dict[str, str] = field(default_factory=dict)
     aliases: dict[str, str] = field(default_factory=dict)
 
@@ -98,6 +104,8 @@ class Program:
             raise SourceError(self.remarks[0])
         for file in reversed(self.files):  # headers, which declare, before the sources that include them
             self._index_file(file)
+        for name, values, place in self._index.given:  # only now all declarations are known, wherever they stand
+            self._give(name, values, place)
 
     def expressions(self) -> Iterator[tuple[Node, Place]]:
         """Yield every node with its place."""
@@ -243,14 +251,18 @@ class Program:
             called = name.partition("(")[0].partition("<")[0].removeprefix("new ").strip()
             if called in _FUNCTION_HOMES:
                 return [Const("~" if "Private" in called else "")]
-            if called.endswith(("NodeHandle", "make_shared", "make_unique")):
+            if called.endswith(("NodeHandle", "make_shared", "make_unique", "ImageTransport")):
                 return self._constructed(arguments_of(node), place, depth)
+            if called.endswith(("_ptr", "Ptr", "std::move")) and arguments_of(node):
+                return self._handles(arguments_of(node)[0], place, depth + 1)
             return []
         if node.type in ("pointer_expression", "parenthesized_expression") and node.named_child_count:
             return self._handles(node.named_children[-1], place, depth + 1)
         found: list[Const | Text] = []
         for declared in self.declared(name, place):
             if "NodeHandle" not in declared.type and not any("NodeHandle" in text(value) for value in declared.values):
+                continue
+            if declared.is_indirect and (not declared.values or text(declared.values[0]) in _NULL):
                 continue
             is_made = [v for v in declared.values if v.type in ("call_expression", "new_expression")]
             if len(declared.values) == 1 and is_made:
@@ -270,7 +282,7 @@ class Program:
         if _is_textual(first) or not self._is_handle(first, place):
             return [value for value, _ in self.texts(first, place, depth + 1)]
         parents = self.handles(first, place, depth + 1)
-        if len(values) == 1 or not (_is_textual(values[1]) or values[1].type == "identifier"):
+        if len(values) == 1:
             return parents
         inner = [value for value, _ in self.texts(values[1], place, depth + 1)]
         return [in_namespace(parent, name) for parent in parents for name in inner]
@@ -339,16 +351,14 @@ class Program:
                 case "declaration" | "field_declaration":
                     self._index_declaration(node, place)
                 case "call_expression" | "new_expression":
+                    if reset := _reset(node):
+                        self._index.given.append((*reset, place))
                     name = text(node.child_by_field_name("function") or node.child_by_field_name("type"))
                     made = re.match(r"(?:\w+::)*make_(?:shared|unique)<(.*)>$", name)
                     arguments = tuple(arguments_of(node))
                     self._index.calls[_last(made[1] if made else name)].append((arguments, place))
                 case "assignment_expression":
-                    target = text(_child(node, "left")).removeprefix("this->")
-                    if place.owner and not self._is_local(target, place):
-                        kind = next((d.type for d in self._index.members.get((place.owner, target), ())), "")
-                        declared = Declared(kind, (_child(node, "right"),), place)
-                        self._index.members[place.owner, target].append(declared)
+                    self._index.given.append((text(_child(node, "left")), (_child(node, "right"),), place))
 
     def _index_declaration(self, node: Node, place: Place) -> None:
         if name := _function_name(node):
@@ -368,12 +378,23 @@ class Program:
             for initialiser in node.named_children:
                 if initialiser.type != "field_initializer" or not initialiser.named_children:
                     continue
-                name = text(initialiser.named_children[0])
+                name = f"this->{text(initialiser.named_children[0])}"
                 values = tuple(initialiser.named_children[-1].named_children)
-                known = self._index.members.get((place.owner, name), [])
-                kind = next((d.type for d in known), "")
-                at = Place(place.file, function, place.owner)
-                self._index.members[place.owner, name] = [*(d for d in known if d.values), Declared(kind, values, at)]
+                self._index.given.append((name, values, Place(place.file, function, place.owner)))
+
+    def _give(self, name: str, values: tuple[Node, ...], place: Place) -> None:
+        """Note what a member or a global variable is given outside its declaration."""
+        plain = name.removeprefix("this->")
+        if plain == name and self._is_local(name, place):
+            return
+        if place.owner and ((place.owner, plain) in self._index.members or plain not in self._index.globals):
+            known = self._index.members[place.owner, plain]
+        elif plain in self._index.globals:
+            known = self._index.globals[plain]
+        else:
+            return
+        kind = known[0].type if known else ""
+        known[:] = [*(declared for declared in known if declared.values), Declared(kind, values, place)]
 
     def _walk(self, root: Node, start: Place) -> Iterator[tuple[Node, Place]]:
         todo = [(root, start)]
@@ -400,12 +421,13 @@ class Program:
                 if node.type == "declaration":
                     for name, declared in _declarations(node, place):
                         found[name].append(declared)
-                elif node.type == "assignment_expression":
-                    target = text(_child(node, "left"))
-                    if target in found:
-                        value = (_child(node, "right"),)
-                        kept = [declared for declared in found[target] if declared.values]
-                        found[target] = [*kept, Declared(found[target][0].type, value, place)]
+                    continue
+                given = _reset(node)
+                if node.type == "assignment_expression":
+                    given = text(_child(node, "left")), (_child(node, "right"),)
+                if given and given[0] in found:
+                    kept = [declared for declared in found[given[0]] if declared.values]
+                    found[given[0]] = [*kept, Declared(found[given[0]][0].type, given[1], place)]
             self._locals[function.id] = dict(found)
         return self._locals[function.id]
 
@@ -517,7 +539,18 @@ def _declarations(node: Node, place: Place) -> Iterator[tuple[str, Declared]]:
         if default is not None:
             is_list = default.type in ("argument_list", "initializer_list")
             value = tuple(default.named_children) if is_list else (default,)
-        yield text(name_node).lstrip("*& ").partition("[")[0].strip(), Declared(kind, value, place)
+        shown = text(name_node)
+        is_indirect = shown.startswith(("*", "&")) or kind.partition("<")[0].endswith(("_ptr", "Ptr"))
+        yield shown.lstrip("*& ").partition("[")[0].strip(), Declared(kind, value, place, is_indirect)
+
+
+def _reset(node: Node) -> tuple[str, tuple[Node, ...]] | None:
+    """Return the smart pointer that a call `pointer.reset(value)` gives a value, and the value."""
+    function = node.child_by_field_name("function") if node.type == "call_expression" else None
+    if function is None or function.type != "field_expression" or text(_child(function, "field")) != "reset":
+        return None
+    arguments = arguments_of(node)
+    return (text(_child(function, "argument")), (arguments[0],)) if arguments else None
 
 
 def _function_name(function: Node) -> str:
