@@ -136,8 +136,11 @@ def test_node_at_whose_address_nobody_listens_is_dead():
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--master", "http://localhost:1"), "is gone (Connection refused): start the system, or set --master"),
-        (("--master", "nonsense"), "ROS master address 'nonsense'"),
+        (("--master", "http://localhost:1"), "http://localhost:1 can't be reached: start the system, or set --master"),
+        *(
+            (("--master", uri), f"{uri!r} is no address of a ROS master: give one like http://localhost:11311")
+            for uri in ("foo", "localhost:11311", "https://localhost:1", "http://", "http://a:99999", "http://a:b")
+        ),
     ],
 )
 def test_command_without_a_master_ends_with_one_line(arguments, said, tmp_path, capsys):
@@ -146,3 +149,11 @@ def test_command_without_a_master_ends_with_one_line(arguments, said, tmp_path, 
     error = capsys.readouterr().err
     assert ended.value.code == 2 and said in error and len(error.strip().splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("timeout", ["nan", "inf", "-1", "0", "soon"])
+def test_patience_must_be_a_finite_time(timeout, tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["snapshot", "-o", str(tmp_path), "--master", "http://localhost:1", "--timeout", timeout])
+    assert ended.value.code == 2
+    assert "Invalid value for '--timeout'" in capsys.readouterr().err

@@ -5,22 +5,32 @@ from __future__ import annotations
 import datetime
 import os
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 import click
 
+from ros_model.commands.ranges import FiniteRange
 from ros_model.errors import ModelError
 
 if TYPE_CHECKING:
     from ros_model.extraction.graph import Models
 
 _MASTER = "http://localhost:11311"
+_LONGEST = 3600.0  # s
 
 
 @click.command()
 @click.option("-o", "--output", default=".", metavar="FOLDER", help="Where the two files go; made if it is missing.")
 @click.option("--master", metavar="URI", help=f"Address of the ROS master; else $ROS_MASTER_URI, else {_MASTER}.")
 @click.option("--name", default="snapshot", show_default=True, help="Name of the system and of the files.")
-@click.option("--timeout", default=2.0, show_default=True, metavar="S", help="Patience with the master and each node.")
+@click.option(
+    "--timeout",
+    type=FiniteRange(min=0, min_open=True, max=_LONGEST),
+    default=2.0,
+    show_default=True,
+    metavar="S",
+    help="Patience with the master and each node.",
+)
 @click.option("--all", "everything", is_flag=True, help="Keep what ROS itself makes: /rosout, ~get_loggers, ...")
 def snapshot(output: str, master: str | None, name: str, timeout: float, everything: bool) -> None:
     """Write NAME.ros and NAME.rossystem of the running system.
@@ -30,7 +40,7 @@ def snapshot(output: str, master: str | None, name: str, timeout: float, everyth
     """
     from ros_model.extraction.output import write_models  # imported when asked for
 
-    uri = master or os.environ.get("ROS_MASTER_URI") or _MASTER
+    uri = _checked_address(master or os.environ.get("ROS_MASTER_URI") or _MASTER)
     models = _models(uri, name, timeout, everything)
     nodes = len(models.system.components)
     for path in write_models(models, output, name):
@@ -38,13 +48,26 @@ def snapshot(output: str, master: str | None, name: str, timeout: float, everyth
     click.echo(f"{nodes} node{'s' * (nodes != 1)}, {len(models.system.connections)} connections")
 
 
+def _checked_address(uri: str) -> str:
+    try:
+        parts = urlsplit(uri)
+        is_address = parts.scheme == "http" and bool(parts.hostname) and parts.port != 0
+    except ValueError:  # a port that is none
+        is_address = False
+    if not is_address:
+        raise ModelError(f"{uri!r} is no address of a ROS master: give one like {_MASTER} with --master")
+    return uri
+
+
 def _models(uri: str, name: str, timeout: float, everything: bool) -> Models:
     from ros_model.extraction.graph import models_of
     from ros_model.extraction.live import look_at
-    from ros_model.snapshot import SnapshotError, take_snapshot
+    from ros_model.snapshot import MasterGoneError, SnapshotError, take_snapshot
 
     try:
         graph = take_snapshot(uri, timeout)
+    except MasterGoneError as error:
+        raise ModelError(f"ROS master {uri} can't be reached: start the system, or set --master") from error
     except SnapshotError as error:
         raise ModelError(f"{error}: start the system, or set --master") from error
     stamp = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
