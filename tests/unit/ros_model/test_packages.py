@@ -393,3 +393,12 @@ def test_published_files_are_read_and_survive_a_round_trip():
                 r"\b(Publisher|Subscriber|ServiceServer|ServiceClient|ActionServer|ActionClient)\s*\{", file.read_text()
             )
         )
+
+
+@pytest.mark.parametrize(
+    "written", ["std_msgs.String", "std_msgs/String", "/*x.y", "String", "a b/c", "a/", "/a", "a/b/c"]
+)
+def test_name_of_a_type_is_written_as_it_was_read(written):
+    publisher = f"Publishers {{ Publisher {{ name x message '{written}' }} }}"
+    packages = parse_packages(f"PackageSet {{ Package p {{ Artifact a {{ Node {{ name n {publisher} }} }} }} }}")
+    assert parse_packages(write_packages(packages)) == packages

@@ -31,6 +31,7 @@ _PORT_WORDS = {  # in the order of the grammar
 }
 _SPEC_WORDS = {SpecKind.TOPIC: "TopicSpec", SpecKind.SERVICE: "ServiceSpec", SpecKind.ACTION: "ActionSpec"}
 _NAMESPACES = {"/": "GlobalNamespace", "~": "PrivateNamespace"}
+_TYPE_NAME = re.compile(r"^(\w+)/(.+)\Z", re.DOTALL)
 _FIELD_TYPE = re.compile(r"(.*?)(\[\d*\])?", re.DOTALL)
 _BARE_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _LINE = 96  # columns of a specification on one line; with its indentation it may take twelve more
@@ -126,4 +127,5 @@ def _word(text: str) -> str:
 
 
 def _dotted(type_name: str) -> str:
-    return type_name.replace("/", ".", 1)
+    """Return a type as the language has it: `package.Type` for `package/Type`, what is neither as it is."""
+    return _TYPE_NAME.sub(r"\1.\2", type_name)
