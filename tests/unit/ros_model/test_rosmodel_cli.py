@@ -1,6 +1,7 @@
 """The command rosmodel: exit status, and one line for every failure."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -32,6 +33,27 @@ def model(tmp_path):
         return path
 
     return write
+
+
+def test_version_is_that_of_the_package(run):
+    package = Path(__file__).parents[3] / "catkin_ws/src/ros_model/package.xml"
+    version = re.search("<version>(.*)</version>", package.read_text())[1]
+    assert run("--version") == (0, f"rosmodel {version}\n", "")
+
+
+def test_version_needs_the_package(run, monkeypatch):
+    monkeypatch.setenv("ROS_PACKAGE_PATH", "/nowhere")
+    monkeypatch.delenv("ROS_ROOT", raising=False)
+    assert run("--version") == (2, "", "rosmodel: no package ros_model: source the workspace that holds it\n")
+
+
+@pytest.mark.parametrize("command", [["show"], ["show", "--graph", "x.svg"], ["diff", "m.rossystem"]])
+def test_folder_is_refused_where_a_file_is_needed(run, model, tmp_path, monkeypatch, command):
+    model(GOOD)
+    (tmp_path / "models").mkdir()
+    monkeypatch.chdir(tmp_path)
+    expected = "rosmodel: models: is a folder: give a .rossystem or .ros file\n"
+    assert run(*command, "models") == (2, "", expected)
 
 
 def test_check_of_a_good_file_is_silent(run, model):

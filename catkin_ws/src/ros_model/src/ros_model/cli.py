@@ -63,6 +63,21 @@ class _Commands(click.Group):
         return found
 
 
+def _version(context: click.Context, _option: click.Parameter, asked: bool) -> None:
+    if not asked or context.resilient_parsing:
+        return
+    import rospkg  # slow to import
+
+    try:
+        click.echo(f"rosmodel {rospkg.RosPack().get_manifest('ros_model').version}")
+    except rospkg.ResourceNotFound as error:
+        raise ModelError("no package ros_model: source the workspace that holds it") from error
+    context.exit()
+
+
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Show the version and exit."
+)
 def command() -> None:
     """Models of ROS systems: check, format, show, generate from them."""

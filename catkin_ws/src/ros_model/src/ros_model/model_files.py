@@ -29,6 +29,8 @@ def read_all(path: Path) -> RosSystem | PackageSet:
     Raises:
         ModelError: it can't be read or is not well-formed.
     """
+    if path.is_dir() and os.access(path, os.R_OK, effective_ids=True):
+        raise ModelError(f"{path}: is a folder: give a {SYSTEM} or {PACKAGES} file")
     return parse_all(read_text(path), str(path))
 
 
