@@ -161,6 +161,24 @@ def test_node_of_several_files_is_followed_through_its_class(tmp_path):
             "dynamic_reconfigure::Server<demo::DemoConfig> s;",
             ("service server", "~set_parameters", "dynamic_reconfigure/Reconfigure"),
         ),
+        (
+            'std_srvs::Empty e; ros::service::waitForService("x"); ros::service::call("/x", e);',
+            ("service client", "/x", "std_srvs/Empty"),
+        ),
+        ('ros::service::createClient<std_srvs::Empty>("x");', ("service client", "x", "std_srvs/Empty")),
+        (
+            'auto o = ros::AdvertiseOptions::create<std_msgs::String>("x", 1, 0, 0, ros::VoidPtr(), 0); '
+            "pnh.advertise(o);",
+            ("publisher", "~x", "std_msgs/String"),
+        ),
+        (
+            'ros::SubscribeOptions o; o = ros::SubscribeOptions::create<std_msgs::String>("x", 1, f);pnh.subscribe(o);',
+            ("subscriber", "~x", "std_msgs/String"),
+        ),
+        (
+            'pnh.advertiseService(ros::AdvertiseServiceOptions::create<std_srvs::Empty>("x", f, ros::VoidPtr(), 0));',
+            ("service server", "~x", "std_srvs/Empty"),
+        ),
         ("tf::TransformListener l;", ("subscriber", "/tf", "tf2_msgs/TFMessage")),
     ],
 )
@@ -255,6 +273,14 @@ def test_handle_whose_construction_is_not_known_is_never_the_root(node, code):
     result = node(code + 'q->advertise<std_msgs::String>("b", 1);')
     assert [(port.is_resolved, "b@main.cpp:6" in port.name) for port in result.ports] == [(False, True)]
     assert "publisher: its name is not known" in remarks(result)
+
+
+def test_options_that_are_made_elsewhere_are_marked(node):
+    result = node('nh.advertise(options);\nros::service::call(name, request); ros::service::waitForService("/y");')
+    assert found(result) == {
+        ("publisher", "{options}@main.cpp:6", ""),
+        ("service client", "{name}@main.cpp:7", ""),
+    }
 
 
 def test_parameters_come_with_defaults(node):

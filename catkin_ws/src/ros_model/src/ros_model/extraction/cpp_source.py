@@ -34,6 +34,12 @@ _ACTIONS = {
     "actionlib::ActionClient": PortKind.ACTION_CLIENT,
 }
 _METHODS = ("advertise", "subscribe", "advertiseService", "serviceClient", "advertiseCamera", "subscribeCamera")
+_OPTIONS = {  # the class whose `create` makes what may be given to a method alone
+    "advertise": (PortKind.PUBLISHER, "AdvertiseOptions"),
+    "subscribe": (PortKind.SUBSCRIBER, "SubscribeOptions"),
+    "advertiseService": (PortKind.SERVICE_SERVER, "AdvertiseServiceOptions"),
+    "serviceClient": (PortKind.SERVICE_CLIENT, "ServiceClientOptions"),
+}
 _GETTERS = {"param": 2, "getParam": 1, "getParamCached": 1, "hasParam": 1}
 _FREE_GETTERS = {"ros::param::get": 1, "ros::param::getCached": 1, "ros::param::param": 2, "ros::param::has": 1}
 _TYPE = re.compile(
@@ -157,6 +163,9 @@ class _Reader:
         elif plain == "ros::topic::waitForMessage" and arguments:
             kind = self._template(name)
             self._port(PortKind.SUBSCRIBER, [Const("")], arguments[0], kind, node, place)
+        elif plain in ("ros::service::call", "ros::service::createClient") and arguments:
+            kind = self._template(name) or self._of_variable(arguments[1:], place)
+            self._port(PortKind.SERVICE_CLIENT, [Const("")], arguments[0], kind, node, place)
         elif plain.endswith(("make_shared", "make_unique")):
             for made in template_arguments(name.replace(" ", "")):
                 self._object(made, arguments, node, place)
@@ -181,6 +190,13 @@ class _Reader:
                 self._port(PortKind.SUBSCRIBER, handles, arguments[1], self._type(types[0]), node, place)
             return
         handles = self._program.handles(owner, place)
+        if (
+            name in _OPTIONS
+            and len(arguments) == 1
+            and "<" not in method
+            and self._options(name, handles, arguments[0], place)
+        ):
+            return
         if name == "advertise":
             self._port(PortKind.PUBLISHER, handles, arguments[0], self._template(method), node, place)
         elif name == "serviceClient":
@@ -191,6 +207,22 @@ class _Reader:
         elif name == "advertiseService":
             kind = self._template(method) or self._of_callback(arguments[1:], place)
             self._port(PortKind.SERVICE_SERVER, handles, arguments[0], kind, node, place)
+
+    def _options(self, method: str, handles: list[Name], given: Node, place: Place) -> bool:
+        """Look at a method that is given options alone; return whether what they are made with is known."""
+        kind, options = _OPTIONS[method]
+        made = [(given, place)]
+        if given.type != "call_expression":
+            made = [(d.values[0], d.place) for d in self._program.declared(text(given), place) if len(d.values) == 1]
+        is_known = False
+        for value, at in made:
+            function, arguments = value.child_by_field_name("function"), arguments_of(value)
+            name = text(function)
+            if function is not None and name.startswith(f"ros::{options}::create") and arguments:
+                type_name = self._template(name) or self._of_callback(arguments[1:], at)
+                self._port(kind, handles, arguments[0], type_name, value, at)
+                is_known = True
+        return is_known
 
     def _image(self, name: str, owner: Node, arguments: list[Node], node: Node, place: Place) -> None:
         """Ports of image_transport; those of its plug-ins (`image/compressed`) depend on what is installed."""
@@ -297,6 +329,11 @@ class _Reader:
             return self._type(match[1] or match[2])
         match = _TYPE.fullmatch(name)
         return f"{match['package']}/{match['name']}" if match else ""
+
+    def _of_variable(self, arguments: Sequence[Node], place: Place) -> str:
+        """Return the type that the first of some arguments, a variable, is declared with."""
+        declared = self._program.declared(text(arguments[0]), place) if arguments else []
+        return next((found for found in (self._type(d.type) for d in declared) if found), "")
 
     def _of_callback(self, arguments: list[Node], place: Place) -> str:
         """Return the type that a callback takes, from its definition."""
