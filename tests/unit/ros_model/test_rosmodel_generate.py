@@ -131,12 +131,18 @@ def test_models_that_generated_files_would_not_find_are_refused(run, models, tmp
         (["launch"], "Missing 'MODELS'"),
         (["launch", "models"], "Missing option '-o'"),
         (["poems", "{models}", "-o", "."], "no generator 'poems': there are deployment, launch"),
+        (
+            ["deployment", "{models}/base.rossystem", "-o", "."],
+            "base.rossystem: is one system, and deployment needs a p",
+        ),
+        (["deployment", "{models}/r.ros", "-o", "."], "r.ros: is no project: give the folder of metacontrol.yaml"),
         (["all", "{models}/none", "-o", "."], "No such file"),
         (["launch", "{models}/v.yaml", "-o", "."], "v.yaml:1:1: package: is missing"),
     ],
 )
 def test_wrong_arguments_are_refused(run, models, arguments, message):
     folder = models({"a": {"speed": 1}})
+    (folder / "r.ros").touch()
     status, _, err = run("generate", *(argument.format(models=folder) for argument in arguments))
     assert status == 2
     assert message in err

@@ -1,5 +1,6 @@
 """`rosmodel init`: a first metacontrol.yaml that checks clean as it is, and never takes the place of one."""
 
+import errno
 from pathlib import Path
 
 import pytest
@@ -115,6 +116,22 @@ def test_nothing_is_overwritten(run, base, name):
     assert f"{path.parent / name}: is there already" in err
     assert sorted(file.name for file in path.parent.iterdir()) == sorted(["base.rossystem", name])
     assert (path.parent / name).read_text() == "mine"
+
+
+def test_folder_in_place_of_the_base_is_refused(run, tmp_path):
+    status, _, err = run("init", tmp_path)
+    assert (status, err) == (2, f"rosmodel: {tmp_path}: is a folder: give the .rossystem file of the base system\n")
+
+
+def test_file_that_can_not_be_written_is_told_by_its_own_name(run, base, monkeypatch):
+    def refuse(*_arguments, **_options):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    path = base(ARM)
+    monkeypatch.setattr(Path, "write_text", refuse)
+    status, _, err = run("init", path)
+    written = path.parent / "metacontrol.yaml"
+    assert (status, err) == (2, f"rosmodel: {written}: can't be written (Permission denied): check its folder\n")
 
 
 @pytest.mark.parametrize(

@@ -116,6 +116,7 @@ def test_presence_other_components_and_targets_by_option(run, tmp_path):
         ([BASE, "{table}", "--set", "rate=a"], "says no component"),
         ([BASE, "{table}"], "t.csv:1:1: nothing says what column 'rate' sets"),
         ([BASE, "{table}.txt"], "is neither .csv nor .yaml"),
+        (["{table}"], "t.csv is a table: give the base .rossystem before it, or the folder of metacontrol.yaml"),
         (["none.rossystem", "{table}"], "none.rossystem: No such file"),
     ],
 )

@@ -70,8 +70,14 @@ class Settings:
 
 
 def locate(folder: str | Path) -> Path:
-    """Return the path of the metacontrol.yaml of a folder, or of that file itself."""
+    """Return the path of the metacontrol.yaml of a folder, or of that file itself.
+
+    Raises:
+        ModelError: the file is no YAML by its name.
+    """
     path = Path(folder)
+    if path.is_file() and path.suffix not in {".yaml", ".yml"}:
+        raise ModelError(f"{path}: is no project: give the folder of {FILE_NAME}, or that file")
     return path / FILE_NAME if path.is_dir() else path
 
 

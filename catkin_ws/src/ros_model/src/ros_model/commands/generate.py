@@ -11,7 +11,7 @@ import click
 from ros_model.errors import ModelError
 from ros_model.files import safe_file_name
 from ros_model.generators import find_generators, write_file
-from ros_model.project import load_project
+from ros_model.project import FILE_NAME, load_project
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -76,6 +76,8 @@ def generate(what: str, models: str | None, output: str | None, as_packages: boo
     generators = find_generators()
     if what != ALL and what not in generators:
         raise ModelError(f"no generator {what!r}: there are {', '.join(sorted(generators))} and {ALL}")
+    if models.endswith(_SYSTEM):
+        raise ModelError(f"{models}: is one system, and {what} needs a project: give the folder of {FILE_NAME}")
     project, package = _placed(load_project(models), Path(output), as_packages)
     for name in _ordered(generators) if what == ALL else [what]:
         written = generators[name](project, package)

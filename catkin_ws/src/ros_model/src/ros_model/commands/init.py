@@ -33,6 +33,8 @@ def init(base: str, package: str | None, component: str | None, qualities: tuple
         if not _QUALITY.fullmatch(name):
             raise click.UsageError(f"--qa {name!r} is no name of letters, digits and '_'")
     path = Path(base)
+    if path.is_dir():
+        raise ModelError(f"{path}: is a folder: give the .rossystem file of the base system")
     folder = path.parent
     choices = Choices(package or _package_around(folder.resolve()), component, qualities)
     texts = first_project(read_system(path), path.name, folder.resolve().name or ".", choices)

@@ -16,7 +16,7 @@ from ros_model.generators.family import origin
 from ros_model.project import position_within
 from ros_model.reader import read_system
 from ros_model.schema_check import dotted, load_schema, violations
-from ros_model.settings import locate, read_settings
+from ros_model.settings import FILE_NAME, locate, read_settings
 from ros_model.tables import read_table
 from ros_model.variants import make_systems
 from ros_model.writer import write_system
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from ros_model.metamodel import RosSystem
 
-_SYSTEM = ".rossystem"
+_SYSTEM, _TABLE = ".rossystem", ".csv"
 _SET = re.compile(r"(?P<column>[^=]+)=(?:(?P<component>[^:*=]+):)?(?P<name>[^:*=]+)(?:\*(?P<factor>[-+0-9.eE]+))?")
 _CONNECT = re.compile(r"(?P<column>[^:=]+):(?P<value>[^=]*)=(?P<source>[^>]*?)(?:->(?P<target>.+))?")
 _PAIR = re.compile(r"(?P<column>[^=]+)=(?P<name>.+)")
@@ -84,6 +84,10 @@ def variants(
     """  # noqa: D301
     options: dict[str, Any] = _section(component, sets, connects, presents, expects, ignores)
     if not base.endswith(_SYSTEM):
+        if base.endswith(_TABLE):
+            raise click.UsageError(
+                f"{base} is a table: give the base .rossystem before it, or the folder of {FILE_NAME}"
+            )
         if options:
             raise click.UsageError(f"metacontrol.yaml says what columns set: take out --{next(iter(options))}")
         found, default, header = _from_project(Path(base), table, qa)

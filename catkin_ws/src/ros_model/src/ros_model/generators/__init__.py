@@ -60,7 +60,7 @@ def write_file(path: Path, text: str, root: Path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise ModelError(f"{path}: {error.strerror or error}: check the folder given with -o") from error
+        raise ModelError(f"{path}: can't be written ({error.strerror or error}): check its folder") from error
     return path
 
 
