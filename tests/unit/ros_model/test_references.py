@@ -87,6 +87,7 @@ def test_sound_system_has_no_findings():
         ),
         ("arm.rate'", "arm.speed'", "m:10:54: error: 'arm.arm_node.arm' declares no parameter 'speed'"),
         ("value 5", "value fast", "m:10:84: error: the value 'fast' of 'rate' is no Double, as it is declared"),
+        ("FromRosNode 'arm.arm_node.arm", "FromRosNode 'arm./arm.arm", "package 'arm' declares no artifact '/arm'"),
         (
             "arm.rate' value 5",
             "arm.axes' value {x}",

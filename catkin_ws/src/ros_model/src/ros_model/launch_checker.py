@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
-from ros_model.findings import Finding
+from ros_model.findings import ERROR, Finding
 from ros_model.generators.launch import declared_type, global_name, legal_name, private_name, remaps, resource_name
 from ros_model.generators.launch_parameters import check_range, parameter_element, sent
+from ros_model.library import Unknown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from ros_model.metamodel import (
         Component,
         ParameterType,
+        Reference,
         RosParameter,
         RosSystem,
         SystemParameter,
@@ -34,23 +36,29 @@ def check_launch(system: RosSystem, whole: RosSystem, library: Library | None) -
         yield from _refused("name", legal_name, global_name(parameter), parameter.position)
         yield from _value(parameter, parameter.type)
     for component in system.components:
-        yield from _component(component, whole)
+        yield from _component(component, whole, library)
         for private in component.parameters:
             yield from _refused("name", legal_name, private_name(private), private.position)
             if private.value is not None:
                 yield from _value(private, declared_type(private, library))
 
 
-def _component(component: Component, whole: RosSystem) -> Iterator[Finding]:
+def _component(component: Component, whole: RosSystem, library: Library | None) -> Iterator[Finding]:
     namespace, _, name = component.graph_name.rpartition("/")
     yield from _refused("name", legal_name, name, component.position)
     if namespace:
         yield from _refused("name", legal_name, namespace, component.position)
     executable = component.executable
-    if executable and executable.artifact:
+    if executable and executable.artifact and not _leads_nowhere(executable, library):
         place = executable.position if executable.position.line else component.position
         yield from _refused("name", resource_name, executable.artifact, place)
     yield from _refused("name", list, remaps(component, whole))
+
+
+def _leads_nowhere(executable: Reference, library: Library | None) -> bool:
+    """Whether a reference is wrong as such, which is found without a launch file."""
+    found = library.node(executable) if library else None
+    return isinstance(found, Unknown) and found.severity == ERROR
 
 
 def _value(parameter: RosParameter | SystemParameter, declared: ParameterType | None) -> Iterator[Finding]:
