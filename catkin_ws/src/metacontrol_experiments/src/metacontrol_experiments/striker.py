@@ -78,7 +78,7 @@ class Striker:
 
         Args:
             contingency: what is to happen.
-            way: where the robot starts and where it goes, for clutter at random places; these follow from it and the seed.
+            way: where the robot starts and where it goes; clutter at random places follows from it and the seed.
 
         Raises:
             StrikeError: it could not.
