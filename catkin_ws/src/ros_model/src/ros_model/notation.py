@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from ros_model.errors import ModelError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from ros_model.metamodel import ParameterType, Position, Value
+    from ros_model.metamodel import ParameterType, Port, PortKind, Position, TypedParameter, Value
+    from ros_model.packages import PortDeclaration
+
+_P = TypeVar("_P", "Port", "PortDeclaration")
 
 INDENT = "    "
 _BARE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -48,6 +51,30 @@ def section(word: str, braces: str, elements: Iterable[list[str]]) -> list[str]:
     """Return the lines of a list of elements with its word and braces; nothing for none."""
     lines = sequence(elements)
     return [f"{word} {braces[0]}", *indented(lines), braces[1]] if lines else []
+
+
+def port_sections(
+    words: Mapping[PortKind, tuple[str, str, str]], ports: Sequence[_P], text: Callable[[str, str, _P], str]
+) -> list[str]:
+    """Return the lists of ports, by kind.
+
+    Args:
+        words: of a list, of a port in it, and of what the port leads to, for each kind in the language's order.
+        ports: the ports.
+        text: makes the line of a port, given the latter two.
+    """
+    lines: list[str] = []
+    for kind, (word, element, inner) in words.items():
+        lines += section(word, "{}", ([text(element, inner, port)] for port in ports if port.kind is kind))
+    return lines
+
+
+def typed_fields(parameter: TypedParameter) -> list[str]:
+    """Return the type and the value of a parameter, as far as it has them."""
+    fields = [f"type {type_text(parameter.type, parameter.position)}"] if parameter.type else []
+    if parameter.value is not None:
+        fields.append(f"value {value_text(parameter.value, parameter.position)}")
+    return fields
 
 
 def block(fields: Iterable[str]) -> str:

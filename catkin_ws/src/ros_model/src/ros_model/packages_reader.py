@@ -104,24 +104,6 @@ class _Builder(Builder):
         ports = tuple(port for kind in PortKind for port in fields.get(kind.value, ()))
         return Node(fields["name"], ports, fields.get("parameters", ()), self.at(items[0]))
 
-    def publishers(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.PUBLISHER, items)
-
-    def subscribers(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.SUBSCRIBER, items)
-
-    def service_servers(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.SERVICE_SERVER, items)
-
-    def service_clients(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.SERVICE_CLIENT, items)
-
-    def action_servers(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.ACTION_SERVER, items)
-
-    def action_clients(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.ACTION_CLIENT, items)
-
     def port(self, items: list[Any]) -> tuple[dict[str, Any], Token]:
         name, rest = split_name(items)
         return self.fields(rest, items[0], needs_name=True, name=name), items[0]
@@ -166,14 +148,11 @@ class _Builder(Builder):
 
     # Helpers
 
-    def _ports(self, kind: PortKind, items: list[Any]) -> Field:
-        ports = tuple(
-            PortDeclaration(
-                fields["name"], kind, fields.get("interface", ""), fields.get("namespace"), self.at(keyword)
-            )
-            for fields, keyword in items[1:]
+    def port_of(self, kind: PortKind, item: tuple[dict[str, Any], Token]) -> PortDeclaration:
+        fields, keyword = item
+        return PortDeclaration(
+            fields["name"], kind, fields.get("interface", ""), fields.get("namespace"), self.at(keyword)
         )
-        return kind.value, ports, items[0]
 
     def _specification(self, kind: SpecKind, items: list[Any]) -> Spec:
         keyword, name, *rest = items

@@ -6,7 +6,17 @@ import re
 from typing import TYPE_CHECKING
 
 from ros_model.metamodel import PortKind
-from ros_model.notation import block, comments, indented, name_text, quoted, section, sequence, type_text, value_text
+from ros_model.notation import (
+    block,
+    comments,
+    indented,
+    name_text,
+    port_sections,
+    quoted,
+    section,
+    sequence,
+    typed_fields,
+)
 from ros_model.packages import SpecKind
 
 if TYPE_CHECKING:
@@ -70,9 +80,7 @@ def _artifact(artifact: Artifact) -> list[str]:
 
 def _node(node: Node) -> list[str]:
     lines = [f"name {name_text(node.name)}"]
-    for kind, (word, element, interface) in _PORT_WORDS.items():
-        found = ([_port(element, interface, port)] for port in node.ports if port.kind is kind)
-        lines += section(word, "{}", found)
+    lines += port_sections(_PORT_WORDS, node.ports, _port)
     lines += section("Parameters", "{}", ([_parameter(parameter)] for parameter in node.parameters))
     return ["Node {", *indented(lines), "}"]
 
@@ -85,11 +93,7 @@ def _port(word: str, interface: str, port: PortDeclaration) -> str:
 
 
 def _parameter(parameter: ParameterDeclaration) -> str:
-    fields = [f"name {quoted(parameter.name)}", *_namespace(parameter.namespace)]
-    if parameter.type:
-        fields.append(f"type {type_text(parameter.type, parameter.position)}")
-    if parameter.value is not None:
-        fields.append(f"value {value_text(parameter.value, parameter.position)}")
+    fields = [f"name {quoted(parameter.name)}", *_namespace(parameter.namespace), *typed_fields(parameter)]
     return f"Parameter {block(fields)}"
 
 

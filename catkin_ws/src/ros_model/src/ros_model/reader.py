@@ -118,24 +118,6 @@ class _Builder(Builder):
         keyword, name, namespace = items
         return Component(text_of(name), namespace=namespace[1] if namespace else None, position=self.at(keyword))
 
-    def publishers(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.PUBLISHER, items)
-
-    def subscribers(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.SUBSCRIBER, items)
-
-    def service_servers(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.SERVICE_SERVER, items)
-
-    def service_clients(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.SERVICE_CLIENT, items)
-
-    def action_servers(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.ACTION_SERVER, items)
-
-    def action_clients(self, items: list[Any]) -> Field:
-        return self._ports(PortKind.ACTION_CLIENT, items)
-
     def port(self, items: list[Any]) -> tuple[str, dict[str, Any], Position]:
         keyword = items[0]
         name, rest = split_name(items)
@@ -195,12 +177,9 @@ class _Builder(Builder):
 
     # Helpers
 
-    def _ports(self, kind: PortKind, items: list[Any]) -> Field:
-        ports = tuple(
-            Port(name, kind, fields.get("reference"), fields.get("namespace"), position)
-            for name, fields, position in items[1:]
-        )
-        return kind.value, ports, items[0]
+    def port_of(self, kind: PortKind, item: tuple[str, dict[str, Any], Position]) -> Port:
+        name, fields, position = item
+        return Port(name, kind, fields.get("reference"), fields.get("namespace"), position)
 
     def _connections(self, kind: ConnectionKind, items: list[Any]) -> Field:
         connections = tuple(

@@ -18,7 +18,7 @@ from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedTok
 from ros_model.comments import header
 from ros_model.errors import ModelError, first_of
 from ros_model.files import MAX_SIZE
-from ros_model.metamodel import ParameterType, Position, TypedParameter, Value
+from ros_model.metamodel import ParameterType, PortKind, Position, TypedParameter, Value
 from ros_model.recovery import Recovery
 
 if TYPE_CHECKING:
@@ -208,6 +208,33 @@ class Builder(Transformer):
 
     def private_namespace(self, items: list[Token | None]) -> str:
         return f"~{_joined(items)}"
+
+    # Ports
+
+    def publishers(self, items: list[Any]) -> Field:
+        return self._ports(PortKind.PUBLISHER, items)
+
+    def subscribers(self, items: list[Any]) -> Field:
+        return self._ports(PortKind.SUBSCRIBER, items)
+
+    def service_servers(self, items: list[Any]) -> Field:
+        return self._ports(PortKind.SERVICE_SERVER, items)
+
+    def service_clients(self, items: list[Any]) -> Field:
+        return self._ports(PortKind.SERVICE_CLIENT, items)
+
+    def action_servers(self, items: list[Any]) -> Field:
+        return self._ports(PortKind.ACTION_SERVER, items)
+
+    def action_clients(self, items: list[Any]) -> Field:
+        return self._ports(PortKind.ACTION_CLIENT, items)
+
+    def _ports(self, kind: PortKind, items: list[Any]) -> Field:
+        return kind.value, tuple(self.port_of(kind, item) for item in items[1:]), items[0]
+
+    def port_of(self, kind: PortKind, item: Any) -> Any:
+        """Return a port of a kind, from what the rule `port` of the language has become."""
+        raise NotImplementedError
 
     # Types
 

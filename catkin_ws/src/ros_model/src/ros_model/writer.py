@@ -5,7 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ros_model.metamodel import Component, Connection, ConnectionKind, PortKind, PortPath
-from ros_model.notation import block, comments, indented, name_text, quoted, section, type_text, value_text
+from ros_model.notation import (
+    block,
+    comments,
+    indented,
+    name_text,
+    port_sections,
+    quoted,
+    section,
+    typed_fields,
+    value_text,
+)
 
 if TYPE_CHECKING:
     from ros_model.metamodel import ComponentStack, Port, Reference, RosParameter, RosSystem, SystemParameter
@@ -60,9 +70,7 @@ def _component(component: Component) -> list[str]:
         lines.append(f"NameSpace {name_text(component.namespace)}")
     if component.node:
         lines.append(f"FromRosNode {quoted(str(component.node))}")
-    for kind, (word, element, reference) in _PORT_WORDS.items():
-        found = ([_port(element, reference, port)] for port in component.ports if port.kind is kind)
-        lines += section(word, "{}", found)
+    lines += port_sections(_PORT_WORDS, component.ports, _port)
     lines += section("RosParameters", "{}", ([_ros_parameter(parameter)] for parameter in component.parameters))
     return ["ComponentInterface {", *indented(lines), "}"]
 
@@ -102,8 +110,4 @@ def _parameter(parameter: SystemParameter) -> str:
     fields = [f"name {name_text(parameter.name)}"]
     if parameter.namespace is not None:
         fields.append(f"NameSpace {name_text(parameter.namespace)}")
-    if parameter.type:
-        fields.append(f"type {type_text(parameter.type, parameter.position)}")
-    if parameter.value is not None:
-        fields.append(f"value {value_text(parameter.value, parameter.position)}")
-    return block(fields)
+    return block([*fields, *typed_fields(parameter)])
