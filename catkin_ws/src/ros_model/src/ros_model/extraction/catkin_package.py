@@ -13,7 +13,7 @@ from catkin_pkg.package import InvalidPackage, parse_package_string
 
 from ros_model.errors import ModelError
 from ros_model.extraction.cmake import Command, commands, sections
-from ros_model.extraction.source import Remark, SourceError, read_source
+from ros_model.extraction.source import Remark, SourceError, read_source, read_xml
 from ros_model.metamodel import Position
 
 MANIFEST = "package.xml"
@@ -79,12 +79,7 @@ def read_package(folder: Path) -> CatkinPackage:
         ModelError: its package.xml can't be read.
     """
     manifest = folder / MANIFEST
-    try:
-        data = read_source(manifest, str(manifest))
-    except SourceError as error:
-        raise ModelError(error.remark.text, error.remark.position) from error
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise ModelError("a package.xml has no DOCTYPE and no entities: remove them", Position(str(manifest), 1, 1))
+    data = read_xml(manifest, f"a {MANIFEST}")
     try:
         package = parse_package_string(data.decode("utf-8"), str(manifest))
     except UnicodeDecodeError as error:

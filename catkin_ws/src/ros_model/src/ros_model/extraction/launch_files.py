@@ -18,8 +18,8 @@ from ros_model.extraction.graph import End, Instance, Models, assemble, label_of
 from ros_model.extraction.names import executable_name, resolve, split_name
 from ros_model.extraction.package_source import named, read_executable
 from ros_model.extraction.python_modules import Library
-from ros_model.extraction.source import NodeSource, SourceError, read_source
-from ros_model.metamodel import PortKind, Position, Reference
+from ros_model.extraction.source import NodeSource, SourceError, read_xml
+from ros_model.metamodel import PortKind, Reference
 
 _SPECIAL = "__"
 
@@ -88,12 +88,7 @@ def load(path: Path, arguments: Sequence[str]) -> tuple[list[LaunchedNode], dict
     import roslaunch.core
     import roslaunch.xmlloader
 
-    try:
-        data = read_source(path, str(path))
-    except SourceError as error:
-        raise ModelError(error.remark.text, error.remark.position) from error
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise ModelError("a launch file has no DOCTYPE and no entities: remove them", Position(str(path), 1, 1))
+    read_xml(path, "a launch file")
     for argument in arguments:
         if ":=" not in argument:
             raise ModelError(f"argument {argument!r} is not NAME:=VALUE")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from ros_model.errors import ModelError
 from ros_model.extraction.values import UnwritableValueError, typed
 from ros_model.metamodel import PortKind, Position
 from ros_model.packages import Node, ParameterDeclaration, PortDeclaration
@@ -134,6 +135,25 @@ def read_source(path: Path, shown: str) -> bytes:
     if b"\0" in data:
         line = data[: data.index(b"\0")].count(b"\n") + 1
         raise SourceError(Remark(Position(shown, line, 1), "not read: it is no text but binary"))
+    return data
+
+
+def read_xml(path: Path, what: str) -> bytes:
+    """Return the content of an XML file that declares no entities.
+
+    Args:
+        path: the file.
+        what: what it is, for messages.
+
+    Raises:
+        ModelError: it can't be read, or has a DOCTYPE or entities.
+    """
+    try:
+        data = read_source(path, str(path))
+    except SourceError as error:
+        raise ModelError(error.remark.text, error.remark.position) from error
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise ModelError(f"{what} has no DOCTYPE and no entities: remove them", Position(str(path), 1, 1))
     return data
 
 
