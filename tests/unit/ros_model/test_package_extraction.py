@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
@@ -88,8 +89,8 @@ def test_compiled_executables_have_the_sources_of_the_libraries_they_link(tmp_pa
     assert executables(tmp_path) == {"node": ["src/a.cpp", "src/b.cpp", "src/lib/c.cpp"]}
     said = [str(remark) for remark in read_package(tmp_path).remarks]
     assert said == [
-        "CMakeLists.txt:6:1: the source src/gone.cpp of demo_node is not in the package",
-        "CMakeLists.txt:6:1: the source ${elsewhere} of demo_node is not in the package",
+        "CMakeLists.txt:6:1: not read: the source src/gone.cpp of demo_node is not in the package",
+        "CMakeLists.txt:6:1: not read: the source ${elsewhere} of demo_node is not in the package",
     ]
 
 
@@ -160,7 +161,7 @@ def test_packages_below_a_folder_are_found_through_links_but_not_in_circles(tmp_
     (tmp_path / "src" / "linked").symlink_to(tmp_path / "elsewhere" / "two")
     (tmp_path / "src" / "a" / "circle").symlink_to(tmp_path / "src")
     (tmp_path / "src" / "a" / "one" / "self").symlink_to(tmp_path / "src" / "a" / "one")
-    assert [path.name for path in find_packages(tmp_path / "src")] == ["one", "linked"]
+    assert [path.name for path in find_packages(tmp_path / "src")[0]] == ["one", "linked"]
     assert executables(tmp_path / "src" / "a" / "one") == {}
 
 
@@ -218,6 +219,68 @@ def test_folder_without_packages_and_missing_paths_are_refused(tmp_path, capsys)
     assert "no such folder" in capsys.readouterr().err
     assert run("extract", tmp_path, "a:=b") == 2
     assert "arguments are for a launch file" in capsys.readouterr().err
+
+
+@pytest.fixture
+def forbid(monkeypatch):
+    """Makes a folder one that can't be entered: root, who may run the tests, can enter all."""
+    stat, forbidden = os.stat, []
+
+    def refusing(path, *arguments, **options):
+        if not isinstance(path, int) and any(folder in Path(path).parents for folder in forbidden):
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return stat(path, *arguments, **options)
+
+    monkeypatch.setattr(os, "stat", refusing)
+    return forbidden.append
+
+
+def test_named_folder_that_can_not_be_entered_is_refused_in_one_line(tmp_path, capsys, forbid):
+    make_package(tmp_path / "demo")
+    forbid(tmp_path)
+    for path in (tmp_path, tmp_path / "demo", tmp_path / "demo" / "a.launch"):
+        assert run("extract", path, "-o", tmp_path / "out") == 2
+        error = capsys.readouterr().err
+        assert error.startswith(f"rosmodel: {path}: not read: Permission denied") and len(error.splitlines()) == 1
+
+
+def test_folder_below_that_can_not_be_entered_is_told_and_the_others_read(tmp_path, capsys, forbid):
+    make_package(tmp_path / "src" / "closed", "closed")
+    good = make_package(tmp_path / "src" / "good", "good")
+    make_script(good / "nodes" / "talker", TALKER + "import private.other\nprivate.other.publish()\n")
+    make_script(good / "private" / "other")
+    forbid(tmp_path / "src" / "closed")
+    forbid(good / "private")
+    assert run("extract", tmp_path / "src", "-o", tmp_path / "out") == 1
+    assert capsys.readouterr().err.splitlines() == [
+        f"rosmodel: {tmp_path}/src/closed: not read: Permission denied",
+        f"rosmodel: {good}/private:1:1: not read: Permission denied",
+    ]
+    assert read_packages(tmp_path / "out" / "good.ros").node("good", "talker", "talker")
+    forbid(good)
+    assert run("extract", tmp_path / "src", "-o", tmp_path / "out") == 2
+    assert (
+        f"no package.xml here or below: give the folder of a ROS package, or of several; {tmp_path}/src/closed: "
+        in (capsys.readouterr().err)
+    )
+
+
+def test_listed_executable_that_does_not_exist_is_told(tmp_path, capsys):
+    lines = "catkin_install_python(PROGRAMS nodes/gone)\nadd_executable(gone_too src/gone.cpp)\n"
+    folder = make_package(tmp_path / "demo", cmake=lines)
+    assert run("extract", folder, "-o", tmp_path / "out") == 1
+    assert capsys.readouterr().err.splitlines() == [
+        f"rosmodel: {folder}/CMakeLists.txt:1:1: not read: the program nodes/gone is not in the package",
+        f"rosmodel: {folder}/CMakeLists.txt:2:1: not read: the source src/gone.cpp of gone_too is not in the package",
+    ]
+
+
+@pytest.mark.parametrize("name", ["main.cpp", "package.xml", "noextension"])
+def test_file_that_is_no_launch_file_is_told_what_is_taken(tmp_path, capsys, name):
+    (tmp_path / name).write_text("int main() {}")
+    assert run("extract", tmp_path / name) == 2
+    said = "no launch file (*.launch, *.xml, *.test): give one, or the folder of a ROS package, or of several"
+    assert capsys.readouterr().err == f"rosmodel: {tmp_path / name}: {said}\n"
 
 
 def test_unwritable_output_is_told(tmp_path, capsys):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import click
@@ -10,6 +11,7 @@ from ros_model.commands import BAD_INPUT
 from ros_model.errors import ModelError
 
 _INCOMPLETE = 1
+_LAUNCH_FILES = (".launch", ".xml", ".test")
 
 
 @click.command()
@@ -20,12 +22,18 @@ def extract(path: str, arguments: tuple[str, ...], output: str) -> int:
     """Write models of what is in PATH: a ROS package, a folder of packages, or a launch file.
 
     A package gives PACKAGE.ros: its executables (rospy and roscpp), their interfaces and parameters, its messages.
-    A launch file, read by roslaunch with the arguments ARG:=VALUE, gives NAME.rossystem and NAME.ros.
+    A launch file (.launch, .xml, .test), read by roslaunch with the arguments ARG:=VALUE, gives NAME.rossystem and
+    NAME.ros.
     What the source does not tell is marked so, with its place, in names and in comments at the top of the files.
 
-    Exit status: 0 all was read, 1 some source file could not be read, 2 a package or launch file could not.
+    Exit status: 0 all was read, 1 some source file or folder could not be read, 2 a package or launch file could not.
     """
-    if Path(path).is_file():
+    if os.path.isfile(path):  # False where that can't be looked at, which find_packages tells
+        if Path(path).suffix not in _LAUNCH_FILES or Path(path).name == "package.xml":
+            known = ", ".join(f"*{suffix}" for suffix in _LAUNCH_FILES)
+            raise ModelError(
+                f"{path}: no launch file ({known}): give one, or the folder of a ROS package, or of several"
+            )
         return _launch_file(Path(path), arguments, output)
     if arguments:
         raise ModelError(f"{arguments[0]}: arguments are for a launch file, and {path} is a folder")
@@ -49,8 +57,11 @@ def _packages(path: Path, output: str) -> int:
     from ros_model.extraction.output import write_package_set
     from ros_model.extraction.package_source import extract_package
 
-    status = 0
-    for folder in find_packages(path.absolute()):
+    folders, unread = find_packages(path.absolute())
+    for remark in unread:
+        click.echo(f"rosmodel: {remark.position.file}: {remark.text}", err=True)
+    status = _INCOMPLETE if unread else 0
+    for folder in folders:
         try:
             extracted = extract_package(folder)
         except ModelError as error:

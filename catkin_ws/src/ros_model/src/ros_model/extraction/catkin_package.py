@@ -57,19 +57,29 @@ class CatkinPackage:
     remarks: tuple[Remark, ...]
 
 
-def find_packages(path: Path) -> tuple[Path, ...]:
-    """Return the folders of the packages at or below a path, each once, links followed but never in a circle.
+def find_packages(path: Path) -> tuple[tuple[Path, ...], tuple[Remark, ...]]:
+    """Return the folders of the packages at or below a path, and which folders below it can't be read.
+
+    Each package comes once; links are followed, but never in a circle.
 
     Raises:
         ModelError: there is none, or the path can't be read.
     """
+    try:
+        path.stat()
+        if path.is_dir():
+            _enter(path)
+    except OSError as error:
+        what = "no such folder" if isinstance(error, FileNotFoundError) else f"not read: {error.strerror or error}"
+        raise ModelError(f"{path}: {what}: give the folder of a ROS package, or of several") from error
     if not path.is_dir():
-        what = "is no folder" if path.exists() else "no such folder"
-        raise ModelError(f"{path}: {what}: give the folder of a ROS package, or of several")
-    found = tuple(_packages_below(path, set()))
+        raise ModelError(f"{path}: is no folder: give the folder of a ROS package, or of several")
+    remarks: list[Remark] = []
+    found = tuple(_packages_below(path, set(), remarks))
     if not found:
-        raise ModelError(f"{path}: no {MANIFEST} here or below: give the folder of a ROS package, or of several")
-    return found
+        said = "".join(f"; {remark.position.file}: {remark.text}" for remark in remarks)
+        raise ModelError(f"{path}: no {MANIFEST} here or below: give the folder of a ROS package, or of several{said}")
+    return found, tuple(remarks)
 
 
 def read_package(folder: Path) -> CatkinPackage:
@@ -142,7 +152,7 @@ class _Executables:
             if self._libraries[library]:
                 text = f"the library {library} is linked by no executable here, and not looked at (a nodelet, perhaps)"
                 self.remarks.append(Remark(Position(_CMAKE, 1, 1), text))
-        for script in _scripts(self._folder):
+        for script in _scripts(self._folder, self.remarks):
             relative = str(script.relative_to(self._folder))
             self.executables.setdefault(script.name, Executable(script.name, (script,), True, Position(relative, 1, 1)))
 
@@ -169,8 +179,8 @@ class _Executables:
     def _program(self, program: str, command: Command) -> None:
         position = Position(_CMAKE, command.line, 1)
         path = self._inside(program)
-        if path is None or not path.is_file():
-            self.remarks.append(Remark(position, f"the program {program} is not in the package"))
+        if path is None or not os.path.isfile(path):  # which says no where the folder can't be entered
+            self.remarks.append(Remark(position, f"not read: the program {program} is not in the package"))
         elif _is_python(path):
             self.executables[path.name] = Executable(path.name, (path,), True, position)
         else:
@@ -182,9 +192,9 @@ class _Executables:
             if name in _LIBRARY_WORDS or (Path(name).suffix and Path(name).suffix not in _SOURCES):
                 continue
             path = self._inside(name)
-            if path is None or not path.is_file():
+            if path is None or not os.path.isfile(path):
                 position = Position(_CMAKE, command.line, 1)
-                text = f"the source {name} of {command.arguments[0]} is not in the package"
+                text = f"not read: the source {name} of {command.arguments[0]} is not in the package"
                 self.remarks.append(Remark(position, text))
             else:
                 found.append(path)
@@ -208,37 +218,56 @@ class _Executables:
         return found
 
 
-def _packages_below(folder: Path, seen: set[Path]) -> Iterator[Path]:
+def _packages_below(folder: Path, seen: set[Path], remarks: list[Remark]) -> Iterator[Path]:
     real = folder.resolve()
-    if real in seen or (folder / "CATKIN_IGNORE").exists():
+    if real in seen:
         return
     seen.add(real)
+    try:
+        entries = _enter(folder)
+    except OSError as error:
+        remarks.append(Remark(Position(str(folder), 1, 1), f"not read: {error.strerror or error}"))
+        return
+    if (folder / "CATKIN_IGNORE").exists():
+        return
     if (folder / MANIFEST).is_file():
         yield folder
         return
-    for entry in _entries(folder):
-        if entry.is_dir() and not entry.name.startswith(".") and entry.name not in _IGNORED_FOLDERS:
-            yield from _packages_below(entry, seen)
+    for entry in entries:
+        if os.path.isdir(entry) and not entry.name.startswith(".") and entry.name not in _IGNORED_FOLDERS:
+            yield from _packages_below(entry, seen, remarks)
 
 
-def _scripts(folder: Path) -> Iterator[Path]:
+def _scripts(package: Path, remarks: list[Remark]) -> Iterator[Path]:
     """Yield the executable Python files of a package; links to folders are not followed."""
-    todo = [folder]
+    todo = [package]
     while todo:
-        for entry in _entries(todo.pop()):
-            if entry.is_dir():
+        folder = todo.pop()
+        try:
+            entries = _enter(folder)
+        except OSError as error:
+            shown = str(folder.relative_to(package))
+            remarks.append(Remark(Position(shown, 1, 1), f"not read: {error.strerror or error}"))
+            continue
+        if folder != package and (folder / MANIFEST).exists():
+            continue
+        for entry in entries:
+            if os.path.isdir(entry):
                 searched = not entry.is_symlink() and entry.name not in _NOT_SEARCHED | _IGNORED_FOLDERS
-                if searched and not entry.name.startswith(".") and not (entry / MANIFEST).exists():
+                if searched and not entry.name.startswith("."):
                     todo.append(entry)
             elif entry.suffix not in _NO_SCRIPTS and entry.name != "setup.py" and _is_script(entry):
                 yield entry
 
 
-def _entries(folder: Path) -> list[Path]:
-    try:
-        return sorted(folder.iterdir())
-    except OSError:
-        return []
+def _enter(folder: Path) -> list[Path]:
+    """Return what is in a folder, in order.
+
+    Raises:
+        OSError: it can't be listed, or what is in it can't be looked at.
+    """
+    (folder / MANIFEST).exists()  # refused where listing alone is allowed
+    return sorted(folder.iterdir())
 
 
 def _is_script(path: Path) -> bool:

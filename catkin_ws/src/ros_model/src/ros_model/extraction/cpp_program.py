@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -331,7 +332,11 @@ class Program:
                 name = text(_child(node, "path")).strip('<>"')
                 for folder in (path.parent, self._folder / "include", self._folder / "src"):
                     header = folder / name
-                    if name.endswith(_HEADERS) and header.is_file() and header.resolve().is_relative_to(self._folder):
+                    if (
+                        name.endswith(_HEADERS)
+                        and os.path.isfile(header)
+                        and header.resolve().is_relative_to(self._folder)
+                    ):
                         yield header
                         break
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -169,13 +170,14 @@ class Library:
         except rospkg.ResourceNotFound:
             return False
         action = re.sub(r"(Action)?(Goal|Result|Feedback)?$", "", name).removesuffix("Action")
-        return (folder / kind / f"{name}.{kind}").is_file() or (folder / "action" / f"{action}.action").is_file()
+        files = (folder / kind / f"{name}.{kind}", folder / "action" / f"{action}.action")
+        return any(os.path.isfile(file) for file in files)
 
     def _find(self, name: str) -> Path | None:
         relative = Path(*name.split("."))
         for folder in self._roots(name.partition(".")[0]):
             for candidate in (folder / relative / "__init__.py", (folder / relative).with_suffix(".py")):
-                if candidate.is_file():
+                if os.path.isfile(candidate):  # False where the folder can't be entered
                     return candidate
         return None
 
