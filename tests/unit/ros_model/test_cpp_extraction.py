@@ -158,6 +158,11 @@ def test_node_of_several_files_is_followed_through_its_class(tmp_path):
             ("publisher", "x", "sensor_msgs/Image"),
         ),
         (
+            "std::unique_ptr<image_transport::ImageTransport> it; it.reset(new image_transport::ImageTransport(pnh)); "
+            'it->advertise("x", 1);',
+            ("publisher", "~x", "sensor_msgs/Image"),
+        ),
+        (
             "dynamic_reconfigure::Server<demo::DemoConfig> s;",
             ("service server", "~set_parameters", "dynamic_reconfigure/Reconfigure"),
         ),
@@ -267,6 +272,8 @@ def test_pointers_that_are_members_or_global_are_followed_too(node):
         "ros::NodeHandlePtr q = made();",
         "std::unique_ptr<ros::NodeHandle> q; q.reset(made());",
         "ros::NodeHandle* q = new ros::NodeHandle(nh, name());",
+        "std::optional<ros::NodeHandle> q; fill(q);",
+        "typedef std::shared_ptr<ros::NodeHandle> Handle; Handle q;",
     ],
 )
 def test_handle_whose_construction_is_not_known_is_never_the_root(node, code):

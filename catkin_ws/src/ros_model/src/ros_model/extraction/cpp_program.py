@@ -1,4 +1,4 @@
-"""C++ sources as syntax trees, and what texts and node handles in them are worth, as far as that shows."""
+"""C++ sources as syntax trees, and what texts in them are worth, as far as that shows."""
 
 from __future__ import annotations
 
@@ -23,9 +23,7 @@ _LANGUAGE = Language(tree_sitter_cpp.language())
 _KNOWN_TEXTS = {"ros::this_node::getName": "~", "ros::this_node::getNamespace": ""}
 _SAME_TEXT = ("std::string", "string", "ros::names::resolve", "ros::names::remap")
 _HEADERS = (".h", ".hpp", ".hh", ".hxx")
-_NULL = ("nullptr", "NULL", "0")
 _ESCAPE = re.compile(r"\\(.)")
-_FUNCTION_HOMES = ("getNodeHandle", "getMTNodeHandle", "getPrivateNodeHandle", "getMTPrivateNodeHandle")
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,7 @@ class Place:
 class Declared:
     """A variable: its type, what it is made with (one value, or the arguments of a constructor), and where.
 
-    `is_indirect`: it is declared as a pointer or a reference, so that without a value nothing is known of it.
+    `is_indirect`: it is declared as a pointer (not a smart one) or a reference.
     """
 
     type: str
@@ -152,12 +150,19 @@ class Program:
         found = self._texts(node, place, depth)
         return found[:MAX_VALUES] if found else unknown
 
-    def handles(self, node: Node | None, place: Place, depth: int = 0) -> list[Const | Text]:
-        """Return the namespaces that a node handle may stand for: "" the node's own, "~" its private one."""
-        if node is None or depth > MAX_DEPTH:
-            return [Const("")] if node is None else [Text((Hole(text(node)),))]
-        found = self._handles(node, place, depth)
-        return found[:MAX_VALUES] or [Text((Hole(text(node)),))]
+    def passed(self, name: str, place: Place) -> list[tuple[Node, Place]]:
+        """Return what the calls of a function pass for one of its parameters."""
+        if place.function is None or name not in (known := parameters(place.function)):
+            return []
+        index, _, default = known[name]
+        called = _function_name(place.function).rpartition("::")[2]
+        found = []
+        for arguments, at in self._index.calls.get(called, ()):
+            if index < len(arguments):
+                found.append((arguments[index], at))
+            elif default is not None:
+                found.append((default, place))
+        return found
 
     # --- texts
 
@@ -178,9 +183,7 @@ class Program:
             case "binary_expression" if text(node.child_by_field_name("operator")) == "+":
                 left, right = (self.texts(_child(node, side), place, depth + 1) for side in ("left", "right"))
                 found = [
-                    (joined([_as_text(one), _as_text(two)]), note or other)
-                    for one, note in left
-                    for two, other in right
+                    (joined([as_text(one), as_text(two)]), note or other) for one, note in left for two, other in right
                 ]
             case "call_expression":
                 found = self._called_text(node, place, depth)
@@ -236,82 +239,13 @@ class Program:
             if len(declared.values) == 1:
                 found += self.texts(declared.values[0], declared.place, depth + 1)
         if not found:
-            for argument, at in self._passed(name, place):
+            for argument, at in self.passed(name, place):
                 found += self.texts(argument, at, depth + 1)
         return found
 
     def _filled(self, name: str, place: Place) -> list[tuple[Node | str | None, Place, str]]:
         keys = (_key(place), place.owner)
         return next((self._fills[key, name] for key in keys if key and (key, name) in self._fills), [])
-
-    # --- node handles
-
-    def _handles(self, node: Node, place: Place, depth: int) -> list[Const | Text]:
-        name = text(node).lstrip("*&").removeprefix("this->")
-        if node.type in ("call_expression", "new_expression"):
-            called = name.partition("(")[0].partition("<")[0].removeprefix("new ").strip()
-            if called in _FUNCTION_HOMES:
-                return [Const("~" if "Private" in called else "")]
-            if called.endswith(("NodeHandle", "make_shared", "make_unique", "ImageTransport")):
-                return self._constructed(arguments_of(node), place, depth)
-            if called.endswith(("_ptr", "Ptr", "std::move")) and arguments_of(node):
-                return self._handles(arguments_of(node)[0], place, depth + 1)
-            return []
-        if node.type in ("pointer_expression", "parenthesized_expression") and node.named_child_count:
-            return self._handles(node.named_children[-1], place, depth + 1)
-        found: list[Const | Text] = []
-        for declared in self.declared(name, place):
-            if "NodeHandle" not in declared.type and not any("NodeHandle" in text(value) for value in declared.values):
-                continue
-            if declared.is_indirect and (not declared.values or text(declared.values[0]) in _NULL):
-                continue
-            is_made = [v for v in declared.values if v.type in ("call_expression", "new_expression")]
-            if len(declared.values) == 1 and is_made:
-                found += self.handles(is_made[0], declared.place, depth + 1)
-            else:
-                found += self._constructed(declared.values, declared.place, depth)
-        if not found:
-            for argument, at in self._passed(name, place):
-                found += self.handles(argument, at, depth + 1)
-        return list(dict.fromkeys(found))
-
-    def _constructed(self, values: Sequence[Node], place: Place, depth: int) -> list[Const | Text]:
-        """Return what the arguments of a node handle's constructor make: nothing, a namespace, a parent and one."""
-        if not values:
-            return [Const("")]
-        first = values[0]
-        if _is_textual(first) or not self._is_handle(first, place):
-            return [value for value, _ in self.texts(first, place, depth + 1)]
-        parents = self.handles(first, place, depth + 1)
-        if len(values) == 1:
-            return parents
-        inner = [value for value, _ in self.texts(values[1], place, depth + 1)]
-        return [in_namespace(parent, name) for parent in parents for name in inner]
-
-    def _is_handle(self, node: Node, place: Place) -> bool:
-        name = text(node).lstrip("*&").removeprefix("this->")
-        if "NodeHandle" in name:
-            return True
-        if any("NodeHandle" in declared.type for declared in self.declared(name, place)):
-            return True
-        parameter = _parameters(place.function).get(name) if place.function is not None else None
-        return parameter is not None and "NodeHandle" in parameter[1]
-
-    # --- parameters of functions
-
-    def _passed(self, name: str, place: Place) -> list[tuple[Node, Place]]:
-        """Return what the calls of a function pass for one of its parameters."""
-        if place.function is None or name not in (parameters := _parameters(place.function)):
-            return []
-        index, _, default = parameters[name]
-        called = _function_name(place.function).rpartition("::")[2]
-        found = []
-        for arguments, at in self._index.calls.get(called, ()):
-            if index < len(arguments):
-                found.append((arguments[index], at))
-            elif default is not None:
-                found.append((default, place))
-        return found
 
     # --- the index
 
@@ -437,7 +371,7 @@ class Program:
         return self._locals[function.id]
 
     def _is_local(self, name: str, place: Place) -> bool:
-        return place.function is not None and (name in self._local(place) or name in _parameters(place.function))
+        return place.function is not None and (name in self._local(place) or name in parameters(place.function))
 
 
 def walk(root: Node | None) -> Iterator[Node]:
@@ -465,15 +399,6 @@ def arguments_of(node: Node) -> list[Node]:
     return [child for child in arguments.named_children if child.type != "comment"] if arguments else []
 
 
-def in_namespace(namespace: Const | Text, name: Const | Text) -> Const | Text:
-    """Return a name as a node handle of a namespace resolves it."""
-    shown = str(_as_text(name))
-    if shown.startswith(("/", "~")) or namespace == Const(""):
-        return name
-    between = "" if namespace == Const("~") or not shown else "/"
-    return joined([_as_text(namespace), Text((between,)), _as_text(name)])
-
-
 def template_arguments(type_name: str) -> list[str]:
     """Return what stands between the outermost `<` and `>` of a type, taken apart at its commas."""
     _, bracket, rest = type_name.partition("<")
@@ -491,10 +416,10 @@ def template_arguments(type_name: str) -> list[str]:
 
 def parameter_types(function: Node) -> list[str]:
     """Return the types of a function's parameters."""
-    return [kind for _, kind, _ in sorted(_parameters(function).values(), key=lambda item: item[0])]
+    return [kind for _, kind, _ in sorted(parameters(function).values(), key=lambda item: item[0])]
 
 
-def _parameters(function: Node) -> dict[str, tuple[int, str, Node | None]]:
+def parameters(function: Node) -> dict[str, tuple[int, str, Node | None]]:
     """Return place, type and default of a function's parameters by name."""
     declarator = function
     while declarator is not None and declarator.type not in ("function_declarator", "lambda_expression"):
@@ -545,7 +470,7 @@ def _declarations(node: Node, place: Place) -> Iterator[tuple[str, Declared]]:
             is_list = default.type in ("argument_list", "initializer_list")
             value = tuple(default.named_children) if is_list else (default,)
         shown = text(name_node)
-        is_indirect = shown.startswith(("*", "&")) or kind.partition("<")[0].endswith(("_ptr", "Ptr"))
+        is_indirect = shown.startswith(("*", "&"))
         yield shown.lstrip("*& ").partition("[")[0].strip(), Declared(kind, value, place, is_indirect)
 
 
@@ -577,13 +502,10 @@ def _last(name: str) -> str:
     return name.partition("<")[0].rpartition("::")[2].rpartition(".")[2].rpartition("->")[2]
 
 
-def _is_textual(node: Node) -> bool:
-    return node.type in ("string_literal", "concatenated_string", "raw_string_literal", "binary_expression")
-
-
 def _literal(node: Node) -> str:
     return _ESCAPE.sub(r"\1", text(node).partition('"')[2].removesuffix('"'))
 
 
-def _as_text(value: Const | Text) -> Text:
+def as_text(value: Const | Text) -> Text:
+    """Return a value as a text."""
     return value if isinstance(value, Text) else Text((str(value.value),))

@@ -10,11 +10,11 @@ from typing import Any
 
 from tree_sitter import Node
 
+from ros_model.extraction.cpp_handles import Handles, in_namespace
 from ros_model.extraction.cpp_program import (
     Place,
     Program,
     arguments_of,
-    in_namespace,
     parameter_types,
     template_arguments,
     text,
@@ -85,6 +85,7 @@ class _Reader:
         self.node_name = ""
         self.position = Position()
         self._program = program
+        self._handles = Handles(program)
         self._values = parameters
 
     def read(self, node: Node, place: Place) -> None:
@@ -117,7 +118,7 @@ class _Reader:
             if method not in _GETTERS or arguments[0].type == "lambda_expression":
                 return
             owner = function.child_by_field_name("argument")
-            handles = self._program.handles(owner, place)
+            handles = self._handles.of(owner, place)
             default_at, is_filling = _GETTERS[method], method != "hasParam"
         else:
             return
@@ -186,10 +187,10 @@ class _Reader:
         if any("message_filters::Subscriber" in kind for kind in kinds) and name == "subscribe":
             if len(arguments) > 1:
                 types = [template_arguments(kind)[0] for kind in kinds if template_arguments(kind)]
-                handles = self._program.handles(arguments[0], place)
+                handles = self._handles.of(arguments[0], place)
                 self._port(PortKind.SUBSCRIBER, handles, arguments[1], self._type(types[0]), node, place)
             return
-        handles = self._program.handles(owner, place)
+        handles = self._handles.of(owner, place)
         if (
             name in _OPTIONS
             and len(arguments) == 1
@@ -229,7 +230,7 @@ class _Reader:
         kind = PortKind.PUBLISHER if name.startswith("advertise") else PortKind.SUBSCRIBER
         handles: list[Name] = []
         for declared in self._program.declared(text(owner), place):
-            handles += self._program.handles(declared.values[0] if declared.values else None, declared.place)
+            handles += self._handles.of(declared.values[0] if declared.values else owner, declared.place)
         self._port(kind, handles, arguments[0], _IMAGE, node, place)
         if name.endswith("Camera"):
             for namespace in handles:
@@ -264,12 +265,12 @@ class _Reader:
             if rest:
                 self._port(_ACTIONS[base], handles, rest[0], self._template(kind), node, place)
         elif base == "message_filters::Subscriber" and len(arguments) > 1 and not is_member:
-            handles = self._program.handles(arguments[0], place)
+            handles = self._handles.of(arguments[0], place)
             self._port(PortKind.SUBSCRIBER, handles, arguments[1], self._template(kind), node, place)
         elif base == "dynamic_reconfigure::Server" and not (is_member and arguments):
             handles = [Const("~")]
-            if arguments and self._program.handles(arguments[-1], place):
-                handles = self._program.handles(arguments[-1], place)
+            if arguments and self._handles.of(arguments[-1], place):
+                handles = self._handles.of(arguments[-1], place)
             for namespace in handles:
                 for made in RECONFIGURE_SERVER:
                     shown = self._name(made.kind.value, in_namespace(namespace, Const(made.name)), position)
@@ -282,7 +283,7 @@ class _Reader:
             return [Const("")], arguments
         kinds = {declared.type for declared in self._program.declared(text(first).lstrip("*&"), place)}
         if len(arguments) > 1 and (any("NodeHandle" in k for k in kinds) or arguments[1].type == "string_literal"):
-            return self._program.handles(first, place), arguments[1:]
+            return self._handles.of(first, place), arguments[1:]
         return [Const("")], arguments
 
     def _port(self, kind: PortKind, handles: list[Name], name: Node, type_name: str, node: Node, place: Place) -> None:
