@@ -232,6 +232,7 @@ class RosPlatform:
 
     def _prepare(self, wanted: Configuration) -> None:
         self._wanted, self._change_number, self._started = wanted, None, ()
+        self._death = None  # a new launcher counts its changes from the start
         self._begun = time.monotonic()
         self._new_server = self._stop_robot = False
 
