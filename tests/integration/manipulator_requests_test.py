@@ -31,12 +31,17 @@ class RequestsTest(PairTest):
         self.manipulator.end()
         type(self).start_manipulator()
         wait_for(lambda: pid_of("/rosgraph_manipulator") == self.manipulator.pid, "the manipulator is there")
-        # its requests are heard when it hears ours
-        wait_for(lambda: self.request_quickly("no_such_configuration") == -1, "it answers")
+        # what was said before it heard us is lost, on either topic
+        wait_for(self.is_heard, "it answers")
+        wait_for(lambda: self.requests.pub_cancel.get_num_connections() > 0, "it hears what is taken back")
 
-    def request_quickly(self, name):
-        self.client.send_goal(MvpReconfigurationGoal(name))
-        return self.client.wait_for_result(rospy.Duration(1)) and self.client.get_result().result
+    def is_heard(self):
+        handle = self.ask("no_such_configuration")
+        try:
+            wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, "an answer", 1.0)
+        except AssertionError:
+            return False
+        return True
 
     def ask(self, name):
         return self.requests.send_goal(MvpReconfigurationGoal(name))
