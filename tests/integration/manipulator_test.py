@@ -3,47 +3,15 @@
 
 import os
 import signal
-import time
 import unittest
-import xmlrpc.client
 
 import actionlib
-import psutil
-import rosgraph
 import rospy
 import rostest
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from manipulator_harness import DEADLINE_S, is_alive, pid_of, wait_for
 from metacontrol_msgs.msg import ActiveConfiguration, MvpReconfigurationAction, MvpReconfigurationGoal
-
-DEADLINE_S = 20
-
-
-def wait_for(condition, what):
-    deadline = time.monotonic() + DEADLINE_S
-    while time.monotonic() < deadline:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.02)
-    raise AssertionError(f"not within {DEADLINE_S} s: {what}")
-
-
-def pid_of(node):
-    """Process id of a node, or None when it does not answer."""
-    try:
-        uri = rosgraph.Master("/test").lookupNode(node)
-        return xmlrpc.client.ServerProxy(uri).getPid("/test")[2]
-    except (rosgraph.MasterException, OSError, xmlrpc.client.Error):
-        return None
-
-
-def is_alive(pid):
-    """Whether a process runs; one that ended but was not waited for by its parent does not."""
-    try:
-        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
-        return False
 
 
 class ManipulatorTest(unittest.TestCase):

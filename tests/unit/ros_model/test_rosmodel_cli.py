@@ -6,23 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from ros_model.cli import main
 from ros_model.reader import read_system
 
 GOOD = "RosSystem { Name good }\n"
 FAULTY = "RosSystem { Name bad TopicConnections { TopicConnection t { From ( 'a.b' ) To ( 'c.d' ) } } }\n"
-
-
-@pytest.fixture
-def run(capsys):
-    def run_command(*arguments):
-        with pytest.raises(SystemExit) as done:
-            main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return done.value.code, captured.out, captured.err
-
-    return run_command
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from ros_model.cli import main
 from ros_model.metamodel import compose
 from ros_model.project import load_project
 from ros_model.reader import read_system
@@ -30,18 +29,6 @@ SETTINGS = {
     "utility": "q",
     "objectives": {"o": {"function": "f"}},
 }
-
-
-@pytest.fixture
-def run(capsys):
-    def run_command(*arguments):
-        with pytest.raises(SystemExit) as done:
-            main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return done.value.code, captured.out, captured.err
-
-    return run_command
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from ros_model.cli import main
 from ros_model.project import load_project
 
 D2 = Path(__file__).parents[3] / "catkin_ws" / "src" / "metacontrol_sim" / "models" / "d2.rossystem"
@@ -22,18 +21,6 @@ ARM = """RosSystem { Name 'Arm-7 "x"'
                 RosParameter tool { RefParameter 'p.arm.arm.tool' value 'a, "b"' },
                 RosParameter joints { RefParameter 'p.arm.arm.joints' value { 1, 2 } },
                 RosParameter rate { RefParameter 'p.arm.arm.rate' } } } ) }"""  # noqa: E501
-
-
-@pytest.fixture
-def run(capsys):
-    def run_command(*arguments):
-        with pytest.raises(SystemExit) as done:
-            main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        assert "Traceback" not in captured.err
-        return done.value.code, captured.out, captured.err
-
-    return run_command
 
 
 @pytest.fixture
