@@ -10,8 +10,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from mros1_reasoner.recording import typestore
 from rosbags.rosbag1 import Reader, ReaderError
-from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+from rosbags.typesys import TypesysError
 
 from metacontrol_experiments import messages
 from metacontrol_experiments.record import (
@@ -24,11 +25,8 @@ from metacontrol_experiments.record import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
     from pathlib import Path
-
-    from rosbags.interfaces import Connection
-    from rosbags.typesys.store import Typestore
 
     from metacontrol_experiments.record import ConfigurationReport, DecisionReport, Event
 
@@ -86,7 +84,7 @@ def read_record(path: Path) -> MissionRecord:
     try:
         with Reader(path) as reader:
             wanted = [connection for connection in reader.connections if connection.topic in builder.handlers]
-            store = _typestore(wanted)
+            store = typestore(wanted)
             for connection, nanoseconds, data in reader.messages(connections=wanted):
                 message = store.deserialize_ros1(data, connection.msgtype)
                 builder.handlers[connection.topic](nanoseconds * 1e-9, message)
@@ -97,16 +95,6 @@ def read_record(path: Path) -> MissionRecord:
         hint = "; it was not closed: run `rosbag reindex`" if path.suffix == ".active" else ""
         raise BagError(f"{path}: not a readable mission bag ({error}){hint}") from error
     return builder.build(first, last)
-
-
-def _typestore(connections: Iterable[Connection]) -> Typestore:
-    """The standard types, completed by the definitions in the bag."""
-    store = get_typestore(Stores.ROS1_NOETIC)
-    for connection in connections:
-        if connection.msgtype not in store.types:
-            types = get_types_from_msg(connection.msgdef.data, connection.msgtype)
-            store.register({name: fields for name, fields in types.items() if name not in store.types})
-    return store
 
 
 class _Builder:

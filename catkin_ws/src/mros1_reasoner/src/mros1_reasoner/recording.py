@@ -168,7 +168,7 @@ def _messages(path: Path, reader: Reader, topics: Collection[str]) -> Iterator[t
     connections = [connection for connection in reader.connections if connection.topic in topics]
     if not connections:
         return
-    store = _typestore(connections)
+    store = typestore(connections)
     for connection, nanoseconds, data in reader.messages(connections=connections):
         try:
             message = store.deserialize_ros1(data, connection.msgtype)
@@ -177,7 +177,7 @@ def _messages(path: Path, reader: Reader, topics: Collection[str]) -> Iterator[t
         yield connection.topic, nanoseconds * 1e-9, message
 
 
-def _typestore(connections: Iterable[Connection]) -> Typestore:
+def typestore(connections: Iterable[Connection]) -> Typestore:
     """Return the standard types, completed by the definitions in the bag."""
     store = get_typestore(Stores.ROS1_NOETIC)
     for connection in connections:
