@@ -21,7 +21,7 @@ class ChangesTest(PairTest):
 
     def setUp(self):
         self.assertEqual(self.request("slow"), 1, self.manipulator.said())
-        self.waiting.cancel_all_goals()
+        self.forget_goals()
 
     def test_many_random_requests_leave_nothing_behind_and_lose_no_goal(self):
         goal_id, _ = self.send_goal()

@@ -185,6 +185,16 @@ class PairTest(unittest.TestCase):
     def wait_for_state(self, name, state="STABLE"):
         wait_for(lambda: self.is_in(name, state), f"{name} is {state}")
 
+    def forget_goals(self):
+        """Cancel what the server has at work, and wait until it has nothing."""
+
+        def is_idle():
+            return not {GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING} & set(self.server_goals.values())
+
+        if not is_idle():
+            self.waiting.cancel_all_goals()
+            wait_for(is_idle, "the server has nothing to do")
+
     def send_goal(self):
         """Send a goal that stays pending; return its id and handle."""
         self.assertTrue(self.waiting.wait_for_server(rospy.Duration(DEADLINE_S)))

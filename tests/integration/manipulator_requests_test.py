@@ -23,7 +23,7 @@ class RequestsTest(PairTest):
 
     def setUp(self):
         self.assertEqual(self.request("slow"), 1, self.manipulator.said())
-        self.waiting.cancel_all_goals()
+        self.forget_goals()
 
     def restart_with(self, **parameters):
         for name, value in parameters.items():

@@ -25,7 +25,7 @@ class SurvivalTest(PairTest):
     def setUp(self):
         self.wait_until_it_serves()
         self.assertEqual(self.request("slow"), 1, self.manipulator.said())
-        self.waiting.cancel_all_goals()
+        self.forget_goals()
         wait_for(lambda: GoalStatus.ACTIVE not in self.server_goals.values(), "no goal is at work")
 
     def kill_server(self):
@@ -112,7 +112,7 @@ class SurvivalTest(PairTest):
                 self.wait_for_goal(goal_id, server)
                 self.assertFalse(is_alive(before))
                 self.wait_until_it_serves()
-                self.waiting.cancel_all_goals()
+                self.forget_goals()
 
     def test_killed_pair_brings_the_mission_back(self):
         goal_id, _ = self.send_goal()

@@ -73,6 +73,34 @@ def test_cancel_follows_the_rules_of_actionlib(keeper, cancel, ends):
     assert (keeper.pending is None) is ends
 
 
+def test_cancelled_goal_that_the_server_goes_on_with_was_sent_after_the_cancellation(keeper):
+    keeper.on_cancel(GoalID())
+    keeper.on_status(status("a", GoalStatus.ACTIVE))  # it may have been on its way
+    assert keeper.pending is None
+    for _ in range(5):
+        keeper.on_status(status("a", GoalStatus.ACTIVE))
+    assert keeper.pending_id == "a"
+    keeper.on_result(result("a", GoalStatus.SUCCEEDED))
+    assert keeper.pending is None
+
+
+@pytest.mark.parametrize("state", [GoalStatus.PREEMPTING, GoalStatus.PREEMPTED])
+def test_cancelled_goal_that_the_server_gives_up_stays_cancelled(keeper, state):
+    keeper.on_cancel(GoalID())
+    keeper.on_status(status("a", state))
+    for _ in range(5):
+        keeper.on_status(status("a", GoalStatus.ACTIVE))
+    assert keeper.pending is None
+
+
+def test_goal_cancelled_during_a_change_stays_cancelled_though_the_old_server_has_it(keeper):
+    keeper.server_changes(True)
+    keeper.on_cancel(GoalID())
+    for _ in range(5):
+        keeper.on_status(status("a", GoalStatus.ACTIVE))
+    assert keeper.pending is None
+
+
 def test_goal_without_an_id_takes_the_one_that_the_server_gave_it():
     keeper = GoalKeeper()
     keeper.on_goal(goal(""))

@@ -15,6 +15,7 @@ TERMINAL = frozenset({PREEMPTED, SUCCEEDED, ABORTED, REJECTED, RECALLED})
 # What a server says of a goal that it drops because it is being shut down.
 DROPPED_BY_SHUTDOWN = frozenset({PREEMPTED, ABORTED, RECALLED})
 REMEMBERED = 1000  # ids of goals that have ended: many more than can be told twice
+CONFIRMATIONS = 3  # statuses with a goal at work, every 0.2 s: more than a server needs to heed a cancellation
 
 
 class GoalKeeper:
@@ -26,6 +27,8 @@ class GoalKeeper:
         self._changing = False
         self._doubted = False  # the goal was known to an earlier keeper: the server has to confirm it
         self._listed: frozenset[str] = frozenset()
+        self._cancelled: Any = None  # the goal that was cancelled last, until the server's status shows that it was
+        self._confirmations = 0  # statuses since then that have it at work
 
     @property
     def pending(self) -> Any:
@@ -58,13 +61,13 @@ class GoalKeeper:
 
     def server_changes(self, changing: bool) -> None:
         """Tell that the server is being replaced: that it drops the goal meanwhile does not end the goal."""
-        self._changing = changing
+        self._changing, self._cancelled = changing, None
 
     def on_goal(self, goal: Any) -> None:
         """Take in a message of the topic `goal`; a newer goal replaces the pending one."""
         if goal.goal_id.id and goal.goal_id.id in self._finished:
             return
-        self._goal, self._doubted = copy.deepcopy(goal), False
+        self._goal, self._doubted, self._cancelled = copy.deepcopy(goal), False, None
 
     def on_status(self, status: Any) -> None:
         """Take in a message of the topic `status`: it ends goals, and names those sent without an id."""
@@ -76,10 +79,28 @@ class GoalKeeper:
             elif self._goal is not None and not self._goal.goal_id.id and state in (PENDING, ACTIVE):
                 # The server made up an id for a goal that came without one.
                 self._goal.goal_id.id, self._goal.goal_id.stamp = goal_id, entry.goal_id.stamp
+        self._doubt_cancellation()
         if self._doubted and not self._changing:
             if not self.is_at_work:
                 self._goal = None
             self._doubted = False
+
+    def _doubt_cancellation(self) -> None:
+        """See whether the server goes on with a cancelled goal.
+
+        A client that cancels all goals and sends a new one does so on two topics, which may arrive here the other way
+        round than at the server.
+        """
+        if self._cancelled is None:
+            return
+        goal_id = self._cancelled.goal_id.id
+        if goal_id not in self._listed:
+            self._cancelled = None
+            return
+        self._confirmations += 1
+        if self._confirmations >= CONFIRMATIONS:
+            self._goal, self._cancelled = self._cancelled, None
+            self._finished.pop(goal_id, None)
 
     def on_result(self, result: Any) -> None:
         """Take in a message of the topic `result`."""
@@ -95,6 +116,7 @@ class GoalKeeper:
         if not cancel.stamp.is_zero() and goal_id.stamp <= cancel.stamp:
             cancelled = True
         if cancelled:
+            self._cancelled, self._confirmations = None if self._changing else self._goal, 0
             self._finish(goal_id.id)
 
     def _end(self, goal_id: str, state: int) -> None:
