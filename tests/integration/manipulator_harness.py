@@ -85,7 +85,7 @@ class Node:
     """A node as a process of the test's own, with what it says."""
 
     def __init__(self, *words, environment=None):
-        self.output = tempfile.TemporaryFile(mode="w+")  # noqa: SIM115, it lives as long as the node
+        self.output = tempfile.NamedTemporaryFile("w")  # noqa: SIM115, it lives as long as the node
         self._process = subprocess.Popen(
             ["/usr/bin/rosrun", *words],
             stdout=self.output,
@@ -103,8 +103,7 @@ class Node:
         return self._process.wait(DEADLINE_S)
 
     def said(self):
-        self.output.seek(0)
-        return self.output.read()
+        return Path(self.output.name).read_text()  # opened anew: the node's place in the file stays where it is
 
 
 class PairTest(unittest.TestCase):
