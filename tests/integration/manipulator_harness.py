@@ -90,7 +90,7 @@ class Node:
             ["/usr/bin/rosrun", *words],
             stdout=self.output,
             stderr=subprocess.STDOUT,
-            env={**os.environ, **(environment or {})},
+            env={**os.environ, "PYTHONUNBUFFERED": "1", **(environment or {})},  # what it says is read at once
         )
         self.pid = self._process.pid
 
