@@ -104,6 +104,13 @@ class Manipulator:
         self._server = actionlib.SimpleActionServer(name, MvpReconfigurationAction, self._execute, auto_start=False)
         self._server.start()
 
+    @property
+    def is_known(self):
+        """Whether a client has found the action, on each of its topics."""
+        server = self._server.action_server
+        ends = (server.goal_sub, server.cancel_sub, server.status_pub, server.feedback_pub, server.result_pub)
+        return all(end.get_num_connections() for end in ends)
+
     def announce(self, configuration, state="STABLE"):
         """Say what runs."""
         self.running = configuration

@@ -27,6 +27,7 @@ class ReasonerTest(unittest.TestCase):
         cls.manipulator = Manipulator()
         cls.manipulator.announce("scan_slow")
         wait_for(lambda: cls.diagnostics.reaches("/reasoner"), "the reasoner is ready")
+        wait_for(lambda: cls.manipulator.is_known, "the reasoner has found the manipulator")
 
     def component(self, name, value):
         return self.diagnostics.component(name, value)
