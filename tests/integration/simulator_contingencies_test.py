@@ -45,13 +45,18 @@ class Heard:
                     return None
 
 
-def died(pid):
+def becomes(condition):
+    """Tell whether a condition comes to hold before the deadline."""
     end = time.monotonic() + DEADLINE_S
-    while psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE:
+    while not condition():
         if time.monotonic() > end:
             return False
         time.sleep(0.05)
     return True
+
+
+def is_dead(pid):
+    return not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
 
 
 class ContingenciesTest(unittest.TestCase):
@@ -76,7 +81,7 @@ class ContingenciesTest(unittest.TestCase):
         self.assertTrue(done.success, done.message)
         event = self.events.wait(lambda e: e.name == "component:/rear_laser")
         pid = int({pair.key: pair.value for pair in event.values}["pid"])
-        self.assertEqual(psutil.Process(pid).status(), psutil.STATUS_STOPPED)
+        self.assertTrue(becomes(lambda: psutil.Process(pid).status() == psutil.STATUS_STOPPED))
         count = len(self.rear.messages)
         self.assertTrue(self.strike(kind="thaw", target="/rear_laser").success)
         self.assertIsNotNone(self.rear.wait(lambda _scan: True, since=count))
@@ -106,7 +111,7 @@ class ContingenciesTest(unittest.TestCase):
         self.assertIsNotNone(struck)
         self.assertEqual(struck.kind, MissionEvent.PERTURBATION)
         pid = int({pair.key: pair.value for pair in struck.values}["pid"])
-        self.assertTrue(died(pid))
+        self.assertTrue(becomes(lambda: is_dead(pid)))
         self.assertEqual([message.data for message in self.light.messages], [1.0])  # the robot has not moved
 
     def test_5_light_and_power_change_on_demand(self):

@@ -52,6 +52,7 @@ _LOG = "[RosReasoner] -- %s"
 _TIMER_PERIOD = 0.02  # s, wall, the shortest between two looks at ROS time while the core waits for a moment
 _FASTEST = 10.0  # ROS time may run so much faster than wall time
 _MASTER_PERIOD = 1.0  # s, wall, between two looks at the master
+_SERVER_WAIT = 1.0  # s, wall, at most, for the connections to the manipulator
 _WARM_UP = 4  # analyses before the node is ready: the JVM compiles what it has run
 _QUEUE = 1000  # diagnostics that wait at most
 _ANSWER_DEADLINE = 60.0  # s, wall, for a service; an analysis may have to start Pellet again
@@ -308,13 +309,22 @@ class ReasonerNode:
         if self._client is None:
             self._report(decision.id, True)
             return
-        if not self._client.wait_for_server(rospy.Duration(-1)):  # one look, without waiting
+        if not self._finds(self._client):
             message = f"the manipulator's action server {rospy.resolve_name(self._client.ns)} is not there"
             self._report(decision.id, False, message, blame=False)
             return
         self._request_ends = time.monotonic() + self._deadline
         goal = messages.MvpReconfigurationGoal(desired_configuration_name=decision.to_configuration)
         self._goal = self._client.send_goal(goal, transition_cb=lambda handle: self._on_transition(handle, decision.id))
+
+    def _finds(self, client: actionlib.ActionClient) -> bool:
+        """Look for the manipulator's action server; just after a start its connections may be on their way."""
+        until = time.monotonic() + _SERVER_WAIT
+        while not client.wait_for_server(rospy.Duration(-1)):  # one look: its own waiting needs a running clock
+            if time.monotonic() > until or rospy.is_shutdown():
+                return False
+            time.sleep(0.02)
+        return True
 
     def _on_transition(self, handle: actionlib.ClientGoalHandle, decision_id: str) -> None:
         if handle.get_comm_state() != actionlib.CommState.DONE:
