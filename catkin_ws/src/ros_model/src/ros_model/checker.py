@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ros_model.findings import WARNING, Finding, sorted_by_place
 from ros_model.launch_checker import check_launch
 from ros_model.library import Library, Unknown, hint
-from ros_model.metamodel import ConnectionKind, PortKind, RosParameter
+from ros_model.metamodel import ENDS, RosParameter
 from ros_model.notation import type_text
 from ros_model.syntax import short
 
@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     from ros_model.metamodel import (
         Component,
         Connection,
+        ConnectionKind,
         ParameterType,
         Port,
+        PortKind,
         PortPath,
         Position,
         Reference,
@@ -33,11 +35,6 @@ if TYPE_CHECKING:
     )
     from ros_model.packages import Node
 
-_ENDS = {
-    ConnectionKind.TOPIC: (PortKind.PUBLISHER, PortKind.SUBSCRIBER),
-    ConnectionKind.SERVICE: (PortKind.SERVICE_SERVER, PortKind.SERVICE_CLIENT),
-    ConnectionKind.ACTION: (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT),
-}
 _FITTING: dict[str, tuple[type, ...]] = {
     "Integer": (int,),
     "Double": (int, float),
@@ -305,7 +302,7 @@ def _wrong_parameter(parameter: RosParameter, reference: Reference, node: Node) 
 
 
 def _connection(connection: Connection, whole: RosSystem) -> Iterator[Finding]:
-    source_kind, target_kind = _ENDS[connection.kind]
+    source_kind, target_kind = ENDS[connection.kind]
     for kind, role, ends in (
         (source_kind, "source", connection.sources),
         (target_kind, "target", connection.targets),
@@ -337,7 +334,7 @@ def _end(end: PortPath, kind: PortKind, whole: RosSystem) -> tuple[str, str] | N
 def _types(connection: Connection, whole: RosSystem, library: Library) -> Iterator[Finding]:
     """Yield the ends that their nodes do not declare, and those whose type is not that of the first end with one."""
     first: tuple[PortPath, str] | None = None
-    for ends, kind in zip((connection.sources, connection.targets), _ENDS[connection.kind], strict=True):
+    for ends, kind in zip((connection.sources, connection.targets), ENDS[connection.kind], strict=True):
         for end in ends:
             port = _port(end, kind, whole)
             node = library.node(port.reference) if port and port.reference else None

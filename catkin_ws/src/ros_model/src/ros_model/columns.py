@@ -7,19 +7,15 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from ros_model.errors import ModelError
-from ros_model.metamodel import ConnectionKind, PortKind, PortPath, Position
+from ros_model.metamodel import ENDS, PortPath, Position
 
 if TYPE_CHECKING:
-    from ros_model.metamodel import Component, RosSystem
+    from ros_model.metamodel import Component, PortKind, RosSystem
     from ros_model.tables import Table
 
 Where = Callable[..., Position | None]
 
-TARGET_OF = {
-    PortKind.PUBLISHER: (ConnectionKind.TOPIC, PortKind.SUBSCRIBER),
-    PortKind.SERVICE_SERVER: (ConnectionKind.SERVICE, PortKind.SERVICE_CLIENT),
-    PortKind.ACTION_SERVER: (ConnectionKind.ACTION, PortKind.ACTION_CLIENT),
-}
+TARGET_OF = {source: (kind, target) for kind, (source, target) in ENDS.items()}
 """For each port that a connection may come from: the kind of the connection, and of the port at its other end."""
 
 _EXPECTED = "qa_"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
-from ros_model.metamodel import ConnectionKind, PortKind
+from ros_model.metamodel import CONNECTION_OF, ENDS, ConnectionKind
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -32,14 +32,6 @@ _EDGES = {
     ConnectionKind.TOPIC: "",
     ConnectionKind.SERVICE: "dir=both, style=dashed",
     ConnectionKind.ACTION: "dir=both, style=bold",
-}
-_KINDS = {
-    PortKind.PUBLISHER: (ConnectionKind.TOPIC, True),
-    PortKind.SUBSCRIBER: (ConnectionKind.TOPIC, False),
-    PortKind.SERVICE_SERVER: (ConnectionKind.SERVICE, True),
-    PortKind.SERVICE_CLIENT: (ConnectionKind.SERVICE, False),
-    PortKind.ACTION_SERVER: (ConnectionKind.ACTION, True),
-    PortKind.ACTION_CLIENT: (ConnectionKind.ACTION, False),
 }
 
 
@@ -118,10 +110,10 @@ def _channels(system: RosSystem) -> list[_Channel]:
         found.append(channel)
     free: dict[tuple[ConnectionKind, str], _Channel] = {}
     for component, port in _free_ports(system.components, connected):
-        kind, is_source = _KINDS[port.kind]
+        kind = CONNECTION_OF[port.kind]
         name = port.name.strip("/")
         channel = free.setdefault((kind, name), _Channel(kind, name))
-        (channel.sources if is_source else channel.targets)[component.name] = None
+        (channel.sources if port.kind is ENDS[kind][0] else channel.targets)[component.name] = None
     return [*found, *free.values()]
 
 

@@ -32,6 +32,25 @@ class PortKind(enum.Enum):
     ACTION_CLIENT = "action client"
 
 
+class ConnectionKind(enum.Enum):
+    """What a connection carries."""
+
+    TOPIC = "topic"
+    SERVICE = "service"
+    ACTION = "action"
+
+
+ENDS = {
+    ConnectionKind.TOPIC: (PortKind.PUBLISHER, PortKind.SUBSCRIBER),
+    ConnectionKind.SERVICE: (PortKind.SERVICE_SERVER, PortKind.SERVICE_CLIENT),
+    ConnectionKind.ACTION: (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT),
+}
+"""The kinds of the ports that a connection comes from and leads to."""
+
+CONNECTION_OF = {port: kind for kind, ends in ENDS.items() for port in ends}
+"""The kind of the connections of a port."""
+
+
 @dataclass(frozen=True)
 class Reference:
     """A dotted reference `package.artifact.node.name`; the name may itself hold dots and slashes."""
@@ -134,14 +153,6 @@ class PortPath:
     def __str__(self) -> str:
         """Return `component.port`."""
         return f"{self.component}.{self.port}" if self.component else self.port
-
-
-class ConnectionKind(enum.Enum):
-    """What a connection carries."""
-
-    TOPIC = "topic"
-    SERVICE = "service"
-    ACTION = "action"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ros_model.checker import misfit
 from ros_model.findings import WARNING, Finding, sorted_by_place
 from ros_model.library import BUILTIN_TYPES, full_type, installed_parts
-from ros_model.metamodel import PortKind
+from ros_model.metamodel import CONNECTION_OF
 from ros_model.packages import SpecKind
 
 if TYPE_CHECKING:
@@ -16,16 +16,6 @@ if TYPE_CHECKING:
     from ros_model.library import Library
     from ros_model.metamodel import Position
     from ros_model.packages import MessageField, Node, Package, PackageSet, Spec
-
-INTERFACES = {
-    PortKind.PUBLISHER: SpecKind.TOPIC,
-    PortKind.SUBSCRIBER: SpecKind.TOPIC,
-    PortKind.SERVICE_SERVER: SpecKind.SERVICE,
-    PortKind.SERVICE_CLIENT: SpecKind.SERVICE,
-    PortKind.ACTION_SERVER: SpecKind.ACTION,
-    PortKind.ACTION_CLIENT: SpecKind.ACTION,
-}
-"""What the type of a port is, by the port's kind."""
 
 
 def check_packages(packages: PackageSet, library: Library) -> tuple[Finding, ...]:
@@ -60,7 +50,8 @@ def _node(node: Node, library: Library) -> Iterator[Finding]:
     yield from _twice("", ((f"{port.kind.value} '{port.name}'", port.position) for port in node.ports))
     yield from _twice("parameter", ((parameter.name, parameter.position) for parameter in node.parameters))
     for port in node.ports:
-        problem = library.missing_type(INTERFACES[port.kind], port.type) if port.type else None
+        kind = SpecKind(CONNECTION_OF[port.kind].value)
+        problem = library.missing_type(kind, port.type) if port.type else None
         if problem:
             yield Finding(
                 f"{port.kind.value} '{port.name}': {problem.message}", port.position, "unknown-type", problem.severity
