@@ -76,18 +76,22 @@ def test_five_topics_become_an_action_and_a_watcher_of_its_result_stays_a_subscr
     assert declared and declared.ports[0].type == "demo_msgs/MoveAction"
 
 
-def test_who_sends_goals_and_listens_to_them_is_a_client_and_a_listener():
+def test_who_sends_goals_but_does_not_hear_all_that_a_server_says_is_a_publisher_and_a_listener():
     models = extracted(
         graph(
             [["/move/goal", ["/keeper"]], ["/move/cancel", ["/keeper"]]]
             + [[f"/move/{part}", ["/server"]] for part in ("status", "feedback", "result")],
-            [["/move/goal", ["/keeper", "/server"]], ["/move/cancel", ["/server"]]]
-            + [[f"/move/{part}", ["/keeper"]] for part in ("status", "result")],
+            [["/move/goal", ["/keeper", "/server"]], ["/move/cancel", ["/server"]], ["/move/result", ["/keeper"]]],
             types=[[f"/move/{part}", kind] for part, kind in ACTION_TYPES.items()],
         )
     )
-    # All five topics exist only where somebody listens to the feedback or publishes it: here the server does.
-    assert ports(models.system, "keeper") == {(PortKind.ACTION_CLIENT, "move"), (PortKind.SUBSCRIBER, "move/goal")}
+    assert ports(models.system, "server") == {(PortKind.ACTION_SERVER, "move")}
+    assert ports(models.system, "keeper") == {
+        (PortKind.PUBLISHER, "move/goal"),
+        (PortKind.PUBLISHER, "move/cancel"),
+        (PortKind.SUBSCRIBER, "move/goal"),
+        (PortKind.SUBSCRIBER, "move/result"),
+    }
 
 
 def test_what_every_node_has_is_left_out_and_said_so():

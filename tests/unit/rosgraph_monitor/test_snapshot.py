@@ -21,7 +21,7 @@ STATE = [
     ],
     [
         ["/scan", ["/move", "/ghost"]],
-        ["/move/goal", ["/move"]],
+        ["/move/goal", ["/move", "/watcher"]],
         ["/move/cancel", ["/move"]],
         ["/move/status", ["/mission", "/watcher"]],
         ["/move/feedback", ["/mission"]],
@@ -79,8 +79,34 @@ def test_action_is_folded_from_its_five_topics(graph):
         ("/move",),
         ("/mission",),
     )
-    assert "/move/status" not in graph.topics
-    assert "/fake/goal" in graph.topics
+    assert graph.actions.keys() == {"/move"}
+    assert graph.nodes["/move"].publications == ()
+    assert graph.nodes["/laser"].publications == ("/fake/goal", "/scan")
+
+
+def test_who_only_listens_to_an_actions_topics_is_no_server_and_no_client(graph):
+    watcher = graph.nodes["/watcher"]
+    assert (watcher.action_servers, watcher.action_clients) == ((), ())
+    assert watcher.subscriptions == ("/move/goal", "/move/status")
+    assert graph.topics["/move/goal"].subscribers == ("/move", "/watcher")
+
+
+def test_server_that_sends_goals_itself_is_a_server_and_a_publisher():
+    publishers, *rest = STATE
+    sent = [[topic, [*nodes, "/move"] if topic == "/move/goal" else nodes] for topic, nodes in publishers]
+    node = build_snapshot([sent, *rest], TYPES, PARAMETERS, ADDRESSES).nodes["/move"]
+    assert (node.action_servers, node.action_clients, node.publications) == (("/move",), (), ("/move/goal",))
+
+
+def test_action_without_a_server_still_has_its_client():
+    gone = {name: uri for name, uri in ADDRESSES.items() if name != "/move"}
+    graph = build_snapshot(STATE, TYPES, PARAMETERS, gone)
+    assert (graph.actions["/move"].servers, graph.actions["/move"].clients) == ((), ("/mission",))
+
+
+def test_five_topics_that_nobody_serves_or_asks_for_are_no_action():
+    watched = {name: uri for name, uri in ADDRESSES.items() if name in ("/watcher", "/laser")}
+    assert build_snapshot(STATE, TYPES, PARAMETERS, watched).actions == {}
 
 
 def test_node_knows_its_ends(graph):

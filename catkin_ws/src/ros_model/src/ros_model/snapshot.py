@@ -19,8 +19,8 @@ from xml.parsers.expat import ExpatError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-_ACTION_SUFFIXES = ("goal", "cancel", "status", "feedback", "result")
-_FROM_CLIENT = frozenset({"goal", "cancel"})
+_TO_SERVER = ("goal", "cancel")
+_TO_CLIENT = ("status", "feedback", "result")
 _GOAL_TYPE = "ActionGoal"
 _RPC_SUCCESS = 1
 _KEPT_ANSWERS = 8
@@ -58,18 +58,24 @@ class ServiceState:
 
 @dataclass(frozen=True)
 class ActionState:
-    """An action, folded from its five topics. The type is that of the action, e.g. `move_base_msgs/MoveBaseAction`."""
+    """An action, folded from its five topics. The type is that of the action, e.g. `move_base_msgs/MoveBaseAction`.
+
+    A server listens to goals and cancellations, and publishes status, feedback and result; a client does the reverse.
+    Who does less only watches, or helps out: it has ends of topics, and none of the action.
+    """
 
     name: str
     type: str
     servers: tuple[str, ...] = ()
     clients: tuple[str, ...] = ()
-    topics: tuple[TopicState, ...] = field(default=(), compare=False)  # the five, for who looks for mere watchers
 
 
 @dataclass(frozen=True)
 class NodeState:
-    """A node that the master lists, with the address of its own XML-RPC API. Names are resolved and sorted."""
+    """A node that the master lists, with the address of its own XML-RPC API. Names are resolved and sorted.
+
+    What it publishes and subscribes to as the server or client of an action is not among its topics.
+    """
 
     name: str
     uri: str
@@ -82,7 +88,7 @@ class NodeState:
 
 @dataclass(frozen=True)
 class GraphSnapshot:
-    """What the master lists. Topics that make up an action are folded into it and are not in `topics`."""
+    """What the master lists: all topics, and the actions that some of them make up."""
 
     nodes: Mapping[str, NodeState] = field(default_factory=dict)
     topics: Mapping[str, TopicState] = field(default_factory=dict)
@@ -222,50 +228,36 @@ def build_snapshot(
         name: TopicState(name, type_of.get(name, ""), publishers.get(name, ()), subscribers.get(name, ()))
         for name in sorted(publishers.keys() | subscribers.keys())
     }
-    actions = _fold_actions(topics)
-    plain = {name: topic for name, topic in topics.items() if _action_of(name) not in actions}
+    actions = _actions(topics)
     offered = {name: ServiceState(name, servers) for name, servers in sorted(services.items())}
     return GraphSnapshot(
-        nodes=_nodes(plain, offered, actions, addresses),
-        topics=plain,
+        nodes=_nodes(topics, offered, actions, addresses),
+        topics=topics,
         services=offered,
         actions=actions,
         parameters=parameters if isinstance(parameters, dict) else {},
     )
 
 
-def _action_of(topic: str) -> str | None:
-    base, _, suffix = topic.rpartition("/")
-    return base if base and suffix in _ACTION_SUFFIXES else None
-
-
-def _fold_actions(topics: Mapping[str, TopicState]) -> dict[str, ActionState]:
-    """Find the topics that together are an action: all five suffixes, and a goal of an action's goal type."""
+def _actions(topics: Mapping[str, TopicState]) -> dict[str, ActionState]:
+    """Find the topics that together are an action: all five, a goal of an action's goal type, a server or client."""
     actions = {}
     for name, goal in topics.items():
-        base = _action_of(name)
-        if base is None or not name.endswith("/goal") or not goal.type.endswith(_GOAL_TYPE):
+        base = name.removesuffix("/goal")
+        if base == name or not goal.type.endswith(_GOAL_TYPE):
             continue
-        parts = {suffix: topics.get(f"{base}/{suffix}") for suffix in _ACTION_SUFFIXES}
-        if not all(parts.values()):
-            continue
-        servers: set[str] = set()
-        clients: set[str] = set()
-        for suffix, part in parts.items():
-            # The status topic tells nothing about clients: anybody may watch it.
-            if part and suffix in _FROM_CLIENT:
-                servers.update(part.subscribers)
-                clients.update(part.publishers)
-            elif part:
-                servers.update(part.publishers)
-        actions[base] = ActionState(
-            base,
-            goal.type.removesuffix("Goal"),
-            tuple(sorted(servers)),
-            tuple(sorted(clients - servers)),
-            tuple(part for part in parts.values() if part),
-        )
+        to_server, to_client = ([topics.get(f"{base}/{end}") for end in ends] for ends in (_TO_SERVER, _TO_CLIENT))
+        servers = _nodes_at_all(subscribed=to_server, published=to_client)
+        clients = _nodes_at_all(subscribed=to_client, published=to_server)
+        if servers or clients:
+            actions[base] = ActionState(base, goal.type.removesuffix("Goal"), servers, clients)
     return actions
+
+
+def _nodes_at_all(subscribed: Iterable[TopicState | None], published: Iterable[TopicState | None]) -> tuple[str, ...]:
+    """Return the nodes that are an end of all these topics; of a topic that does not exist, none is."""
+    ends = [t.subscribers if t else () for t in subscribed] + [t.publishers if t else () for t in published]
+    return tuple(sorted(set(ends[0]).intersection(*ends[1:])))
 
 
 def _nodes(
@@ -275,11 +267,14 @@ def _nodes(
     addresses: Mapping[str, str],
 ) -> dict[str, NodeState]:
     ends: dict[str, dict[str, list[str]]] = {name: defaultdict(list) for name in sorted(addresses)}
+    heard, sent = _folded(actions.values())
     for topic in topics.values():
         for node in topic.publishers:
-            ends[node]["publications"].append(topic.name)
+            if (topic.name, node) not in sent:
+                ends[node]["publications"].append(topic.name)
         for node in topic.subscribers:
-            ends[node]["subscriptions"].append(topic.name)
+            if (topic.name, node) not in heard:
+                ends[node]["subscriptions"].append(topic.name)
     for service in services.values():
         for node in service.servers:
             ends[node]["services"].append(service.name)
@@ -292,6 +287,20 @@ def _nodes(
         name: NodeState(name, addresses[name], **{kind: tuple(names) for kind, names in kinds.items()})
         for name, kinds in ends.items()
     }
+
+
+def _folded(actions: Iterable[ActionState]) -> tuple[set[tuple[str, str]], set[tuple[str, str]]]:
+    """Return the ends of topics, as topic and node, that actions account for: subscribers, publishers."""
+    heard: set[tuple[str, str]] = set()
+    sent: set[tuple[str, str]] = set()
+    for action in actions:
+        for nodes, hears, sends in (
+            (action.servers, _TO_SERVER, _TO_CLIENT),
+            (action.clients, _TO_CLIENT, _TO_SERVER),
+        ):
+            heard.update((f"{action.name}/{end}", node) for end in hears for node in nodes)
+            sent.update((f"{action.name}/{end}", node) for end in sends for node in nodes)
+    return heard, sent
 
 
 def _identical(one: Any, other: Any) -> bool:

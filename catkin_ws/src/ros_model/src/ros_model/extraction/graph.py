@@ -27,14 +27,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from ros_model.extraction.live import Details
-    from ros_model.snapshot import ActionState, GraphSnapshot
+    from ros_model.snapshot import GraphSnapshot
 
 NO_PACKAGE = "unknown_package"
 """Package of nodes whose executable can't be traced; the artifact is then named as the node."""
-
-_SERVER_ENDS = {"goal": "subscribers", "cancel": "subscribers", "status": "publishers"} | dict.fromkeys(
-    ("feedback", "result"), "publishers"
-)
 
 
 @dataclass(frozen=True)
@@ -121,47 +117,19 @@ def assemble(
 
 def interfaces(snapshot: GraphSnapshot, details: Details) -> Iterator[End]:
     """Yield all interfaces of all nodes; an action is one, and what else touches its topics is a topic's end."""
-    for topic in snapshot.topics.values():
-        known = topic.type if is_known_type(topic.type) else ""
-        for node in topic.publishers:
-            yield End(node, PortKind.PUBLISHER, topic.name, known)
-        for node in topic.subscribers:
-            yield End(node, PortKind.SUBSCRIBER, topic.name, known)
-    for service in snapshot.services.values():
-        for node in service.servers:
-            yield End(node, PortKind.SERVICE_SERVER, service.name, details.service_types.get(service.name, ""))
-    for action in snapshot.actions.values():
-        yield from _action_ends(action)
-
-
-def _action_ends(action: ActionState) -> Iterator[End]:
-    """Yield the ends of an action.
-
-    A server publishes status and result and listens to goals; who publishes goals is a client. The rest only watches,
-    or helps out, as a topic's publisher or subscriber.
-    """
-    touching: dict[str, set[tuple[str, str]]] = defaultdict(set)
-    types = {}
-    for topic in action.topics:
-        suffix = topic.name.rpartition("/")[2]
-        types[suffix] = topic.type
-        for side, nodes in (("publishers", topic.publishers), ("subscribers", topic.subscribers)):
-            for node in nodes:
-                touching[node].add((suffix, side))
-    server_ends = set(_SERVER_ENDS.items())
-    client_ends = {(suffix, "publishers" if side == "subscribers" else "subscribers") for suffix, side in server_ends}
-    for node, touched in sorted(touching.items()):
-        if {("goal", "subscribers"), ("status", "publishers"), ("result", "publishers")} <= touched:
-            yield End(node, PortKind.ACTION_SERVER, action.name, action.type)
-            rest = touched - server_ends
-        elif ("goal", "publishers") in touched:
-            yield End(node, PortKind.ACTION_CLIENT, action.name, action.type)
-            rest = touched - client_ends
-        else:
-            rest = touched
-        for suffix, side in sorted(rest):
-            kind = PortKind.PUBLISHER if side == "publishers" else PortKind.SUBSCRIBER
-            yield End(node, kind, f"{action.name}/{suffix}", types[suffix])
+    for name, node in snapshot.nodes.items():
+        for kind, topics in ((PortKind.PUBLISHER, node.publications), (PortKind.SUBSCRIBER, node.subscriptions)):
+            for topic in topics:
+                type_name = snapshot.topics[topic].type
+                yield End(name, kind, topic, type_name if is_known_type(type_name) else "")
+        for service in node.services:
+            yield End(name, PortKind.SERVICE_SERVER, service, details.service_types.get(service, ""))
+        for kind, actions in (
+            (PortKind.ACTION_SERVER, node.action_servers),
+            (PortKind.ACTION_CLIENT, node.action_clients),
+        ):
+            for action in actions:
+                yield End(name, kind, action, snapshot.actions[action].type)
 
 
 def _instances(names: Sequence[str], details: Details, remarks: _Remarks) -> dict[str, Instance]:
