@@ -10,7 +10,7 @@ import os
 import queue
 import sys
 import threading
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import actionlib
 import cv2
@@ -57,9 +57,6 @@ FRAME_PATIENCE = 2.0
 
 FEEDBACK_PERIOD = 0.2
 """s; the action's status has the same rate."""
-
-EXIT_PATIENCE = 2.0
-"""How long the node's end waits until it is unregistered, s, wall: the master may be gone."""
 
 TF_CACHE = 10.0
 """Transforms kept, s: tf2's own default."""
@@ -476,18 +473,17 @@ def main() -> None:
     except ParameterError as error:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
         sys.exit(2)
-    unregistered = threading.Event()
-    rospy.core.add_shutdown_hook(lambda _reason: unregistered.set())  # comes after rospy's own, in their order
+    rospy.core.add_shutdown_hook(_exit)  # comes after rospy's own, in their order
     MoveBaseNode(parameters, tree, _resumed_goal(tree.pop("resume_goal", None))).run()
-    _exit(unregistered)
 
 
-def _exit(unregistered: threading.Event) -> NoReturn:
+def _exit(reason: str) -> None:
     """Ends the process at once when the master knows of its end: who replaces it waits for that.
 
-    Threads of actionlib and rospy would keep it for some tenths of a second more, asleep.
+    Threads of actionlib and rospy, and a wait for the next tick of a simulated clock, would keep it for half a second.
     """
-    unregistered.wait(EXIT_PATIENCE)
+    if reason == "atexit":  # it ends already, with a status of its own
+        return
     logging.shutdown()
     sys.stdout.flush()
     sys.stderr.flush()
