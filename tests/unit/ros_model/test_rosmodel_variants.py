@@ -65,7 +65,7 @@ def test_table_in_place_of_that_of_the_project(run, tmp_path):
         "crawl: {controller_frequency_hz: 5, max_vel_mps: 0.1, inflation_radius_m: 1, observation_source: scan}"
     )
     qa = tmp_path / "qa.csv"
-    qa.write_text("name,safety\ncrawl,0.1\n")
+    qa.write_text("name,safety,source,safety_spread,missions,seeds\ncrawl,0.1,measured,0.02,30,1-5\n")
     assert run(D2, table, "--qa", qa, "-o", tmp_path / "out")[0] == 0
     system = read_system(tmp_path / "out" / "crawl.rossystem")
     assert system.expected_qas == {"safety": 0.1}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from decimal import Decimal
 from typing import TYPE_CHECKING
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
     from ros_model.columns import Columns, Setting, Wire
     from ros_model.tables import Row, Table
 
-_SOURCE = "source"  # column of a table of levels that says where they are from
+_ABOUT = re.compile(r"source|seeds|missions|.*_spread")
+"""Columns of a table of levels that tell where they are from."""
 _CONNECTION_ORDER = list(ConnectionKind)
 _PORT_ORDER = list(PortKind)
 
@@ -47,7 +49,8 @@ def make_systems(
         base: the system with all that may be there.
         columns: what the columns set.
         table: one row a variant.
-        levels: a column for each quality attribute, and perhaps `source`.
+        levels: a column for each quality attribute, and perhaps what tells where they are from:
+            `source`, `seeds`, `missions`, `*_spread`.
 
     Raises:
         ModelError: the base, the columns and the tables do not fit together; says where, of every row.
@@ -253,7 +256,7 @@ def _levels(row: Row, levels: Table | None) -> Iterator[SystemParameter]:
     if found is None:
         raise ModelError(f"no row for {row.name}: add its expected levels", Position(str(levels.path), 1, 1))
     for column, cell in found.cells.items():
-        if column != _SOURCE:
+        if not _ABOUT.fullmatch(column):
             yield _level(column, cell, f"{row.name}: {column}", found.position)
 
 
