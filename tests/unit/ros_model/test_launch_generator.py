@@ -111,6 +111,7 @@ TEXT, WHOLE, DOUBLE, BYTES = (ParameterType(kind) for kind in ("String", "Intege
         ("String", True, {}, "true"),
         ("Boolean", False, {}, False),
         ("Base64", "aGVsbG8=", {}, Binary(b"hello")),
+        ("Base64", "0b100000001", {}, Binary(b"\x01\x01")),
         ("Integer", None, {"default": 7}, 7),
         ("Array", [1, 2.5], {"elements": (DOUBLE,)}, [1.0, 2.5]),
         ("List", [1, 1, "aGk="], {"elements": (DOUBLE, TEXT, BYTES)}, [1.0, "1", Binary(b"hi")]),
@@ -146,7 +147,7 @@ def test_members_of_a_struct_have_their_declared_types():
     ],
 )
 def test_value_that_is_none_of_its_type_is_refused(kind, value, more):
-    with pytest.raises(ModelError, match=rf"^x\.rossystem:3:5: the value .* is no {kind}|Integer"):
+    with pytest.raises(ModelError, match=rf"^x\.rossystem:3:5: the value .* of 'a' (is no {kind}|has )"):
         declared(kind, value, **more)
 
 

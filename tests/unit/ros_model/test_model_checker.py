@@ -1,5 +1,6 @@
 """The checker: what is wrong in a model that reads well, and where."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -66,6 +67,7 @@ def test_sound_model_has_no_findings():
         (parameter("type Integer value { 1 }"), "the value [1] of 'p' is no Integer"),
         (parameter("type Base64 value 'no base!'"), "is no Base64"),
         (parameter("type Date value yesterday"), "is no Date"),
+        (parameter("type Struct {b List {Double, Integer default x}}"), "the default 'x' of 'p' is no Integer"),
     ],
 )  # fmt: skip
 def test_fault_is_found(text, finding):
@@ -110,6 +112,34 @@ def test_caret_stands_under_the_value(value):
 
 
 @pytest.mark.parametrize(
+    "declared",
+    [
+        "Integer default HERE",
+        "Integer { default HERE }",
+        "Array { type Integer default { HERE } }",
+        "Array { type Integer } default 'HERE'",
+        "Struct { a Integer, b Integer default HERE }",
+        "List { Integer default HERE }",
+    ],
+)
+def test_caret_stands_under_the_default(declared):
+    text = parameter(f"type {declared}")
+    column = text.index(re.search(r"'?(\{ )?HERE", text[text.index("default") :])[0]) + 1
+    assert found(text)[0].startswith(f"m:1:{column}: error: the default ")
+
+
+@pytest.mark.parametrize(
+    "inside",
+    ["type Integer value 1.5", "type List {Integer} value {}", "type Struct {b Integer} value { {c {value 1}} }"],
+)
+def test_generate_says_of_a_value_what_check_says(inside):
+    text = parameter(inside)
+    with pytest.raises(ModelError) as refused:
+        launch_file(parse_system(text, "m"))
+    assert found(text) == [str(refused.value).replace(": the", ": error: the", 1)]
+
+
+@pytest.mark.parametrize(
     "inside",
     [
         "type Double value 1",
@@ -118,10 +148,12 @@ def test_caret_stands_under_the_value(value):
         "type Struct {b Integer} value { {b {value 1}} }",
         "type Base64 value 'AAEC'",
         "type Base64 value 0b0110",
+        "type Base64 value 'AA EC'",
         "type Date value 2026-1-2T10:20:30",
         "type Any value 1",
         "type List value {1, a}",
     ],
 )
-def test_value_of_its_type_is_no_fault(inside):
+def test_value_of_its_type_is_no_fault_and_can_be_launched(inside):
     assert found(parameter(inside)) == []
+    assert "qa" in launch_file(parse_system(parameter(inside).replace("name p", "name qa")))

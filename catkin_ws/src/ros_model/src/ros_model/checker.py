@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import re
 from collections import defaultdict
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ros_model.findings import WARNING, Finding, sorted_by_place
 from ros_model.launch_checker import check_launch
 from ros_model.library import Library, Unknown, hint
 from ros_model.metamodel import ENDS, RosParameter
-from ros_model.notation import type_text
-from ros_model.syntax import short
+from ros_model.typed_values import misfit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -35,20 +31,7 @@ if TYPE_CHECKING:
     )
     from ros_model.packages import Node
 
-_FITTING: dict[str, tuple[type, ...]] = {
-    "Integer": (int,),
-    "Double": (int, float),
-    "String": (str,),
-    "Boolean": (bool,),
-    "Base64": (str,),
-    "Date": (str,),
-    "List": (list,),
-    "Array": (list,),
-    "Struct": (dict,),
-}
 _PACKAGE = re.compile(r"[A-Za-z0-9_][\w.-]*", re.ASCII)  # and no path
-_BINARY = re.compile(r"0[bB][01]+")  # how the published grammar writes Base64
-_DATE = re.compile(r"\d{4}-?\d{1,2}-?\d{1,2}T\d{1,2}:\d{1,2}:\d{1,2}")  # ISO 8601, as the grammar and XML-RPC write it
 
 
 def check_system(
@@ -98,73 +81,27 @@ def families(systems: Iterable[RosSystem]) -> list[list[RosSystem]]:
     return [variants for variants in found.values() if len(variants) > 1]
 
 
-def fault(value: Value, declared: ParameterType) -> str | None:
-    """Return why a value is none of a declared type, as what follows `the value`; None if it is one."""
-    expected = _FITTING.get(declared.kind)
-    if expected is None:
-        return None
-    wrong_type = not isinstance(value, expected) or (isinstance(value, bool) and bool not in expected)
-    if wrong_type or (isinstance(value, str) and not _well_written(value, declared.kind)):
-        return f"is no {declared.kind}"
-    if isinstance(value, list) and declared.elements:
-        return _fault_of_elements(value, declared)
-    if isinstance(value, dict) and declared.members:
-        return _fault_of_members(value, declared)
-    return None
-
-
-def _fault_of_elements(values: list[Value], declared: ParameterType) -> str | None:
-    types = declared.elements * len(values) if declared.kind == "Array" else declared.elements
-    if len(values) != len(types):
-        return f"has {len(values)} member{'s' * (len(values) != 1)}, {_written(declared)} has {len(types)}"
-    faults = (
-        f"has member {number}, {short(repr(value))}, that {found}"
-        for number, (value, kind) in enumerate(zip(values, types, strict=True), start=1)
-        if (found := fault(value, kind))
-    )
-    return next(faults, None)
-
-
-def _fault_of_members(values: dict[str, Value], declared: ParameterType) -> str | None:
-    types = dict(declared.members)
-    for name, value in values.items():
-        if name not in types:
-            return f"has member '{name}', {_written(declared)} has none of that name{hint(name, types)}"
-        if found := fault(value, types[name]):
-            return f"has member '{name}', {short(repr(value))}, that {found}"
-    return None
-
-
-def _written(declared: ParameterType) -> str:
-    return short(type_text(replace(declared, default=None), declared.position))
-
-
-def misfit(parameter: TypedParameter) -> Iterator[Finding]:
-    """Yield that a parameter's value, or the default of its type, is none of the type."""
-    declared = parameter.type
-    if declared is None:
+def misfits(parameter: TypedParameter) -> Iterator[Finding]:
+    """Yield that a parameter's value, or a default of its type, is none of the type."""
+    if parameter.type is None:
         return
-    places = {"value": value_place(parameter), "default": _first(declared.position, parameter.position)}
-    for role, item in (("value", parameter.value), ("default", declared.default)):
-        if item is not None and (found := fault(item, declared)):
-            yield Finding(f"the {role} {item!r} of '{parameter.name}' {found}", places[role], "value")
+    if parameter.value is not None and (text := misfit("value", parameter.value, parameter.name, parameter.type)):
+        yield Finding(text, value_place(parameter), "value")
+    for declared in _types_within(parameter.type):
+        if declared.default is not None and (text := misfit("default", declared.default, parameter.name, declared)):
+            yield Finding(text, _first(declared.default_position, parameter.position), "value")
+
+
+def _types_within(declared: ParameterType) -> Iterator[ParameterType]:
+    """Yield a type, and the types of its elements and members."""
+    yield declared
+    for inner in (*declared.elements, *(member for _, member in declared.members)):
+        yield from _types_within(inner)
 
 
 def value_place(parameter: TypedParameter | RosParameter) -> Position:
     """Return where a parameter's value stands; where the parameter does, if its value comes from elsewhere."""
     return _first(parameter.value_position, parameter.position)
-
-
-def _well_written(value: str, kind: str) -> bool:
-    if kind == "Date":
-        return _DATE.fullmatch(value) is not None
-    if kind != "Base64" or _BINARY.fullmatch(value):
-        return True
-    try:
-        base64.b64decode("".join(value.split()), validate=True)
-    except (binascii.Error, ValueError):
-        return False
-    return True
 
 
 def _twice(system: RosSystem) -> Iterator[Finding]:
@@ -231,10 +168,10 @@ def _incomplete_reference(reference: Reference, complete: bool, more: str, posit
 
 def _values(system: RosSystem) -> Iterator[Finding]:
     for parameter in system.parameters:
-        yield from misfit(parameter)
+        yield from misfits(parameter)
     for stack in system.stacks:
         for quality in stack.quality_attributes:
-            yield from misfit(quality)
+            yield from misfits(quality)
 
 
 # References
@@ -293,9 +230,9 @@ def _wrong_parameter(parameter: RosParameter, reference: Reference, node: Node) 
         text = f"'{reference.package}.{reference.artifact}.{reference.node}' declares no parameter '{reference.name}'"
         text += hint(reference.name, (known.name for known in node.parameters))
         yield Finding(text, _place(reference, parameter.position), "unknown-reference")
-    elif parameter.value is not None and declared.type and (found := fault(parameter.value, declared.type)):
-        text = f"the value {parameter.value!r} of '{reference.name}' {found}, as it is declared"
-        yield Finding(text, value_place(parameter), "value")
+    elif parameter.value is not None and declared.type:
+        problem = misfit("value", parameter.value, reference.name, declared.type)
+        yield from [Finding(f"{problem}, as it is declared", value_place(parameter), "value")] if problem else ()
 
 
 # Connections

@@ -179,6 +179,7 @@ class ParameterType:
     members: tuple[tuple[str, ParameterType], ...] = ()
     default: Value | None = None
     position: Position = field(default=Position(), compare=False, repr=False)
+    default_position: Position = field(default=Position(), compare=False, repr=False)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ros_model.checker import misfit
+from ros_model.checker import misfits
 from ros_model.findings import WARNING, Finding, sorted_by_place
 from ros_model.library import BUILTIN_TYPES, full_type, installed_parts
 from ros_model.metamodel import CONNECTION_OF
@@ -57,7 +57,7 @@ def _node(node: Node, library: Library) -> Iterator[Finding]:
                 f"{port.kind.value} '{port.name}': {problem.message}", port.position, "unknown-type", problem.severity
             )
     for parameter in node.parameters:
-        yield from misfit(parameter)
+        yield from misfits(parameter)
 
 
 def _spec(spec: Spec, package: str, library: Library) -> Iterator[Finding]:

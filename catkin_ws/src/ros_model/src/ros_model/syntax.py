@@ -191,8 +191,7 @@ class Builder(Transformer):
 
     def value_field(self, items: list[Any]) -> Field:
         keyword, value = items
-        first = value.token if isinstance(value, (_Value, _Members)) else value
-        return "value", (self.plain(value), self.at(first or keyword)), keyword
+        return "value", (self.plain(value), self._place_of(value) or self.at(keyword)), keyword
 
     # Namespaces, written as ROS writes them: /global, relative, ~private
 
@@ -239,24 +238,24 @@ class Builder(Transformer):
     # Types
 
     def primitive(self, items: list[Any]) -> ParameterType:
-        return ParameterType(str(items[0]), default=_default(items), position=self.at(items[0]))
+        return self._type(str(items[0]), items)
 
     def list_type(self, items: list[Any]) -> ParameterType:
         elements = tuple(item for item in items if isinstance(item, ParameterType))
-        return ParameterType("List", elements, default=_default(items), position=self.at(items[0]))
+        return self._type("List", items, elements=elements)
 
     def array_type(self, items: list[Any]) -> ParameterType:
         """Build an Array; a default within its braces is its own, though its element's type may have taken it."""
         elements = [item for item in items if isinstance(item, ParameterType)]
-        default = _default(items)
-        if default is None and elements:
-            default = elements[0].default
-            elements[0] = replace(elements[0], default=None)
-        return ParameterType("Array", tuple(elements), default=default, position=self.at(items[0]))
+        declared = self._type("Array", items)
+        if declared.default is None and elements:
+            declared = _with_default(declared, elements[0].default, elements[0].default_position)
+            elements[0] = _with_default(elements[0], None, Position())
+        return replace(declared, elements=tuple(elements))
 
     def struct_type(self, items: list[Any]) -> ParameterType:
         members = tuple(item.member for item in items if isinstance(item, _MemberType))
-        return ParameterType("Struct", members=members, default=_default(items), position=self.at(items[0]))
+        return self._type("Struct", items, members=members)
 
     def member_type(self, items: list[Any]) -> _MemberType:
         return _MemberType((text_of(items[0]), items[1]))
@@ -264,10 +263,20 @@ class Builder(Transformer):
     def old_member_type(self, items: list[Any]) -> _MemberType:
         declared = next(item for item in items if isinstance(item, ParameterType))
         default = _default(items)
-        return _MemberType((text_of(items[0]), declared if default is None else replace(declared, default=default)))
+        if default.value is not None:
+            declared = _with_default(declared, default.value, default.position)
+        return _MemberType((text_of(items[0]), declared))
+
+    def _type(self, kind: str, items: list[Any], **inside: Any) -> ParameterType:
+        default = _default(items)
+        return ParameterType(
+            kind, default=default.value, position=self.at(items[0]), default_position=default.position, **inside
+        )
 
     def default(self, items: list[Any]) -> _Default:
-        return _Default(self.plain(items[-1]) if items else None)
+        if not items:
+            return _Default()
+        return _Default(self.plain(items[-1]), self._place_of(items[-1]) or Position())
 
     # Values
 
@@ -361,6 +370,11 @@ class Builder(Transformer):
             fields.get("value_position", Position()),
         )
 
+    def _place_of(self, value: Token | _Value | _Members) -> Position | None:
+        """Return where a value begins; None where it is empty (`ParameterAny { }`)."""
+        first = value.token if isinstance(value, (_Value, _Members)) else value
+        return None if first is None else self.at(first)
+
     def plain(self, item: Token | _Value | _Members) -> Value:
         """Return a value as Python has it."""
         if isinstance(item, _Members):
@@ -424,7 +438,8 @@ class _MemberType(NamedTuple):
 class _Default(NamedTuple):
     """The default of a type; None where its braces are empty."""
 
-    value: Value | None
+    value: Value | None = None
+    position: Position = Position()
 
 
 def text_of(token: Token) -> str:
@@ -451,8 +466,12 @@ def line_and_column(text: str, offset: int) -> tuple[int, int]:
     return text.count("\n", 0, offset) + 1, offset - (text.rfind("\n", 0, offset) + 1) + 1
 
 
-def _default(items: Iterable[Any]) -> Value | None:
-    return next((item.value for item in items if isinstance(item, _Default)), None)
+def _default(items: Iterable[Any]) -> _Default:
+    return next((item for item in items if isinstance(item, _Default)), _Default())
+
+
+def _with_default(declared: ParameterType, default: Value | None, position: Position) -> ParameterType:
+    return replace(declared, default=default, default_position=position)
 
 
 def _unescape(match: re.Match[str]) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import math
 import re
 import xml.etree.ElementTree as ET
@@ -12,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from ros_model.errors import ModelError
+from ros_model.typed_values import bytes_of, element_types, fault, misfit
 
 if TYPE_CHECKING:
     from ros_model.metamodel import ParameterType, Position, RosParameter, SystemParameter, Value
@@ -31,61 +30,43 @@ _Quoting.add_representer(str, lambda dumper, text: dumper.represent_scalar("tag:
 
 
 def sent(parameter: RosParameter | SystemParameter, declared: ParameterType | None) -> Sent | None:
-    """Return the value of a parameter, or its declared default, as its declared type has it."""
-    if declared is None:
-        return parameter.value
-    value = declared.default if parameter.value is None else parameter.value
-    return None if value is None else _converted(value, declared, parameter)
+    """Return the value of a parameter, or its declared default, as its declared type has it.
+
+    Raises:
+        ModelError: it is none of the type.
+    """
+    role, value, place = "value", parameter.value, parameter.value_position
+    if declared and value is None:
+        role, value, place = "default", declared.default, declared.default_position
+    if declared is None or value is None:
+        return value
+    try:
+        return _converted(value, declared)
+    except (KeyError, ValueError):
+        text = misfit(role, value, parameter.name, declared)
+        raise ModelError(str(text), place if place.line else parameter.position) from None
 
 
-def _converted(value: Value, declared: ParameterType, parameter: RosParameter | SystemParameter) -> Sent:
-    """Return a value as its type has it on the parameter server: a Double is never an integer, Base64 is bytes."""
-    converted: Sent | None = value
+def _converted(value: Value, declared: ParameterType) -> Sent:
+    """Return a value as its type has it on the parameter server: a Double is never an integer, Base64 is bytes.
+
+    Raises:
+        KeyError: a struct has a member that its type lacks.
+        ValueError: the value is none of the type in another way.
+    """
     if isinstance(value, list) and declared.elements:
-        types = declared.elements * len(value) if declared.kind == "Array" else declared.elements
-        if len(types) == len(value):
-            return [_converted(item, kind, parameter) for item, kind in zip(value, types, strict=True)]
-        converted = None
-    elif isinstance(value, dict) and declared.members:
+        types = element_types(declared, len(value))
+        return [_converted(item, kind) for item, kind in zip(value, types, strict=True)]
+    if isinstance(value, dict) and declared.members:
         members = dict(declared.members)
-        if set(value) <= set(members):
-            return {name: _converted(item, members[name], parameter) for name, item in value.items()}
-        converted = None
-    elif declared.kind in _SCALARS:
-        converted = _SCALARS[declared.kind](value)
-    if converted is None:
-        raise ModelError(f"the value {value!r} of '{parameter.name}' is no {declared.kind}", parameter.position)
-    return converted
-
-
-def _as_double(value: Value) -> Sent | None:
-    try:
-        return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else None
-    except OverflowError:
-        return None
-
-
-def _as_text(value: Value) -> Sent | None:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return str(value) if isinstance(value, (str, int, float)) else None
-
-
-def _as_bytes(value: Value) -> Sent | None:
-    try:
-        return base64.b64decode(value, validate=True) if isinstance(value, str) else None
-    except (binascii.Error, ValueError):
-        return None
-
-
-_SCALARS = {
-    "Integer": lambda value: value if isinstance(value, int) and not isinstance(value, bool) else None,
-    "Double": _as_double,
-    "Boolean": lambda value: value if isinstance(value, bool) else None,
-    "String": _as_text,
-    "Date": _as_text,
-    "Base64": _as_bytes,
-}
+        return {name: _converted(item, members[name]) for name, item in value.items()}
+    if declared.kind == "String" and isinstance(value, (bool, int, float)):  # as the cells of tables are read
+        return str(value).lower() if isinstance(value, bool) else str(value)
+    if found := fault(value, declared):
+        raise ValueError(found)
+    if isinstance(value, str) and declared.kind == "Base64":
+        return bytes_of(value) or b""
+    return float(value) if isinstance(value, int) and declared.kind == "Double" else value
 
 
 def parameter_element(name: str, value: Sent, where: Position) -> ET.Element:
