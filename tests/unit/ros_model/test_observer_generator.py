@@ -185,6 +185,32 @@ def test_what_the_developer_wrote_is_left_alone(generated, generate):
     assert path.read_bytes() == written
 
 
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        ({}, ""),
+        ({"rate": 6}, "rate"),
+        ({"range": [1.0, 6.0]}, "range"),
+        ({"topics": {"imu/data": "sensor_msgs/Imu"}}, "topics"),
+        ({"max_age": None}, "max_age"),
+        ({"max_age": None, "rate": 6}, "max_age, rate"),
+    ],
+)
+def test_plugin_that_is_not_as_described_any_more_is_told(package, generated, generate, change, part):
+    write_formula(generated)
+    package({key: value for key, value in {**DESCRIPTION, **change}.items() if value is not None})
+    told = [line for line in generate(generated).splitlines() if line.startswith("  kept")]
+    path = generated / "src" / generated.name / "comfort_quality_observer.py"
+    message = f"  kept {path} with another {part}: correct that, or delete it to have it made anew"
+    assert told == [message] * bool(part)
+
+
+@pytest.mark.parametrize("text", ["", "class Other: pass", "class (", "class ComfortQualityObserver: max_age = 0.5"])
+def test_plugin_of_another_form_is_its_developers_matter(generated, generate, text):
+    (generated / "src" / generated.name / "comfort_quality_observer.py").write_text(text)
+    assert "kept" not in generate(generated)
+
+
 def test_export_line_is_told_until_it_is_there(package, generate):
     folder = package(DESCRIPTION)
     line = (

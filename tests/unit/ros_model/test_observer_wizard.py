@@ -125,7 +125,7 @@ def test_direction_of_a_known_quality_is_not_asked_again(robot, answer):
 
 
 def test_plugin_that_is_kept_is_told(robot, answer):
-    kept = "kept src/robot_models/comf.py: its rate, topics and range are the old ones; delete it to have it made anew"
+    kept = "kept src/robot_models/comf.py with another range, rate, topics: correct that, or delete it to have it made"
     assert "kept" not in answer("", "comfort", "Comf", "1", "10", "", "0", "1", ".", "n").output
     written = (robot / "src/robot_models/comf.py").read_bytes()
     assert kept in answer("", "comfort", "Comf", "2", "5", "", "0", "2", ".", "n").output

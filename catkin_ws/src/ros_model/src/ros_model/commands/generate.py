@@ -85,7 +85,7 @@ def generate(what: str, models: str | None, output: str | None, as_packages: boo
         for path in _stale(written):
             click.echo(f"  {path} was generated once and is not any more: delete it")
         if name == "observer":
-            _tell_exports(project, package)
+            _tell_of_observers(project, package)
 
 
 def _ordered(generators: dict[str, Generator]) -> list[str]:
@@ -115,11 +115,14 @@ def _stale(written: list[Path]) -> list[Path]:
     return sorted(path for path in found if _MARK in path.read_bytes()[:_HEAD])
 
 
-def _tell_exports(project: Project, package: Path) -> None:
-    from ros_model.generators.observer import missing_exports
+def _tell_of_observers(project: Project, package: Path) -> None:
+    from ros_model.generators.observer import missing_exports, outdated
     from ros_model.observers import described_observers
 
-    for line in missing_exports(described_observers(project), package):
+    observers = described_observers(project)
+    for line in outdated(observers, package):
+        click.echo(f"  kept {line}")
+    for line in missing_exports(observers, package):
         click.echo(f"  add to {package / 'package.xml'}: {line}")
 
 

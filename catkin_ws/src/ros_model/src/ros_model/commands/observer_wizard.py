@@ -12,7 +12,7 @@ from ros_model.commands.ranges import FiniteRange
 from ros_model.errors import ModelError
 from ros_model.files import read_text
 from ros_model.generators import write_file
-from ros_model.generators.observer import missing_exports, write_observers
+from ros_model.generators.observer import missing_exports, outdated, plugin_path, write_observers
 from ros_model.observers import camel_case, described_observers, observer_model
 from ros_model.packages import SpecKind
 from ros_model.project import DIRECTIONS, load_project
@@ -57,15 +57,13 @@ def run_wizard(output: str | None = None) -> None:
     _add_to_settings(project, entry, None if known else direction)
     observer = observer_model(entry, project.package, direction)
     others = [other for other in described_observers(project) if other.name != name]
-    plugin = folder / "src" / observer.python_package / f"{observer.module}.py"
-    is_old = plugin.exists()
     for path in write_observers([*others, observer], folder):
         click.echo(f"wrote {path}")
-    if is_old:
-        click.echo(f"kept {plugin}: its rate, topics and range are the old ones; delete it to have it made anew")
+    for line in outdated([observer], folder):
+        click.echo(f"kept {line}")
     for line in missing_exports([observer], folder):
         click.echo(f"add to {folder / 'package.xml'}: {line}")
-    click.echo(f"Now write calculate_attr in {plugin}")
+    click.echo(f"Now write calculate_attr in {plugin_path(observer, folder)}")
 
 
 def _ask(text: str, check: Callable[[str], str], default: str | None = None) -> str:
