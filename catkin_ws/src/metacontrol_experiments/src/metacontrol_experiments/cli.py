@@ -14,6 +14,7 @@ import rospkg
 from rich.console import Console
 
 from metacontrol_experiments.bag import BagError, read_record
+from metacontrol_experiments.calibration_cli import calibrate, variants
 from metacontrol_experiments.commit import current_commit
 from metacontrol_experiments.components import ComponentError, node_of, read_components
 from metacontrol_experiments.contingency import (
@@ -48,6 +49,10 @@ _FAILED, _REFUSED, _INTERRUPTED = 1, 2, 130
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 def metacontrol() -> None:
     """Missions of a robot that adapts, and what their bags tell."""
+
+
+metacontrol.add_command(calibrate)
+metacontrol.add_command(variants)
 
 
 class _Number(click.FloatRange):

@@ -159,6 +159,17 @@ def mean(samples: Samples, start: float, end: float) -> float | None:
     return float((levels * durations).sum()) / total if total > 0 else None
 
 
+def quantile(samples: Samples, share: float, start: float, end: float) -> float | None:
+    """Level that was not exceeded for a share of the time; None without any sample."""
+    levels, durations = held(samples, start, end)
+    total = float(durations.sum())
+    if total <= 0:
+        return None
+    order = np.argsort(levels, kind="stable")
+    reached = np.cumsum(durations[order]) >= share * total - 1e-9
+    return float(levels[order][int(reached.argmax())])
+
+
 def path_length(record: MissionRecord, start: float, end: float) -> float:
     """Length of the way driven in m, from the ground truth."""
     stamps = record.poses[:, 0]

@@ -40,17 +40,31 @@ def read_route(path: Path, name: str) -> Route:
     Raises:
         RouteError: the file cannot be read, has no such route, or the route lacks a valid start or goal.
     """
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as error:
-        raise RouteError(f"{path}: cannot be read as YAML: {' '.join(str(error).split())}") from error
-    routes = content.get("routes", content) if isinstance(content, dict) else {}
+    routes = _read(path)
     if name not in routes:
         raise RouteError(f"{path}: no route {name!r}; there are {', '.join(map(str, routes)) or 'none'}")
     entry = routes[name]
     if not isinstance(entry, dict):
         raise RouteError(f"{path}: route {name!r} needs a start and a goal")
     return Route(name, *(_pose(entry.get(end), f"{path}: route {name!r}, {end}") for end in ("start", "goal")))
+
+
+def route_names(path: Path) -> list[str]:
+    """Names of the routes of a file, in its order.
+
+    Raises:
+        RouteError: the file cannot be read.
+    """
+    return [str(name) for name in _read(path)]
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise RouteError(f"{path}: cannot be read as YAML: {' '.join(str(error).split())}") from error
+    routes = content.get("routes", content) if isinstance(content, dict) else {}
+    return routes if isinstance(routes, dict) else {}
 
 
 def _pose(value: Any, where: str) -> Pose:

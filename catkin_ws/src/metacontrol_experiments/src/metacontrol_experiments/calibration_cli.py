@@ -1,0 +1,140 @@
+"""The commands `metacontrol calibrate` and `metacontrol variants`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+import rospkg
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from metacontrol_experiments.calibration import (
+    CalibrationError,
+    append_runs,
+    drive,
+    missing_runs,
+    plan,
+    read_runs,
+    write_levels,
+)
+from metacontrol_experiments.commit import current_commit
+from metacontrol_experiments.routes import RouteError, read_route, route_names
+
+RUNS = Path("results/calibration/runs.csv")
+
+_runs_option = click.option(
+    "--runs", type=click.Path(dir_okay=False, path_type=Path), default=RUNS, show_default=True, help="File of runs."
+)
+
+
+@click.command()
+@click.option("--seeds", type=click.IntRange(1), default=5, show_default=True, help="How many: 1, 2, ...")
+@click.option("--route", "routes", multiple=True, help="Only this one; any number of times.  [default: all]")
+@click.option("--variant", "variants", multiple=True, help="Only this one; any number of times.  [default: all]")
+@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Missions driven side by side.")
+@_runs_option
+@click.option(
+    "--levels",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Where the measured levels go, when all variants are measured.  [default: metacontrol_sim/models/qa.csv]",
+)
+def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tuple[str, ...]) -> None:
+    """Measure the expected quality levels: drive every variant over routes and seeds, in lockstep.
+
+    A line is added to the file of runs for each mission; what is in it already is not driven again. Then run
+    `rosmodel generate all` to take the levels into variants and ontology.
+    """
+    console = Console(highlight=False)
+    try:
+        package = _simulation()
+        known = sorted(path.stem for path in (package / "models" / "variants").glob("*.rossystem"))
+        file = package / "worlds" / "routes.yaml"
+        variants = _chosen("--variant", only["variants"], known)
+        routes = _chosen("--route", only["routes"], route_names(file))
+        for name in routes:
+            read_route(file, name)
+        done = read_runs(runs)
+        driven = {run.job for run in done}
+        missing = [job for job in plan(variants, routes, seeds) if job not in driven]
+        with _progress(console) as bar:
+            task = bar.add_task("missions", total=len(missing))
+            for run in append_runs(runs, drive(missing, file, current_commit(), jobs)):
+                done.append(run)
+                bar.update(task, advance=1, description=f"{run.variant} {run.route} seed {run.seed}: {run.outcome}")
+        _tell(console, done, len(missing), runs)
+        lacking = missing_runs(done, known)
+        if lacking:
+            first = ", ".join(f"{job.variant} on {job.route} with seed {job.seed}" for job in lacking[:3])
+            console.print(f"no levels written: {len(lacking)} missions are missing, {first} ...", soft_wrap=True)
+            return
+        target = levels or package / "models" / "qa.csv"
+        write_levels(target, done)
+    except (CalibrationError, RouteError, RuntimeError, OSError) as error:
+        raise _refused(error) from error
+    console.print(f"measured levels are in {target}; now: rosmodel generate all", soft_wrap=True)
+
+
+@click.command()
+@_runs_option
+@click.option("--output", type=click.Path(dir_okay=False, path_type=Path), help="Write to a file instead.")
+def variants(runs: Path, output: Path | None) -> None:
+    """Print tables of a calibration's runs as Markdown, with 95 % confidence intervals over seeds."""
+    from metacontrol_experiments.variant_table import markdown  # scipy takes a while to import
+
+    try:
+        done = read_runs(runs)
+        if not done:
+            raise CalibrationError(f"{runs}: no runs; metacontrol calibrate makes some")
+        text = markdown(done)
+        if output:
+            output.write_text(
+                f"# Variants\n\nMade by `metacontrol variants --output {output}`.\n\n{text}", encoding="utf-8"
+            )
+    except (CalibrationError, OSError) as error:
+        raise _refused(error) from error
+    if not output:
+        click.echo(text, nl=False)
+
+
+def _simulation() -> Path:
+    try:
+        return Path(rospkg.RosPack().get_path("metacontrol_sim"))
+    except rospkg.ResourceNotFound as error:
+        raise CalibrationError("package metacontrol_sim not found; source the workspace's devel/setup.bash") from error
+
+
+def _chosen(option: str, asked: tuple[str, ...], known: list[str]) -> list[str]:
+    """Return what was asked for, all without any.
+
+    Raises:
+        CalibrationError: something of it is not there.
+    """
+    for name in asked:
+        if name not in known:
+            raise CalibrationError(f"{option}: no {name!r}; there are {', '.join(known)}")
+    return list(asked) or known
+
+
+def _progress(console: Console) -> Progress:
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    return Progress(*columns, console=console)
+
+
+def _tell(console: Console, done: list[Any], driven: int, path: Path) -> None:
+    bad = [run for run in done if not run.reached or run.collisions]
+    console.print(
+        f"{driven} missions driven, {len(done)} in {path}, {len(bad)} of them without success or with a collision"
+    )
+    for run in bad[:10]:
+        console.print(
+            f"  {run.variant} on {run.route} with seed {run.seed}: {run.outcome}, {run.collisions} collisions"
+        )
+    if len({run.commit for run in done}) > 1:
+        console.print(f"{path} holds runs of different commits: delete it to measure one", style="yellow")
+
+
+def _refused(error: Exception) -> click.exceptions.Exit:
+    click.echo(f"metacontrol: {' '.join(str(error).split())}", err=True)
+    return click.exceptions.Exit(2)
