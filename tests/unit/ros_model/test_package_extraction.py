@@ -287,7 +287,7 @@ def test_unwritable_output_is_told(tmp_path, capsys):
     make_package(tmp_path / "demo")
     (tmp_path / "file").touch()
     assert run("extract", tmp_path / "demo", "-o", tmp_path / "file" / "x") == 2
-    assert "give a folder that can be written" in capsys.readouterr().err
+    assert "check its folder" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["metacontrol_msgs", "metacontrol_sim", "move_base", "rosgraph_manipulator"])

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import rospkg
 
 from ros_model.findings import ERROR, WARNING
-from ros_model.packages import PARTS, MessageField, Node, Package, Spec, SpecKind
+from ros_model.packages import EXTENSIONS, PARTS, MessageField, Node, Package, Spec, SpecKind
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -26,7 +26,6 @@ BUILTIN_TYPES = frozenset(
 )
 """Types of fields that belong to no package; `Header` stands for std_msgs/Header."""
 
-_FOLDERS = {SpecKind.TOPIC: "msg", SpecKind.SERVICE: "srv", SpecKind.ACTION: "action"}
 _WORDS = {SpecKind.TOPIC: "message", SpecKind.SERVICE: "service", SpecKind.ACTION: "action"}
 _TYPE = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)", re.ASCII)
 _OF_AN_ACTION = re.compile(r"(\w+?)(?:Action(?:Goal|Result|Feedback)?|Goal|Result|Feedback)", re.ASCII)
@@ -122,7 +121,7 @@ def installed_parts(package: str, spec: Spec) -> dict[str, tuple[MessageField, .
     folder = _installed(package)
     if folder is None or spec.kind is SpecKind.ACTION or not _TYPE.fullmatch(f"{package}/{spec.name}"):
         return {}
-    path = folder / _FOLDERS[spec.kind] / f"{spec.name}.{_FOLDERS[spec.kind]}"
+    path = folder / EXTENSIONS[spec.kind] / f"{spec.name}.{EXTENSIONS[spec.kind]}"
     if not path.is_file():
         return {}
     from genmsg import InvalidMsgSpec, MsgContext
@@ -170,7 +169,7 @@ def _installed(package: str) -> Path | None:
 
 def _is_installed(folder: Path, kind: SpecKind, name: str) -> bool:
     """Whether a package's folder has the type; messages that are made of an action count, too."""
-    if (folder / _FOLDERS[kind] / f"{name}.{_FOLDERS[kind]}").is_file():
+    if (folder / EXTENSIONS[kind] / f"{name}.{EXTENSIONS[kind]}").is_file():
         return True
     if kind is SpecKind.ACTION:
         return (folder / "msg" / f"{name}Action.msg").is_file() or _is_action_of(folder, name.removesuffix("Action"))

@@ -62,6 +62,9 @@ PARTS = {
 }
 """The parts that a specification has, in their order."""
 
+EXTENSIONS = {SpecKind.TOPIC: "msg", SpecKind.SERVICE: "srv", SpecKind.ACTION: "action"}
+"""The extensions of the files of specifications, and the names of their folders in a package."""
+
 
 @dataclass(frozen=True)
 class MessageField:

@@ -8,13 +8,8 @@ from pathlib import Path
 
 from ros_model.extraction.source import Remark, SourceError, read_source
 from ros_model.metamodel import Position
-from ros_model.packages import MessageField, Spec, SpecKind
+from ros_model.packages import EXTENSIONS, PARTS, MessageField, Spec, SpecKind
 
-_KINDS = {
-    "msg": (SpecKind.TOPIC, ("message",)),
-    "srv": (SpecKind.SERVICE, ("request", "response")),
-    "action": (SpecKind.ACTION, ("goal", "result", "feedback")),
-}
 _FIELD = re.compile(r"(?P<type>[A-Za-z][\w/]*(?:\[\d*\])?)\s+(?P<name>\w+)\s*(?:=(?P<constant>.*))?")
 _SEPARATOR = "---"
 
@@ -23,19 +18,18 @@ def read_specs(folder: Path) -> tuple[tuple[Spec, ...], tuple[Remark, ...]]:
     """Return the specifications in a package's msg, srv and action folders, and what in them is wrong."""
     specs: list[Spec] = []
     remarks: list[Remark] = []
-    for kind in _KINDS:
-        for path in sorted((folder / kind).glob(f"*.{kind}")):
+    for kind, extension in EXTENSIONS.items():
+        for path in sorted((folder / extension).glob(f"*.{extension}")):
             try:
-                specs.append(_spec(path, f"{kind}/{path.name}", kind))
+                specs.append(_spec(path, f"{extension}/{path.name}", kind))
             except SourceError as error:
                 remarks.append(error.remark)
     return tuple(specs), tuple(remarks)
 
 
-def _spec(path: Path, shown: str, kind: str) -> Spec:
+def _spec(path: Path, shown: str, kind: SpecKind) -> Spec:
     text = read_source(path, shown).decode("utf-8", "replace")
-    spec_kind, names = _KINDS[kind]
-    parts: list[list[MessageField]] = [[] for _ in names]
+    parts: list[list[MessageField]] = [[] for _ in PARTS[kind]]
     part = 0
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip() == _SEPARATOR:
@@ -46,7 +40,7 @@ def _spec(path: Path, shown: str, kind: str) -> Spec:
             parts[part] += _field(line, Position(shown, number, 1))
     for fields in parts:
         fields.sort(key=lambda field: field.constant is None)  # constants come first in a message's definition
-    return Spec(path.stem, spec_kind, tuple(zip(names, map(tuple, parts), strict=True)), Position(shown, 1, 1))
+    return Spec(path.stem, kind, tuple(zip(PARTS[kind], map(tuple, parts), strict=True)), Position(shown, 1, 1))
 
 
 def _field(line: str, position: Position) -> Iterator[MessageField]:

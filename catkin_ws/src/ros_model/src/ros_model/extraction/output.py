@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ros_model.errors import ModelError
 from ros_model.files import safe_file_name
+from ros_model.generators import write_file
 
 if TYPE_CHECKING:
     from ros_model.extraction.graph import Models
@@ -24,8 +24,7 @@ def write_models(models: Models, folder: str | Path, name: str) -> tuple[Path, P
     path = _path(folder, name, ".rossystem")
     text = write_system(models.system)
     packages = write_package_set(models.packages, folder, name)
-    _write(path, text)
-    return packages, path
+    return packages, write_file(path, text, Path(folder))
 
 
 def write_package_set(packages: PackageSet, folder: str | Path, name: str) -> Path:
@@ -36,18 +35,8 @@ def write_package_set(packages: PackageSet, folder: str | Path, name: str) -> Pa
     """
     from ros_model.packages_writer import write_packages
 
-    path = _path(folder, name, ".ros")
-    _write(path, write_packages(packages))
-    return path
+    return write_file(_path(folder, name, ".ros"), write_packages(packages), Path(folder))
 
 
 def _path(folder: str | Path, name: str, suffix: str) -> Path:
     return Path(folder) / (safe_file_name(name, "model") + suffix)
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ModelError(f"{path}: {error.strerror or error}: give a folder that can be written") from error

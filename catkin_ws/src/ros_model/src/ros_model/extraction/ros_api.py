@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ros_model.metamodel import PortKind
+from ros_model.metamodel import ENDS, PortKind
 
 TF = "tf2_msgs/TFMessage"
 
@@ -59,14 +59,7 @@ RECONFIGURE_SERVER = (
 )
 """Below the server's namespace; a client has the counterparts."""
 
-COUNTERPART = {
-    PortKind.PUBLISHER: PortKind.SUBSCRIBER,
-    PortKind.SUBSCRIBER: PortKind.PUBLISHER,
-    PortKind.SERVICE_SERVER: PortKind.SERVICE_CLIENT,
-    PortKind.SERVICE_CLIENT: PortKind.SERVICE_SERVER,
-    PortKind.ACTION_SERVER: PortKind.ACTION_CLIENT,
-    PortKind.ACTION_CLIENT: PortKind.ACTION_SERVER,
-}
+COUNTERPART = {end: other for ends in ENDS.values() for end, other in zip(ends, reversed(ends), strict=True)}
 
 CPP_FIXED = {
     "tf::TransformBroadcaster": (Made(_PUBLISHER, "/tf", TF),),
