@@ -6,16 +6,8 @@ from collections.abc import Sequence
 
 from tree_sitter import Node
 
-from ros_model.extraction.cpp_program import (
-    MAX_DEPTH,
-    MAX_VALUES,
-    Place,
-    Program,
-    arguments_of,
-    as_text,
-    parameters,
-    text,
-)
+from ros_model.extraction.cpp_program import MAX_DEPTH, MAX_VALUES, Place, Program, as_text
+from ros_model.extraction.cpp_syntax import arguments_of, parameters, text
 from ros_model.extraction.python_values import Const, Hole, Text, joined
 
 _FUNCTION_HOMES = ("getNodeHandle", "getMTNodeHandle", "getPrivateNodeHandle", "getMTPrivateNodeHandle")

@@ -1,4 +1,4 @@
-"""C++ sources as syntax trees, and what texts in them are worth, as far as that shows."""
+"""The C++ sources of a program: what they declare and call, and what texts in them are worth, as far as that shows."""
 
 from __future__ import annotations
 
@@ -12,6 +12,17 @@ from pathlib import Path
 import tree_sitter_cpp
 from tree_sitter import Language, Node, Parser
 
+from ros_model.extraction.cpp_syntax import (
+    arguments_of,
+    child_of,
+    function_name,
+    last_name,
+    literal_text,
+    parameters,
+    text,
+    type_text,
+    walk,
+)
 from ros_model.extraction.python_values import Const, Hole, Text, joined
 from ros_model.extraction.source import Remark, SourceError, read_source
 from ros_model.metamodel import Position
@@ -23,7 +34,6 @@ _LANGUAGE = Language(tree_sitter_cpp.language())
 _KNOWN_TEXTS = {"ros::this_node::getName": "~", "ros::this_node::getNamespace": ""}
 _SAME_TEXT = ("std::string", "string", "ros::names::resolve", "ros::names::remap")
 _HEADERS = (".h", ".hpp", ".hh", ".hxx")
-_ESCAPE = re.compile(r"\\(.)")
 
 
 @dataclass(frozen=True)
@@ -155,7 +165,7 @@ class Program:
         if place.function is None or name not in (known := parameters(place.function)):
             return []
         index, _, default = known[name]
-        called = _function_name(place.function).rpartition("::")[2]
+        called = function_name(place.function).rpartition("::")[2]
         found = []
         for arguments, at in self._index.calls.get(called, ()):
             if index < len(arguments):
@@ -171,9 +181,9 @@ class Program:
         found: list[tuple[Const | Text, str]] = []
         match node.type:
             case "string_literal":
-                found = [(Const(_literal(node)), "")]
+                found = [(Const(literal_text(text(node))), "")]
             case "concatenated_string":
-                found = [(Const("".join(map(_literal, children))), "")]
+                found = [(Const("".join(literal_text(text(child)) for child in children)), "")]
             case "raw_string_literal":
                 found = [(Const("".join(text(n) for n in children if n.type == "raw_string_content")), "")]
             case "number_literal" | "true" | "false":
@@ -181,7 +191,7 @@ class Program:
             case "parenthesized_expression" | "initializer_list" if len(children) == 1:
                 found = self.texts(children[0], place, depth + 1)
             case "binary_expression" if text(node.child_by_field_name("operator")) == "+":
-                left, right = (self.texts(_child(node, side), place, depth + 1) for side in ("left", "right"))
+                left, right = (self.texts(child_of(node, side), place, depth + 1) for side in ("left", "right"))
                 found = [
                     (joined([as_text(one), as_text(two)]), note or other) for one, note in left for two, other in right
                 ]
@@ -192,7 +202,7 @@ class Program:
         return found
 
     def _called_text(self, node: Node, place: Place, depth: int) -> list[tuple[Const | Text, str]]:
-        function, arguments = _child(node, "function"), arguments_of(node)
+        function, arguments = child_of(node, "function"), arguments_of(node)
         name = text(function)
         if name in _KNOWN_TEXTS:
             return [(Const(_KNOWN_TEXTS[name]), "")]
@@ -210,9 +220,9 @@ class Program:
     def _method_text(
         self, function: Node, arguments: Sequence[Node], place: Place, depth: int
     ) -> list[tuple[Const | Text, str]]:
-        method = text(_child(function, "field")).partition("<")[0]
+        method = text(child_of(function, "field")).partition("<")[0]
         if method in ("c_str", "str") and not arguments:
-            return self.texts(_child(function, "argument"), place, depth + 1)
+            return self.texts(child_of(function, "argument"), place, depth + 1)
         if method == "resolveName" and arguments:
             return self.texts(arguments[0], place, depth + 1)
         if method == "param" and len(arguments) == 2:
@@ -263,7 +273,7 @@ class Program:
     def _included(self, file: File, path: Path) -> Iterator[Path]:
         for node in walk(file.root):
             if node.type == "preproc_include":
-                name = text(_child(node, "path")).strip('<>"')
+                name = text(child_of(node, "path")).strip('<>"')
                 for folder in (path.parent, self._folder / "include", self._folder / "src"):
                     header = folder / name
                     if (
@@ -278,15 +288,15 @@ class Program:
         for node, place in self._walk(file.root, Place(file)):
             match node.type:
                 case "function_definition":
-                    self._index.functions[_function_name(node).rpartition("::")[2]].append((node, place))
+                    self._index.functions[function_name(node).rpartition("::")[2]].append((node, place))
                     self._initialised(node, place)
                 case "preproc_def":
                     value = text(node.child_by_field_name("value")).strip()
                     if value.startswith('"') and value.endswith('"') and len(value) > 1:
-                        self._index.macros[text(_child(node, "name"))] = _ESCAPE.sub(r"\1", value[1:-1])
+                        self._index.macros[text(child_of(node, "name"))] = literal_text(value)
                 case "type_definition" | "alias_declaration":
                     declarator = node.child_by_field_name("declarator") or node.child_by_field_name("name")
-                    self._index.aliases[text(declarator)] = type_text(_child(node, "type"))
+                    self._index.aliases[text(declarator)] = type_text(child_of(node, "type"))
                 case "declaration" | "field_declaration":
                     self._index_declaration(node, place)
                 case "call_expression" | "new_expression":
@@ -295,19 +305,19 @@ class Program:
                     name = text(node.child_by_field_name("function") or node.child_by_field_name("type"))
                     made = re.match(r"(?:\w+::)*make_(?:shared|unique)<(.*)>$", name)
                     arguments = tuple(arguments_of(node))
-                    self._index.calls[_last(made[1] if made else name)].append((arguments, place))
+                    self._index.calls[last_name(made[1] if made else name)].append((arguments, place))
                 case "assignment_expression":
-                    self._index.given.append((text(_child(node, "left")), (_child(node, "right"),), place))
+                    self._index.given.append((text(child_of(node, "left")), (child_of(node, "right"),), place))
 
     def _index_declaration(self, node: Node, place: Place) -> None:
-        if name := _function_name(node):
+        if name := function_name(node):
             self._index.functions[name.rpartition("::")[2]].append((node, place))
         for name, declared in _declarations(node, place):
             if place.function is None and place.owner:
                 self._index.members[place.owner, name].append(declared)
             elif place.function is None:
                 self._index.globals[name].append(declared)
-            self._index.calls[_last(declared.type)].append((declared.values, place))
+            self._index.calls[last_name(declared.type)].append((declared.values, place))
 
     def _initialised(self, function: Node, place: Place) -> None:
         """Note what a constructor's initialisers give the members."""
@@ -341,7 +351,7 @@ class Program:
             node, place = todo.pop()
             inner = place
             if node.type == "function_definition":
-                name = _function_name(node)
+                name = function_name(node)
                 owner = name.rpartition("::")[0].rpartition("::")[2] or place.owner
                 inner = Place(place.file, node, owner)
                 place = Place(place.file, place.function, owner)
@@ -363,7 +373,7 @@ class Program:
                     continue
                 given = _reset(node)
                 if node.type == "assignment_expression":
-                    given = text(_child(node, "left")), (_child(node, "right"),)
+                    given = text(child_of(node, "left")), (child_of(node, "right"),)
                 if given and given[0] in found:
                     kept = [declared for declared in found[given[0]] if declared.values]
                     found[given[0]] = [*kept, Declared(found[given[0]][0].type, given[1], place)]
@@ -374,79 +384,6 @@ class Program:
         return place.function is not None and (name in self._local(place) or name in parameters(place.function))
 
 
-def walk(root: Node | None) -> Iterator[Node]:
-    """Yield a node and all below it, in the order of the text."""
-    todo = [root] if root is not None else []
-    while todo:
-        node = todo.pop()
-        yield node
-        todo += reversed(node.named_children)
-
-
-def text(node: Node | None) -> str:
-    """Return a node's source on one line."""
-    return "" if node is None or node.text is None else " ".join(node.text.decode("utf-8", "replace").split())
-
-
-def type_text(node: Node | None) -> str:
-    """Return a type without spaces, `const` and references."""
-    return re.sub(r"\b(const|typename|static|struct|class)\b|[\s&*]", "", text(node))
-
-
-def arguments_of(node: Node) -> list[Node]:
-    """Return the arguments of a call, of `new`, of a declaration."""
-    arguments = node.child_by_field_name("arguments")
-    return [child for child in arguments.named_children if child.type != "comment"] if arguments else []
-
-
-def template_arguments(type_name: str) -> list[str]:
-    """Return what stands between the outermost `<` and `>` of a type, taken apart at its commas."""
-    _, bracket, rest = type_name.partition("<")
-    if not bracket:
-        return []
-    parts, depth = [""], 0
-    for character in rest.rstrip().removesuffix(">"):
-        depth += {"<": 1, ">": -1}.get(character, 0)
-        if character == "," and depth == 0:
-            parts.append("")
-        else:
-            parts[-1] += character
-    return [part.strip() for part in parts]
-
-
-def parameter_types(function: Node) -> list[str]:
-    """Return the types of a function's parameters."""
-    return [kind for _, kind, _ in sorted(parameters(function).values(), key=lambda item: item[0])]
-
-
-def parameters(function: Node) -> dict[str, tuple[int, str, Node | None]]:
-    """Return place, type and default of a function's parameters by name."""
-    declarator = function
-    while declarator is not None and declarator.type not in ("function_declarator", "lambda_expression"):
-        following = declarator.child_by_field_name("declarator")
-        if following is None:
-            return {}
-        declarator = following
-    if declarator.type == "lambda_expression":
-        inner = declarator.child_by_field_name("declarator")
-        if inner is None:
-            return {}
-        declarator = inner
-    listed = declarator.child_by_field_name("parameters")
-    found = {}
-    number = 0
-    for node in listed.named_children if listed else ():
-        if node.type in ("parameter_declaration", "optional_parameter_declaration"):
-            name = text(node.child_by_field_name("declarator")).lstrip("*& ").partition("=")[0].strip()
-            found[name or f"#{number}"] = (
-                number,
-                type_text(node.child_by_field_name("type")),
-                node.child_by_field_name("default_value"),
-            )
-            number += 1
-    return found
-
-
 def _declarations(node: Node, place: Place) -> Iterator[tuple[str, Declared]]:
     """Yield the variables that a declaration declares."""
     kind = type_text(node.child_by_field_name("type"))
@@ -455,7 +392,7 @@ def _declarations(node: Node, place: Place) -> Iterator[tuple[str, Declared]]:
         name_node = declarator
         if declarator.type == "init_declarator":
             given = declarator.child_by_field_name("value")
-            name_node = _child(declarator, "declarator")
+            name_node = child_of(declarator, "declarator")
             if given is not None:
                 is_list = given.type in ("argument_list", "initializer_list")
                 value = tuple(given.named_children) if is_list else (given,)
@@ -464,7 +401,7 @@ def _declarations(node: Node, place: Place) -> Iterator[tuple[str, Declared]]:
             listed = declarator.child_by_field_name("parameters")
             children = listed.named_children if listed else []
             value = tuple(child.named_children[0] for child in children if child.named_children)
-            name_node = _child(declarator, "declarator")
+            name_node = child_of(declarator, "declarator")
         default = node.child_by_field_name("default_value")
         if default is not None:
             is_list = default.type in ("argument_list", "initializer_list")
@@ -477,33 +414,14 @@ def _declarations(node: Node, place: Place) -> Iterator[tuple[str, Declared]]:
 def _reset(node: Node) -> tuple[str, tuple[Node, ...]] | None:
     """Return the smart pointer that a call `pointer.reset(value)` gives a value, and the value."""
     function = node.child_by_field_name("function") if node.type == "call_expression" else None
-    if function is None or function.type != "field_expression" or text(_child(function, "field")) != "reset":
+    if function is None or function.type != "field_expression" or text(child_of(function, "field")) != "reset":
         return None
     arguments = arguments_of(node)
-    return (text(_child(function, "argument")), (arguments[0],)) if arguments else None
-
-
-def _function_name(function: Node) -> str:
-    declarator: Node | None = function
-    while declarator is not None and declarator.type != "function_declarator":
-        declarator = declarator.child_by_field_name("declarator")
-    return text(declarator.child_by_field_name("declarator")) if declarator is not None else ""
-
-
-def _child(node: Node, name: str) -> Node:
-    return node.child_by_field_name(name) or node
+    return (text(child_of(function, "argument")), (arguments[0],)) if arguments else None
 
 
 def _key(place: Place) -> str:
     return f"{place.file.shown}:{place.function.start_byte}" if place.function is not None else ""
-
-
-def _last(name: str) -> str:
-    return name.partition("<")[0].rpartition("::")[2].rpartition(".")[2].rpartition("->")[2]
-
-
-def _literal(node: Node) -> str:
-    return _ESCAPE.sub(r"\1", text(node).partition('"')[2].removesuffix('"'))
 
 
 def as_text(value: Const | Text) -> Text:

@@ -11,15 +11,8 @@ from typing import Any
 from tree_sitter import Node
 
 from ros_model.extraction.cpp_handles import Handles, in_namespace
-from ros_model.extraction.cpp_program import (
-    Place,
-    Program,
-    arguments_of,
-    parameter_types,
-    template_arguments,
-    text,
-    type_text,
-)
+from ros_model.extraction.cpp_program import Place, Program
+from ros_model.extraction.cpp_syntax import arguments_of, parameter_types, template_arguments, text, type_text
 from ros_model.extraction.python_values import Const, Text
 from ros_model.extraction.ros_api import CPP_FIXED, RECONFIGURE_SERVER
 from ros_model.extraction.source import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved

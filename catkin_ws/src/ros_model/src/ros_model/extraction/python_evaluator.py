@@ -17,6 +17,7 @@ from ros_model.extraction import python_known
 from ros_model.extraction.python_callers import root_frame, skipped
 from ros_model.extraction.python_calls import MAX_VALUES, CallEvaluator, Given
 from ros_model.extraction.python_modules import Binding, Library, Module, Scope, at_end, reaching
+from ros_model.extraction.python_operations import is_number, operated
 from ros_model.extraction.python_values import (
     Class,
     Const,
@@ -295,7 +296,7 @@ class Evaluator(CallEvaluator):
     def _negation(self, node: ast.UnaryOp, frame: Frame, world: World) -> Results:
         results: Results = []
         for value, w in self.evaluate(node.operand, frame, world):
-            is_known = isinstance(node.op, ast.USub) and isinstance(value, Const) and _is_number(value.value)
+            is_known = isinstance(node.op, ast.USub) and isinstance(value, Const) and is_number(value.value)
             results.append((Const(-value.value) if is_known and isinstance(value, Const) else Unknown(node), w))
         return results
 
@@ -327,7 +328,7 @@ class Evaluator(CallEvaluator):
     def _operation(self, node: ast.BinOp, frame: Frame, world: World) -> Results:
         results: Results = []
         for values, w in self.evaluate_all([Given(node.left), Given(node.right)], frame, world):
-            results.append((_operated(node, *values), w))
+            results.append((operated(node, *values), w))
         return results
 
     def _literal(self, node: ast.Tuple | ast.List | ast.Set, frame: Frame, world: World) -> Results:
@@ -609,52 +610,6 @@ def _at(value: Value, binding: Binding) -> Value:
             return Unknown(binding.name)
         value = items[index]
     return value
-
-
-def _operated(node: ast.BinOp, left: Value, right: Value) -> Value:
-    match node.op, left, right:
-        case ast.Add(), Items(one), Items(two):
-            return Items((*one, *two))
-        case ast.Add(), _, _ if _is_textual(left) or _is_textual(right):
-            texts = [
-                text_of(value) if not isinstance(value, Unknown) else Text((Hole(side),))
-                for value, side in ((left, node.left), (right, node.right))
-            ]
-            known = [text for text in texts if text]
-            return joined(known) if len(known) == 2 else Unknown(node)
-        case ast.Mod(), Const(str(pattern)), Const() | Items():
-            try:
-                raw = python_known.plain(right)
-                return Const(pattern % (tuple(raw) if isinstance(raw, list) else raw))
-            except (ValueError, TypeError):
-                return Unknown(node)
-        case _, Const(one), Const(two) if _is_number(one) and _is_number(two):
-            return _number(node, one, two)
-    return Unknown(node)
-
-
-def _number(node: ast.BinOp, one: float, two: float) -> Value:
-    try:
-        match node.op:
-            case ast.Add():
-                return Const(one + two)
-            case ast.Sub():
-                return Const(one - two)
-            case ast.Mult():
-                return Const(one * two)
-            case ast.Div():
-                return Const(one / two)
-    except (ArithmeticError, ValueError):
-        pass
-    return Unknown(node)
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _is_textual(value: Value) -> bool:
-    return isinstance(value, Text) or (isinstance(value, Const) and isinstance(value.value, str))
 
 
 def _assigned(method: Scope, attribute: str) -> Iterator[Binding]:
