@@ -1,11 +1,14 @@
 """The closed loop: navigator, costmaps, planner and controller drive a simulated base."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from move_base.geometry import Pose, Velocity
+from move_base.costmap import LETHAL
+from move_base.geometry import Pose, Velocity, planar_matrix
 from move_base.navigator import Outcome
+from move_base.oscillation import OscillationFlags
 
 RACK = (0.0, -1.5, 0.8, 6.0, 0.0)
 
@@ -110,11 +113,11 @@ def test_robot_drives_on_when_data_come_back(simulate, walls):
     assert drive(simulation, (4.0, 0.0, 0.0), until=data_are_back).outcome is Outcome.SUCCEEDED
 
 
-def test_nothing_turns_in_recovery_on_stale_data(simulate, walls):
-    simulation = simulate([*walls(), RACK], start=(-3.0, 0.0, 0.0), hidden=[])
+def test_nothing_turns_in_recovery_on_stale_data(simulate, walls, tree):
+    turning = [{"name": "turn", "type": "rotate_recovery/RotateRecovery"}]
+    simulation = simulate([*walls(), RACK], start=(-3.0, 0.0, 0.0), tree=tree(recovery_behaviors=turning))
     drive(simulation, (3.0, 0.0, 0.0), seconds=1.0)
     simulation.navigator._start_recovery(simulation.time, simulation.pose, "test")
-    simulation.navigator._work.behaviour = "rotate"
     simulation.silent_from = simulation.time
     log = simulation.run(3.0)
     assert {command for when, command in log.commands if when > simulation.silent_from + 1.1} == {Velocity()}
@@ -173,4 +176,151 @@ def test_clock_set_back_does_not_end_the_goal(simulate, walls):
     simulation.time -= 50.0
     simulation.sent = -math.inf
     simulation.navigator.reset_time(simulation.time)
+    assert simulation.run(40.0).outcome is Outcome.SUCCEEDED
+
+
+def at_a_wall(simulate, walls, **options):
+    """A robot that a wall ahead keeps from driving on and from turning; it wants to go on through the wall."""
+    simulation = simulate([*walls(), (0.7, 0.0, 0.2, 6.0, 0.0)], **options)
+    simulation.run(0.3)
+    robot = Pose.from_matrix(simulation.lookup("odom", "base_link", None))
+    path = robot.apply(np.array([[0.1 * step, 0.0] for step in range(30)]))
+    return simulation.navigator._controller, robot, path, simulation.navigator.local_snapshot
+
+
+def test_sideways_is_tried_before_backward(simulate, walls):
+    controller, robot, path, snapshot = at_a_wall(simulate, walls)
+    chosen = controller.follow(robot, Velocity(), path, 3.0, snapshot)
+    assert chosen.velocity.x == 0.0 and chosen.velocity.y != 0.0
+
+
+def test_base_that_cannot_move_sideways_backs_off(simulate, walls, tree):
+    controller, robot, path, snapshot = at_a_wall(
+        simulate, walls, tree=tree(TrajectoryPlannerROS__holonomic_robot=False)
+    )
+    chosen = controller.follow(robot, Velocity(), path, 3.0, snapshot)
+    assert chosen.velocity == Velocity(-0.1, 0.0, 0.0)
+
+
+def test_back_and_forth_on_the_spot_ends_until_the_robot_has_moved():
+    for column, velocity in ((1, Velocity(0.0, 0.3, 0.0)), (2, Velocity(0.0, 0.0, 0.5))):
+        flags, here = OscillationFlags(), Pose(0.0, 0.0, 0.0)
+        samples = np.zeros((2, 3))
+        samples[:, column] = -0.3, 0.3
+        flags.take(here, velocity)
+        assert len(flags.allowed(samples)) == 2
+        flags.take(here, Velocity(0.0, -velocity.y, -velocity.yaw))
+        assert flags.allowed(samples)[:, column].tolist() == [-0.3]
+        flags.follow(Pose(0.04, 0.0, 0.0), 0.05)
+        assert len(flags.allowed(samples)) == 1
+        flags.follow(Pose(0.06, 0.0, 0.0), 0.05)
+        assert len(flags.allowed(samples)) == 2
+
+
+CLOSED = (0.0, 0.0, 0.8, 12.0, 0.0)  # a wall from one side of the room to the other
+
+
+def recovered(log):
+    """Names of the recovery behaviours in the order in which they began."""
+    return [text.split()[1].rstrip(":") for _, text in log.warnings if text.startswith("Recovery ")]
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, ["conservative_reset", "rotate_recovery", "aggressive_reset", "rotate_recovery"]),
+        ({"clearing_rotation_allowed": False}, ["conservative_reset", "aggressive_reset"]),
+        ({"recovery_behavior_enabled": False}, []),
+        ({"recovery_behaviors": [{"name": "wipe", "type": "clear_costmap_recovery/ClearCostmapRecovery"}]}, ["wipe"]),
+        ({"recovery_behaviors": []}, []),
+    ],
+)
+def test_recovery_sequence_is_the_one_asked_for(simulate, walls, tree, changes, expected):
+    simulation = simulate([*walls(), CLOSED], start=(-3.0, 0.0, 0.0), tree=tree(planner_patience=1.0, **changes))
+    log = drive(simulation, (3.0, 0.0, 0.0))
+    assert log.outcome is Outcome.ABORTED
+    assert recovered(log) == expected
+    assert log.contacts == 0
+
+
+def test_rotation_of_recovery_is_a_full_turn(simulate, walls, tree):
+    turn = [{"name": "turn", "type": "rotate_recovery/RotateRecovery"}]
+    changes = {"planner_patience": 1.0, "recovery_behaviors": turn}
+    simulation = simulate([*walls(), CLOSED], start=(-3.0, 0.0, 0.0), tree=tree(**changes))
+    log = drive(simulation, (3.0, 0.0, 0.0))
+    yaws = np.unwrap([pose.yaw for _, pose, _ in log.states])
+    assert yaws[-1] - yaws[0] == pytest.approx(2.0 * math.pi, abs=0.25)
+    assert max(command.yaw for _, command in log.commands) <= 1.0
+
+
+@pytest.mark.parametrize(("side", "kept"), [(1.0, False), (4.0, True)])
+def test_clearing_keeps_a_square_of_its_reset_distance(simulate, walls, tree, side, kept):
+    wipe = [{"name": "wipe", "type": "clear_costmap_recovery/ClearCostmapRecovery"}]
+    changes = {"planner_patience": 1.0, "recovery_behaviors": wipe, "wipe__reset_distance": side}
+    simulation = simulate([*walls(), CLOSED], start=(-3.0, 0.0, math.pi), tree=tree(**changes))
+    costmap = simulation.navigator._global.costmap
+    behind = costmap.geometry.cell(-2.0, 0.0)  # where no ray goes
+    costmap._obstacles[behind] = LETHAL
+    assert recovered(drive(simulation, (3.0, 0.0, 0.0))) == ["wipe"]
+    assert (costmap._obstacles[behind] == LETHAL) == kept
+
+
+def test_planning_is_given_up_after_the_retries(simulate, walls, tree):
+    changes = {"planner_patience": 30.0, "max_planning_retries": 3, "recovery_behavior_enabled": False}
+    simulation = simulate([*walls(), CLOSED], start=(-3.0, 0.0, 0.0), tree=tree(**changes))
+    log = drive(simulation, (3.0, 0.0, 0.0))
+    assert log.outcome is Outcome.ABORTED
+    assert "4 retries" in log.text and "there is no way to the goal" in log.text
+    assert log.duration < 5.0
+
+
+def test_controller_without_a_free_velocity_recovers_after_its_patience(simulate, walls, tree):
+    changes = {"controller_patience": 2.0, "clearing_rotation_allowed": False}
+    simulation = simulate(walls(), start=(-3.0, 0.0, 0.0), tree=tree(**changes))
+    simulation.navigator._controller.follow = lambda *_: None
+    log = drive(simulation, (3.0, 0.0, 0.0))
+    assert log.outcome is Outcome.ABORTED
+    assert log.text == "no free velocity for 2 s (after all recovery behaviours)"
+    assert recovered(log) == ["conservative_reset", "aggressive_reset"]
+    assert log.duration == pytest.approx(3 * 2.0, abs=1.0)
+
+
+def test_robot_that_hardly_moves_oscillates(simulate, walls, tree):
+    changes = {"oscillation_timeout": 3.0, "oscillation_distance": 0.4, "recovery_behavior_enabled": False}
+    simulation = simulate(walls(), start=(-3.0, 0.0, 0.0), tree=tree(**changes))
+    simulation.move = lambda command, duration: setattr(simulation, "time", simulation.time + duration)  # wheels spin
+    simulation.lookup = lambda target, source, stamp, look=simulation.lookup: look(target, source, None)
+    log = drive(simulation, (3.0, 0.0, 0.0), seconds=20.0)
+    assert log.outcome is Outcome.ABORTED
+    assert log.text == "moved less than 0.4 m in 3 s (recovery is disabled)"
+
+
+def test_localisation_that_jumps_is_followed_by_a_new_plan(simulate, walls):
+    simulation = simulate([*walls(), RACK], start=(-3.0, -3.0, 0.0))
+    drive(simulation, (3.0, -3.0, 0.0), until=lambda s: s.pose.y > -1.0)
+    simulation.map_to_odom = planar_matrix(Pose(0.9, 0.3, 0.1))
+    simulation.pose = Pose(simulation.pose.x - 0.5, simulation.pose.y, simulation.pose.yaw)  # where it says to be now
+    log = simulation.run(60.0)
+    assert log.outcome is Outcome.SUCCEEDED
+    assert log.contacts == 0
+
+
+def test_scan_that_repeats_is_old_after_a_while(simulate, walls):
+    simulation = simulate(walls(), start=(-4.0, 0.0, 0.0))
+    drive(simulation, (4.0, 0.0, 0.0), seconds=2.0)
+    observe, (source,) = simulation.navigator.observe, simulation.navigator.sources
+    stuck = simulation.navigator._sensors[source.topic, source.data_type].recent[-1]
+    simulation.navigator.observe = lambda _, now: observe(stuck, now)
+    log = simulation.run(30.0)
+    assert log.outcome is Outcome.ABORTED
+    assert log.text == "no current data from front/scan for 15.0 s"
+
+
+def test_scan_whose_stamp_jumps_does_not_shut_out_later_ones(simulate, walls):
+    simulation = simulate(walls(), start=(-4.0, 0.0, 0.0))
+    drive(simulation, (4.0, 0.0, 0.0), seconds=2.0)
+    (source,) = simulation.navigator.sources
+    newest = simulation.navigator._sensors[source.topic, source.data_type].recent[-1]
+    for jump in (1e9, -50.0):
+        assert simulation.navigator.observe(replace(newest, stamp=newest.stamp + jump), simulation.time)
     assert simulation.run(40.0).outcome is Outcome.SUCCEEDED

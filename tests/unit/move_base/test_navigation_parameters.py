@@ -69,7 +69,7 @@ def test_lateral_limits_clip_the_samples(tree, samples, limits, expected):
         ("TrajectoryPlannerROS", 3, "must be a group of parameters"),
         ("global_costmap__inflater_layer__inflation_radius", float("inf"), "must be finite"),
         ("global_costmap__plugins", [], "must list the layers"),
-        ("global_costmap__plugins", [{"name": "a", "type": "b"}], "unknown layer type"),
+        ("global_costmap__plugins", [{"name": "a", "type": "b"}], "unknown type; known are costmap_2d::StaticLayer"),
         ("global_costmap__footprint", [[1.0, 2.0]], "at least three"),
         ("global_costmap__footprint", "round", "list of [x, y] corners"),
         ("local_costmap__rolling_window", "yes", "must be true or false"),

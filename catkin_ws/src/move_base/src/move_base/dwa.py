@@ -13,15 +13,17 @@ import numpy as np
 
 from move_base.costmap import INSCRIBED, inscribed_radius
 from move_base.geometry import Pose, Velocity, wrap_angle
+from move_base.oscillation import OscillationFlags
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from move_base.costmap import Snapshot
-    from move_base.parameters import ControllerParameters
+    from move_base.parameters import MoveBaseParameters
 
-MAX_STEPS = 20
-"""Poses per trajectory; at 0.75 m/s and 2 s they are 7.5 cm apart, under a tenth of the footprint."""
+MIN_STEPS, MAX_STEPS = 4, 20
+"""Poses per trajectory: as many as sim_granularity asks for, within these. At 0.75 m/s and 2 s the most are 7.5 cm
+apart, under a tenth of the footprint."""
 
 EDGE_SPACING = 0.1
 """Distance between the points that stand for the footprint's edge, m."""
@@ -93,41 +95,23 @@ class _Scene:
 class DwaController:
     """The controller; from one step to the next it keeps the last command, and where it began to back off."""
 
-    def __init__(
-        self,
-        parameters: ControllerParameters,
-        footprint: NDArray[np.float64],
-        padded_footprint: NDArray[np.float64],
-        period: float,
-    ) -> None:
-        """Prepares the footprints.
-
-        Args:
-            parameters: of TrajectoryPlannerROS.
-            footprint: corners in the base frame (N, 2), m.
-            padded_footprint: the same, padded.
-            period: of control, s.
-        """
-        self.reconfigure(parameters, footprint, padded_footprint, period)
+    def __init__(self, parameters: MoveBaseParameters) -> None:
+        self.reconfigure(parameters)
         self.reset()
 
-    def reconfigure(
-        self,
-        parameters: ControllerParameters,
-        footprint: NDArray[np.float64],
-        padded_footprint: NDArray[np.float64],
-        period: float,
-    ) -> None:
-        """Takes other parameters, as the constructor does, on the way."""
-        self.parameters = parameters
-        self._period = period
-        padding = inscribed_radius(padded_footprint) - inscribed_radius(footprint)
+    def reconfigure(self, parameters: MoveBaseParameters) -> None:
+        """Takes other parameters on the way."""
+        self.parameters = parameters.controller
+        self._period = 1.0 / parameters.controller_frequency
+        footprint, padded = np.array(parameters.local_costmap.footprint), parameters.local_costmap.padded_footprint()
+        padding = inscribed_radius(padded) - inscribed_radius(footprint)
         self._shapes = [_Shape(footprint, share * padding) for share in HARD_PADDING]
 
     def reset(self) -> None:
         """Forgets the last command, for a new goal."""
         self._last = Velocity()
         self._backing_from: Pose | None = None
+        self._oscillation = OscillationFlags()
 
     def follow(
         self, robot: Pose, velocity: Velocity, path: NDArray[np.float64], to_goal: float, snapshot: Snapshot
@@ -142,6 +126,7 @@ class DwaController:
             snapshot: the local costmap.
         """
         p = self.parameters
+        self._oscillation.follow(robot, p.oscillation_reset_dist)
         horizon = min(p.sim_time, max(MIN_HORIZON, 2.0 * to_goal / p.max_vel_x))
         scene = _Scene(path, snapshot, self._shape_for(robot, snapshot))
         best = self._back_off(robot, scene)
@@ -151,11 +136,13 @@ class DwaController:
         if best is None:
             best = self._best(self._arc_samples(velocity), robot, horizon, scene)
         if best is None:
-            best = self._best(self._escape_samples(), robot, MIN_HORIZON, scene)
-            backing = best is not None and best.velocity.x < 0.0
-            self._backing_from = robot if backing else None
+            best = self._best(self._sideways_samples(), robot, MIN_HORIZON, scene)
+        if best is None:
+            best = self._best(self._backward_samples(), robot, MIN_HORIZON, scene)
+            self._backing_from = None if best is None else robot
         if best is not None:
             self._last = best.velocity
+            self._oscillation.take(robot, best.velocity)
         return best
 
     def turn(self, robot: Pose, angle: float, snapshot: Snapshot) -> Trajectory | None:
@@ -166,7 +153,7 @@ class DwaController:
         p = self.parameters
         speed = min(p.max_vel_theta, max(p.min_in_place_vel_theta, abs(angle) / 0.5))
         command = np.array([[0.0, 0.0, np.copysign(speed, angle)]])
-        rollout = _roll_out(command, robot, min(abs(angle) / speed, 1.0))
+        rollout = _roll_out(command, robot, min(abs(angle) / speed, 1.0), MAX_STEPS)
         if not self._free(rollout, snapshot, self._shape_for(robot, snapshot))[0]:
             return None
         self._last = Velocity(0.0, 0.0, float(command[0, 2]))
@@ -177,7 +164,7 @@ class DwaController:
         if self._backing_from is None:
             return None
         if robot.distance(self._backing_from) < ESCAPE_DISTANCE:
-            backward = self._best(np.array([[self.parameters.escape_vel, 0.0, 0.0]]), robot, MIN_HORIZON, scene)
+            backward = self._best(self._backward_samples(), robot, MIN_HORIZON, scene)
             if backward is not None:
                 return backward
         self._backing_from = None
@@ -221,13 +208,16 @@ class DwaController:
         near = rates[np.abs(rates - velocity.yaw) <= max(turn_reach, p.min_in_place_vel_theta * 1.01)]
         samples = np.zeros((len(near), 3))
         samples[:, 2] = near
-        return samples
+        return self._oscillation.allowed(samples)
 
-    def _escape_samples(self) -> NDArray[np.float64]:
+    def _sideways_samples(self) -> NDArray[np.float64]:
         p = self.parameters
-        sideways = [(forward, lateral, 0.0) for lateral in p.y_vels for forward in (0.0, p.min_vel_x)]
-        backward = [(p.escape_vel, 0.0, 0.0)] if p.escape_vel else []
-        return np.array([*sideways, *backward]).reshape(-1, 3)
+        samples = [(forward, lateral, 0.0) for lateral in p.y_vels for forward in (0.0, p.min_vel_x)]
+        return self._oscillation.allowed(np.array(samples).reshape(-1, 3))
+
+    def _backward_samples(self) -> NDArray[np.float64]:
+        escape = self.parameters.escape_vel
+        return np.array([[escape, 0.0, 0.0]] if escape else []).reshape(-1, 3)
 
     def _best(
         self,
@@ -238,7 +228,7 @@ class DwaController:
     ) -> Trajectory | None:
         if len(samples) == 0:
             return None
-        rollout = _roll_out(samples, robot, horizon)
+        rollout = _roll_out(samples, robot, horizon, self._steps(horizon))
         free = self._free(rollout, scene.snapshot, scene.shape)
         if not free.any():
             return None
@@ -246,6 +236,10 @@ class DwaController:
         costs = self._score(kept, scene.path, scene.snapshot)
         best = int(costs.argmin())
         return _trajectory(kept, best, float(costs[best]))
+
+    def _steps(self, horizon: float) -> int:
+        p = self.parameters
+        return int(np.clip(np.ceil(p.max_vel_x * horizon / p.sim_granularity), MIN_STEPS, MAX_STEPS))
 
     def _free(self, rollout: _Rollout, snapshot: Snapshot, shape: _Shape) -> NDArray[np.bool_]:
         """Whether each trajectory keeps the footprint off obstacles (C,); outside the costmap nothing is free.
@@ -315,9 +309,9 @@ class _Shape:
         self.circumscribed = float(np.hypot(*corners.T).max())
 
 
-def _roll_out(velocities: NDArray[np.float64], robot: Pose, horizon: float) -> _Rollout:
-    """Integrates constant velocities (C, 3) in closed form over the horizon (s)."""
-    times = np.linspace(horizon / MAX_STEPS, horizon, MAX_STEPS)
+def _roll_out(velocities: NDArray[np.float64], robot: Pose, horizon: float, steps: int) -> _Rollout:
+    """Integrates constant velocities (C, 3) in closed form over the horizon (s), to so many poses."""
+    times = np.linspace(horizon / steps, horizon, steps)
     turned = velocities[:, 2:] * times
     # sin(a)/a and (1 - cos(a))/a, whose limits at a = 0 are 1 and 0
     sinc = np.sinc(turned / np.pi)

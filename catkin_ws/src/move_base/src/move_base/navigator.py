@@ -21,6 +21,7 @@ from move_base.costmap import LETHAL, Costmap, Snapshot
 from move_base.dwa import DwaController, Trajectory
 from move_base.geometry import STOP, Pose, Velocity, wrap_angle
 from move_base.global_planner import Plan, PlanningError, make_plan, path_cost
+from move_base.recovery import Recovery
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,12 +51,8 @@ KEPT_OBSERVATIONS = 5
 ROTATE_SPEED = 1.0
 """Speed of the recovery's turn, rad/s: rotate_recovery's default."""
 
-
 QUIET_WAIT = 0.5
 """Waiting is worth a warning after this time, s: the first messages after a start take a few tenths."""
-
-ROTATE_PATIENCE = 15.0
-"""The recovery's turn is given up after this time, s: over twice what it takes."""
 
 
 class State(Enum):
@@ -139,16 +136,12 @@ class _Work:
         anchor: see above.
         planned: when planning was last tried.
         planning_error: why it failed.
+        failed_plans: how often, since `planned_well`.
         progress: index of the plan's point nearest to the robot.
         stale_since: since when sensor data are too old.
         not_ready_since: since when map or transforms are missing.
         reached_xy: whether the robot was within the goal's position tolerance.
-        recovery_index: the next recovery behaviour.
-        behaviour: the present one.
-        recovering_since: when it began.
-        recovered_at: where it began.
-        turned: how far a recovery's turn has come, rad.
-        last_yaw: the heading when that was last summed up, rad.
+        recovery: what was tried against being stuck.
     """
 
     planned_well: float
@@ -157,16 +150,12 @@ class _Work:
     anchor: Pose | None = None
     planned: float = -math.inf
     planning_error: str = ""
+    failed_plans: int = 0
     progress: int = 0
     stale_since: float | None = None
     not_ready_since: float | None = None
     reached_xy: bool = False
-    recovery_index: int = 0
-    behaviour: str = ""
-    recovering_since: float = 0.0
-    recovered_at: Pose | None = None
-    turned: float = 0.0
-    last_yaw: float = 0.0
+    recovery: Recovery = field(default_factory=Recovery)
 
     @classmethod
     def begun(cls, now: float) -> _Work:
@@ -175,6 +164,7 @@ class _Work:
     def restart_patience(self, now: float) -> None:
         """Starts planner's, controller's and oscillation's patience anew; also while the robot has to stand still."""
         self.planned_well = self.controlled = self.anchored = now
+        self.failed_plans = 0
         self.anchor = None
 
 
@@ -204,12 +194,7 @@ class Navigator:
         self._local = _MappedArea(parameters.local_costmap)
         sources = [*parameters.global_costmap.sources, *parameters.local_costmap.sources]
         self._sensors = {(source.topic, source.data_type): _Sensor(source) for source in sources}
-        self._controller = DwaController(
-            parameters.controller,
-            np.array(parameters.local_costmap.footprint),
-            parameters.local_costmap.padded_footprint(),
-            1.0 / parameters.controller_frequency,
-        )
+        self._controller = DwaController(parameters)
         self._map_frame = ""
         self._work = _Work.begun(0.0)
 
@@ -224,12 +209,7 @@ class Navigator:
                 area.parameters = new
                 area.costmap.reconfigure(new)
                 area.updated = -math.inf
-        self._controller.reconfigure(
-            parameters.controller,
-            np.array(parameters.local_costmap.footprint),
-            parameters.local_costmap.padded_footprint(),
-            1.0 / parameters.controller_frequency,
-        )
+        self._controller.reconfigure(parameters)
 
     # -- what comes in ---------------------------------------------------------------------------------------------
 
@@ -454,10 +434,11 @@ class Navigator:
             hopeless = self._hopeless_goal()
             if hopeless:
                 return self._abort(robot, hopeless)
-            if now - self._work.planned_well >= p.planner_patience:
-                return self._start_recovery(
-                    now, robot, f"no plan for {p.planner_patience:g} s: {self._work.planning_error}"
-                )
+            waited = now - self._work.planned_well
+            retries = self._work.failed_plans - 1
+            if waited >= p.planner_patience or 0 <= p.max_planning_retries < retries:
+                tried = f"no plan for {waited:.1f} s, {retries} retries: {self._work.planning_error}"
+                return self._start_recovery(now, robot, tried)
             return Result(velocity=STOP, robot=robot, warning=f"No plan: {self._work.planning_error}")
         self.state = State.CONTROLLING
         if self._oscillating(now, robot):
@@ -502,10 +483,12 @@ class Navigator:
             plan = self.plan_between(robot, self.goal, p.controller.xy_goal_tolerance)
         except PlanningError as error:
             self._work.planning_error = str(error)
+            self._work.failed_plans += 1
             if not self._plan_is_free(robot):
                 self.plan = None
             return None
         self._work.planned_well = now
+        self._work.failed_plans = 0
         if self._keeps_plan(robot, plan):
             return None
         self.plan, self._work.progress = plan, 0
@@ -573,41 +556,33 @@ class Navigator:
         p = self.parameters
         if self._work.anchor is None or robot.distance(self._work.anchor) >= p.oscillation_distance:
             self._work.anchor, self._work.anchored = robot, now
-            if self._moved_since_recovery(robot):
-                self._work.recovery_index = 0
+            self._work.recovery.follow(robot)
         return p.oscillation_timeout > 0.0 and now - self._work.anchored > p.oscillation_timeout
-
-    def _moved_since_recovery(self, robot: Pose) -> bool:
-        return self._work.recovered_at is None or robot.distance(self._work.recovered_at) > 1.0
 
     def _start_recovery(self, now: float, robot: Pose, reason: str, new_plan: Plan | None = None) -> Result:
         """Begins the next recovery behaviour; aborts with the reason when all were tried."""
         p = self.parameters
-        behaviours = ["conservative_reset", "rotate", "aggressive_reset", "rotate"]
-        if not p.clearing_rotation_allowed:
-            behaviours = [name for name in behaviours if name != "rotate"]
-        if not p.recovery_behavior_enabled or self._work.recovery_index >= len(behaviours):
+        behaviour = None
+        if p.recovery_behavior_enabled:
+            behaviour = self._work.recovery.begin(p.recovery_behaviors, now, robot)
+        if behaviour is None:
             tried = "after all recovery behaviours" if p.recovery_behavior_enabled else "recovery is disabled"
             return self._abort(robot, f"{reason} ({tried})")
-        self._work.behaviour = behaviours[self._work.recovery_index]
-        self._work.recovery_index += 1
-        self._work.recovered_at = robot
-        self._work.turned, self._work.last_yaw, self._work.recovering_since = 0.0, robot.yaw, now
         self.state = State.RECOVERING
-        warning = f"Recovery {self._work.behaviour}: {reason}"
+        warning = f"Recovery {behaviour.name}: {reason}"
         return Result(velocity=STOP, robot=robot, warning=warning, new_plan=new_plan)
 
     def _recover(self, now: float, robot: Pose, local_robot: Pose) -> Result:
-        if self._work.behaviour == "rotate":
-            self._work.turned += wrap_angle(robot.yaw - self._work.last_yaw)
-            self._work.last_yaw = robot.yaw
-            left = 2.0 * math.pi - self._work.turned
+        recovery = self._work.recovery
+        assert recovery.behaviour is not None  # noqa: S101
+        if recovery.behaviour.kind == "rotate":
+            angle = min(recovery.left_to_turn(now, robot), 0.5 * ROTATE_SPEED)
             snapshot = self._local.snapshot
-            turn = self._controller.turn(local_robot, min(left, 0.5 * ROTATE_SPEED), snapshot) if snapshot else None
-            if left > 0.1 and turn is not None and now - self._work.recovering_since < ROTATE_PATIENCE:
+            turn = self._controller.turn(local_robot, angle, snapshot) if snapshot and angle else None
+            if turn is not None:
                 return Result(velocity=turn.velocity, robot=robot, trajectory=turn)
         else:
-            keep = self.parameters.conservative_reset_dist if self._work.behaviour == "conservative_reset" else 0.0
+            keep = 0.5 * recovery.behaviour.reset_distance
             self._global.costmap.clear(robot, keep)
             self._local.costmap.clear(local_robot, keep)
         self.state = State.PLANNING

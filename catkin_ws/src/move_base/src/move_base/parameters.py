@@ -28,6 +28,13 @@ LAYER_TYPES = {
     "costmap_2d::InflationLayer": "inflation",
 }
 
+RECOVERY_TYPES = {
+    "clear_costmap_recovery/ClearCostmapRecovery": "clear",
+    "rotate_recovery/RotateRecovery": "rotate",
+}
+
+_ROTATION = "clearing_rotation_allowed"
+
 
 class ParameterError(ValueError):
     """A parameter is missing, of the wrong type or out of its range; the message names it."""
@@ -149,21 +156,42 @@ class ControllerParameters:
     goal_distance_bias: float
     occdist_scale: float
     heading_lookahead: float
+    oscillation_reset_dist: float
+
+
+@dataclass(frozen=True)
+class RecoveryBehavior:
+    """One step of the recovery sequence.
+
+    Attributes:
+        name: as warnings tell it.
+        kind: `clear` or `rotate`.
+        reset_distance: side of the square around the robot in which obstacles are kept, m (clear).
+    """
+
+    name: str
+    kind: str
+    reset_distance: float = 0.0
 
 
 @dataclass(frozen=True)
 class MoveBaseParameters:
-    """Everything that move_base is told; frequencies in Hz, times in s, lengths in m."""
+    """Everything that move_base is told; frequencies in Hz, times in s, lengths in m.
+
+    `max_planning_retries` is -1 where only `planner_patience` limits them.
+    """
 
     controller_frequency: float
     planner_frequency: float
     controller_patience: float
     planner_patience: float
+    max_planning_retries: int
     oscillation_timeout: float
     oscillation_distance: float
     conservative_reset_dist: float
     recovery_behavior_enabled: bool
     clearing_rotation_allowed: bool
+    recovery_behaviors: tuple[RecoveryBehavior, ...]
     allow_unknown: bool
     controller: ControllerParameters
     global_costmap: CostmapParameters
@@ -186,11 +214,13 @@ def read_parameters(tree: Mapping[str, Any]) -> MoveBaseParameters:
         planner_frequency=top.number("planner_frequency", 0.0, low=0.0, high=1000.0),
         controller_patience=top.number("controller_patience", 15.0, low=0.0),
         planner_patience=top.number("planner_patience", 5.0, low=0.0),
+        max_planning_retries=top.integer("max_planning_retries", -1, low=-1, high=1000),
         oscillation_timeout=top.number("oscillation_timeout", 0.0, low=0.0),
         oscillation_distance=top.number("oscillation_distance", 0.5, low=0.0),
         conservative_reset_dist=top.number("conservative_reset_dist", 3.0, low=0.0),
         recovery_behavior_enabled=top.boolean("recovery_behavior_enabled", True),
-        clearing_rotation_allowed=top.boolean("clearing_rotation_allowed", True),
+        clearing_rotation_allowed=top.boolean(_ROTATION, True),
+        recovery_behaviors=_read_recovery(top, local),
         allow_unknown=top.child("NavfnROS").boolean("allow_unknown", True),
         controller=_read_controller(top.child("TrajectoryPlannerROS")),
         global_costmap=_read_costmap(top.child("global_costmap"), rolling_default=False),
@@ -233,7 +263,23 @@ def _read_controller(reader: _Reader) -> ControllerParameters:
         goal_distance_bias=reader.number("goal_distance_bias", reader.number("gdist_scale", 0.8, low=0.0), low=0.0),
         occdist_scale=reader.number("occdist_scale", 0.01, low=0.0),
         heading_lookahead=reader.number("heading_lookahead", 0.325, low=0.0),
+        oscillation_reset_dist=reader.number("oscillation_reset_dist", 0.05, low=0.0),
     )
+
+
+def _read_recovery(reader: _Reader, local: CostmapParameters) -> tuple[RecoveryBehavior, ...]:
+    """The behaviours that `recovery_behaviors` lists; without it the published default."""
+    if not reader.has("recovery_behaviors"):
+        radius = float(np.hypot(*np.array(local.footprint).T).max())
+        near = reader.number("conservative_reset_dist", 3.0, low=0.0)
+        rotate = [RecoveryBehavior("rotate_recovery", "rotate")] if reader.boolean(_ROTATION, True) else []
+        conservative = RecoveryBehavior("conservative_reset", "clear", near)
+        return (conservative, *rotate, RecoveryBehavior("aggressive_reset", "clear", 4.0 * radius), *rotate)
+    found = []
+    for index, entry in enumerate(reader.sequence("recovery_behaviors", ())):
+        name, kind = reader.plugin(f"recovery_behaviors[{index}]", entry, RECOVERY_TYPES)
+        found.append(RecoveryBehavior(name, kind, reader.child(name).number("reset_distance", 3.0, low=0.0)))
+    return tuple(found)
 
 
 def _read_lateral_samples(reader: _Reader) -> tuple[float, ...]:
@@ -273,14 +319,8 @@ def _read_costmap(reader: _Reader, *, rolling_default: bool) -> CostmapParameter
 def _read_layers(reader: _Reader) -> tuple[Layer, ...]:
     layers = []
     for index, entry in enumerate(reader.sequence("plugins", ())):
-        where = f"plugins[{index}]"
-        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
-            raise reader.error(where, "must have a name and a type", entry)
-        kind = LAYER_TYPES.get(str(entry.get("type")))
-        if kind is None:
-            known = ", ".join(LAYER_TYPES)
-            raise reader.error(where, f"unknown layer type; known are {known}", entry.get("type"))
-        layers.append(_read_layer(reader.child(entry["name"]), entry["name"], kind))
+        name, kind = reader.plugin(f"plugins[{index}]", entry, LAYER_TYPES)
+        layers.append(_read_layer(reader.child(name), name, kind))
     if not layers:
         raise reader.error("plugins", "must list the layers (load the base navigation parameters first)", None)
     return tuple(layer for layer in layers if layer is not None)
@@ -427,6 +467,15 @@ class _Reader:
         if not isinstance(value, list | tuple):
             raise self.error(name, "must be a list", value)
         return tuple(value)
+
+    def plugin(self, where: str, entry: Any, types: Mapping[str, str]) -> tuple[str, str]:
+        """Name and kind of an entry `{name, type}` of a list of plug-ins."""
+        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
+            raise self.error(where, "must have a name and a type", entry)
+        kind = types.get(str(entry.get("type")))
+        if kind is None:
+            raise self.error(where, f"unknown type; known are {', '.join(types)}", entry.get("type"))
+        return entry["name"], kind
 
     def numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
         values = self.sequence(name, default)
