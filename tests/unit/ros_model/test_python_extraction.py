@@ -501,6 +501,34 @@ def test_deep_code_does_not_exhaust_the_stack(node, code):
     assert not port.is_resolved
 
 
+def doubled(first, line):
+    return first + "".join(f"\nt{i + 1} = {line.replace('T', f't{i}')}" for i in range(25)) + "\nt = t25"
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        doubled("t0 = 'aaaa'", "T + T"),
+        doubled("t0 = [1]", "[T, T]"),
+        doubled("t0 = 9999", "T * T"),
+        doubled("t0 = f'{x}a'", "f'{T}{T}'"),
+        doubled("t0 = 1", "{1: T, 2: T}"),
+        "t = 'a%0300000000d' % 1",
+        "t = 'a%*d' % (300000000, 1)",
+        "t = 'a{:300000000}'.format(1)",
+        "t = 'a{:{}}'.format(1, 300000000)",
+        f"t = {'a' * 9000!r}.replace('a', {'b' * 9000!r})",
+        f"t = {'a' * 9000!r}.join({'b' * 9000!r})",
+    ],
+)
+def test_value_that_grows_without_bound_is_not_known(node, code):
+    result = node(f"{code}\nrospy.get_param('~p', t)\nrospy.Publisher(t, String)\n")
+    (port,) = result.ports
+    assert not port.is_resolved
+    assert len(port.name) < 100_000
+    assert result.parameters[0].default is None
+
+
 def test_model_says_what_could_not_be_resolved(package):
     result = package(
         "import rospy, sys\nfrom std_msgs.msg import String\nrospy.init_node('a')\nrospy.Publisher(sys.x, String)\n"

@@ -39,6 +39,7 @@ from ros_model.extraction.python_values import (
     joined,
     source_of,
     text_of,
+    weight,
 )
 
 MAX_STEPS = 3_000
@@ -47,6 +48,9 @@ MAX_TOTAL = 1_000_000
 """Expressions looked at for one node: some 20 s."""
 MAX_DEPTH = 60
 """Expressions within each other, through calls; some ten of Python's own frames each."""
+
+MAX_WEIGHT = 20_000
+"""Characters and elements of a value that is followed; names are shorter, and code may double a text in each line."""
 
 _GET_PARAMETER = ("rospy.get_param", "rospy.client.get_param", "rospy.get_param_cached")
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
@@ -115,7 +119,7 @@ class Evaluator(CallEvaluator):
         finally:
             self._depth -= 1
             self._active.discard(key)
-        if not results or len(results) > MAX_VALUES:
+        if not results or len(results) > MAX_VALUES or any(weight(value) > MAX_WEIGHT for value, _ in results):
             return [(Unknown(node), world)]
         if len(results) == 1 and unsettled == self._unsettled:
             value, after = results[0]

@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ros_model.extraction.python_values import Const, External, Items, Table, Text, Unknown, Value, joined, text_of
+from ros_model.extraction.python_values import (
+    Const,
+    External,
+    Items,
+    Table,
+    Text,
+    Unknown,
+    Value,
+    joined,
+    text_of,
+    weight,
+)
 
 OWN_NAME = "~"
 """Stands for the node's own name: what follows it is private."""
@@ -15,6 +27,8 @@ _ROS = ("rospy.", "rosgraph.")
 _MESSAGES = ("numpy_msg", "get_message_class", "get_service_class")
 _CONVERSIONS: dict[str, Any] = {"str": str, "int": int, "float": float, "bool": bool, "range": range}
 _MAX_RANGE = 64
+_MAX_WORK = 1_000_000  # characters of a text times those of what is put into it
+_WIDE = re.compile(r"%[^%a-zA-Z]*(?:\d{4}|\*)|\{[^{}:]*:[^{}]*(?:\d{4}|\{)")  # fields of a width over 999, or any
 _SAME_ITEMS = {"list", "tuple", "set", "frozenset", "iter", "reversed", "sorted"}
 _SAME_NAME = {"resolve_name", "remap_name", "canonicalize_name"}
 _TEXT_METHODS = {
@@ -57,6 +71,11 @@ def plain(value: Value | None) -> Any:
     raise ValueError("not known")
 
 
+def is_costly(text: str, arguments: Iterable[Value]) -> bool:
+    """Tell whether a pattern filled in, or a method of a text, might give a huge one: by wide fields, by repetition."""
+    return _WIDE.search(text) is not None or len(text) * max(map(weight, arguments), default=1) > _MAX_WORK
+
+
 def knows(name: str) -> bool:
     """Tell whether `call_function` may have an answer for a function."""
     package, _, function = name.rpartition(".")
@@ -82,7 +101,7 @@ def call_function(name: str, arguments: Sequence[Value]) -> Value | None:
 def call_method(value: Value, method: str, arguments: Sequence[Value]) -> Value | None:
     """Return what a method of a text, list or dict returns, or None where that is not known."""
     match value:
-        case Const(str(text)):
+        case Const(str(text)) if not is_costly(text, arguments):
             return _text_method(text, method, arguments)
         case Table(items):
             return _table_method(items, method, arguments)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 
-from ros_model.extraction.python_known import plain
+from ros_model.extraction.python_known import is_costly, plain
 from ros_model.extraction.python_values import Const, Hole, Items, Text, Unknown, Value, joined, text_of
 
 
@@ -20,7 +20,7 @@ def operated(node: ast.BinOp, left: Value, right: Value) -> Value:
             ]
             known = [text for text in texts if text]
             return joined(known) if len(known) == 2 else Unknown(node)
-        case ast.Mod(), Const(str(pattern)), Const() | Items():
+        case ast.Mod(), Const(str(pattern)), Const() | Items() if not is_costly(pattern, [right]):
             try:
                 raw = plain(right)
                 return Const(pattern % (tuple(raw) if isinstance(raw, list) else raw))

@@ -166,6 +166,8 @@ class World:
         return self if note in self.notes else World(self.choices, (*self.notes, note))
 
 
+_MAX_BITS = 64  # of an integer that weighs as much as any other value
+
 Results = list[tuple[Value, World]]
 
 
@@ -190,6 +192,22 @@ def text_of(value: Value) -> Text | None:
         case Unknown(source):
             return Text((Hole(source),))
     return None
+
+
+def weight(value: Value) -> int:
+    """Return how large a value is: characters and elements of it, and of what it holds."""
+    match value:
+        case Const(str() | bytes() as text):
+            return len(text)
+        case Const(int(number)) if number.bit_length() > _MAX_BITS:
+            return number.bit_length()
+        case Text(parts):
+            return sum(len(part) if isinstance(part, str) else 1 for part in parts)
+        case Items(values):
+            return len(values) + sum(map(weight, values))
+        case Table(items):
+            return len(items) + sum(weight(key) + weight(item) for key, item in items)
+    return 1
 
 
 def joined(parts: list[Text]) -> Const | Text:
