@@ -3,7 +3,6 @@
 
 import contextlib
 import os
-import queue
 import signal
 import socket
 import subprocess
@@ -29,12 +28,24 @@ def wait_for(condition, timeout):
         time.sleep(0.02)
 
 
+def answers(master):
+    try:
+        return master.getPid("/test")[0] == 1
+    except OSError:
+        return False
+
+
 class Proxy:
-    """Stands between a node and its master, and delays, spoils or swallows the master's answers."""
+    """Stands between a node and its master, and delays, spoils or swallows the master's answers.
+
+    `mode` is "pass", "slow", "garbage" or "silent"; `passed` and `swallowed` count pieces of answers.
+    """
 
     def __init__(self, master_port):
         self.mode = "pass"
-        self._master_port = master_port
+        self.passed = self.swallowed = 0
+        self.master_port = master_port
+        self._open = []
         self._server = socket.create_server(("127.0.0.1", 0))
         self.uri = f"http://127.0.0.1:{self._server.getsockname()[1]}"
         threading.Thread(target=self._serve, daemon=True).start()
@@ -43,7 +54,8 @@ class Proxy:
         with contextlib.suppress(OSError):
             while True:
                 client, _ = self._server.accept()
-                master = socket.create_connection(("127.0.0.1", self._master_port))
+                master = socket.create_connection(("127.0.0.1", self.master_port))
+                self._open += [client, master]
                 threading.Thread(target=self._pump, args=(client, master), daemon=True).start()
                 threading.Thread(target=self._pump, args=(master, client, True), daemon=True).start()
 
@@ -51,11 +63,20 @@ class Proxy:
         with source, target, contextlib.suppress(OSError):
             while data := source.recv(65536):
                 if to_client and self.mode == "slow":
-                    time.sleep(0.2)
+                    time.sleep(0.05)
                 if to_client and self.mode == "garbage":
                     data = b"HTTP/1.1 200 OK\r\nContent-Length: 7\r\n\r\ngarbage"
-                if not (to_client and self.mode == "silent"):
+                if to_client and self.mode == "silent":
+                    self.swallowed += 1
+                else:
                     target.sendall(data)
+                    self.passed += to_client
+
+    def drop(self):
+        """Close all connections; new ones are let through."""
+        for end in self._open:
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
 
     def close(self):
         self._server.close()
@@ -63,6 +84,7 @@ class Proxy:
 
 READY = (1, "/rosgraph_manipulator/active_configuration")
 """What the monitor registers last."""
+PATHS = ("desired_rossystem", "ros_models")
 
 
 class MonitorMasterTest(unittest.TestCase):
@@ -87,80 +109,127 @@ class MonitorMasterTest(unittest.TestCase):
 
     def start_master(self):
         master = self.start("rosmaster", "--core", "-p", str(self.master_port))
-        self.proxy = xmlrpc.client.ServerProxy(self.uri)
-        wait_for(self.master_answers, 30.0)
+        self.master = xmlrpc.client.ServerProxy(self.uri)
+        wait_for(lambda: answers(self.master), 30.0)
         return master
 
-    def master_answers(self):
-        try:
-            return self.proxy.getPid("/test")[0] == 1
-        except OSError:
-            return False
+    def start_proxy(self):
+        proxy = Proxy(self.master_port)
+        self.addCleanup(proxy.close)
+        self.environment["ROS_MASTER_URI"] = proxy.uri
+        return proxy
 
-    def start_monitor(self, until):
+    def registered(self, part, name):
+        return any(name == entry[0] for entry in self.master.getSystemState("/test")[2][part])
+
+    def start_monitor(self, until=READY, namespace="/"):
         """Start it, and wait until it has registered a service (2), or a subscription (1)."""
-        part, name = until
-        monitor = self.start("rosrun", "rosgraph_monitor", "monitor")
-        wait_for(lambda: any(name == entry[0] for entry in self.proxy.getSystemState("/test")[2][part]), 30.0)
+        monitor = self.start("rosrun", "rosgraph_monitor", "monitor", f"__ns:={namespace}")
+        if until:
+            wait_for(lambda: self.registered(*until), 30.0)
         return monitor
+
+    def expect_end(self, process, *words, status=0):
+        """Wait until it has ended, with one line on stderr that holds these words, or none where there are none."""
+        _, stderr = process.communicate(timeout=40.0)
+        self.assertEqual(process.returncode, status, stderr)
+        self.assertEqual(len(stderr.strip().splitlines()), bool(words), stderr)
+        for word in words:
+            self.assertIn(word, stderr)
 
     def test_lost_master_is_said_in_one_line_and_ends_the_monitor(self):
         master = self.start_master()
-        monitor = self.start_monitor(READY)
-        master.send_signal(signal.SIGKILL)
-        _, stderr = monitor.communicate(timeout=20.0)
-        self.assertEqual(monitor.returncode, 0)
-        lines = stderr.strip().splitlines()
-        self.assertEqual(len(lines), 1, stderr)
-        self.assertIn(self.uri, lines[0])
+        monitor = self.start_monitor()
+        master.kill()
+        self.expect_end(monitor, f"{self.uri} is gone")
 
     def test_master_lost_during_the_start_ends_the_monitor_as_well(self):
         master = self.start_master()
         monitor = self.start_monitor(until=(2, "/load_observer"))
-        master.send_signal(signal.SIGKILL)
+        master.kill()
         _, stderr = monitor.communicate(timeout=40.0)
         self.assertEqual(monitor.returncode, 0)
         self.assertIn(f"{self.uri} is gone", stderr)
+        self.assertNotIn("Traceback", stderr)
+
+    def test_other_master_at_the_same_address_ends_the_monitor(self):
+        self.start_master()
+        proxy = self.start_proxy()
+        monitor = self.start_monitor()
+        port = free_port()
+        self.start("rosmaster", "--core", "-p", str(port))
+        wait_for(lambda: answers(xmlrpc.client.ServerProxy(f"http://localhost:{port}")), 30.0)
+        proxy.master_port = port
+        proxy.drop()
+        self.expect_end(monitor, "another one")
 
     def test_stopped_master_is_said_in_one_line_and_ends_the_monitor(self):
         master = self.start_master()
-        monitor = self.start_monitor(READY)
+        self.master.setParam("/test", "/rosgraph_monitor/master_patience", 1.0)
+        monitor = self.start_monitor()
         master.send_signal(signal.SIGSTOP)
-        self.addCleanup(master.send_signal, signal.SIGCONT)
-        _, stderr = monitor.communicate(timeout=40.0)
-        self.assertEqual(monitor.returncode, 0)
-        lines = stderr.strip().splitlines()
-        self.assertEqual(len(lines), 1, stderr)
-        self.assertIn("does not answer", lines[0])
+        self.expect_end(monitor, "does not answer")
+
+    def test_master_that_falls_silent_while_the_monitor_registers_ends_it(self):
+        self.start_master()
+        proxy = self.start_proxy()
+        monitor = self.start_monitor(until=None)
+        wait_for(lambda: proxy.passed, 30.0)
+        proxy.mode = "silent"
+        self.expect_end(monitor, "does not answer")
+
+    def test_signals_end_the_monitor_and_it_unregisters(self):
+        self.start_master()
+        for number, monitor in self.start_two().items():
+            monitor.send_signal(number)
+            self.expect_end(monitor)
+        self.assertEqual(self.master.getSystemState("/test")[2][0], [])
+
+    def test_signals_end_the_monitor_while_its_master_is_silent(self):
+        master = self.start_master()
+        monitors = self.start_two()
+        master.send_signal(signal.SIGSTOP)
+        for number, monitor in monitors.items():
+            monitor.send_signal(number)
+        for monitor in monitors.values():
+            _, stderr = monitor.communicate(timeout=40.0)
+            self.assertEqual(monitor.returncode, 0, stderr)
+            self.assertNotIn("Traceback", stderr)
+
+    def test_signal_ends_the_monitor_while_it_registers(self):
+        self.start_master()
+        proxy = self.start_proxy()
+        monitor = self.start_monitor(until=None)
+        wait_for(lambda: proxy.passed, 30.0)
+        proxy.mode = "silent"
+        wait_for(lambda: proxy.swallowed, 30.0)
+        monitor.terminate()
+        monitor.communicate(timeout=40.0)
+        self.assertIn(monitor.returncode, (0, -signal.SIGTERM))
+
+    def start_two(self):
+        """Start a monitor for each signal."""
+        return {
+            signal.SIGINT: self.start_monitor(),
+            signal.SIGTERM: self.start_monitor((1, f"/other{READY[1]}"), "/other"),
+        }
 
     def test_slow_master_is_no_problem_and_one_that_answers_garbage_is_told_and_forgiven(self):
         self.start_master()
-        proxy = Proxy(self.master_port)
-        self.addCleanup(proxy.close)
-        self.environment["ROS_MASTER_URI"] = proxy.uri
+        proxy = self.start_proxy()
         proxy.mode = "slow"
-        monitor = self.start_monitor(READY)
-        lines = queue.Queue()
-        reader = threading.Thread(target=lambda: [lines.put(line) for line in monitor.stderr], daemon=True)
-        reader.start()
+        monitor = self.start_monitor()
         proxy.mode = "garbage"
-        while "garbage" not in lines.get(timeout=40.0):
-            pass
+        self.assertIn("garbage", monitor.stderr.readline())
         proxy.mode = "pass"
-        node = self.start("rosrun", "rosgraph_monitor", "monitor", "__name:=second")  # the first one goes on
-        wait_for(lambda: any("/second" in entry[1] for entry in self.proxy.getSystemState("/test")[2][2]), 40.0)
-        self.assertIsNone(monitor.poll())
-        node.terminate()
+        before = proxy.passed
+        wait_for(lambda: proxy.passed > before + 20, 40.0)  # looks at the graph, and more
         monitor.terminate()
-        self.assertEqual(monitor.wait(timeout=40.0), 0)
-        reader.join(timeout=40.0)
-        self.assertNotIn("Traceback", "".join(lines.queue))
+        self.expect_end(monitor)
 
     def test_no_master_is_said_in_one_line(self):
-        monitor = self.start("rosrun", "rosgraph_monitor", "monitor")
-        _, stderr = monitor.communicate(timeout=40.0)
-        self.assertEqual(monitor.returncode, 2)
-        self.assertEqual(len(stderr.strip().splitlines()), 1, stderr)
+        for executable in ("monitor", "diagnostic_names"):
+            self.expect_end(self.start("rosrun", "rosgraph_monitor", executable), self.uri, status=2)
 
     def test_bad_parameters_are_said_in_one_line(self):
         self.start_master()
@@ -173,12 +242,10 @@ class MonitorMasterTest(unittest.TestCase):
             "ros_models": ["/nowhere/laser.ros"],
         }
         for name, value in bad.items():
-            self.proxy.setParam("/test", f"/rosgraph_monitor/{name}", value)
-            monitor = self.start("rosrun", "rosgraph_monitor", "monitor")
-            _, stderr = monitor.communicate(timeout=40.0)
-            self.assertEqual(monitor.returncode, 2, name)
-            self.assertEqual(len(stderr.strip().splitlines()), 1, stderr)
-            self.proxy.deleteParam("/test", f"/rosgraph_monitor/{name}")
+            self.master.setParam("/test", f"/{name}/rosgraph_monitor/{name}", value)
+        monitors = {name: self.start_monitor(until=None, namespace=f"/{name}") for name in bad}
+        for name, monitor in monitors.items():
+            self.expect_end(monitor, name if name not in PATHS else "/nowhere", status=2)
 
 
 if __name__ == "__main__":

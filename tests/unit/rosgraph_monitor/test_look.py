@@ -3,9 +3,9 @@
 import queue
 
 import pytest
-from ros_model.snapshot import GraphSnapshot, MasterGoneError, NodeState, SnapshotError
+from ros_model.snapshot import GraphSnapshot, NodeState, SnapshotError
 from rosgraph_monitor.liveness import Life
-from rosgraph_monitor.look import MASTER, Looker
+from rosgraph_monitor.look import Looker
 
 GRAPH = GraphSnapshot(nodes={name: NodeState(name, f"http://host{name}") for name in ("/laser", "/monitor")})
 DEADLINE = 30.0
@@ -13,8 +13,6 @@ HOURLY = 3600.0
 
 
 class Master:
-    uri = "http://master:11311"
-
     def __init__(self):
         self.answers = queue.Queue()
         self.closed = False
@@ -58,7 +56,7 @@ def stand(request):
     made = Stand(getattr(request, "param", 0.01))
     made.looker.start()
     yield made
-    made.master.answers.put(MasterGoneError("the test is over"))
+    made.master.answers.put(SnapshotError("the test is over"))
     made.looker.close()
 
 
@@ -66,25 +64,16 @@ def test_look_has_what_was_known_and_tells_the_watcher_whom_to_watch(stand):
     stand.answer(GRAPH)
     assert stand.looker.latest.snapshot is GRAPH
     assert stand.looker.latest.lives == stand.watcher.known
-    assert stand.watcher.watched == {"/laser": "http://host/laser", MASTER: Master.uri}
+    assert stand.watcher.watched == {"/laser": "http://host/laser"}
 
 
-def test_silence_has_its_beginning_and_ends_with_an_answer(stand):
-    stand.answer(GRAPH, SnapshotError("a"), SnapshotError("b"))
-    since, error = stand.looker.silence
-    assert str(error) == "b"
-    assert stand.looker.latest.snapshot is GRAPH
-    stand.answer(SnapshotError("c"))
-    assert stand.looker.silence[0] == since
+def test_look_that_fails_leaves_the_latest_and_the_next_one_counts_again(stand):
     stand.answer(GRAPH)
-    assert stand.looker.silence is None
-
-
-def test_lost_master_ends_the_looks(stand):
-    stand.answer(GRAPH, MasterGoneError("gone"))
-    assert str(stand.looker.lost) == "gone"
-    stand.looker.close()
-    assert stand.master.closed
+    stand.master.answers.put(SnapshotError("no answer"))
+    later = GraphSnapshot()
+    stand.answer(later)
+    assert stand.looker.latest.snapshot is later
+    assert stand.looker.count == 2
 
 
 @pytest.mark.parametrize("stand", [HOURLY], indirect=True)

@@ -15,6 +15,7 @@ from rich.live import Live
 from ros_model.snapshot import GraphSnapshot, MasterClient, SnapshotError
 
 from rosgraph_monitor.board import Board
+from rosgraph_monitor.master_node import BAD_START, end_in_time, say
 
 _REFRESH = 0.5
 
@@ -28,8 +29,9 @@ def main() -> None:
     try:
         graph = client.snapshot()
     except SnapshotError as error:
-        sys.stderr.write(f"watch: {error}: start roscore or set ROS_MASTER_URI\n")
-        sys.exit(2)
+        say("watch", f"{error}: start roscore or set ROS_MASTER_URI")
+        sys.exit(BAD_START)
+    rospy.on_shutdown(end_in_time)
     rospy.init_node("rosgraph_watch", anonymous=True, disable_signals=True)
     board, lock = Board(), threading.Lock()
 
@@ -49,7 +51,7 @@ def main() -> None:
     except KeyboardInterrupt:
         return
     except SnapshotError as error:
-        sys.stderr.write(f"watch: {error}\n")
+        say("watch", str(error))
 
 
 def _show(console: Console, client: MasterClient, graph: GraphSnapshot, board: Board, lock: threading.Lock) -> None:

@@ -6,11 +6,22 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 
 from rosgraph_monitor.grouping import unique_name
+from rosgraph_monitor.master_node import PATIENCE, MasterWatch, require_master
+
+NAME = "diagnostic_names"
 
 
 def main() -> None:
-    """Run the node."""
-    rospy.init_node("diagnostic_names")
+    """Run the node; exit with status 2 and one line without a master."""
+    require_master(NAME)
+    master = MasterWatch(NAME)
+    try:
+        rospy.init_node(NAME)
+    except rospy.ROSException:
+        if not rospy.is_shutdown():
+            raise
+        return  # it was ended, or lost its master, while it started
+    master.patience = PATIENCE
     publisher = rospy.Publisher("diagnostics_named", DiagnosticArray, queue_size=50)
 
     def pass_on(msg: DiagnosticArray) -> None:

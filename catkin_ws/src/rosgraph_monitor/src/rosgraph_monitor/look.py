@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ros_model.snapshot import MasterGoneError, SnapshotError
+from ros_model.snapshot import SnapshotError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 _SHORTEST = 0.1
 """Wall s between looks at least: many nodes may come or go at once."""
-MASTER = "ROS master"
-"""Name under which the master itself is watched."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +47,10 @@ class Looker:
 
         Args:
             client: asks the master; nobody else may use it.
-            watcher: is told which nodes to watch, and the master.
+            watcher: is told which nodes to watch.
             period: wall s between looks.
             own_name: resolved name of this node, which need not be watched.
-            on_look: called in the looking thread after each look, and when one has failed.
+            on_look: called in the looking thread after each look; one that fails leaves the latest as it was.
         """
         self._client = client
         self._watcher = watcher
@@ -63,8 +61,6 @@ class Looker:
         self._closing = False
         self.latest: Look | None = None
         self.count = 0
-        self.lost: MasterGoneError | None = None
-        self.silence: tuple[float, SnapshotError] | None = None
         self._thread = threading.Thread(target=self._run, name="look", daemon=True)
 
     def start(self) -> None:
@@ -83,11 +79,10 @@ class Looker:
 
     def _run(self) -> None:
         due = time.monotonic()
-        while not (self._closing or self.lost):
+        while not self._closing:
             self._requested.clear()
             begin = time.monotonic()
             self._look(begin)
-            self._on_look()
             if begin >= due:
                 due = max(due + self._period, begin)
             if not self._requested.wait(max(due - time.monotonic(), 0.0)):
@@ -99,14 +94,9 @@ class Looker:
         lives = self._watcher.lives()
         try:
             snapshot = self._client.snapshot()
-        except MasterGoneError as error:
-            self.lost = error
-            return
-        except SnapshotError as error:
-            self.silence = (self.silence[0] if self.silence else begin, error)
-            return
-        self.silence = None
+        except SnapshotError:
+            return  # who watches the master tells of it
         self.count += 1
         self.latest = Look(snapshot, lives, time.monotonic() - begin)
-        nodes = {name: node.uri for name, node in snapshot.nodes.items() if name != self._own_name}
-        self._watcher.watch(nodes | {MASTER: self._client.uri})
+        self._watcher.watch({name: node.uri for name, node in snapshot.nodes.items() if name != self._own_name})
+        self._on_look()

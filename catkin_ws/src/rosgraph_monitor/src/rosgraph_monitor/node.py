@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import os
 import resource
-import socket
+import signal
 import sys
 import threading
 import time
@@ -20,13 +19,14 @@ from metacontrol_msgs.msg import ActiveConfiguration
 from ros_model.errors import ModelError
 from ros_model.files import resolve, safe_file_name
 from ros_model.reader import read_system
-from ros_model.snapshot import MasterClient, SnapshotError
+from ros_model.snapshot import MasterClient
 
 from rosgraph_monitor import parameters_node
 from rosgraph_monitor.desired import DesiredModel, Grounding
 from rosgraph_monitor.health import merged, model_topics
 from rosgraph_monitor.liveness import Life
 from rosgraph_monitor.look import Look, Looker
+from rosgraph_monitor.master_node import BAD_START, PATIENCE, MasterWatch, require_master
 from rosgraph_monitor.monitor import GraphMonitor
 from rosgraph_monitor.names import resolved
 from rosgraph_monitor.observer_node import ObserverHost
@@ -41,16 +41,11 @@ if TYPE_CHECKING:
 
     from rosgraph_monitor.status import Status
 
-BAD_START = 2
-"""Exit status of a start that failed. The loss of the master ends the node with 0: it has done all it could."""
-
+NAME = "rosgraph_monitor"
 _MASTER_TIMEOUT = 1.2
-"""Wall seconds for one answer of the master: with a tick of 0.5 s before it, its silence is told within 2 s."""
-_START_TIMEOUT = 5.0
-_MASTER_SILENCE = 10.0
-"""Wall seconds without a useful answer after which the master counts as lost; if it is gone, that shows at once."""
-_LONGEST_END = 5.0
-"""Wall seconds that the node may take to end after the master was lost."""
+"""Wall seconds for one answer of the master."""
+_TIME_TO_NOTICE = 5.0
+"""Wall seconds to see, after a call has failed, whether that is because the master is lost."""
 _COALESCE = 0.02
 """Wall seconds between evaluations at least, for events that come in a bunch."""
 _FRESH = 0.15
@@ -58,7 +53,7 @@ _FRESH = 0.15
 _TOPIC_PERIOD = 0.05
 _USAGE_PERIOD = 1.0
 _LAUNCHER = "rosgraph_launcher"
-_METACONTROL_NODES = ["rosgraph_monitor", "reasoner", "rosgraph_manipulator", _LAUNCHER]
+_METACONTROL_NODES = [NAME, "reasoner", "rosgraph_manipulator", _LAUNCHER]
 
 
 class MonitorNode:
@@ -76,7 +71,6 @@ class MonitorNode:
         """
         self._events = threading.Event()
         self._looked = threading.Event()
-        self._silence_told = False
         self._watcher = Watcher(self._on_life, parameters_node.timing(), rospy.get_name())
         self._period = 1.0 / parameters_node.number("~rate", 2.0)
         self._looker = Looker(
@@ -86,8 +80,8 @@ class MonitorNode:
             rospy.get_name(),
             self._on_look,
         )
-        rospy.on_shutdown(self._events.set)
-        # At once: rospy goes on trying to register for as long as nobody tells it that the master is lost.
+        self._ending = False
+        rospy.on_shutdown(self._end)
         self._watcher.start()
         self._looker.start()
         self._namespace = rospy.get_namespace()
@@ -125,7 +119,7 @@ class MonitorNode:
     def run(self) -> None:
         """Evaluate after every look, and whenever a node or topic fails or returns, until node or master end."""
         try:
-            while not rospy.is_shutdown():
+            while not self._ending:
                 look = self._looker.latest
                 if look:
                     begin = time.monotonic()
@@ -134,8 +128,15 @@ class MonitorNode:
                     # Never more than half the time: hundreds of nodes may come or go together.
                     time.sleep(max(_COALESCE, self._evaluation))
                 self._wait()
+        except rospy.ROSException:
+            if not self._ending:
+                raise
         finally:
             self.close()
+
+    def _end(self) -> None:
+        self._ending = True
+        self._events.set()
 
     def close(self) -> None:
         """Stop watching."""
@@ -149,29 +150,8 @@ class MonitorNode:
         self._events.set()
 
     def _on_look(self) -> None:
-        if self._looker.lost:
-            _say(f"{self._looker.lost}: the monitor ends, start it again with the master")
-            # Should rospy hang on to the master, as it may while it registers, the process ends all the same.
-            last_resort = threading.Timer(_LONGEST_END, os._exit, (0,))
-            last_resort.daemon = True
-            last_resort.start()
-            rospy.signal_shutdown("the master is lost")
-        elif self._looker.silence:
-            self._bear_silence(*self._looker.silence)
-        else:
-            self._silence_told = False
-            self._looked.set()
+        self._looked.set()
         self._events.set()
-
-    def _bear_silence(self, since: float, error: SnapshotError) -> None:
-        """Say in one line that the master is silent, and end when that lasts."""
-        if not self._silence_told:
-            self._silence_told = True
-            _say(f"{error}: the monitor ends if it stays silent for {_MASTER_SILENCE:g} s")
-        if time.monotonic() - since >= _MASTER_SILENCE:
-            # To unregister, rospy would wait for an answer of this master for ever.
-            logging.shutdown()
-            os._exit(0)
 
     def _wait(self) -> None:
         """Wait until there is something to evaluate."""
@@ -179,7 +159,7 @@ class MonitorNode:
             if self._topics_changed():
                 return
         self._events.clear()
-        if not rospy.is_shutdown():
+        if not self._ending:
             self._looked.wait(_FRESH)
 
     def _topics_changed(self) -> bool:
@@ -236,7 +216,7 @@ class MonitorNode:
         return local
 
     def _publish(self, statuses: list[Status]) -> None:
-        if not statuses or rospy.is_shutdown():
+        if not statuses:
             return
         array = DiagnosticArray(status=[_message(status) for status in statuses])
         array.header.stamp = rospy.Time.now()
@@ -271,38 +251,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="monitor", description="Compares the live ROS graph with the desired one.")
     parser.add_argument("--load", nargs="+", default=[], metavar="NAME", help="observers to start")
     options = parser.parse_args(rospy.myargv()[1:])
-    uri = rosgraph.get_master_uri()
-    if not _master_answers():
-        sys.stderr.write(f"rosgraph_monitor: no ROS master answers at {uri}: start roscore or set ROS_MASTER_URI\n")
-        sys.exit(BAD_START)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until rospy takes over, there is nothing to put in order
+    require_master(NAME)
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))  # a connection to each node
-    rospy.init_node("rosgraph_monitor")
+    master = MasterWatch(NAME)
     try:
+        rospy.init_node(NAME)
+        master.patience = parameters_node.number("~master_patience", PATIENCE)
         node = MonitorNode(options.load)
-    except (parameters_node.ParameterError, ModelError, SnapshotError) as error:
+    except (parameters_node.ParameterError, ModelError) as error:
         rospy.logfatal("%s", error)
         sys.exit(BAD_START)
     except (rospy.ROSException, OSError):
-        if not rospy.is_shutdown() and _master_answers():
+        if not rospy.is_shutdown() and not master.lost.wait(_TIME_TO_NOTICE):
             raise
         return  # it was ended, or lost its master, while it started
     node.run()
     rospy.signal_shutdown("the monitor has ended")
-
-
-def _say(line: str) -> None:
-    """Write a line of its own: rospy's logging asks the master for a parameter, and would wait for it."""
-    sys.stderr.write(f"rosgraph_monitor: {line}\n")
-    sys.stderr.flush()
-
-
-def _master_answers() -> bool:
-    socket.setdefaulttimeout(_START_TIMEOUT)
-    try:
-        return bool(rosgraph.is_master_online())
-    finally:
-        socket.setdefaulttimeout(None)
 
 
 def _message(status: Status) -> DiagnosticStatus:
