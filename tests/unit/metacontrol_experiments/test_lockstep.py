@@ -11,7 +11,6 @@ from metacontrol_experiments import cli
 from metacontrol_experiments.contingency import parse_contingency
 from metacontrol_experiments.lockstep import Lockstep, LockstepError, navigation_parameters
 from metacontrol_experiments.lockstep_frames import KEPT_S, Frames
-from metacontrol_experiments.lockstep_manager import RESTART
 from metacontrol_experiments.metrics import summarise
 from metacontrol_experiments.mission import Outcome
 from metacontrol_experiments.routes import Pose, Route
@@ -104,11 +103,6 @@ def test_energy_over_its_limit_is_answered_without_a_stop(tmp_path):
     began = record.start_stamp + change["stamp_s"]
     during = record.poses[(record.poses[:, 0] > began) & (record.poses[:, 0] < began + 1.0), 1:]
     assert np.hypot(*(during[-1] - during[0])) > 0.1
-
-
-def test_delays_have_their_median():
-    rng = np.random.default_rng(1)
-    assert np.median([RESTART.draw(rng) for _ in range(4000)]) == pytest.approx(RESTART.median, rel=0.03)
 
 
 def test_frozen_laser_that_thaws_is_waited_for(tmp_path):

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-import rospkg
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -20,6 +19,7 @@ from metacontrol_experiments.calibration import (
     write_levels,
 )
 from metacontrol_experiments.commit import current_commit
+from metacontrol_experiments.package import refused, simulation_package
 from metacontrol_experiments.routes import RouteError, read_route, route_names
 
 RUNS = Path("results/calibration/runs.csv")
@@ -48,7 +48,7 @@ def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tu
     """
     console = Console(highlight=False)
     try:
-        package = _simulation()
+        package = simulation_package()
         known = sorted(path.stem for path in (package / "models" / "variants").glob("*.rossystem"))
         file = package / "worlds" / "routes.yaml"
         variants = _chosen("--variant", only["variants"], known)
@@ -72,7 +72,7 @@ def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tu
         target = levels or package / "models" / "qa.csv"
         write_levels(target, done)
     except (CalibrationError, RouteError, RuntimeError, OSError) as error:
-        raise _refused(error) from error
+        raise refused(error) from error
     console.print(f"measured levels are in {target}; now: rosmodel generate all", soft_wrap=True)
 
 
@@ -93,16 +93,9 @@ def variants(runs: Path, output: Path | None) -> None:
                 f"# Variants\n\nMade by `metacontrol variants --output {output}`.\n\n{text}", encoding="utf-8"
             )
     except (CalibrationError, OSError) as error:
-        raise _refused(error) from error
+        raise refused(error) from error
     if not output:
         click.echo(text, nl=False)
-
-
-def _simulation() -> Path:
-    try:
-        return Path(rospkg.RosPack().get_path("metacontrol_sim"))
-    except rospkg.ResourceNotFound as error:
-        raise CalibrationError("package metacontrol_sim not found; source the workspace's devel/setup.bash") from error
 
 
 def _chosen(option: str, asked: tuple[str, ...], known: list[str]) -> list[str]:
@@ -133,8 +126,3 @@ def _tell(console: Console, done: list[Any], driven: int, path: Path) -> None:
         )
     if len({run.commit for run in done}) > 1:
         console.print(f"{path} holds runs of different commits: delete it to measure one", style="yellow")
-
-
-def _refused(error: Exception) -> click.exceptions.Exit:
-    click.echo(f"metacontrol: {' '.join(str(error).split())}", err=True)
-    return click.exceptions.Exit(2)

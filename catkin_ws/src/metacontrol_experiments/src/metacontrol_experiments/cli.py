@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import rospkg
 from rich.console import Console
 
 from metacontrol_experiments.bag import BagError, read_record
 from metacontrol_experiments.calibration_cli import calibrate, variants
 from metacontrol_experiments.commit import current_commit
+from metacontrol_experiments.comparison_cli import compare, delays
 from metacontrol_experiments.components import ComponentError, node_of, read_components
 from metacontrol_experiments.contingency import (
     DEFAULT_SHARE,
@@ -29,6 +29,7 @@ from metacontrol_experiments.contingency import (
 from metacontrol_experiments.display import Display
 from metacontrol_experiments.metrics import DEFAULT_THRESHOLDS, MetricsError, summarise
 from metacontrol_experiments.mission import TIMEOUT_S, Outcome
+from metacontrol_experiments.package import refused, simulation_package
 from metacontrol_experiments.routes import RouteError, read_route
 from metacontrol_experiments.runner import BAG_NAME, RunError, run_mission
 from metacontrol_experiments.settings import Settings
@@ -43,7 +44,7 @@ SUMMARY_NAME = "summary.json"
 FIGURE_NAME = "mission.png"
 LOG_NAME = "mission.log"
 
-_FAILED, _REFUSED, _INTERRUPTED = 1, 2, 130
+_FAILED, _INTERRUPTED = 1, 130
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -51,8 +52,8 @@ def metacontrol() -> None:
     """Missions of a robot that adapts, and what their bags tell."""
 
 
-metacontrol.add_command(calibrate)
-metacontrol.add_command(variants)
+for _command in (calibrate, variants, compare, delays):
+    metacontrol.add_command(_command)
 
 
 class _Number(click.FloatRange):
@@ -150,7 +151,7 @@ def run(quiet: bool, output: Path, engine: str, **options: Any) -> None:
         _write_summary(summary, output / SUMMARY_NAME)
         _draw(record, output / FIGURE_NAME)
     except (RunError, RouteError, ContingencyError, ComponentError, BagError, MetricsError, OSError) as error:
-        _refuse(error)
+        raise refused(error) from error
     except KeyboardInterrupt:
         click.echo("metacontrol: interrupted; every process was ended", err=True)
         sys.exit(_INTERRUPTED)
@@ -171,7 +172,7 @@ def summary_command(bag: Path, output: Path | None) -> None:
             _write_summary(summary, output)
             return
     except (BagError, MetricsError, OSError) as error:
-        _refuse(error)
+        raise refused(error) from error
     click.echo(json.dumps(summary, indent=2))
 
 
@@ -184,7 +185,7 @@ def figure_command(bag: Path, output: Path | None) -> None:
     try:
         _draw(read_record(bag), target)
     except (BagError, MetricsError, OSError) as error:
-        _refuse(error)
+        raise refused(error) from error
     click.echo(target)
 
 
@@ -201,10 +202,7 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
         RouteError: there is no such route.
         ContingencyError, ComponentError: what is to go wrong makes no sense.
     """
-    try:
-        simulation = Path(rospkg.RosPack().get_path("metacontrol_sim"))
-    except rospkg.ResourceNotFound as error:
-        raise RunError("package metacontrol_sim not found; source the workspace's devel/setup.bash first") from error
+    simulation = simulation_package()
     name = options["initial_configuration"]
     variants = sorted(path.stem for path in (simulation / "launch" / "variants").glob("*.launch"))
     if name not in variants:
@@ -292,6 +290,5 @@ def _draw(record: Any, path: Path) -> None:
     draw(record, path)
 
 
-def _refuse(error: Exception) -> None:
-    click.echo(f"metacontrol: {' '.join(str(error).split())}", err=True)
-    sys.exit(_REFUSED)
+if __name__ == "__main__":
+    main()

@@ -27,6 +27,7 @@ from rosgraph_monitor.status import QA_STALE, QA_STATUS
 from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
 
+from metacontrol_experiments.delays import DelayError, Delays, read_delays
 from metacontrol_experiments.record import ComponentReport, DecisionReport, QualityReport
 
 if TYPE_CHECKING:
@@ -45,32 +46,6 @@ HEARTBEAT_STEPS = 200
 
 class ManagerError(RuntimeError):
     """The meta-controller cannot run."""
-
-
-@dataclass(frozen=True)
-class Delay:
-    """A time that something takes on ROS at real-time factor 1: log-normal.
-
-    Attributes:
-        median: s.
-        spread: standard deviation of the logarithm.
-    """
-
-    median: float
-    spread: float
-
-    def draw(self, rng: np.random.Generator) -> float:
-        """Return one time in s."""
-        return self.median * math.exp(self.spread * float(rng.standard_normal()))
-
-
-DETECT = Delay(0.03, 0.6)
-DECIDE = Delay(0.06, 0.3)
-RESTART = Delay(1.8, 0.2)
-PARAMETERS = Delay(0.17, 0.2)
-"""From the kill of a node to its diagnostic, from there to the decision, from there to the end of a reconfiguration by
-restart and by parameters. Medians of the first missions measured on ROS, a handful on a busy machine; the spreads are
-estimates."""
 
 
 @dataclass
@@ -115,6 +90,10 @@ class Manager:
         self._package = package
         self._base = read_system(package / "models" / "d2.rossystem")
         self._rng = np.random.default_rng([seed, 10])
+        try:
+            self._delays: Delays = read_delays()
+        except DelayError as error:
+            raise ManagerError(str(error)) from error
         self._writer = OdometryWriter(ODOM)
         self._safety, self._energy = SafetyQualityObserver(), EnergyQualityObserver()
         self._safety.receive("/tf_static", _static_frames(robot), 0.0)
@@ -155,7 +134,7 @@ class Manager:
 
     def component_changed(self, now: float, component: str, works: bool) -> None:
         """A component's node died or came back; the monitor finds out after a while."""
-        self._due.append((now + DETECT.draw(self._rng), component, "RECOVERED" if works else "FALSE"))
+        self._due.append((now + self._delays.draw("detect", self._rng), component, "RECOVERED" if works else "FALSE"))
 
     def step(self, now: float, step: int, simulation: Simulation, stamp: genpy.Time) -> tuple[str, str] | None:
         """Observe, reason, and carry out.
@@ -172,7 +151,8 @@ class Manager:
         Raises:
             ManagerError: the analysis failed.
         """
-        for due in [entry for entry in self._due if entry[0] <= now]:
+        found = [entry for entry in self._due if entry[0] <= now]
+        for due in found:
             self._due.remove(due)
             self._core.observe_component(now, due[1], due[2], stamp=now)
             self.components.append(ComponentReport(now, due[1], due[2]))
@@ -180,7 +160,7 @@ class Manager:
             self._observe(now, step, simulation, stamp)
         if self._pending is not None:
             return self._carry_out(now)
-        if step % REASON_STEPS == 0:
+        if found or step % REASON_STEPS == 0:
             self._reason(now, heartbeat=step % HEARTBEAT_STEPS == 0)
         return None
 
@@ -215,9 +195,10 @@ class Manager:
             raise ManagerError(str(error)) from error
         for decision in decisions:
             if decision.state == DECIDED:
-                decided = now + DECIDE.draw(self._rng)
-                same = self._sensor(decision.from_configuration) == self._sensor(decision.to_configuration)
-                done = decided + (PARAMETERS if same else RESTART).draw(self._rng)
+                decided = now + self._delays.draw("decide", self._rng)
+                names = (decision.from_configuration, decision.to_configuration)
+                same = len({observation_sources(self._package, name) for name in names}) == 1
+                done = decided + self._delays.draw("parameters" if same else "restart", self._rng)
                 self._pending = _Pending(decision, decided, done)
             else:
                 self.decisions.append(_report(decision, now))
@@ -247,12 +228,12 @@ class Manager:
         self._safety.follow(system)
         self._energy.follow(system)
 
-    def _sensor(self, configuration: str) -> tuple[str, ...]:
-        """Return what a configuration navigates by: with another one, navigation is started anew."""
-        variant = read_system(self._package / "models" / "variants" / f"{configuration}.rossystem")
-        navigation = variant.component("move_base")
-        parameters = navigation.parameters if navigation else ()
-        return tuple(str(p.value) for p in parameters if p.key.endswith("observation_sources"))
+
+def observation_sources(package: Path, configuration: str) -> tuple[str, ...]:
+    """Return what a configuration navigates by: between two that differ in it, navigation is started anew."""
+    navigation = read_system(package / "models" / "variants" / f"{configuration}.rossystem").component("move_base")
+    parameters = navigation.parameters if navigation else ()
+    return tuple(str(p.value) for p in parameters if p.key.endswith("observation_sources"))
 
 
 def _report(decision: Decision, now: float) -> DecisionReport:

@@ -5,40 +5,20 @@ Every figure is a mean over routes for each seed, then over seeds, with Student'
 
 from __future__ import annotations
 
-import math
 import re
 import statistics
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from scipy.stats import t as student
-
 from metacontrol_experiments.calibration import measure
+from metacontrol_experiments.intervals import Interval, interval
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from metacontrol_experiments.calibration import Run
 
-CONFIDENCE = 0.95
-
 _NAME = re.compile(r"f(\d+)_v(\d+)_r(\d+)(_k)?")
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A mean and the half width of its confidence interval."""
-
-    mean: float
-    half: float
-
-    def text(self, digits: int) -> str:
-        """As a table shows it."""
-        return (
-            f"{self.mean:.{digits}f} ± {self.half:.{digits}f}"
-            if math.isfinite(self.half)
-            else f"{self.mean:.{digits}f}"
-        )
 
 
 @dataclass(frozen=True)
@@ -70,14 +50,6 @@ CLAIMS = (
     ("higher frequencies cost energy", ENERGY, "f", 1.0),
 )
 """Claim, figure, the part of the name in which the variants compared differ, and the sign of the difference."""
-
-
-def interval(values: Sequence[float]) -> Interval:
-    """Mean of some values with its confidence interval; an infinite one for a single value."""
-    if len(values) < 2:
-        return Interval(values[0], math.inf)
-    factor = float(student.ppf(0.5 + CONFIDENCE / 2.0, len(values) - 1))
-    return Interval(statistics.fmean(values), factor * statistics.stdev(values) / math.sqrt(len(values)))
 
 
 def markdown(runs: Sequence[Run]) -> str:
