@@ -61,6 +61,13 @@ def test_sound_system_has_no_findings():
     assert found(SYSTEM) == []
 
 
+def test_what_several_models_declare_of_a_node_is_known_together():
+    running = PACKAGES.replace("name joints ", "name '/joints' ").replace("name rate", "name '/rate'")
+    both = SYSTEM.replace(".arm.joints'", ".arm./joints'")
+    assert found(both, PACKAGES, running) == found(both, running, PACKAGES) == []
+    assert "value 'fast' of 'rate' is no Double" in found(SYSTEM.replace("value 5", "value fast"), running, PACKAGES)[0]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "finding"),
     [

@@ -6,7 +6,7 @@ import difflib
 import functools
 import re
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,7 +40,7 @@ class Unknown:
 
 
 class Library:
-    """Packages by their names; several models may declare parts of one package.
+    """Packages by their names; several models may declare parts of one package, and of one node.
 
     Args:
         packages: what the models at hand declare.
@@ -54,7 +54,7 @@ class Library:
             for artifact in package.artifacts:
                 nodes = artifacts.setdefault(artifact.name, {})
                 for node in artifact.nodes:
-                    nodes.setdefault(node.name, node)
+                    nodes[node.name] = _joined(nodes[node.name], node) if node.name in nodes else node
             for spec in package.specs:
                 self._specs[package.name].setdefault((spec.kind, spec.name), spec)
 
@@ -153,6 +153,17 @@ def full_type(declared: str, package: str) -> str:
     elif "/" not in name and name not in BUILTIN_TYPES:
         name = f"{package}/{name}"
     return name + bracket + size
+
+
+def _joined(first: Node, second: Node) -> Node:
+    """Return a node with what two models declare of it; where both do, the first one's."""
+    ports = {(port.kind, port.name) for port in first.ports}
+    parameters = {parameter.name for parameter in first.parameters}
+    return replace(
+        first,
+        ports=(*first.ports, *(port for port in second.ports if (port.kind, port.name) not in ports)),
+        parameters=(*first.parameters, *(known for known in second.parameters if known.name not in parameters)),
+    )
 
 
 @functools.cache
