@@ -2,8 +2,9 @@
 
 import pytest
 from mros1_reasoner.knowledge_base import KnowledgeBaseError
-from mros1_reasoner.mape import Mape, Settings
+from mros1_reasoner.mape import Mape
 from mros1_reasoner.reasoner import InconsistentError
+from mros1_reasoner.settings import Settings
 from reasoner_helpers import DECIMAL, OBJECTIVE, application, value
 
 BOOLEAN = "http://www.w3.org/2001/XMLSchema#boolean"

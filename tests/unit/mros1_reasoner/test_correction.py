@@ -8,9 +8,10 @@ import pytest
 from mros1_reasoner.decision import DECIDED
 from mros1_reasoner.knowledge_base import KnowledgeBase
 from mros1_reasoner.levels import Levels
-from mros1_reasoner.mape import Mape, Settings
+from mros1_reasoner.mape import Mape
 from mros1_reasoner.model import Design, Direction, Objective, Quality
 from mros1_reasoner.planner import Situation, difference, plan
+from mros1_reasoner.settings import Settings
 
 D2 = Path(__file__).parents[3] / "catkin_ws" / "src" / "metacontrol_sim" / "models" / "d2.owl"
 ONSET, DURATION = 20.0, 300.0  # s: when the power consumption rises, and how long the mission is

@@ -2,7 +2,8 @@
 
 import pytest
 from mros1_reasoner.decision import ADVISED, FAILED
-from mros1_reasoner.mape import Mape, Settings
+from mros1_reasoner.mape import Mape
+from mros1_reasoner.settings import Settings
 from reasoner_helpers import OBJECTIVE
 
 

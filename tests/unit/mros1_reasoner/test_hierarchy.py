@@ -4,8 +4,9 @@ import pytest
 from mros1_reasoner import vocabulary as v
 from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED
 from mros1_reasoner.knowledge_base import KnowledgeBase
-from mros1_reasoner.mape import Mape, MapeError, Settings
+from mros1_reasoner.mape import Mape, MapeError
 from mros1_reasoner.model import Objective
+from mros1_reasoner.settings import Settings
 from reasoner_helpers import HEAD, value
 
 # design -> (function, performance, functions that it requires)

@@ -3,7 +3,8 @@
 import pytest
 from mros1_reasoner.decision import DECIDED, EXECUTED
 from mros1_reasoner.journal import Entry, Journal, apply, decided, entry
-from mros1_reasoner.mape import Mape, MapeError, Settings
+from mros1_reasoner.mape import Mape, MapeError
+from mros1_reasoner.settings import Settings
 from reasoner_helpers import OBJECTIVE
 
 

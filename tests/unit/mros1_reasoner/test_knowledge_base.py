@@ -4,8 +4,9 @@ import socket
 import pytest
 from mros1_reasoner import vocabulary as v
 from mros1_reasoner.knowledge_base import KnowledgeBase, KnowledgeBaseError
-from mros1_reasoner.mape import Mape, Settings
+from mros1_reasoner.mape import Mape
 from mros1_reasoner.model import Direction, Facts
+from mros1_reasoner.settings import Settings
 from reasoner_helpers import HEAD, OBJECTIVE, application, value
 
 RULE = """

@@ -5,8 +5,9 @@ import contextlib
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mros1_reasoner.decision import DECIDED
-from mros1_reasoner.mape import Mape, MapeError, Settings
+from mros1_reasoner.mape import Mape, MapeError
 from mros1_reasoner.model import Objective
+from mros1_reasoner.settings import Settings
 from test_hierarchy import COMPONENTS, D1, model
 
 DESIGNS = {**D1, "FD3": ("F3", 0.5, ("F2",)), "FD3.0": ("F3", 0.4, ())}

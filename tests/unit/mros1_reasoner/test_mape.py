@@ -3,10 +3,12 @@ import math
 from dataclasses import replace
 
 import pytest
-from mros1_reasoner import mape
-from mros1_reasoner.mape import DECIDED, EXECUTED, FAILED, Mape, MapeError, Settings
+from mros1_reasoner import decision, state
+from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED
+from mros1_reasoner.mape import Mape, MapeError
 from mros1_reasoner.model import Objective
 from mros1_reasoner.reasoner import ReasonerError
+from mros1_reasoner.settings import Settings
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
 
@@ -435,6 +437,7 @@ def test_names_of_qualities_do_not_matter(load, pellet):
 def test_states_are_those_of_the_messages():
     from metacontrol_msgs.msg import Decision, FunctionGrounding
 
-    assert (mape.DECIDED, mape.EXECUTED, mape.FAILED) == (Decision.DECIDED, Decision.EXECUTED, Decision.FAILED)
-    assert (mape.STABLE, mape.RECONFIGURING) == (FunctionGrounding.STABLE, FunctionGrounding.RECONFIGURING)
-    assert (mape.RECOVERING, mape.FAILED) == (FunctionGrounding.RECOVERING, FunctionGrounding.FAILED)
+    for name in ("PROPOSED", "ADVISED", "DECIDED", "EXECUTED", "FAILED"):
+        assert getattr(decision, name) == getattr(Decision, name)
+    for name in ("STABLE", "RECONFIGURING", "RECOVERING", "FAILED"):
+        assert getattr(state, name) == getattr(FunctionGrounding, name)

@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED, PROPOSED
 from mros1_reasoner.knowledge_base import KnowledgeBase
-from mros1_reasoner.mape import Mape, MapeError, Settings
+from mros1_reasoner.mape import Mape, MapeError
 from mros1_reasoner.model import Objective
+from mros1_reasoner.settings import Settings
 from reasoner_helpers import DESIGNS, OBJECTIVE
 
 

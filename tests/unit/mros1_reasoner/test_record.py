@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import pytest
 from bag_helpers import Types
 from mros1_reasoner.explain import line, render
-from mros1_reasoner.mape import Mape, Settings
+from mros1_reasoner.mape import Mape
 from mros1_reasoner.record import read_message, record_of, seconds
+from mros1_reasoner.settings import Settings
 from reasoner_helpers import OBJECTIVE
 from rich.console import Console
 

@@ -8,7 +8,7 @@ from mros1_reasoner.commands import explain, replay_command
 from mros1_reasoner.mape import Mape
 from mros1_reasoner.parameters import Parameters
 from mros1_reasoner.replay import first_messages
-from reasoner_helpers import application
+from reasoner_helpers import HEAD, application
 
 PARAMETERS = {
     "model_file": "/not/here/application.owl",
@@ -58,6 +58,7 @@ def life(model, pellet):
         pellet.load(knowledge_base.ontology)
         objectives, settings = parameters.objectives(knowledge_base), parameters.settings(knowledge_base)
         life = Life(Mape(knowledge_base, pellet, objectives, settings, name=NAME))
+        life.files = {f"/elsewhere/{path.name}": path.read_text() for path in knowledge_base.files}
         first = (START, "active", "f_move", "scan_slow", "STABLE")
         life.live(START + until, [first, *given], START)
         return life
@@ -66,7 +67,7 @@ def life(model, pellet):
 
 
 @pytest.fixture
-def bag(tmp_path, model):
+def bag(tmp_path):
     """Return a function that writes what a recorder that came late has of a life."""
 
     def write(life, joined=0.0, space=""):
@@ -74,8 +75,7 @@ def bag(tmp_path, model):
         journal, decision = f"{space}/mros1_reasoner/journal", f"{space}/mros1_reasoner/decision"
         before = [e for e in life.entries if e.now < START + joined]
         with Bag(path) as bag:
-            files = {"/elsewhere/application.owl": model.read_text()}
-            bag.journal(START + joined, before, 0, NAME, PARAMETERS, files, topic=journal)
+            bag.journal(START + joined, before, 0, NAME, PARAMETERS, life.files, topic=journal)
             for number, item in enumerate(life.entries[len(before) :], len(before)):
                 bag.journal(item.now, [item], number, NAME, topic=journal)
             for now, record in life.decisions:
@@ -109,6 +109,23 @@ def test_recorder_that_came_late_still_has_all_it_takes(life, bag):
     assert result.exit_code == 0, result.output
     assert "the same" in result.output
     assert "differs" not in result.output
+
+
+def test_bag_brings_the_imported_files_of_a_model_along(tmp_path, life, bag, model, caplog):
+    text, ontology = model.read_text(), '<owl:Ontology rdf:about="http://example.org/app"'
+    start = text.index('<t:Component rdf:about="#laser">')
+    end = text.index("</t:Component>", start) + len("</t:Component>")
+    parts = f"{HEAD.replace(ontology, ontology.replace('app', 'other'))}{text[start:end]}</rdf:RDF>"
+    (tmp_path / "parts.owl").write_text(parts)
+    imports = f'{ontology}><owl:imports rdf:resource="http://example.org/parts"/></owl:Ontology>'
+    model.write_text((text[:start] + text[end:]).replace(f"{ontology}/>", imports))
+    path = bag(life(BUSY))
+    for file in tmp_path.glob("*.owl"):
+        file.unlink()
+    result = run(replay_command, path)
+    assert result.exit_code == 0, result.output
+    assert "camera_slow" in result.output
+    assert "going on without" not in caplog.text
 
 
 def test_other_limit_tells_what_it_would_have_done(life, bag):

@@ -145,11 +145,11 @@ def _knowledge_base(parameters: Parameters, run: Run, models: Sequence[Path]) ->
     if models or not run.files:
         return parameters.knowledge_base(list(models) or None)
     with tempfile.TemporaryDirectory() as folder:
-        paths = []
-        for number, (name, content) in enumerate(run.files.items()):
-            place = Path(folder) / str(number)
-            place.mkdir()
-            path = place / f"{Path(name).stem or 'model'}.owl"
+        paths: list[Path] = []
+        for name, content in run.files.items():
+            file_name = f"{Path(name).stem or 'model'}.owl"  # together, so that they find each other by name
+            path = Path(folder) / str(sum(other.name == file_name for other in paths)) / file_name
+            path.parent.mkdir(exist_ok=True)
             path.write_text(content, encoding="utf-8")
             paths.append(path)
         return parameters.knowledge_base(paths, [])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import logging
 import math
-import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -15,15 +14,16 @@ import owlready2
 
 from mros1_reasoner import vocabulary as v
 from mros1_reasoner.model import Analysis, Design, Direction, Facts, Objective, ObjectiveAnalysis, Quality
+from mros1_reasoner.ontology_files import read_ontologies
 from mros1_reasoner.reasoner import Assertion, Reasoner
 from mros1_reasoner.triples import (
+    Graph,
     Triple,
     TripleError,
     assertion_triple,
     iri_of,
     literal_of,
     local_name,
-    read_triples,
     write_ntriples,
 )
 
@@ -69,6 +69,7 @@ class KnowledgeBase:
         qualities: how levels compare, of every quality attribute by name.
         objectives: those that the models hold already, but for those that a grounding requires.
         component_statuses: statuses that the models assert.
+        files: all that was loaded, imports included, but for the package's own vocabulary.
         ontology: vocabulary, rules and models as N-Triples, without what comes as facts.
     """
 
@@ -92,7 +93,11 @@ class KnowledgeBase:
             raise KnowledgeBaseError("no application model is given: set model_file to an OWL file")
         own = own_ontologies()
         others = [path for path in vocabularies if path.resolve() not in {file.resolve() for file in own}]
-        graph = _Graph(_read_all(own, [*others, *models]))
+        try:
+            triples, self.files = read_ontologies(own, [*others, *models])
+        except TripleError as error:
+            raise KnowledgeBaseError(str(error)) from error
+        graph = Graph(triples)
         self._where = ", ".join(str(path) for path in models)
         self._functions = self._names(graph, (v.FUNCTION,), graph.objects(v.SOLVES_F) | graph.objects(v.TYPE_F))
         if not self._functions:
@@ -245,7 +250,7 @@ class KnowledgeBase:
 
     # Reading the models
 
-    def _names(self, graph: _Graph, classes: Iterable[str], also: Iterable[str]) -> dict[str, str]:
+    def _names(self, graph: Graph, classes: Iterable[str], also: Iterable[str]) -> dict[str, str]:
         """Return local name -> IRI of the individuals of the classes and of those that properties show to be one."""
         iris = {iri for name in classes for iri in graph.instances(name)} | set(also)
         result: dict[str, str] = {}
@@ -257,7 +262,7 @@ class KnowledgeBase:
                 )
         return result
 
-    def _quality(self, graph: _Graph, name: str, directions: Mapping[str, Direction]) -> Quality:
+    def _quality(self, graph: Graph, name: str, directions: Mapping[str, Direction]) -> Quality:
         """Return how levels of a quality compare: as given, else as the model says, else lower is better."""
         iri = self._quality_types[name]
         low, high = (self._bound(graph, iri, predicate) for predicate in (v.QA_MIN, v.QA_MAX))
@@ -276,14 +281,14 @@ class KnowledgeBase:
         direction = directions.get(name, direction if signs else quality.direction)
         return replace(quality, direction=direction, reaching_violates=reaching)
 
-    def _bound(self, graph: _Graph, quality: str, predicate: str) -> float | None:
+    def _bound(self, graph: Graph, quality: str, predicate: str) -> float | None:
         numbers = [_number(text) for text in graph.literals_of(quality, predicate)]
         if len(numbers) > 1 or not all(math.isfinite(number) for number in numbers):
             name = local_name(quality)
             raise KnowledgeBaseError(f"{self._where}: {local_name(predicate)} of {name} must be one finite number")
         return numbers[0] if numbers else None
 
-    def _design(self, graph: _Graph, name: str) -> Design:
+    def _design(self, graph: Graph, name: str) -> Design:
         iri = self._designs[name]
         functions = sorted(graph.objects_of(iri, v.SOLVES_F))
         if len(functions) != 1:
@@ -300,7 +305,7 @@ class KnowledgeBase:
             requires=tuple(sorted(local_name(f) for f in graph.objects_of(iri, v.REQUIRES_F))),
         )
 
-    def _objective(self, graph: _Graph, name: str) -> Objective:
+    def _objective(self, graph: Graph, name: str) -> Objective:
         iri = self._objectives[name]
         functions = graph.objects_of(iri, v.TYPE_F)
         if len(functions) != 1:
@@ -309,7 +314,7 @@ class KnowledgeBase:
         improves = {text in ("true", "1") for text in graph.literals_of(iri, v.O_ALWAYS_IMPROVE)}
         return Objective(name, self._function_name[functions.pop()], limits, improves.pop() if improves else None)
 
-    def _read_levels(self, graph: _Graph, owner: str, predicate: str) -> dict[str, float]:
+    def _read_levels(self, graph: Graph, owner: str, predicate: str) -> dict[str, float]:
         levels: dict[str, float] = {}
         for value in sorted(graph.objects_of(owner, predicate)):
             types = graph.objects_of(value, v.IS_QA_TYPE)
@@ -371,7 +376,7 @@ class KnowledgeBase:
         for function in self.functions:
             visit(function, ())
 
-    def _static(self, graph: _Graph) -> str:
+    def _static(self, graph: Graph) -> str:
         values = graph.instances(v.QA_VALUE) | {
             value
             for predicate in (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION)
@@ -428,160 +433,6 @@ class KnowledgeBase:
         for name, iri in self._designs.items():
             realisable = "false" if name in analysis.unrealisable else "true"
             yield Assertion(iri, v.FD_REALISABILITY, realisable, v.XSD + "boolean")
-
-
-class _Graph:
-    """Triples with the look-ups that reading a model needs; names are IRIs."""
-
-    def __init__(self, triples: Sequence[Triple]) -> None:
-        self.triples = triples
-        self._objects: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
-        self._subjects: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
-        self._literals: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
-        for subject, predicate, value in triples:
-            name, owner = iri_of(predicate), iri_of(subject)
-            literal = literal_of(value)
-            if literal is None:
-                self._objects[name][owner].add(iri_of(value))
-                self._subjects[name][iri_of(value)].add(owner)
-            else:
-                self._literals[name][owner].append(literal[0])
-
-    def instances(self, class_iri: str) -> set[str]:
-        return set(self._subjects[v.RDF_TYPE].get(class_iri, ()))
-
-    def subjects(self, predicate: str) -> set[str]:
-        return set(self._objects[predicate]) | set(self._literals[predicate])
-
-    def objects(self, predicate: str) -> set[str]:
-        return set(self._subjects[predicate])
-
-    def objects_of(self, subject: str, predicate: str) -> set[str]:
-        return set(self._objects[predicate].get(subject, ()))
-
-    def subjects_of(self, predicate: str, value: str) -> set[str]:
-        return set(self._subjects[predicate].get(value, ()))
-
-    def pairs(self, predicate: str) -> list[tuple[str, str]]:
-        return [(subject, value) for subject, values in self._objects[predicate].items() for value in sorted(values)]
-
-    def literals(self, predicate: str) -> list[tuple[str, str]]:
-        return [(subject, value) for subject, values in self._literals[predicate].items() for value in values]
-
-    def literals_of(self, subject: str, predicate: str) -> list[str]:
-        return self._literals[predicate].get(subject, [])
-
-
-def _read_all(own: Sequence[Path], others: Sequence[Path]) -> list[Triple]:
-    """Read the files and, from the folders they lie in, what they import."""
-    known = set()
-    triples: list[Triple] = []
-    queue = [(path, True) for path in own] + [(path, False) for path in others]
-    read: set[Path] = set()
-    imports: list[tuple[str, Path]] = []
-    while queue or imports:
-        if not queue:
-            iri, importer = imports.pop()
-            path = None if iri in known else _find_import(iri, importer)
-            if path is not None:
-                queue.append((path, False))
-            elif iri not in known:
-                _log.warning("%s imports <%s>, which is not among the given files: going on without", importer, iri)
-            known.add(iri)
-            continue
-        path, ours = queue.pop(0)
-        if path.resolve() in read:
-            continue
-        read.add(path.resolve())
-        try:
-            content = read_triples(path)
-        except TripleError as error:
-            raise KnowledgeBaseError(str(error)) from error
-        known |= {
-            iri_of(s).rstrip("#/") for s, p, o in content if iri_of(p) == v.RDF_TYPE and iri_of(o) == v.OWL_ONTOLOGY
-        }
-        imports += [(iri_of(o).rstrip("#/"), path) for _, p, o in content if iri_of(p) == v.OWL_IMPORTS]
-        content = _renamed(content, len(read))
-        triples += content if ours else _without_concluding_rules(content, path)
-    return list(dict.fromkeys(triples))
-
-
-def _find_import(iri: str, importer: Path) -> Path | None:
-    """Return the file beside the importing one that bears the last part of the IRI as its name, else the IRI itself."""
-    name = local_name(iri)
-    folder = importer.resolve().parent
-    for file_name in (name, f"{name}.owl", f"{name}.rdf"):
-        path = folder / file_name
-        if file_name and path.is_file() and path.parent == folder:
-            return path
-    bears = re.compile(rf"Ontology[^>]*\b(?:about|ontologyIRI)=[\"']{re.escape(iri)}[#/]?[\"']".encode())
-    for path in sorted([*folder.glob("*.owl"), *folder.glob("*.rdf")]):
-        try:
-            if bears.search(path.read_bytes()):
-                return path
-        except OSError:
-            continue
-    return None
-
-
-def _renamed(triples: Iterable[Triple], number: int) -> list[Triple]:
-    """Give blank nodes labels of their own, requiredBy its one IRI, and drop what is about the file itself."""
-
-    def term(text: str) -> str:
-        if text.startswith("_:"):
-            return f"_:f{number}x{text[2:]}"
-        if text.startswith("<") and local_name(text[1:-1]) == "requiredBy":
-            return f"<{v.REQUIRED_BY}>"
-        return text
-
-    def is_about_file(triple: Triple) -> bool:
-        predicate = iri_of(triple[1])
-        is_ontology = predicate == v.RDF_TYPE and iri_of(triple[2]) == v.OWL_ONTOLOGY
-        return predicate == v.OWL_IMPORTS or is_ontology or predicate.startswith(v.OWLREADY)
-
-    return [(term(s), term(p), term(o)) for s, p, o in triples if not is_about_file((s, p, o))]
-
-
-def _without_concluding_rules(triples: list[Triple], path: Path) -> list[Triple]:
-    """Set aside the rules that conclude a derived status: two values of one would contradict each other."""
-    by_subject: dict[str, list[Triple]] = defaultdict(list)
-    for triple in triples:
-        by_subject[triple[0]].append(triple)
-
-    def reach(node: str) -> set[str]:
-        """Return the node and the nodes of its lists and atoms, which belong to it alone."""
-        nodes, waiting = {node}, [node]
-        while waiting:
-            for _, _, value in by_subject[waiting.pop()]:
-                if value in by_subject and value not in nodes and _is_rule_part(by_subject[value]):
-                    nodes.add(value)
-                    waiting.append(value)
-        return nodes
-
-    dropped: set[str] = set()
-    labels = []
-    for rule in [s for s, p, o in triples if iri_of(p) == v.RDF_TYPE and iri_of(o) == v.SWRL + "Imp"]:
-        heads = [o for _, p, o in by_subject[rule] if iri_of(p) == v.SWRL + "head"]
-        concluded = {
-            iri_of(o)
-            for head in heads
-            for node in reach(head)
-            for _, p, o in by_subject[node]
-            if iri_of(p) == v.SWRL + "propertyPredicate"
-        }
-        statuses = concluded & set(v.DERIVED_STATUSES)
-        if statuses:
-            dropped |= reach(rule)
-            label = next((literal_of(o) for _, p, o in by_subject[rule] if iri_of(p) == v.RDFS_LABEL), None)
-            labels.append(label[0] if label else f"a rule for {local_name(sorted(statuses)[0])}")
-    if labels:
-        _log.warning("%s: its own rules are set aside, the generic ones hold: %s", path, ", ".join(sorted(labels)))
-    return [triple for triple in triples if triple[0] not in dropped]
-
-
-def _is_rule_part(statements: Sequence[Triple]) -> bool:
-    predicates = {iri_of(predicate) for _, predicate, _ in statements}
-    return v.RDF_FIRST in predicates or any(predicate.startswith(v.SWRL) for predicate in predicates)
 
 
 def _worst(causes: Iterable[str]) -> str:

@@ -13,30 +13,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from mros1_reasoner import vocabulary as v
-from mros1_reasoner.decision import ADVISED, DECIDED, EXECUTED, FAILED, OPERATOR, PROPOSED, Decision
+from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED, OPERATOR, PROPOSED, Decision
 from mros1_reasoner.deliberation import Deliberation, Timing
 from mros1_reasoner.knowledge_base import KnowledgeBase
 from mros1_reasoner.model import Analysis, Facts, Objective
 from mros1_reasoner.planner import Distance, Utility, difference
 from mros1_reasoner.reasoner import Reasoner
 from mros1_reasoner.settings import Settings
-from mros1_reasoner.state import BUSY, RECONFIGURING, RECOVERING, STABLE, Component, State
+from mros1_reasoner.state import BUSY, STABLE, Component, State
 from mros1_reasoner.utility import make_utility
-
-__all__ = [
-    "ADVISED",
-    "DECIDED",
-    "EXECUTED",
-    "FAILED",
-    "PROPOSED",
-    "RECONFIGURING",
-    "RECOVERING",
-    "STABLE",
-    "Decision",
-    "Mape",
-    "MapeError",
-    "Settings",
-]
 
 
 class MapeError(Exception):

@@ -13,8 +13,8 @@ import rospkg
 from ros_model.files import resolve
 
 from mros1_reasoner.knowledge_base import KnowledgeBase
-from mros1_reasoner.mape import Settings
 from mros1_reasoner.model import Direction, Objective
+from mros1_reasoner.settings import Settings
 from mros1_reasoner.utility import UtilityError, make_utility
 
 _log = logging.getLogger(__name__)

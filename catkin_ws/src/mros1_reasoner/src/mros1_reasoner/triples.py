@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import owlready2
 
 from mros1_reasoner.reasoner import Assertion
+from mros1_reasoner.vocabulary import RDF_TYPE
 
 Triple = tuple[str, str, str]
 
@@ -21,6 +23,56 @@ _ESCAPED = {"n": "\n", "r": "\r", "t": "\t", "b": "\b", "f": "\f"}
 
 class TripleError(Exception):
     """A file holds no readable triples."""
+
+
+class Graph:
+    """Triples with the look-ups that reading a model needs; names are IRIs, blank nodes their labels."""
+
+    def __init__(self, triples: Sequence[Triple]) -> None:
+        self.triples = triples
+        self._objects: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+        self._subjects: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+        self._literals: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
+        for subject, predicate, value in triples:
+            name, owner = iri_of(predicate), iri_of(subject)
+            literal = literal_of(value)
+            if literal is None:
+                self._objects[name][owner].add(iri_of(value))
+                self._subjects[name][iri_of(value)].add(owner)
+            else:
+                self._literals[name][owner].append(literal[0])
+
+    def instances(self, class_iri: str) -> set[str]:
+        """Return the individuals of a class."""
+        return set(self._subjects[RDF_TYPE].get(class_iri, ()))
+
+    def subjects(self, predicate: str) -> set[str]:
+        """Return what has the property."""
+        return set(self._objects[predicate]) | set(self._literals[predicate])
+
+    def objects(self, predicate: str) -> set[str]:
+        """Return what something has by the property."""
+        return set(self._subjects[predicate])
+
+    def objects_of(self, subject: str, predicate: str) -> set[str]:
+        """Return what a subject has by the property."""
+        return set(self._objects[predicate].get(subject, ()))
+
+    def subjects_of(self, predicate: str, value: str) -> set[str]:
+        """Return what has a value by the property."""
+        return set(self._subjects[predicate].get(value, ()))
+
+    def pairs(self, predicate: str) -> list[tuple[str, str]]:
+        """Return subject and value of each statement with the property."""
+        return [(subject, value) for subject, values in self._objects[predicate].items() for value in sorted(values)]
+
+    def literals(self, predicate: str) -> list[tuple[str, str]]:
+        """Return subject and text of each statement with the property."""
+        return [(subject, value) for subject, values in self._literals[predicate].items() for value in values]
+
+    def literals_of(self, subject: str, predicate: str) -> list[str]:
+        """Return the texts that a subject has by the property."""
+        return self._literals[predicate].get(subject, [])
 
 
 def read_triples(path: Path) -> list[Triple]:
