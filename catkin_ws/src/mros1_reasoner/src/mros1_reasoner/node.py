@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import logging
 import math
-import os
-import signal
 import sys
 import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
-import actionlib
-import rosgraph
 import rospy
-import yaml
-from actionlib_msgs.msg import GoalStatus, GoalStatusArray
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from actionlib_msgs.msg import GoalStatusArray
+from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_msgs import msg as messages
 from ros_model.errors import ModelError
 from std_msgs.msg import Bool
 
-from mros1_reasoner import journal, mape
+from mros1_reasoner import journal
 from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED, Decision
 from mros1_reasoner.diagnostics import (
     BindingFact,
@@ -37,13 +33,17 @@ from mros1_reasoner.diagnostics import (
     StaleFact,
     TaskFact,
 )
+from mros1_reasoner.ending_node import end, end_on_signals, start_node
 from mros1_reasoner.explain import line
+from mros1_reasoner.journal_node import JournalTopic
 from mros1_reasoner.knowledge_base import KnowledgeBase, KnowledgeBaseError
+from mros1_reasoner.mape import Mape, MapeError
 from mros1_reasoner.model import Facts, Objective
 from mros1_reasoner.parameters import ParameterError, Parameters
 from mros1_reasoner.pellet import make_reasoner
 from mros1_reasoner.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.record import fill_message, record_of
+from mros1_reasoner.requests_node import Requests
 from mros1_reasoner.services_node import Services
 from mros1_reasoner.tasks import newest_goal
 from mros1_reasoner.throttle import Throttle
@@ -51,11 +51,12 @@ from mros1_reasoner.throttle import Throttle
 _LOG = "[RosReasoner] -- %s"
 _TIMER_PERIOD = 0.02  # s, wall, the shortest between two looks at ROS time while the core waits for a moment
 _FASTEST = 10.0  # ROS time may run so much faster than wall time
-_MASTER_PERIOD = 1.0  # s, wall, between two looks at the master
-_SERVER_WAIT = 1.0  # s, wall, at most, for the connections to the manipulator
+_LONGEST_WAIT = 1.0  # s, wall, until it is seen that somebody has asked the node to end
 _WARM_UP = 4  # analyses before the node is ready: the JVM compiles what it has run
 _QUEUE = 1000  # diagnostics that wait at most
 _ANSWER_DEADLINE = 60.0  # s, wall, for a service; an analysis may have to start Pellet again
+
+_BAD_START = (ParameterError, KnowledgeBaseError, ReasonerError, ModelError, rospy.ROSInitException)
 
 _T = TypeVar("_T")
 
@@ -66,45 +67,35 @@ class ReasonerNode:
     Callbacks only queue what they get; everything else happens in the thread that calls `run`.
     """
 
-    def __init__(self) -> None:
-        """Read parameters and models, start Pellet, warm it up.
+    def __init__(self, reasoner: Reasoner) -> None:
+        """Read parameters and models, warm the reasoner up, offer and listen to all topics and services.
 
         Raises:
             ParameterError, KnowledgeBaseError, ModelError, ReasonerError: the node can't work.
         """
         parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
-        self._period, self._deadline = parameters.period, parameters.execution_deadline
-        files = [*parameters.model_files, *parameters.vocabulary_files]
-        self._reasoner: Reasoner = make_reasoner()
-        self.knowledge_base = parameters.knowledge_base()
-        objectives = parameters.objectives(self.knowledge_base)
-        settings = parameters.settings(self.knowledge_base)
-        self._reasoner.load(self.knowledge_base.ontology)
-        for path in files:
+        self._period = parameters.period
+        knowledge_base = parameters.knowledge_base()
+        objectives = parameters.objectives(knowledge_base)
+        settings = parameters.settings(knowledge_base)
+        reasoner.load(knowledge_base.ontology)
+        for path in knowledge_base.files:
             rospy.loginfo(f"Loaded ontology: {path}")
-        _warm_up(self.knowledge_base, self._reasoner, objectives)
+        _warm_up(knowledge_base, reasoner, objectives)
         name = f"{rospy.get_name().strip('/')}-{int(time.time())}"
-        self.core = mape.Mape(
-            self.knowledge_base, self._reasoner, objectives, settings, clock=rospy.get_time, name=name
-        )
+        self.core = Mape(knowledge_base, reasoner, objectives, settings, clock=rospy.get_time, name=name)
         self._waiting: deque[Callable[[], object]] = deque()
         self._wake = threading.Condition()
-        self._reader = DiagnosticsReader(
-            self.knowledge_base.qualities, self.knowledge_base.components, parameters.nodes
-        )
+        self._reader = DiagnosticsReader(knowledge_base.qualities, knowledge_base.components, parameters.nodes)
         self._throttle, self._levels_told = Throttle(), Throttle(self._period, burst=1)
         self._told: set[str] = set()
         self._taken_over: set[str] = set()
         self._goals: dict[str, tuple[str, bool]] = {}  # newest goal of an objective's task, and whether it failed
-        self._request_ends = math.inf  # wall time
-        self._goal: Any = None
-        self._failures, self._trouble = 0, ""
-        self._journal = _JournalTopic(name, parameters, files)
+        self._journal = JournalTopic(name, parameters, knowledge_base.files)
         self._decisions = rospy.Publisher("mros1_reasoner/decision", messages.Decision, queue_size=10, latch=True)
-        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
-        asks = parameters.asks and not settings.dry_run
-        action = parameters.action
-        self._client = actionlib.ActionClient(action, messages.MvpReconfigurationAction) if asks else None
+        self._requests = None
+        if parameters.asks and not settings.dry_run:
+            self._requests = Requests(parameters.action, parameters.execution_deadline, self._queue, self._report)
         self._listen(parameters.task_actions)
         self._services = Services(self, parameters.save_folder)
         for objective in objectives:
@@ -121,38 +112,32 @@ class ReasonerNode:
             rospy.Subscriber(f"{action}/status", GoalStatusArray, listen)
 
     def run(self) -> None:
-        """Work until the node is shut down or the master is gone."""
-        heartbeat = master_check = time.monotonic()
+        """Work until the node is shut down."""
+        heartbeat = time.monotonic()
         while not rospy.is_shutdown():
             now = time.monotonic()
-            if now >= master_check:
-                master_check = now + _MASTER_PERIOD
-                if not _master_answers():
-                    rospy.logerr(_LOG, "the ROS master is gone: shutting down; start the system again")
-                    rospy.signal_shutdown("the master is gone")
-                    break
             is_heartbeat = now >= heartbeat
             if is_heartbeat:
                 heartbeat = now + self._period
-                self._report_trouble()
             self._drain()
-            self._check_deadline()
+            if self._requests:
+                self._requests.look()
+                if is_heartbeat:
+                    self._requests.tell_trouble()
             self._take("step", is_heartbeat)
             self._journal.flush()
-            until = min(heartbeat, master_check, self._next_look())
+            until = min(heartbeat, now + _LONGEST_WAIT, self._next_look())
             with self._wake:
                 if not self._waiting:
                     self._wake.wait(max(0.0, until - time.monotonic()))
 
     def _next_look(self) -> float:
-        """Return the wall time at which to look whether the moment has come for which the core waits."""
-        ros_now = rospy.get_time()
+        """Return the wall time at which to look whether the moment has come for which the core or a request waits."""
+        ros_now, request = rospy.get_time(), self._requests.next_look if self._requests else math.inf
         due = self.core.due(ros_now)
-        return math.inf if due is None else time.monotonic() + max(_TIMER_PERIOD, (due - ros_now) / _FASTEST)
-
-    def close(self) -> None:
-        """End Pellet's process."""
-        self._reasoner.close()
+        if due is None:
+            return request
+        return min(request, time.monotonic() + max(_TIMER_PERIOD, (due - ros_now) / _FASTEST))
 
     # What comes in
 
@@ -170,7 +155,7 @@ class ReasonerNode:
                 return  # nobody waits any more
             try:
                 answer.set_result(work())
-            except (mape.MapeError, KnowledgeBaseError, ReasonerError, ValueError) as error:
+            except (MapeError, KnowledgeBaseError, ReasonerError, ValueError) as error:
                 answer.set_exception(error)
 
         self._queue(run)
@@ -235,7 +220,7 @@ class ReasonerNode:
         """Take something in and announce what follows; say what is wrong where it does not fit."""
         try:
             self._announce(self._applied(kind, *values))
-        except (mape.MapeError, KnowledgeBaseError) as error:
+        except (MapeError, KnowledgeBaseError) as error:
             self._warn(kind, str(error))
         except ReasonerError as error:
             self._warn("analysis", f"analysis failed: {error}")
@@ -286,8 +271,17 @@ class ReasonerNode:
         for decision in decisions:
             self._publish(decision)
             self._tell_decision(decision)
-            if decision.state == DECIDED:
-                self._execute(decision)
+            if decision.state != DECIDED:
+                continue
+            if self._requests:
+                self._requests.ask(decision.id, decision.to_configuration)
+            else:
+                self._report(decision.id, True)
+
+    def _report(self, decision: str, ok: bool, message: str = "", *, blame: bool = True) -> None:
+        """Take in how a decision went."""
+        self._take("result", decision, ok, message, blame)
+        self._queue(lambda: None)  # look at once at what happened meanwhile
 
     def _tell_decision(self, decision: Decision) -> None:
         if decision.state == EXECUTED:
@@ -304,75 +298,6 @@ class ReasonerNode:
         message = fill_message(messages.Decision(), record, rospy.Time.from_sec, messages)
         message.header.stamp = rospy.Time.now()
         self._decisions.publish(message)
-
-    def _execute(self, decision: Decision) -> None:
-        if self._client is None:
-            self._report(decision.id, True)
-            return
-        if not self._finds(self._client):
-            message = f"the manipulator's action server {rospy.resolve_name(self._client.ns)} is not there"
-            self._report(decision.id, False, message, blame=False)
-            return
-        self._request_ends = time.monotonic() + self._deadline
-        goal = messages.MvpReconfigurationGoal(desired_configuration_name=decision.to_configuration)
-        self._goal = self._client.send_goal(goal, transition_cb=lambda handle: self._on_transition(handle, decision.id))
-
-    def _finds(self, client: actionlib.ActionClient) -> bool:
-        """Look for the manipulator's action server; just after a start its connections may be on their way."""
-        until = time.monotonic() + _SERVER_WAIT
-        while not client.wait_for_server(rospy.Duration(-1)):  # one look: its own waiting needs a running clock
-            if time.monotonic() > until or rospy.is_shutdown():
-                return False
-            time.sleep(0.02)
-        return True
-
-    def _on_transition(self, handle: actionlib.ClientGoalHandle, decision_id: str) -> None:
-        if handle.get_comm_state() != actionlib.CommState.DONE:
-            return
-        status, result = handle.get_goal_status(), handle.get_result()
-        text = handle.get_goal_status_text()
-        code = result.result if result is not None else None
-        self._queue(lambda: self._take_result(decision_id, status, code, text))
-
-    def _take_result(self, decision_id: str, status: int, code: int | None, text: str) -> None:
-        if self.core.pending is None or self.core.pending.id != decision_id:
-            return  # it came after the deadline
-        ok = code == 1 and status == GoalStatus.SUCCEEDED
-        meanings = {0: "the manipulator restored the former one", -1: "the manipulator does not know it"}
-        reason = text or meanings.get(code if code is not None else -2, "the manipulator gave no result")
-        self._report(decision_id, ok, "" if ok else reason, blame=code in (0, -1))
-
-    def _check_deadline(self) -> None:
-        pending = self.core.pending
-        if pending is None or time.monotonic() < self._request_ends:
-            return
-        if self._goal is not None:
-            self._goal.cancel()
-        self._report(pending.id, False, f"no result within {self._deadline:g} s")
-
-    def _report(self, decision_id: str, ok: bool, message: str = "", *, blame: bool = True) -> None:
-        self._request_ends, self._goal = math.inf, None
-        was_in_trouble = bool(self._trouble)
-        self._failures, self._trouble = (0, "") if ok else (self._failures + 1, message)
-        self._take("result", decision_id, ok, message, blame)
-        if self._trouble or was_in_trouble:
-            self._report_trouble(is_over=ok)
-        self._queue(lambda: None)  # look at once at what happened meanwhile
-
-    def _report_trouble(self, *, is_over: bool = False) -> None:
-        """Publish the state of reconfigurations as a diagnostic while they fail, and once when they no longer do."""
-        if not self._trouble and not is_over:
-            return
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.OK if is_over else DiagnosticStatus.ERROR,
-            name=f"{rospy.get_name().strip('/')}: reconfiguration",
-            message="Reconfiguration works" if is_over else f"Reconfiguration fails: {self._trouble}",
-            hardware_id=rospy.get_name(),
-            values=[KeyValue("failed attempts in a row", str(self._failures))],
-        )
-        array = DiagnosticArray(status=[status])
-        array.header.stamp = rospy.Time.now()
-        self._diagnostics.publish(array)
 
     # What is logged
 
@@ -401,89 +326,27 @@ class ReasonerNode:
             rospy.logwarn(said) if is_published else rospy.logwarn(_LOG, said)
 
 
-class _JournalTopic:
-    """Publishes what the loop takes in, so that a bag holds what a replay needs; a new subscriber gets what was before.
-
-    The loop's thread appends and flushes; subscribers come in rospy's threads.
-    """
-
-    def __init__(self, name: str, parameters: Parameters, files: list[Any]) -> None:
-        self._name = name
-        self._parameters = yaml.safe_dump(dict(parameters.values))
-        self._files = [str(path) for path in files]
-        self._contents = [path.read_text(encoding="utf-8", errors="replace") for path in files]
-        self._journal = journal.Journal()
-        self._lock = threading.Lock()
-        self._fresh: list[journal.Entry] = []
-        self._first = 0
-        listener = rospy.SubscribeListener()
-        listener.peer_subscribe = lambda _topic, _publish, publish_to_peer: publish_to_peer(self._beginning())
-        self._publisher = rospy.Publisher(
-            "mros1_reasoner/journal", messages.ReasonerJournal, subscriber_listener=listener, queue_size=1000
-        )
-
-    def append(self, item: journal.Entry) -> None:
-        """Add an entry."""
-        with self._lock:
-            number = self._journal.append(item)
-        if not self._fresh:
-            self._first = number
-        self._fresh.append(item)
-
-    def flush(self) -> None:
-        """Publish the entries since the last flush."""
-        fresh, self._fresh = self._fresh, []
-        if fresh and self._publisher.get_num_connections():
-            self._publisher.publish(self._message(self._first, fresh))
-
-    def _beginning(self) -> messages.ReasonerJournal:
-        with self._lock:
-            first, entries = self._journal.snapshot()
-        message = self._message(first, entries)
-        message.parameters, message.files, message.contents = self._parameters, self._files, self._contents
-        return message
-
-    def _message(self, first: int, entries: list[journal.Entry]) -> messages.ReasonerJournal:
-        message = messages.ReasonerJournal(name=self._name, first=first)
-        message.header.stamp = rospy.Time.now()
-        message.entries = [messages.JournalEntry(item.now, item.kind, list(item.values)) for item in entries]
-        return message
-
-
-class _Ended(BaseException):
-    """A signal asks the process to end."""
-
-
 def main() -> None:
     """Run the node; exit status 2 when it can't start."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _end)
-    node = None
+    end_on_signals()
     try:
-        rospy.init_node("reasoner", disable_signals=True)
+        reasoner = make_reasoner()  # its process gets ready while this one goes on
+        start_node("reasoner")
         logger = logging.getLogger("mros1_reasoner")
         logger.setLevel(logging.INFO)
         logger.propagate = False
         logger.addHandler(_RosLog())
-        node = ReasonerNode()
-        node.run()
-    except (ParameterError, KnowledgeBaseError, ReasonerError, ModelError, rospy.ROSInitException) as error:
-        sys.stderr.write(f"reasoner: {' '.join(str(error).split())}\n")
-        sys.stderr.flush()
-        rospy.signal_shutdown("it can't start")
-        os._exit(2)  # rospy's threads would keep the process
-    except _Ended:
-        rospy.signal_shutdown("it was asked to end")
-    finally:
-        if node is not None:
-            node.close()
-
-
-def _end(*_: object) -> None:
-    """Unwind the main thread; rospy's own handler calls the master from here, and hangs where a call is under way."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-    raise _Ended
+        ReasonerNode(reasoner).run()
+    except Exception as error:
+        if rospy.is_shutdown():
+            pass  # the end has cut a call short
+        elif isinstance(error, _BAD_START):
+            sys.stderr.write(f"reasoner: {' '.join(str(error).split())}\n")
+            end("it can't start", 2)
+        else:
+            traceback.print_exc()
+            end("it has failed", 1)
+    end("it was asked to end")
 
 
 class _RosLog(logging.Handler):
@@ -505,11 +368,3 @@ def _warm_up(knowledge_base: KnowledgeBase, reasoner: Reasoner, objectives: tupl
     )
     for _ in range(_WARM_UP):
         knowledge_base.analyse(facts, reasoner)
-
-
-def _master_answers() -> bool:
-    try:
-        rosgraph.Master(rospy.get_name()).getPid()
-    except (OSError, rosgraph.MasterException):
-        return False
-    return True
