@@ -28,9 +28,12 @@ class Diagnostics:
         with self._changed:
             self._seen.clear()
 
-    def statuses(self, name, message):
+    def all(self):
         with self._changed:
-            return [status for _, status in self._seen if (status.name, status.message) == (name, message)]
+            return [status for _, status in self._seen]
+
+    def statuses(self, name, message):
+        return [status for status in self.all() if (status.name, status.message) == (name, message)]
 
     def wait(self, what, condition, timeout=40.0):
         """Return arrival time and status of the first one that meets the condition since the last `forget`."""

@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 """A node with the interfaces that its arguments name: pub=TOPIC:TYPE[@HZ], sub=TOPIC:TYPE, srv=NAME.
 
+act=NAME:TYPE serves an action, ask=NAME:TYPE is a client of it.
+
 What it publishes changes with each message, or what ~mode says: "quiet" nothing, "stuck" the same again and again.
 """
 
 import itertools
 import sys
 
+import actionlib
 import roslib.message
 import rospy
 from std_msgs.msg import String
@@ -29,6 +32,10 @@ class Node:
         text, _, rate = text.partition("@")
         topic, _, type_name = text.partition(":")
         message_class = roslib.message.get_message_class(type_name)
+        if kind == "act":
+            return actionlib.ActionServer(topic, message_class, lambda _: None, auto_start=False).start()
+        if kind == "ask":
+            return actionlib.ActionClient(topic, message_class)
         if kind == "sub":
             return rospy.Subscriber(topic, message_class, lambda _: None)
         publisher = rospy.Publisher(topic, message_class, queue_size=1)

@@ -139,7 +139,7 @@ def test_parameter_of_the_system_is_compared_but_not_what_only_describes_it():
         ("/talker", "/talker"),
         ("/listener", "/listener_1700000000000"),
         ("/pub_11_1600000000000", "/pub_4711_1700000000000"),
-        ("/twin", None),
+        ("/twin", "/twin_1_1700000000001"),
     ],
 )
 def test_anonymous_instance_stands_for_a_node_of_the_model(name, found):

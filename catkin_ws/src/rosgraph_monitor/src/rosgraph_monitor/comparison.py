@@ -89,7 +89,8 @@ def compare(
         if running:
             live[component.name] = Live(component, snapshot.nodes[running])
         else:
-            missing.append(MissingNode(component.graph_name, *dead.get(name, NOT_REGISTERED)))
+            state = dead.get(instance(name, dead) or name, NOT_REGISTERED)
+            missing.append(MissingNode(component.graph_name, *state))
     additional = [
         AdditionalNode(name)
         for name in (relative(node, scope.namespace) for node in sorted(alive - expected))

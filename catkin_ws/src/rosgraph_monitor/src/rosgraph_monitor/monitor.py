@@ -195,8 +195,9 @@ class GraphMonitor:
         )
         expected |= dict.fromkeys(self._component_of)
         conditions = {}
+        candidates = {name for name, known in life.items() if known in _CONDITION}
         for name in expected:
-            running = instance(resolved(name, self._scope.namespace), life.keys())
+            running = instance(resolved(name, self._scope.namespace), candidates)
             condition = NodeCondition.GONE if running is None else self._condition(life[running])
             conditions[name] = condition
             if condition is NodeCondition.ALIVE:

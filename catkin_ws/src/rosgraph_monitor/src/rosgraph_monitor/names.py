@@ -62,12 +62,11 @@ def is_ignored_port(name: str, node: str, patterns: Iterable[str]) -> bool:
 
 
 def instance(name: str, nodes: Collection[str]) -> str | None:
-    """Return the running node that a resolved name of the model stands for: itself, else its one anonymous instance."""
+    """Return the node that a resolved name of the model stands for: itself, else the first anonymous instance of it."""
     if name in nodes:
         return name
     stem = _stem(name)
-    found = [node for node in nodes if node.startswith(stem) and node != stem and _stem(node) == stem]
-    return found[0] if len(found) == 1 else None
+    return min((node for node in nodes if node.startswith(stem) and node != stem and _stem(node) == stem), default=None)
 
 
 def _stem(name: str) -> str:
