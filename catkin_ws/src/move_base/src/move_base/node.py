@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import logging
 import math
-import os
 import queue
 import sys
 import threading
@@ -28,6 +26,7 @@ from sensor_msgs.msg import LaserScan, PointCloud2
 from std_srvs.srv import Empty, EmptyResponse
 
 from move_base.costmap import CostmapError, StaticMap, occupancy_values
+from move_base.ending_node import end_in_time
 from move_base.geometry import STOP, Pose, Velocity
 from move_base.global_planner import PlanningError
 from move_base.navigator import Navigator, Outcome
@@ -464,7 +463,11 @@ class _CostmapDisplay:
 
 def main() -> None:
     """Entry point of the node."""
-    rospy.init_node("move_base")
+    try:
+        rospy.init_node("move_base")
+    except (rospy.ROSInitException, OSError) as error:
+        sys.stderr.write(f"move_base: no master: {error}\n")
+        sys.exit(2)
     cv2.setNumThreads(1)  # the grids are small: threads cost more than they give
     tree = rospy.get_param("~", {})
     tree = tree if isinstance(tree, dict) else {}
@@ -473,21 +476,8 @@ def main() -> None:
     except ParameterError as error:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
         sys.exit(2)
-    rospy.core.add_shutdown_hook(_exit)  # comes after rospy's own, in their order
+    end_in_time()
     MoveBaseNode(parameters, tree, _resumed_goal(tree.pop("resume_goal", None))).run()
-
-
-def _exit(reason: str) -> None:
-    """Ends the process at once when the master knows of its end: who replaces it waits for that.
-
-    Threads of actionlib and rospy, and a wait for the next tick of a simulated clock, would keep it for half a second.
-    """
-    if reason == "atexit":  # it ends already, with a status of its own
-        return
-    logging.shutdown()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(0)
 
 
 def _resumed_goal(value: object) -> MoveBaseActionGoal | None:

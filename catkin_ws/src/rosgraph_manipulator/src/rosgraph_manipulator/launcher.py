@@ -393,12 +393,12 @@ class Launcher:
 
     def _ask_to_end(self, names: list[str]) -> None:
         """Ask nodes over their own API, side by side: a hung one must not keep the others waiting."""
-        alive = [name for name in names if self._nodes[name].process is not None]
+        alive = [(name, node.process) for name in names if (node := self._nodes[name]).process is not None]
         if not alive:
             return
         pool = ThreadPoolExecutor(ASK_THREADS, thread_name_prefix="ask to end")
-        for name in alive:
-            pool.submit(NodeApi.request_shutdown, name, REASON)
+        for name, process in alive:
+            pool.submit(_ask_to_end, name, process)
         pool.shutdown(wait=False)
 
     def _end(self, names: list[str], forget: Iterable[str] = (), patience: bool = True) -> None:
@@ -422,6 +422,11 @@ class Launcher:
                 forget_node(name)
             except MasterError as error:
                 self._log(f"node {name} may still be listed: {error}")
+
+
+def _ask_to_end(name: str, process: Process) -> None:
+    if not NodeApi.request_shutdown(name, REASON) and process.status is None:
+        process.signal(signal.SIGINT)  # it is not registered yet, or does not listen
 
 
 def _kind(command: Command) -> tuple[Any, ...]:

@@ -21,6 +21,7 @@ from metacontrol_msgs.msg import LauncherState, Phase
 from metacontrol_msgs.srv import ChangeConfiguration, ChangeConfigurationRequest, ChangeConfigurationResponse
 
 from rosgraph_manipulator.launcher import Launcher, LauncherError, Options
+from rosgraph_manipulator.lifetime_node import LONGEST_END, cut_off, on_signal, tell_loss
 from rosgraph_manipulator.master import MasterWatch
 from rosgraph_manipulator.settings import SettingError, boolean, number
 from rosgraph_manipulator.supervision import RestartPolicy
@@ -46,23 +47,32 @@ class LauncherNode:
         self._wake_read, self._wake_write = os.pipe()
         os.set_blocking(self._wake_write, False)
         self._ends = ""
+        self._master_is_lost = False
         self._changed_at = time.monotonic()
-        for kind in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(kind, lambda received, _frame: self.end(f"signal {received}"))
+        # Twice: a change that is under way ends first, then all.
+        self._cut_off = cut_off(LONGEST_END + 2 * (options.shutdown_timeout + options.sigint_timeout))
+        on_signal(self.end)  # the main thread stops the nodes first
+        rospy.on_shutdown(lambda: self.end("it was asked to end"))
         self._state = rospy.Publisher("~state", LauncherState, queue_size=10, latch=True)
         self._launcher = Launcher(options, self._publish, rospy.logwarn)
         self._publish()
-        self._watch = MasterWatch(lambda: self.end("the master is lost"))
+        self._watch = MasterWatch(self._on_master_loss)
         self._service = rospy.Service("~change", ChangeConfiguration, self._on_change)
 
     def end(self, reason: str) -> None:
         """Have the main thread end the node."""
         self._ends = self._ends or reason
+        self._cut_off.set()
         self._wake()
+
+    def _on_master_loss(self) -> None:
+        tell_loss("its nodes are stopped, and it ends")
+        self._master_is_lost = True
+        self.end("the master is lost")
 
     def spin(self) -> None:
         """Serve requests and look after the nodes until the node is told to end; then stop what runs."""
-        while not self._ends and not rospy.is_shutdown():
+        while not self._ends:
             self._wait()
             with contextlib.suppress(queue.Empty):
                 job = self._jobs.get_nowait()
@@ -73,12 +83,9 @@ class LauncherNode:
             if self._jobs.empty() and time.monotonic() - self._changed_at > STANDBY_DELAY:
                 self._launcher.stand_by()
         self._watch.close()
-        lost = self._ends == "the master is lost"
-        if lost:
-            sys.stderr.write(f"rosgraph_launcher: {self._ends}: its nodes are stopped, and it ends\n")
-        self._launcher.close(gently=not lost)
-        if not lost:
-            rospy.signal_shutdown(self._ends)
+        self._launcher.close(gently=not self._master_is_lost)
+        cut_off(LONGEST_END).set()
+        rospy.signal_shutdown(self._ends)
 
     def _wait(self) -> None:
         due = self._launcher.next_due()
@@ -100,7 +107,7 @@ class LauncherNode:
         self._jobs.put(job)
         self._wake()
         while not job.done.wait(0.5):
-            if rospy.is_shutdown() or self._ends:
+            if self._ends:
                 raise rospy.ServiceException("the launcher is shutting down")
         return job.answer
 
@@ -116,9 +123,7 @@ class LauncherNode:
         )
 
     def _publish(self) -> None:
-        launcher = self._launcher if hasattr(self, "_launcher") else None
-        if launcher is None:
-            return  # it is being made, and nothing runs
+        launcher = self._launcher
         message = LauncherState(
             configuration=launcher.configuration,
             change=launcher.changes,
@@ -156,7 +161,7 @@ def read_options() -> Options:
 def main() -> None:
     """Run the node; exit status 2 when it can't start."""
     try:
-        # Signals are for the main thread, which first stops the nodes.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # as with SIGTERM, nothing is to be ended yet
         rospy.init_node("rosgraph_launcher", disable_signals=True)
         node = LauncherNode(read_options())
     except (rospy.ROSInitException, SettingError, OSError) as error:

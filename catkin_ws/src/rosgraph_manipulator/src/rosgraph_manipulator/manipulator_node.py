@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import sys
 import threading
@@ -28,7 +29,8 @@ from rosgraph_manipulator.deployment import CancelledError, DeploymentError, Out
 from rosgraph_manipulator.description import compare
 from rosgraph_manipulator.goal_node import PendingGoal
 from rosgraph_manipulator.journal import Journal, Resumption, parse_journal, resume
-from rosgraph_manipulator.master import MasterWatch
+from rosgraph_manipulator.lifetime_node import end_without_master, init_node
+from rosgraph_manipulator.master import MasterError, MasterWatch, set_parameters
 from rosgraph_manipulator.platform_node import RosPlatform
 from rosgraph_manipulator.request_queue import Policy, RequestQueue
 from rosgraph_manipulator.settings import SettingError, choice, number
@@ -115,7 +117,7 @@ class Manipulator:
         running = known.get(self._resumption.running)
         wanted = known.get(self._resumption.deploy)
         self._last_good = known.get(self._resumption.last_good)
-        self._watch = MasterWatch(self._on_master_loss, heartbeat=self._heartbeat)
+        self._watch = MasterWatch(end_without_master, heartbeat=self._heartbeat)
         rospy.on_shutdown(self._close)
         if running:
             self._running = self._last_good = running
@@ -136,11 +138,6 @@ class Manipulator:
         self._watch.close()
         self._note(ended=True)
 
-    def _on_master_loss(self) -> None:
-        sys.stderr.write("rosgraph_manipulator: the master is lost: the manipulator ends\n")
-        self._watch.close()
-        rospy.signal_shutdown("the master is lost")
-
     def _heartbeat(self) -> None:
         if time.time() - self._journal.alive > HEARTBEAT_PERIOD:
             self._note()
@@ -155,10 +152,8 @@ class Manipulator:
                 alive=time.time(),
                 ended=ended,
             )
-            try:
-                rospy.set_param("~journal", self._journal.as_parameter())
-            except (rospy.ROSException, OSError):
-                return  # without a master there is nobody to read it
+            with contextlib.suppress(MasterError):  # without a master there is nobody to read it
+                set_parameters({rospy.resolve_name("~journal"): self._journal.as_parameter()})
 
     # -- requests -------------------------------------------------------------------------------------------------
 
@@ -394,7 +389,7 @@ def read_file(name: str) -> dict[str, Any]:
 def main() -> None:
     """Run the node; exit status 2 when its configuration cannot be used."""
     try:
-        rospy.init_node("rosgraph_manipulator")
+        init_node("rosgraph_manipulator")
         settings = parse_settings(read_parameters(rospy.myargv()[1:]))
         initial = str(rospy.get_param("~initial_configuration", ""))
         if initial and initial not in settings.configurations:

@@ -15,7 +15,8 @@ import rosgraph
 
 CALL_TIMEOUT = 1.0  # s, wall
 WATCH_PERIOD = 0.4  # s, wall, between two calls that see whether the master is there
-LOST_AFTER = 1.2  # s, wall, without an answer, after which it counts as lost: noticed within 2 s
+LOST_AFTER = 1.2  # s, wall, without an answer, after which a master that nobody listens for is lost: noticed within 2 s
+SILENT_AFTER = 10.0  # s, wall, the same for one that may just be overloaded
 CALLER = "/rosgraph_manipulator"
 
 _TRANSPORT_ERRORS = (OSError, xmlrpc.client.Error, http.client.HTTPException)
@@ -188,7 +189,7 @@ class MasterWatch:
         """Begin to watch.
 
         Args:
-            on_loss: called once, in a thread of its own, when the master was not there for LOST_AFTER.
+            on_loss: called once, in a thread of its own, when the master is lost.
             heartbeat: called, in that thread, after each answer.
         """
         self._on_loss = on_loss
@@ -204,19 +205,17 @@ class MasterWatch:
     def _run(self) -> None:
         seen, master_pid = time.monotonic(), None
         while not self._end.wait(WATCH_PERIOD):
-            pid = self._pid()
-            if pid is not None and master_pid in (None, pid):
-                seen, master_pid = time.monotonic(), pid
-                if self._heartbeat:
-                    self._heartbeat()
-            elif pid is not None or time.monotonic() - seen > LOST_AFTER:
+            try:
+                pid = int(_master().getPid(f"{CALLER}_{os.getpid()}")[2])
+            except (*_TRANSPORT_ERRORS, LookupError, TypeError, ValueError) as error:
+                patience = LOST_AFTER if isinstance(error, ConnectionRefusedError) else SILENT_AFTER
+                if time.monotonic() - seen > patience:
+                    break
+                continue
+            if master_pid not in (None, pid):
                 break  # another master at the same address knows nothing of us
+            seen, master_pid = time.monotonic(), pid
+            if self._heartbeat:
+                self._heartbeat()
         if not self._end.is_set():
             self._on_loss()
-
-    @staticmethod
-    def _pid() -> int | None:
-        try:
-            return int(_master().getPid(f"{CALLER}_{os.getpid()}")[2])
-        except (*_TRANSPORT_ERRORS, LookupError, TypeError, ValueError):
-            return None

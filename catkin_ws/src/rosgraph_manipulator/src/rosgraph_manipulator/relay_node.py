@@ -12,6 +12,7 @@ import rospy
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
 
 from rosgraph_manipulator.configuration import ConfigurationError, action_type
+from rosgraph_manipulator.lifetime_node import end_without_master, init_node
 from rosgraph_manipulator.master import MasterWatch
 from rosgraph_manipulator.relay import Ending, Link
 
@@ -106,7 +107,7 @@ class Relay:
 def main() -> None:
     """Run the node; exit status 2 where it is not told what to relay."""
     try:
-        rospy.init_node("action_relay")
+        init_node("action_relay")
         names = [rospy.get_param(f"~{key}", "") for key in ("action", "server")]
         if not all(isinstance(name, str) and name for name in names) or names[0] == names[1]:
             raise ConfigurationError("parameters '~action' and '~server' must be two different names of actions")
@@ -118,10 +119,5 @@ def main() -> None:
         sys.stderr.write(f"action_relay: {' '.join(str(error).split())}\n")
         sys.exit(2)
     relay = Relay(names[0], names[1], message_class)
-    MasterWatch(_on_master_loss)
+    MasterWatch(end_without_master)
     relay.spin()
-
-
-def _on_master_loss() -> None:
-    sys.stderr.write("action_relay: the master is lost: the relay ends\n")
-    rospy.signal_shutdown("the master is lost")
