@@ -14,11 +14,16 @@ from mros1_reasoner.planner import Situation, difference, plan
 from mros1_reasoner.settings import Settings
 
 D2 = Path(__file__).parents[3] / "catkin_ws" / "src" / "metacontrol_sim" / "models" / "d2.owl"
+START = "f2_v2_r2"
 ONSET, DURATION = 20.0, 300.0  # s: when the power consumption rises, and how long the mission is
 
 
 def use_of(design):
     return design.expected.get("use", 0.0)
+
+
+def expected_energy(d2, design=START):
+    return d2.designs[design].expected["energy"]
 
 
 @dataclass
@@ -75,19 +80,19 @@ def mission(d2, pellet):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("factor", [1.6, 2.0])
 def test_lasting_power_increase_leads_to_few_adaptations_and_then_to_rest(mission, factor, seed):
-    done = mission(factor, seed).run("f2_v2_r2")
+    done = mission(factor, seed).run(START)
     assert 1 <= len(done.adaptations) <= 2, done.adaptations
     assert max(when for when, _ in done.adaptations) < DURATION / 3
     assert "_v1_" in done.adaptations[-1][1], "the slow variants are the best there is"
 
 
 def test_after_the_adaptation_the_energy_is_below_its_threshold_where_that_is_possible(mission):
-    done = mission(1.6).run("f2_v2_r2")
+    done = mission(1.6).run(START)
     assert done.above / (DURATION - ONSET) < 0.25
 
 
 def test_without_correction_designs_are_tried_one_after_the_other(mission):
-    corrected, plain = mission(2.0).run("f2_v2_r2"), mission(2.0, correct_expected=False).run("f2_v2_r2")
+    corrected, plain = mission(2.0).run(START), mission(2.0, correct_expected=False).run(START)
     assert len(plain.adaptations) > 2 * len(corrected.adaptations)
 
 
@@ -95,37 +100,38 @@ def test_robot_as_expected_is_left_alone(mission):
     assert mission(1.0).run("f1_v1_r1").adaptations == []
 
 
-def test_decision_tells_the_factor(mission):
+def test_decision_tells_the_factor(mission, d2):
     core = mission(1.6).core
-    core.observe_active(0.0, "f_navigate", "f2_v2_r2", "STABLE")
+    core.observe_active(0.0, "f_navigate", START, "STABLE")
     for now in (1.0, 2.0, 3.0):
-        core.observe_level(now, "energy", 0.57 * 1.6)
+        core.observe_level(now, "energy", 1.6 * expected_energy(d2))
         decisions = core.step(now)
     (decision,) = decisions
     (text,) = decision.corrections
     assert text == (
-        "energy was 1.6 times what was expected of f2_v2_r2: 1.6 times (at most 2.5) is expected of the others"
+        f"energy was 1.6 times what was expected of {START}: 1.6 times (at most 2.5) is expected of the others"
     )
     assert text in decision.explanation
     refused = {c.design.name: c.refused_because for c in decision.candidates}
-    assert refused["f1_v2_r1"].startswith("energy 0.768 (expected, times 1.6) > 0.62")
-    assert decision.to_configuration == "f1_v1_r1"
+    level = 1.6 * expected_energy(d2, "f1_v2_r1")
+    assert refused["f1_v2_r1"].startswith(f"energy {level:.3g} (expected, times 1.6) > 0.62")
+    assert "_v1_" in decision.to_configuration
 
 
 @pytest.mark.parametrize(("ratio", "factor"), [(0.5, 1.0), (1.2, 1.2), (9.0, 2.5)])
-def test_factor_is_bounded_and_never_makes_things_look_better(mission, ratio, factor):
+def test_factor_is_bounded_and_never_makes_things_look_better(mission, d2, ratio, factor):
     core = mission(1.0).core
-    core.observe_active(0.0, "f_navigate", "f2_v2_r2", "STABLE")
+    core.observe_active(0.0, "f_navigate", START, "STABLE")
     for now in range(300):
-        core.observe_level(now, "energy", 0.57 * ratio)
+        core.observe_level(now, "energy", ratio * expected_energy(d2))
     assert core._deliberation.factors("o_navigate", 300.0)["energy"] == pytest.approx(factor, abs=0.01)
 
 
-def test_what_was_learnt_of_one_design_holds_for_the_next(mission):
+def test_what_was_learnt_of_one_design_holds_for_the_next(mission, d2):
     core = mission(1.6).core
-    core.observe_active(0.0, "f_navigate", "f2_v2_r2", "STABLE")
+    core.observe_active(0.0, "f_navigate", START, "STABLE")
     for now in (1.0, 2.0, 3.0):
-        core.observe_level(now, "energy", 0.57 * 1.6)
+        core.observe_level(now, "energy", 1.6 * expected_energy(d2))
         decisions = core.step(now)
     core.report(4.0, decisions[0].id, True)
     core.observe_component(5.0, "front_laser", "FALSE")
