@@ -22,7 +22,6 @@ _NODE = _PACKAGES / "mros1_reasoner" / "nodes" / "reasoner"
 _MODEL = _PACKAGES / "metacontrol_sim" / "models" / "d2.owl"
 _LAST = "/reasoner/save_knowledge_base"  # what the node offers last, when it listens to all else
 _STARTS = 5
-_SETTLE_S = 5.0  # the JVM goes on compiling for a while
 _IDLE_S = 20.0
 _DEADLINE_S = 60.0
 
@@ -35,7 +34,6 @@ def run() -> list[dict[str, Any]]:
             with _reasoner(uri, environment) as (process, took):
                 ready.append(took)
                 if number == _STARTS - 1:
-                    time.sleep(_SETTLE_S)
                     idle, memory = _idle(process)
     return [
         _entry("reasoner_ready", statistics.median(ready), "s", _STARTS),

@@ -3,11 +3,14 @@
 
 import unittest
 
+import actionlib
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
+from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
 from metacontrol_msgs.srv import Feasible
-from reasoner_harness import Diagnostics, Manipulator, Reasoner, status, wait_for
+from reasoner_harness import DEADLINE_S, Diagnostics, Manipulator, Reasoner, status, wait_for
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
 PACKAGE = "metacontrol_tests"
@@ -67,6 +70,19 @@ class LifecycleTest(unittest.TestCase):
             reasoner.listener.decided("EXECUTED")
             self.assertEqual(manipulator.requests, ["camera_slow"])
 
+    def test_simulated_time_that_does_not_run_yet_is_waited_for(self):
+        manipulator = Manipulator("/clock")
+        manipulator.announce("scan_slow")
+        rospy.set_param("/use_sim_time", True)  # heeded by the nodes that start from now on
+        self.addCleanup(rospy.set_param, "/use_sim_time", False)
+        with self.reasoner("/clock") as reasoner:
+            reasoner.listener.logged("f_move runs scan_slow")
+            self.diagnostics.component("laser", "FALSE")
+            self.assertEqual(reasoner.listener.decided("FAILED").to_configuration, "camera_slow")
+            self.assertEqual(manipulator.requests, [])
+            rospy.Publisher("/clock", Clock, queue_size=1, latch=True).publish(rospy.Time(10))
+            self.assertEqual(reasoner.listener.decided("EXECUTED").to_configuration, "camera_slow")
+
     def test_restarted_reasoner_takes_over_what_runs(self):
         manipulator = Manipulator("/again")
         manipulator.announce("scan_slow")
@@ -103,6 +119,21 @@ class LifecycleTest(unittest.TestCase):
             errors.publish(True)
             second = reasoner.listener.decided("EXECUTED", 2)
             self.assertEqual((second.trigger, second.from_configuration), ("task:o_moveA", first.to_configuration))
+
+    def test_aborted_goal_of_its_action_violates_an_objective(self):
+        manipulator = Manipulator("/aborted")
+        manipulator.announce("scan_slow")
+        drive = Manipulator("/aborted/drive")  # serves an action; which one, does not matter
+        drive.result = 0
+        action = "drive/rosgraph_manipulator_action_server"
+        with self.reasoner("/aborted", task_actions=f"{{o_moveA: {action}}}") as reasoner:
+            reasoner.listener.logged("f_move runs scan_slow")
+            client = actionlib.SimpleActionClient(f"/aborted/{action}", MvpReconfigurationAction)
+            self.assertTrue(client.wait_for_server(rospy.Duration(DEADLINE_S)))
+            client.send_goal(MvpReconfigurationGoal("somewhere"))
+            done = reasoner.listener.decided("EXECUTED")
+            self.assertEqual((done.trigger, done.from_configuration), ("task:o_moveA", "scan_slow"))
+            self.assertIn(f"a goal of {action} was aborted", done.explanation)
 
 
 if __name__ == "__main__":

@@ -193,16 +193,6 @@ class Mape:
     # What an operator asks for
 
     @property
-    def paused(self) -> bool:
-        """Whether nothing is decided at present."""
-        return self._paused
-
-    @property
-    def locked(self) -> frozenset[str]:
-        """Objectives that keep the configuration they have."""
-        return frozenset(self._state.locked)
-
-    @property
     def proposal(self) -> Decision | None:
         """The decision that waits for approval."""
         return self._state.proposal
