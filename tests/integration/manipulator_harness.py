@@ -65,7 +65,7 @@ def configuration(**arguments):
 
 CONFIGURATIONS = {
     "slow": configuration(period="slow"),
-    "fast": configuration(period="fast"),
+    "fast": {**configuration(period="fast"), "topics": ["wait/status"]},
     "exits": configuration(args="--exit-at-once"),
     "hangs": configuration(args="--hang"),
     "stubborn": configuration(args="--stubborn"),

@@ -8,11 +8,13 @@ import actionlib
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalID, GoalStatus
-from manipulator_harness import DEADLINE_S, PairTest, pid_of, wait_for
+from manipulator_harness import CONFIGURATIONS, DEADLINE_S, PairTest, pid_of, wait_for
 from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
 
 
 class RequestsTest(PairTest):
+    # The manipulator publishes cmd_vel, and no node of the configuration does.
+    configurations = {**CONFIGURATIONS, "mute": {**CONFIGURATIONS["fast"], "topics": ["wait/status", "cmd_vel"]}}
     manipulator_parameters = {"settle_time": 0.2, "probation": 0.0}
 
     @classmethod
@@ -54,6 +56,13 @@ class RequestsTest(PairTest):
     def finish(handle):
         wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, "the request has a result")
         return handle.get_goal_status(), handle.get_result() and handle.get_result().result
+
+    def test_configuration_without_its_topics_is_not_ready(self):
+        self.restart_with(ready_timeout=10.0)
+        self.addCleanup(self.restart_with, ready_timeout=30.0)
+        self.assertEqual(self.request("mute"), 0)
+        self.assertIn("not all of the topics /cmd_vel, /wait/status are published", self.text)
+        self.wait_for_state("slow")
 
     def test_requests_wait_for_their_turn(self):
         self.restart_with(concurrency="wait")

@@ -69,6 +69,11 @@ def test_variants_load_with_their_values(robot):
     assert repr(config.params["/move_base/controller_frequency"].value) == "10.0"
 
 
+def test_manipulator_waits_for_what_others_need_of_a_variant(robot):
+    manipulator = yaml.safe_load((robot / "config/rosgraph_manipulator.yaml").read_text())
+    assert manipulator["configurations"]["calm"]["topics"] == ["cmd_vel"]
+
+
 def test_ontology_and_configuration_agree(robot):
     designs = KnowledgeBase([robot / "models/d2.owl"]).designs
     manipulator = yaml.safe_load((robot / "config/rosgraph_manipulator.yaml").read_text())

@@ -23,7 +23,7 @@ class ConfigurationError(Exception):
 class Configuration:
     """One way to deploy a function: a launch file with its arguments (`NAME:=VALUE`).
 
-    It counts as ready only when the topics are published.
+    It counts as ready only when its nodes publish the topics.
     """
 
     name: str

@@ -121,15 +121,15 @@ def publishers(topic: str) -> set[str]:
     return set(dict(_system_state()[0]).get(topic, ()))
 
 
-def advertised(nodes: Iterable[str] | None = None) -> set[str]:
-    """Return the topics that the nodes (None: all) publish, and the services that they offer.
+def advertised(nodes: Iterable[str]) -> set[str]:
+    """Return the topics that nodes publish, and the services that they offer.
 
     Raises:
         MasterError: the master does not answer.
     """
-    wanted = None if nodes is None else set(nodes)
+    wanted = set(nodes)
     topics, _, services = _system_state()
-    return {name for name, owners in (*topics, *services) if wanted is None or wanted & set(owners)}
+    return {name for name, owners in (*topics, *services) if wanted & set(owners)}
 
 
 def services_of(node: str) -> list[str]:

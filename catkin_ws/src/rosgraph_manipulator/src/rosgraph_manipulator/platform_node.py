@@ -161,7 +161,8 @@ class RosPlatform:
         assert self._wanted is not None  # noqa: S101
         topics = {rospy.resolve_name(topic) for topic in self._wanted.topics}
         if topics:
-            self._wait(lambda: topics <= advertised(), deadline, f"one of the topics {', '.join(topics)} is missing")
+            what = f"not all of the topics {', '.join(sorted(topics))} are published"
+            self._wait(lambda: topics <= self._published(), deadline, what)
         if self._goal is not None and (self._new_server or between_servers):
             goal = self._goal
             self._wait(lambda: goal.server_is_new, deadline, "its action server is not up")
@@ -294,6 +295,9 @@ class RosPlatform:
                 self.stop_robot()  # before a new driver begins
             self._news.notify_all()
         self._on_state(state)
+
+    def _published(self) -> set[str]:
+        return advertised(self.launcher.nodes if self.launcher else ())
 
     def _is_up(self, node: str) -> bool:
         state = self.launcher
