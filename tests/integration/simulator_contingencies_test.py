@@ -86,6 +86,18 @@ class ContingenciesTest(unittest.TestCase):
         self.assertTrue(self.strike(kind="thaw", target="/rear_laser").success)
         self.assertIsNotNone(self.rear.wait(lambda _scan: True, since=count))
 
+    def test_2_spoilt_driver_repeats_itself_or_jumps_until_thawed(self):
+        stamps = lambda count: [m.header.stamp for m in self.rear.messages[-count:]]  # noqa: E731
+        self.assertTrue(self.strike(kind="repeat", target="/rear_laser").success)
+        self.assertTrue(becomes(lambda: len(set(stamps(4))) == 1))
+        self.assertTrue(self.strike(kind="jump", target="/rear_laser").success)
+        self.assertTrue(becomes(lambda: any(b < a for a, b in zip(stamps(3), stamps(3)[1:], strict=False))))
+        self.assertTrue(self.strike(kind="thaw", target="/rear_laser").success)
+        self.assertTrue(becomes(lambda: stamps(4) == sorted(set(stamps(4)))))
+        refused = self.strike(kind="jump", target="/simulator")
+        self.assertFalse(refused.success)
+        self.assertIn("no driver", refused.message)
+
     def test_3_what_makes_no_sense_is_refused_with_a_reason(self):
         for request, reason in (
             ({"kind": "explode", "target": "camera"}, "no kind"),

@@ -135,7 +135,8 @@ def test_mission_gives_its_seed_to_clutter_without_one():
 def test_broken_component_is_called_as_the_trigger_of_a_decision():
     for kind in ("kill", "stop", "freeze"):
         assert parse_contingency(f"{kind}:camera").event == "component:camera"
-    assert parse_contingency("thaw:camera").event == "thaw:camera"
+    for kind in ("thaw", "repeat", "jump"):
+        assert parse_contingency(f"{kind}:camera").event == f"{kind}:camera"
     assert [parse_contingency(text).event for text in ("power:1.60", "clutter:7")] == ["power:1.6", "clutter:7"]
 
 

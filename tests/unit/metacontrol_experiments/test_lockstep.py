@@ -110,6 +110,21 @@ def test_frozen_laser_that_thaws_is_waited_for(tmp_path):
     assert outcome.state.outcome is Outcome.REACHED
 
 
+def test_laser_that_repeats_itself_is_not_believed_until_it_thaws(tmp_path):
+    strikes = ("repeat:front_laser@time:2", "thaw:front_laser@time:8")
+    outcome = Lockstep(settings(tmp_path, *strikes), PACKAGE).run()
+    assert outcome.state.outcome is Outcome.REACHED
+    seconds = outcome.record.poses[:, 0] - outcome.state.started_s
+    standing = outcome.record.poses[(seconds > 4.0) & (seconds < 8.0), 1:]
+    assert len(standing) > 100 and np.ptp(standing, axis=0).max() < 0.01
+
+
+def test_laser_whose_stamps_jump_still_leads_to_the_goal(tmp_path):
+    outcome = Lockstep(settings(tmp_path, "jump:front_laser@time:2"), PACKAGE).run()
+    assert outcome.state.outcome is Outcome.REACHED
+    assert summarise(outcome.record)["collisions"] == 0
+
+
 def test_camera_variant_drives(tmp_path):
     camera = settings(tmp_path, initial_configuration="f2_v1_r3_k")
     assert Lockstep(camera, PACKAGE).run().state.outcome is Outcome.REACHED

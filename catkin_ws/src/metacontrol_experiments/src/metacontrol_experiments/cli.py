@@ -98,8 +98,8 @@ class _Number(click.FloatRange):
     "contingencies",
     multiple=True,
     metavar="KIND:WHAT[@WHEN]",
-    help="What goes wrong, any number of times: kill:, stop:, freeze: or thaw:COMPONENT, power:FACTOR, clutter:NUMBER, "
-    "light:0..1; at share:0..1 of the way, time:SECONDS or place:X,Y. Clutter lies there from the start.",
+    help="What goes wrong, any number of times: kill:, stop:, freeze:, thaw:, repeat: or jump:COMPONENT, power:FACTOR, "
+    "clutter:NUMBER, light:0..1; at share:0..1 of the way, time:SECONDS or place:X,Y. Clutter is there from the start.",
 )
 @click.option("--timeline", type=click.Path(path_type=Path), help="YAML file of contingencies.")
 @click.option(

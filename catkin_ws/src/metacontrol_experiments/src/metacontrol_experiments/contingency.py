@@ -36,6 +36,8 @@ class Kind(Enum):
     STOP = "stop"
     FREEZE = "freeze"
     THAW = "thaw"
+    REPEAT = "repeat"
+    JUMP = "jump"
     POWER = "power"
     CLUTTER = "clutter"
     LIGHT = "light"
@@ -47,11 +49,16 @@ class Kind(Enum):
 
     @property
     def breaks_component(self) -> bool:
-        """Whether the component does not work afterwards."""
-        return self.hits_component and self is not Kind.THAW
+        """Whether the component's node does not run afterwards."""
+        return self in (Kind.KILL, Kind.STOP, Kind.FREEZE)
+
+    @property
+    def spoils_data(self) -> bool:
+        """Whether the component's node runs on with something wrong in its data."""
+        return self in (Kind.REPEAT, Kind.JUMP)
 
 
-_OF_COMPONENTS = (Kind.KILL, Kind.STOP, Kind.FREEZE, Kind.THAW)
+_OF_COMPONENTS = (Kind.KILL, Kind.STOP, Kind.FREEZE, Kind.THAW, Kind.REPEAT, Kind.JUMP)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import numpy as np
 import rospkg
 import yaml
 from metacontrol_sim.clutter import ClutterError, scatter
+from metacontrol_sim.faults import Fault, Outlet
 from metacontrol_sim.geometry import Pose
 from metacontrol_sim.grid_messages import occupancy_grid
 from metacontrol_sim.messages import stamp
@@ -108,24 +109,36 @@ class Drivers:
         self._camera_rng = np.random.default_rng([seed, 8])
         camera = simulation.robot.camera
         self._projector = DepthProjector(camera.width, camera.height, camera.field_of_view)
-        self.silent: dict[str, Kind] = {}  # component -> what made it so
+        self._silent: dict[str, Kind] = {}  # component -> what made it so
+        self._outlets = {"front_laser": Outlet(), "camera": Outlet(), "rear_laser": Outlet()}
+
+    def strike(self, kind: Kind, component: str) -> None:
+        """Let something happen to a driver; only what was frozen thaws."""
+        if kind.spoils_data:
+            self._outlets[component].fault = Fault(kind.value)
+        elif kind is not Kind.THAW:
+            self._silent[component] = kind
+        else:
+            self._outlets[component].fault = None
+            if self._silent.get(component) is Kind.FREEZE:
+                del self._silent[component]
 
     def message(self, topic: str, stamp: Any) -> Any | None:
         """Return a driver's message, a ROS one so that navigation takes it as on ROS; None where it is silent."""
         robot = self._simulation.robot
         if topic == "front/scan":
-            if "front_laser" in self.silent:
+            if "front_laser" in self._silent:
                 return None
             laser = robot.front_laser
             ranges = self._simulation.scan(laser)
             noisy = measure_ranges(ranges, laser.range_min, laser.range_max, LASER_NOISE, self._laser_rng)
-            return laser_scan(laser, noisy, stamp)
+            return self._outlets["front_laser"].pass_on(laser_scan(laser, noisy, stamp))
         if topic.strip("/") == "camera/depth/points":
-            if "camera" in self.silent:
+            if "camera" in self._silent:
                 return None
             depth = measure_depth(self._simulation.depth_image(), self._simulation.light, DEPTH_NOISE, self._camera_rng)
             points = self._projector.points(depth, robot.camera.range_min, robot.camera.range_max)
-            return point_cloud(points, robot.camera.mount.frame, stamp)
+            return self._outlets["camera"].pass_on(point_cloud(points, robot.camera.mount.frame, stamp))
         raise LockstepError(f"navigation wants {topic}, which no driver publishes in lockstep")
 
 
@@ -343,11 +356,8 @@ class Lockstep:
         """
         simulation, kind = self._simulation, contingency.kind
         if kind.hits_component:
-            if kind is not Kind.THAW:
-                self._drivers.silent[contingency.target] = kind
-            elif self._drivers.silent.get(contingency.target) is Kind.FREEZE:
-                del self._drivers.silent[contingency.target]
-            if self._manager is not None:
+            self._drivers.strike(kind, contingency.target)
+            if self._manager is not None and not kind.spoils_data:
                 self._manager.component_changed(simulation.time, contingency.target, kind is Kind.THAW)
             return {"how": kind.value}
         if kind is Kind.POWER:

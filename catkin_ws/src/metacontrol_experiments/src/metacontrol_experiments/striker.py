@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import rosgraph
 import rospy
 from metacontrol_sim.clutter import ClutterError, scatter
+from metacontrol_sim.faults import SIGNALS, Fault
 from metacontrol_sim.geometry import Pose
 from metacontrol_sim.grid_messages import GridMessageError, read_grid
 from metacontrol_sim.srv import (
@@ -39,6 +40,8 @@ _SIGNALS = {
     Kind.STOP: signal.SIGINT,
     Kind.FREEZE: signal.SIGSTOP,
     Kind.THAW: signal.SIGCONT,
+    Kind.REPEAT: SIGNALS[Fault.REPEAT],
+    Kind.JUMP: SIGNALS[Fault.JUMP],
 }
 _WAIT_S = 10.0
 _CALL_S = 2.0
@@ -104,7 +107,10 @@ class Striker:
         pid = self._pids.get(node) or self._pid_of(node)
         if not self._owns(pid):
             raise StrikeError(f"{node} (pid {pid}) is not a process that may be struck from here")
-        os.kill(pid, _SIGNALS[contingency.kind])
+        number = _SIGNALS[contingency.kind]
+        if contingency.kind.spoils_data and not _handles(pid, number):
+            raise StrikeError(f"{node} (pid {pid}) is no driver whose data can be spoilt")
+        os.kill(pid, number)
         if contingency.kind is Kind.FREEZE:
             self._pids[node] = pid
         else:
@@ -143,6 +149,13 @@ class Striker:
             return told
 
         return call
+
+
+def _handles(pid: int, number: int) -> bool:
+    """Whether a process takes a signal that would end it otherwise."""
+    with open(f"/proc/{pid}/status", encoding="ascii", errors="replace") as status:
+        caught = next((line.split()[1] for line in status if line.startswith("SigCgt:")), "0")
+    return bool(int(caught, 16) >> (number - 1) & 1)
 
 
 def serve(strike: Callable[[Contingency], None], seed: int) -> rospy.Service:

@@ -10,6 +10,7 @@ import rospy
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Float32
 
+from metacontrol_sim.faults import Outlet
 from metacontrol_sim.parameters import ParameterError, number, seed
 from metacontrol_sim.sensor_messages import point_cloud, read_depth
 from metacontrol_sim.sensors import DepthProjector, SensorError, measure_depth
@@ -34,6 +35,8 @@ class CameraNode(rospy.SubscribeListener):
         self._light = 1.0
         self._projector: DepthProjector | None = None
         self._depth: rospy.Subscriber | None = None
+        self._outlet = Outlet()
+        self._outlet.listen()
         self._lock = threading.Lock()
         self._points = rospy.Publisher("camera/depth/points", PointCloud2, subscriber_listener=self, queue_size=1)
         self._lamp = rospy.Subscriber("simulator/light", Float32, self._on_light, queue_size=1)
@@ -67,7 +70,7 @@ class CameraNode(rospy.SubscribeListener):
         except SensorError as error:
             rospy.logwarn_throttle(10.0, f"simulator/depth refused: {error}")
             return
-        self._points.publish(point_cloud(points, "camera_link", image.header.stamp))
+        self._points.publish(self._outlet.pass_on(point_cloud(points, "camera_link", image.header.stamp)))
 
 
 def main() -> int:

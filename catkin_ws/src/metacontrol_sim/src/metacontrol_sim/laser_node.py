@@ -8,6 +8,7 @@ import numpy as np
 import rospy
 from sensor_msgs.msg import LaserScan
 
+from metacontrol_sim.faults import Outlet
 from metacontrol_sim.parameters import ParameterError, number, seed
 from metacontrol_sim.sensors import SensorError, measure_ranges
 
@@ -30,6 +31,8 @@ class LaserNode(rospy.SubscribeListener):
         self._noise = number(rospy.get_param("~noise", 0.01), "~noise", 0.0, 1.0)
         self._rng = np.random.default_rng([seed(rospy.get_param("~seed", 0)), SIDES[side]])
         self._rays: rospy.Subscriber | None = None
+        self._outlet = Outlet()
+        self._outlet.listen()
         self._lock = threading.Lock()
         self._scan = rospy.Publisher(
             f"{side}/scan", LaserScan, subscriber_listener=self, queue_size=1, tcp_nodelay=True
@@ -56,7 +59,7 @@ class LaserNode(rospy.SubscribeListener):
             return
         rays.header.frame_id = self._frame
         rays.ranges = ranges.tolist()
-        self._scan.publish(rays)
+        self._scan.publish(self._outlet.pass_on(rays))
 
 
 def main(side: str) -> int:

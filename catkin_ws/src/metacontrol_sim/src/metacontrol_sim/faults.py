@@ -1,0 +1,56 @@
+"""Devices that go wrong while their driver runs on: data that repeat, stamps that jump."""
+
+from __future__ import annotations
+
+import signal
+from enum import Enum
+from typing import Any
+
+JUMP_S = 10.0
+"""So far ahead of the clock are stamps that have jumped."""
+
+
+class Fault(Enum):
+    """What is wrong with a device."""
+
+    REPEAT = "repeat"
+    JUMP = "jump"
+
+
+SIGNALS = {Fault.REPEAT: signal.SIGRTMIN + 1, Fault.JUMP: signal.SIGRTMIN + 2, None: signal.SIGCONT}
+"""By which signal a driver's process is told; the last one: nothing is wrong any more. Handlers of several signals run in
+the order of their numbers, and that of SIGCONT may wait for a while: so the others' numbers are higher."""
+
+
+class Outlet:
+    """What a driver's messages pass through.
+
+    Attributes:
+        fault: REPEAT: the last message is sent again and again. JUMP: every other stamp is ahead of its time.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a fault."""
+        self.fault: Fault | None = None
+        self._last: Any = None
+        self._ahead = False
+
+    def listen(self) -> None:
+        """Take faults by signals (in a process's main thread only)."""
+        for number in SIGNALS.values():
+            signal.signal(number, self._on_signal)
+
+    def pass_on(self, message: Any) -> Any:
+        """Return what is sent in place of a message with a header."""
+        if self.fault is Fault.REPEAT and self._last is not None:
+            return self._last
+        self._last = message
+        if self.fault is Fault.JUMP:
+            self._ahead = not self._ahead
+            if self._ahead:
+                stamp = message.header.stamp
+                message.header.stamp = type(stamp)(stamp.secs + int(JUMP_S), stamp.nsecs)
+        return message
+
+    def _on_signal(self, number: int, _frame: object) -> None:
+        self.fault = next(fault for fault, known in SIGNALS.items() if known == number)
