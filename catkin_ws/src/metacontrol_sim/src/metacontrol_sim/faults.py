@@ -18,8 +18,11 @@ class Fault(Enum):
 
 
 SIGNALS = {Fault.REPEAT: signal.SIGRTMIN + 1, Fault.JUMP: signal.SIGRTMIN + 2, None: signal.SIGCONT}
-"""By which signal a driver's process is told; the last one: nothing is wrong any more. Handlers of several signals run in
-the order of their numbers, and that of SIGCONT may wait for a while: so the others' numbers are higher."""
+"""By which signal a driver's process is told; the last one: nothing is wrong any more.
+
+Handlers of several signals run in the order of their numbers, and that of SIGCONT may wait for a while: so the others'
+numbers are higher.
+"""
 
 
 class Outlet:
