@@ -110,6 +110,7 @@ def test_claim_that_does_not_hold_shows():
 def test_one_seed_has_no_interval():
     text = variant_table.markdown([a_run(), a_run("f1_v2_r1", duration_s=30.0)])
     assert "| 40.00 |" in text and "±" not in text
+    assert "| needs more seeds |" in text
 
 
 def test_command_drives_once_and_writes_levels_only_when_all_variants_are_measured(tmp_path, monkeypatch):

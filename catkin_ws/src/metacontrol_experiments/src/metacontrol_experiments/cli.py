@@ -79,7 +79,12 @@ class _Number(click.FloatRange):
     "--seed", type=click.IntRange(0), default=1, show_default=True, help="Of everything random in the simulation."
 )
 @click.option("--route", default="r1", show_default=True, help="One of the routes.")
-@click.option("--initial-configuration", default="f2_v2_r2", show_default=True, help="The variant deployed first.")
+@click.option(
+    "--initial-configuration",
+    default=Settings.initial_configuration,
+    show_default=True,
+    help="The variant deployed first.",
+)
 @click.option(
     "--failure", help="Component whose node is killed, or none.  [default: front_laser, without other contingencies]"
 )

@@ -5,6 +5,7 @@ Every figure is a mean over routes for each seed, then over seeds, with Student'
 
 from __future__ import annotations
 
+import math
 import re
 import statistics
 from dataclasses import dataclass
@@ -89,8 +90,9 @@ def _comparisons(runs: Sequence[Run]) -> Iterable[str]:
         gains = [Interval(sign * gain.mean, gain.half) for gain in gains]
         if gains:
             clear = sum(gain.mean > gain.half for gain in gains)
+            told = f"{clear} of {len(gains)}" if math.isfinite(gains[0].half) else "needs more seeds"
             mean, least = statistics.fmean(gain.mean for gain in gains), min(gains, key=lambda gain: gain.mean)
-            cells = (claim, part, f"{mean:.{figure.digits}f}", least.text(figure.digits), f"{clear} of {len(gains)}")
+            cells = (claim, part, f"{mean:.{figure.digits}f}", least.text(figure.digits), told)
             rows.append(f"| {' | '.join(cells)} |")
     if rows:
         yield "| claim | pairs that differ in | mean difference | the least | clear at 95 % |"
