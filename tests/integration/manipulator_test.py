@@ -59,10 +59,15 @@ class ManipulatorTest(unittest.TestCase):
         before = pid_of("/wait_server")
         self.assertEqual(self.request("fast"), 1)
         wait_for(lambda: self.is_stable("fast"), "fast is stable")
-        self.assertEqual(self.active.function, "f_wait")
+        self.assertEqual(self.active.function, "f_navigate")
         self.assertNotEqual(pid_of("/wait_server"), before)
         self.assertFalse(is_alive(before))
         self.assertEqual(rospy.get_param("/wait_server/period"), "fast")
+
+    def test_keys_of_the_file_become_parameters_as_published(self):
+        command = "roslaunch metacontrol_tests server.launch period:=fast"
+        self.assertEqual(rospy.get_param("/configurations/fast/command"), command)
+        self.assertEqual(rospy.get_param("/save_action"), "wait")
 
     def test_running_configuration_is_left_alone(self):
         before = pid_of("/wait_server")
