@@ -15,6 +15,7 @@ from __future__ import annotations
 import csv
 import itertools
 import multiprocessing
+import signal
 import statistics
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass, fields
@@ -124,7 +125,8 @@ def drive(jobs: Sequence[Job], routes: Path, commit: str, processes: int) -> Ite
         yield from (_drive(job, routes, commit) for job in jobs)
         return
     # Spawned: PyBullet and numpy's threads do not survive a fork.
-    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+    spawn, ignore = multiprocessing.get_context("spawn"), (signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for this process
+    with ProcessPoolExecutor(processes, spawn, signal.signal, ignore) as pool:
         pending = [pool.submit(_drive, job, routes, commit) for job in jobs]
         try:
             for run in pending:
