@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from rosgraph_manipulator.configuration import Configuration
-from rosgraph_manipulator.tactics import Plan
+from rosgraph_manipulator.tactics import Plan, SetParameters
 from rosgraph_manipulator.tactics import Platform as StepPlatform
 
 
@@ -128,7 +128,7 @@ def deploy(
 
 def _carry_out(platform: Platform, plan: Plan, watch: Stopwatch) -> None:
     for step in plan.steps:
-        with watch.phase("change"):
+        with watch.phase("set" if isinstance(step, SetParameters) else "change"):
             step.run(platform)
     with watch.phase("ready"):
         platform.wait_until_ready()

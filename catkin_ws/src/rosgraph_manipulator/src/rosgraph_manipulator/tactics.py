@@ -17,7 +17,7 @@ from rosgraph_manipulator.description import Difference
 
 PACKAGE = "rosgraph_manipulator"
 
-PARAMETERS_COST, RESTART_COST, REPLACE_COST = 0.05, 0.8, 1.2
+PARAMETERS_COST, RESTART_COST, REPLACE_COST = 0.05, 0.6, 1.2
 """Seconds, to compare plans by: measured with D2's move_base (tests/bench/reconfigure_*.py); a restart counts once,
 since nodes start side by side."""
 
