@@ -2,9 +2,10 @@
 
 import time
 
-from diagnostic_msgs.msg import DiagnosticStatus
-from rosgraph_monitor.observer import TopicObserver
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from rosgraph_monitor.observer import Observer, ServiceObserver, TopicObserver
 from std_msgs.msg import Float32
+from std_srvs.srv import Trigger
 
 
 class FailingObserver(TopicObserver):
@@ -55,3 +56,25 @@ class HealthyObserver(TopicObserver):
 
     def calculate_attr(self, msgs):
         return self.qa_status(msgs[0].data)
+
+
+class ServedQualityObserver(ServiceObserver):
+    """Reads its level from the answer of a service; written as for the published monitor."""
+
+    def __init__(self, name):
+        super(ServedQualityObserver, self).__init__(name, "/served_level", Trigger)  # noqa: UP008 - as published
+
+    def diagnostics_from_response(self, resp):
+        status = DiagnosticStatus(level=DiagnosticStatus.OK, message="QA status")
+        status.values.append(KeyValue("served", resp.message))
+        return [status]
+
+
+class TimelessObserver(Observer):
+    """Does without the time; written as for the published monitor."""
+
+    def __init__(self, name):
+        super(TimelessObserver, self).__init__(name)  # noqa: UP008 - as published
+
+    def generate_diagnostics(self):
+        return [DiagnosticStatus(name="timeless", message="QA status", values=[KeyValue("timeless", "0.25")])]

@@ -9,7 +9,9 @@ from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from metacontrol_msgs.srv import ListObservers, LoadObserver, UnloadObserver
 from monitor_common import Diagnostics
+from rosgraph_msgs.msg import Log
 from std_msgs.msg import Bool, Float32
+from std_srvs.srv import Trigger, TriggerResponse
 
 SHIPPED = {"ObjectiveErrorObserver", "LocalizationQualityObserver", "CpuLoadQualityObserver"}
 
@@ -61,16 +63,32 @@ class MonitorObserversTest(unittest.TestCase):
         self.assertFalse(self.load("monitor_broken_import:Observer").ok)
 
     def test_observers_that_raise_quit_or_hang_stop_no_other(self):
+        log = []
+        rosout = rospy.Subscriber("/rosout", Log, lambda msg: log.append(msg.msg))
+        self.addCleanup(rosout.unregister)
         for name in ("FailingObserver", "QuittingObserver", "HangingObserver", "HealthyObserver"):
             self.loaded(name)
         self.wait_qa("FailingObserver", "ValueError: no sense in 0.5")
         self.wait_qa("QuittingObserver", "SystemExit")
         status = self.wait_qa("HangingObserver", "observer hangs")
         self.assertEqual(status.message, "QA stale")
+        for name in ("FailingObserver", "QuittingObserver"):  # which have failed dozens of times by now
+            self.assertLessEqual(sum(f"{name} fails" in line for line in log), 5, log)
         self.seen.forget()
         self.assertEqual(float(self.wait_qa("HealthyObserver").values[0].value), 0.5)
         self.assertTrue(self.unload("monitor_observers:HangingObserver").ok)
         self.assertNotIn("monitor_observers:HangingObserver", self.active().types)
+
+    def test_published_observer_of_a_service_is_stale_until_there_is_one(self):
+        self.loaded("ServedQualityObserver")
+        self.assertEqual(self.wait_qa("ServedQualityObserver", "unavailable").message, "QA stale")
+        service = rospy.Service("served_level", Trigger, lambda _: TriggerResponse(True, "0.75"))
+        self.assertEqual(self.wait_qa("ServedQualityObserver").values[0].value, "0.75")
+        service.shutdown()
+
+    def test_published_observer_that_does_without_the_time(self):
+        self.loaded("TimelessObserver")
+        self.assertEqual(self.wait_qa("TimelessObserver").values[0].value, "0.25")
 
     def test_aborted_goal_is_told_on_obj_error(self):
         heard = []

@@ -31,6 +31,11 @@ def test_topic_may_bring_its_first_message_within_the_grace():
     assert said(followed, 5.1) == ["Silent topic"]
 
 
+@pytest.mark.parametrize(("ros", "wall"), [(60.0, 4.0), (4.0, 60.0)])
+def test_neither_a_fast_simulation_nor_a_paused_one_shortens_the_grace(ros, wall):
+    assert health(max_age=1.0).judge(ros, wall)[0].message == ""
+
+
 def test_silence_is_told_when_the_last_message_is_too_old():
     followed = health(max_age=1.0)
     followed.arrived("scan", 2.0, 2.0)

@@ -136,9 +136,10 @@ def verdict_statuses(verdicts: Iterable[Verdict]) -> list[Status]:
 
 @dataclass
 class _Seen:
-    """History of a topic. `since`: when its silence began to count."""
+    """History of a topic. `since`, `since_wall`: when its silence began to count."""
 
     since: float
+    since_wall: float
     last: float | None = None
     arrivals: deque[float] = field(default_factory=deque)
     digest: object = None
@@ -152,7 +153,8 @@ class TopicHealth:
         """Start with nothing to follow.
 
         Args:
-            grace: seconds in which a topic may bring its first message.
+            grace: seconds, wall time and the topic's own, in which a topic may bring its first message: a fast
+                simulation starts no faster for it, and a paused one brings nothing.
         """
         self._grace = grace
         self._specs: dict[str, TopicSpec] = {}
@@ -163,7 +165,8 @@ class TopicHealth:
         """Follow these topics from now on, and forget others. Times in s."""
         self._specs = {name: spec for name, spec in specs.items() if spec.is_watched}
         self._seen = {
-            name: self._seen.get(name, _Seen(wall if spec.wall_time else ros)) for name, spec in self._specs.items()
+            name: self._seen.get(name, _Seen(wall if spec.wall_time else ros, wall))
+            for name, spec in self._specs.items()
         }
 
     def arrived(self, topic: str, ros: float, wall: float, digest: object = None) -> None:
@@ -189,17 +192,17 @@ class TopicHealth:
         for name, spec in self._specs.items():
             now = wall if spec.wall_time else ros
             if not spec.wall_time and (jumped or self._seen[name].since <= 0.0):
-                self._seen[name] = _Seen(now)
+                self._seen[name] = _Seen(now, wall)
             if name in excused:
-                self._seen[name] = _Seen(now)
+                self._seen[name] = _Seen(now, wall)
                 verdicts.append(Verdict(spec, heard=False))
             else:
-                verdicts.append(self._judge(spec, self._seen[name], now))
+                verdicts.append(self._judge(spec, self._seen[name], now, wall))
         return verdicts
 
-    def _judge(self, spec: TopicSpec, seen: _Seen, now: float) -> Verdict:
+    def _judge(self, spec: TopicSpec, seen: _Seen, now: float, wall: float) -> Verdict:
         if seen.last is None:
-            waited = now - seen.since
+            waited = min(now - seen.since, wall - seen.since_wall)
             if waited <= max(self._grace, spec.max_age):
                 return Verdict(spec, heard=False)
             return Verdict(spec, SILENT_TOPIC, f"no message in {waited:.1f} s", "messages", "none")

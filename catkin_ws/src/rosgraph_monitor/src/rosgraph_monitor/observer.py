@@ -8,6 +8,7 @@ runs them.
 
 from __future__ import annotations
 
+import inspect
 import math
 import re
 from collections import deque
@@ -18,7 +19,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rosgraph_monitor.status import QA_STALE, QA_STATUS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from ros_model.metamodel import RosSystem
 
@@ -43,13 +44,13 @@ class Observer:
     defaults: Mapping[str, Any] = {}
     """The observer's own settings with their default values, found in `self.settings`."""
 
-    def __init__(self, name: str, rate_hz: float) -> None:
+    def __init__(self, name: str, loop_rate_hz: float = 1.0) -> None:
         """Name the observer and set its rate in Hz of ROS time."""
-        if not rate_hz > 0.0:
-            raise ValueError(f"observer {name}: rate {rate_hz} Hz must be positive")
+        if not loop_rate_hz > 0.0:
+            raise ValueError(f"observer {name}: rate {loop_rate_hz} Hz must be positive")
         self._id = ""
         self._name = name
-        self._rate = float(rate_hz)
+        self._rate = float(loop_rate_hz)
         self._last_qa_name = ""
         self._reported: float | None = None
         self.settings: dict[str, Any] = dict(self.defaults)
@@ -108,13 +109,18 @@ class Observer:
         return []
 
     def generate_diagnostics(self, now: float) -> list[DiagnosticStatus]:
-        """Return the statuses of this evaluation. Raises StaleInputError."""
+        """Override: return the statuses of this evaluation, or raise StaleInputError.
+
+        An override in the published form does without `now`.
+        """
         raise NotImplementedError
 
     def evaluate(self, now: float) -> list[DiagnosticStatus]:
         """Evaluate at ROS time `now` in s, and turn stale input and values that are no numbers into "QA stale"."""
         try:
-            return [self._checked(status) for status in self.generate_diagnostics(now)]
+            timed = inspect.signature(self.generate_diagnostics).parameters
+            statuses = self.generate_diagnostics(now) if timed else self.generate_diagnostics()  # type: ignore[call-arg]
+            return [self._checked(status) for status in statuses]
         except StaleInputError as error:
             return [self.stale(str(error))]
 
@@ -155,9 +161,9 @@ class Observer:
 class TopicObserver(Observer):
     """An observer of topics, evaluated over the latest message of each."""
 
-    def __init__(self, name: str, rate_hz: float, topics: Sequence[tuple[str, type]]) -> None:
+    def __init__(self, name: str, loop_rate_hz: float, topics: Sequence[tuple[str, type]]) -> None:
         """Name the observer, set its rate in Hz, and its (topic, message class) pairs."""
-        super().__init__(name, rate_hz)
+        super().__init__(name, loop_rate_hz)
         self._topics: Topics = list(topics)
         self._latest: dict[str, tuple[float, Any]] = {}
         self._arrivals: dict[str, deque[float]] = {}
@@ -206,6 +212,26 @@ class TopicObserver(Observer):
     def generate_diagnostics(self, now: float) -> list[DiagnosticStatus]:
         """Return what `calculate_attr` makes of the latest messages."""
         return [self.calculate_attr([self.latest(topic, now) for topic, _ in self.topics])]
+
+
+class ServiceObserver(Observer):
+    """An observer of what a service without arguments answers. While there is no such service, it is stale."""
+
+    client: Callable[[], Any]
+    """Calls the service; set by who runs the observer."""
+
+    def __init__(self, name: str, service_name: str, service_type: type, loop_rate_hz: float = 1.0) -> None:
+        """Name the observer and the service that is called at this rate in Hz."""
+        super().__init__(name, loop_rate_hz)
+        self.service = service_name, service_type
+
+    def diagnostics_from_response(self, response: Any) -> list[DiagnosticStatus]:
+        """Override: return the statuses from an answer of the service."""
+        raise NotImplementedError
+
+    def generate_diagnostics(self, now: float) -> list[DiagnosticStatus]:  # noqa: ARG002 - interface
+        """Return what `diagnostics_from_response` makes of a new answer."""
+        return self.diagnostics_from_response(self.client())
 
 
 def _qa_name(observer: str) -> str:

@@ -19,6 +19,7 @@ from metacontrol_msgs.srv import (
 )
 
 from rosgraph_monitor import plugins
+from rosgraph_monitor.observer import ServiceObserver
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -129,7 +130,10 @@ class _Runner:
         self._inbox: deque[tuple[str, Any, float]] = deque(maxlen=_INBOX)
         self._news: deque[RosSystem | None] = deque(maxlen=1)
         self._busy_since: float | None = None
+        self._warned = "", 0.0
         self._stopped = threading.Event()
+        if isinstance(observer, ServiceObserver):
+            observer.client = rospy.ServiceProxy(*observer.service)
         self._subscribe()
         threading.Thread(target=self._run, name=f"observer {observer.name}", daemon=True).start()
 
@@ -227,6 +231,11 @@ class _Runner:
         self._inbox.append((topic, msg, rospy.get_time()))
 
     def _warn(self, error: BaseException) -> None:
-        rospy.logwarn_throttle_identical(
-            _WARNING_PERIOD, f"observer {self.observer.name} fails: {type(error).__name__}: {error}"
-        )
+        """Log an error, one of the same kind only now and then.
+
+        rospy's own throttling mixes up observers that fail in turns.
+        """
+        kind, now = type(error).__name__, time.monotonic()
+        if kind != self._warned[0] or now - self._warned[1] >= _WARNING_PERIOD:
+            self._warned = kind, now
+            rospy.logwarn("observer %s fails: %s: %s", self.observer.name, kind, error)
