@@ -24,8 +24,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from mros1_reasoner.decision import DECIDED, PROPOSED, Decision
+from mros1_reasoner.diagnostics import BindingFact, ComponentFact, Fact, LevelFact, StaleFact, TaskFact
 from mros1_reasoner.mape import Mape
 from mros1_reasoner.model import Objective
 
@@ -45,6 +47,21 @@ class Entry:
 def entry(now: float, kind: str, *values: object) -> Entry:
     """Make an entry; numbers are written so that they read back exactly."""
     return Entry(now, kind, tuple(_text(value) for value in values))
+
+
+def of_fact(fact: Fact, stamp: float) -> tuple[Any, ...]:
+    """Return kind and values of the entry about a fact from a diagnostic with a stamp."""
+    match fact:
+        case LevelFact():
+            return "level", fact.quality, fact.level, fact.grounding, stamp
+        case StaleFact():
+            return "stale", fact.quality
+        case ComponentFact():
+            return "component", fact.component, fact.status, stamp
+        case BindingFact():
+            return "binding", fact.grounding, fact.in_error
+        case TaskFact():
+            return "task", fact.name, fact.failed, stamp, "reported as a diagnostic"
 
 
 def apply(core: Mape, item: Entry) -> list[Decision]:

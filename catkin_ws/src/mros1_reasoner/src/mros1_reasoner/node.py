@@ -23,16 +23,7 @@ from std_msgs.msg import Bool
 
 from mros1_reasoner import journal
 from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED, Decision
-from mros1_reasoner.diagnostics import (
-    BindingFact,
-    ComponentFact,
-    DiagnosticsReader,
-    LevelFact,
-    Reading,
-    Remark,
-    StaleFact,
-    TaskFact,
-)
+from mros1_reasoner.diagnostics import DiagnosticsReader, LevelFact, Reading, Remark, StaleFact
 from mros1_reasoner.ending_node import end, end_on_signals, start_node
 from mros1_reasoner.explain import line
 from mros1_reasoner.journal_node import JournalTopic
@@ -240,19 +231,11 @@ class ReasonerNode:
         for remark in reading.remarks:
             self._tell_remark(remark)
         for fact in reading.facts:
-            match fact:
-                case LevelFact():
-                    if self._take("level", fact.quality, fact.level, fact.grounding, stamp):
-                        self._tell_level(fact)
-                case StaleFact():
-                    self._take("stale", fact.quality)
-                    self._warn("stale", f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
-                case ComponentFact():
-                    self._take("component", fact.component, fact.status, stamp)
-                case BindingFact():
-                    self._take("binding", fact.grounding, fact.in_error)
-                case TaskFact():
-                    self._take("task", fact.name, fact.failed, stamp, "reported as a diagnostic")
+            taken = self._take(*journal.of_fact(fact, stamp))
+            if isinstance(fact, LevelFact) and taken:
+                self._tell_level(fact)
+            elif isinstance(fact, StaleFact):
+                self._warn("stale", f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
 
     def _take_active(self, active: messages.ActiveConfiguration) -> None:
         for function in active.functions:

@@ -14,15 +14,7 @@ from dataclasses import dataclass, fields
 
 from mros1_reasoner import journal
 from mros1_reasoner.decision import DECIDED, EXECUTED, PROPOSED, Decision
-from mros1_reasoner.diagnostics import (
-    BindingFact,
-    ComponentFact,
-    DiagnosticsReader,
-    Fact,
-    LevelFact,
-    StaleFact,
-    TaskFact,
-)
+from mros1_reasoner.diagnostics import DiagnosticsReader
 from mros1_reasoner.journal import DECIDED_KIND, Entry, entry
 from mros1_reasoner.mape import Mape, MapeError
 from mros1_reasoner.record import DecisionRecord, record_of
@@ -188,7 +180,7 @@ def without_journal(recording: Recording, reader: DiagnosticsReader, initial: Se
             known.add(item.values[0])
             entries.append(item)
     for array in recording.diagnostics:
-        entries += [_entry_of(array.now, array.stamp, fact) for fact in reader.read(array.statuses).facts]
+        entries += [entry(array.now, *journal.of_fact(fact, array.stamp)) for fact in reader.read(array.statuses).facts]
     entries.sort(key=lambda item: item.now)
     return [step for item in entries for step in (item, entry(item.now, "step", True))]
 
@@ -231,17 +223,3 @@ def _is_same(first: DecisionRecord, second: DecisionRecord, alike: Sequence[str]
 def _differences(first: DecisionRecord, second: DecisionRecord) -> tuple[str, ...]:
     names = [item.name for item in fields(DecisionRecord) if item.name not in _NOT_COMPARED]
     return tuple(name for name in names if getattr(first, name) != getattr(second, name))
-
-
-def _entry_of(now: float, stamp: float, fact: Fact) -> Entry:
-    match fact:
-        case LevelFact():
-            return entry(now, "level", fact.quality, fact.level, fact.grounding, stamp)
-        case StaleFact():
-            return entry(now, "stale", fact.quality)
-        case ComponentFact():
-            return entry(now, "component", fact.component, fact.status, stamp)
-        case BindingFact():
-            return entry(now, "binding", fact.grounding, fact.in_error)
-        case TaskFact():
-            return entry(now, "task", fact.name, fact.failed, stamp, "reported as a diagnostic")
