@@ -51,6 +51,14 @@ def test_goal_reached_while_the_server_is_being_replaced_is_not_resurrected(keep
     assert keeper.pending is None
 
 
+@pytest.mark.parametrize("end", [result, status])
+def test_goal_that_arrives_after_its_own_end_is_not_pending(end):
+    keeper = GoalKeeper()
+    (keeper.on_result if end is result else keeper.on_status)(end("a", GoalStatus.SUCCEEDED))
+    keeper.on_goal(goal("a"))
+    assert keeper.pending is None
+
+
 def test_finished_goal_sent_again_by_ourselves_is_not_taken_as_new(keeper):
     keeper.on_result(result("a", GoalStatus.SUCCEEDED))
     keeper.on_goal(goal("a"))

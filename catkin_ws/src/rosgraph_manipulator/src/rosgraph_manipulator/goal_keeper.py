@@ -122,11 +122,11 @@ class GoalKeeper:
     def _end(self, goal_id: str, state: int) -> None:
         if self._changing and state in DROPPED_BY_SHUTDOWN:
             return
-        if self._goal is not None and goal_id == self._goal.goal_id.id:
-            self._finish(goal_id)
+        self._finish(goal_id)  # also one not known yet: a result may arrive here before its goal
 
     def _finish(self, goal_id: str) -> None:
-        self._goal = None
+        if goal_id == self.pending_id:
+            self._goal = None
         self._finished[goal_id] = None
         if len(self._finished) > REMEMBERED:
             self._finished.popitem(last=False)
