@@ -27,6 +27,8 @@ class MonitorGraphTest(unittest.TestCase):
         cls.seen = Diagnostics()
         cls.modes = {name: rospy.Publisher(f"/{name}/mode", String, queue_size=1, latch=True) for name in AS_MODELLED}
         cls.nodes = {}
+        _, status = cls.seen.wait_status("laser", "Missing node")
+        assert value_of(status, "actual") == "absent", status  # it never came
         for name in AS_MODELLED:
             cls.start(name)
 
@@ -75,6 +77,8 @@ class MonitorGraphTest(unittest.TestCase):
         self.start("base", "sub=cmd_vel:std_msgs/Int32")
         _, status = self.seen.wait_status("cmd", "Missing connection")
         self.assertIn("base.cmd takes nothing", value_of(status, "actual"))
+        _, status = self.seen.wait_status("base", "Missing port", "cmd")
+        self.assertEqual(value_of(status, "expected"), "subscriber")
         self.restore("base")
 
     def test_topic_of_another_type(self):
