@@ -28,6 +28,14 @@ def wait_for(condition, what):
     return found
 
 
+def has_ended(child):
+    """Tell whether a process has ended; where nobody inherits the children of others, it stays as a zombie."""
+    try:
+        return child.status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
+
+
 @contextlib.contextmanager
 def process(command, **options):
     started = subprocess.Popen(command, **options)
@@ -93,7 +101,7 @@ class World:
         _, said = self.reasoner.communicate(timeout=DEADLINE_S)
         assert self.reasoner.returncode == 0, said
         assert "Traceback" not in said
-        wait_for(lambda: not self.child.is_running(), "the end of Pellet's process")
+        wait_for(lambda: has_ended(self.child), "the end of Pellet's process")
         return said
 
 

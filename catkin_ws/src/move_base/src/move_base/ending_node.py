@@ -54,6 +54,11 @@ def _watch_master(begun: threading.Event) -> None:
         except OSError:
             pass  # it may just be overloaded
         seen = time.monotonic()
+    end_without_master()
+
+
+def end_without_master() -> None:
+    """Says that the master is lost, and ends the node."""
     sys.stderr.write(f"{rospy.get_name()}: the master is lost: the node ends\n")
     rospy.signal_shutdown("the master is lost")
 

@@ -26,7 +26,7 @@ from sensor_msgs.msg import LaserScan, PointCloud2
 from std_srvs.srv import Empty, EmptyResponse
 
 from move_base.costmap import CostmapError, StaticMap, occupancy_values
-from move_base.ending_node import end_in_time
+from move_base.ending_node import end_in_time, end_without_master
 from move_base.geometry import STOP, Pose, Velocity
 from move_base.global_planner import PlanningError
 from move_base.navigator import Navigator, Outcome
@@ -477,7 +477,12 @@ def main() -> None:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
         sys.exit(2)
     end_in_time()
-    MoveBaseNode(parameters, tree, _resumed_goal(tree.pop("resume_goal", None))).run()
+    try:
+        node = MoveBaseNode(parameters, tree, _resumed_goal(tree.pop("resume_goal", None)))
+    except ConnectionError:
+        end_without_master()
+        return
+    node.run()
 
 
 def _resumed_goal(value: object) -> MoveBaseActionGoal | None:

@@ -164,6 +164,9 @@ def main() -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # as with SIGTERM, nothing is to be ended yet
         rospy.init_node("rosgraph_launcher", disable_signals=True)
         node = LauncherNode(read_options())
+    except ConnectionError:
+        tell_loss("it ends")
+        sys.exit(2)
     except (rospy.ROSInitException, SettingError, OSError) as error:
         sys.stderr.write(f"rosgraph_launcher: {' '.join(str(error).split())}\n")
         sys.exit(2)

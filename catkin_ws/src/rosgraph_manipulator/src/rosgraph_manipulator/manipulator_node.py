@@ -396,6 +396,9 @@ def main() -> None:
             known = ", ".join(sorted(settings.configurations))
             raise ConfigurationError(f"parameter '~initial_configuration' is '{initial}'; known are: {known}")
         manipulator = Manipulator(settings, load_tactics(), initial)
+    except ConnectionError:
+        end_without_master()
+        return
     except (ConfigurationError, SettingError, TacticError, rospy.ROSInitException, OSError) as error:
         sys.stderr.write(f"rosgraph_manipulator: {' '.join(str(error).split())}\n")
         sys.exit(2)

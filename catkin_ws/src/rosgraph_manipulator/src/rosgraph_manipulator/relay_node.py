@@ -115,9 +115,12 @@ def main() -> None:
         message_class = roslib.message.get_message_class(kind)
         if message_class is None:
             raise ConfigurationError(f"parameter '~type': message type {kind} is not installed")
+        relay = Relay(names[0], names[1], message_class)
+    except ConnectionError:
+        end_without_master()
+        return
     except (ConfigurationError, rospy.ROSInitException) as error:
         sys.stderr.write(f"action_relay: {' '.join(str(error).split())}\n")
         sys.exit(2)
-    relay = Relay(names[0], names[1], message_class)
     MasterWatch(end_without_master)
     relay.spin()
