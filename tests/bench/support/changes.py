@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import os
 import statistics
@@ -26,7 +27,8 @@ from nav_msgs.msg import Odometry
 DEADLINE_S = 60.0
 PAPER_S = 4.3  # mean time of a reconfiguration in the paper
 PAPER = "published system (paper, another machine)"
-GOAL = (5.4, 6.0)  # far away, so that it stays pending
+GOALS = (5.4, 6.0), (-8.0, -8.0)  # of a long way to and fro
+CHANGES_PER_GOAL = 6  # the goal is not reached meanwhile
 
 
 @dataclass
@@ -69,7 +71,9 @@ class System:
             raise RuntimeError("no configuration was deployed")
         if not self.navigation.wait_for_server(rospy.Duration(DEADLINE_S)):
             raise RuntimeError("navigation did not come up")
-        self.goal_id = self._send_goal()
+        self._goals = itertools.cycle(GOALS)
+        self._handles: list[actionlib.ClientGoalHandle] = []  # actionlib forgets a goal whose handle is gone
+        self.set_off()
 
     def change(self, name: str) -> Change:
         """Have a configuration deployed, and wait until the goal is at work in it and the robot moves."""
@@ -103,16 +107,16 @@ class System:
         """Wait until the robot drives."""
         return bool(wait_until(lambda: self._speed > 0.1, DEADLINE_S))
 
-    def _send_goal(self) -> str:
+    def set_off(self) -> None:
+        """Send the next navigation goal, in place of the former one, and wait until it is at work."""
         goal = MoveBaseGoal()
         goal.target_pose.header.frame_id = "map"
-        goal.target_pose.pose.position.x, goal.target_pose.pose.position.y = GOAL
+        goal.target_pose.pose.position.x, goal.target_pose.pose.position.y = next(self._goals)
         goal.target_pose.pose.orientation.w = 1.0
-        self._handle = self.navigation.send_goal(goal)
-        goal_id = str(self._handle.comm_state_machine.action_goal.goal_id.id)
-        if not wait_until(lambda: self._active[0] == goal_id, DEADLINE_S):
+        self._handles.append(self.navigation.send_goal(goal))
+        self.goal_id = str(self._handles[-1].comm_state_machine.action_goal.goal_id.id)
+        if not wait_until(lambda: self._active[0] == self.goal_id, DEADLINE_S):
             raise RuntimeError("the navigation goal was not accepted")
-        return goal_id
 
     def _on_status(self, message: GoalStatusArray) -> None:
         connection = message._connection_header  # one object per connection, so another one is another server
@@ -179,6 +183,8 @@ def changes(
     found = []
     with running_system(configurations[0], parameters) as system:
         for number in range(count):
+            if number % CHANGES_PER_GOAL == CHANGES_PER_GOAL - 1:
+                system.set_off()
             if not system.drives():
                 raise RuntimeError("the robot does not drive")
             time.sleep(pause)
