@@ -24,8 +24,8 @@ _PERIOD = 0.4  # s, wall, between two looks at the master
 _LOST_AFTER = 1.2  # s, wall, without an answer: told within 2 s
 _UNREACHABLE = (OSError, xmlrpc.client.Error, http.client.HTTPException, LookupError, TypeError, ValueError)
 
-
 _unregistered = threading.Event()
+_loss_is_told = threading.Lock()
 
 
 def end(reason: str, status: int = 0) -> NoReturn:
@@ -80,5 +80,11 @@ def _watch(caller: str) -> None:
             seen = time.monotonic()
         time.sleep(_PERIOD)
     if not rospy.is_shutdown():
+        end_without_master()
+
+
+def end_without_master() -> None:
+    """Say, once, that the master is gone, and end the process."""
+    if _loss_is_told.acquire(blocking=False):
         sys.stderr.write("reasoner: the ROS master is gone: the reasoner ends; start the system again\n")
-        end("the master is gone")
+    end("the master is gone")

@@ -24,7 +24,7 @@ from std_msgs.msg import Bool
 from mros1_reasoner import journal
 from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED, Decision
 from mros1_reasoner.diagnostics import DiagnosticsReader, LevelFact, Reading, Remark, StaleFact
-from mros1_reasoner.ending_node import end, end_on_signals, start_node
+from mros1_reasoner.ending_node import end, end_on_signals, end_without_master, start_node
 from mros1_reasoner.explain import line
 from mros1_reasoner.journal_node import JournalTopic
 from mros1_reasoner.knowledge_base import KnowledgeBase, KnowledgeBaseError
@@ -323,6 +323,8 @@ def main() -> None:
     except Exception as error:
         if rospy.is_shutdown():
             pass  # the end has cut a call short
+        elif isinstance(error, ConnectionError):
+            end_without_master()
         elif isinstance(error, _BAD_START):
             sys.stderr.write(f"reasoner: {' '.join(str(error).split())}\n")
             end("it can't start", 2)
