@@ -61,7 +61,12 @@ def start_node(name: str) -> None:
         uri = rosgraph.get_master_uri()
         raise rospy.ROSInitException(f"no ROS master answers at {uri}: start roscore or set ROS_MASTER_URI")
     threading.Thread(target=_watch, args=(f"/{name}_watch",), name="master watch", daemon=True).start()
-    rospy.init_node(name, disable_signals=True)
+    try:
+        rospy.init_node(name, disable_signals=True)
+    except rospy.ROSInitException:
+        if rosgraph.is_master_online():
+            raise
+        end_without_master()
     rospy.core.add_shutdown_hook(lambda _: _unregistered.set())  # hooks go in order: rospy's own come before
 
 
