@@ -10,7 +10,8 @@ Definitions
   above it then.
 - `decide_s`: from that diagnostic to the Decision DECIDED. `execute_s`: from DECIDED to EXECUTED.
 - `control` is of the initial configuration, until the first change: the rate that its controller was set to, and the
-  share of its periods in which no velocity command came: a gap of n periods between two commands has n - 1 of them.
+  share of its periods in which no velocity command came: between two commands that are n periods apart, or more but
+  less than n + 1, these are n - 1. A command that is late within its period is none of them.
 - `success` is the paper's: goal reached, mean safety risk < 0.4, risk below its threshold for more than 95 % of the
   time, energy below its threshold for more than 90 % of the time; and not longer than 250 s.
 """
@@ -45,6 +46,9 @@ MAX_SHARE = {"safety": 0.05, "energy": 0.10}
 
 _SAME_MOMENT_S = 0.05
 """Stamps of different nodes may differ by a few periods of `/clock` (0.01 s) for what happened in the same moment."""
+
+_ROUNDING = 1e-6
+"""Periods by which times that are whole numbers of periods apart may seem less."""
 
 _CLOCK_LAG_S = 0.5
 """So far the clock of a node may lag behind another's on a loaded machine; the mission ends by its own."""
@@ -291,8 +295,9 @@ def periods_missed(stamps: Sequence[float], rate: float) -> float | None:
     """Share of a controller's periods (rate in Hz) in which no command came; None with fewer than two commands."""
     if len(stamps) < 2:
         return None
-    periods = np.maximum(np.rint(np.diff(np.asarray(stamps)) * rate), 1.0)
-    return float((periods - 1.0).sum() / periods.sum())
+    gaps = np.diff(np.asarray(stamps)) * rate
+    empty = np.maximum(np.floor(gaps + _ROUNDING) - 1.0, 0.0)
+    return float(empty.sum() / max(gaps.sum(), 1.0))
 
 
 def _control(record: MissionRecord, told: dict[str, str], start: float, end: float) -> dict[str, float | None]:
