@@ -123,7 +123,7 @@ class SimulatorTest(unittest.TestCase):
         expected = 2.0 - 0.15 - 0.393
         self.assertIsNotNone(scan.wait(lambda s: abs(s.ranges[180] - expected) < 0.1, 30.0), "not seen")
         self.assertIsNotNone(
-            shown.wait(lambda m: "crate" in {marker.text for marker in m.markers}, 30.0) or shown.message
+            shown.wait(lambda m: "crate" in {marker.ns for marker in m.markers}, 30.0) or shown.message
         )
         again = self.call("simulator/spawn_obstacle", SpawnObstacle, name="crate", **place)
         self.assertFalse(again.success)
@@ -139,7 +139,7 @@ class SimulatorTest(unittest.TestCase):
         spawned = self.call("simulator/spawn_obstacle", SpawnObstacle, name="ann", waypoints=way, speed=2.0)
         self.assertTrue(spawned.success, spawned.message)
         shown = Latest("ground_truth/obstacles", MarkerArray)
-        walked = shown.wait(lambda m: any(k.text == "ann" and k.pose.position.x > -7.0 for k in m.markers), 30.0)
+        walked = shown.wait(lambda m: any(k.ns == "ann" and k.pose.position.x > -7.0 for k in m.markers), 30.0)
         self.assertIsNotNone(walked, "she stands")
         self.assertTrue(self.call("simulator/delete_obstacle", DeleteObstacle, "").success)
         shown.close()

@@ -65,7 +65,7 @@ class BagBuilder:
     def obstacles(self, stamp, *places):
         markers = [Marker(action=Marker.DELETEALL)]
         for number, (x, y) in enumerate(places):
-            marker = Marker(type=Marker.CUBE, id=number, text=f"obstacle_{number}")
+            marker = Marker(type=Marker.CUBE, ns=f"obstacle_{number}")
             marker.pose.position.x, marker.pose.position.y = x, y
             markers.append(marker)
         self.messages.append((stamp, "/ground_truth/obstacles", MarkerArray(markers)))

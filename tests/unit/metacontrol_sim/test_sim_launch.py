@@ -34,5 +34,5 @@ def test_monitor_expects_what_the_window_listens_to_only_where_there_is_one(file
     assert "/rosgraph_monitor/ignore_ports" not in parameters(file)
     ignored = parameters(file, "gui:=true")["/rosgraph_monitor/ignore_ports"]
     text = (PACKAGE / "src/metacontrol_sim/window_node.py").read_text()
-    assert len(ignored) == 7
+    assert len(ignored) == 8
     assert [name for name in ignored if f'"{name.removeprefix("*/")}"' not in text] == []

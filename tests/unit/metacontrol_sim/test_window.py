@@ -9,7 +9,17 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
 from metacontrol_sim.geometry import Pose
 from metacontrol_sim.status_text import StatusText
-from metacontrol_sim.window import HIGH, LOW, RED, Points, Window, cost_points, cross_points, path_points, scan_points
+from metacontrol_sim.window import (
+    LOCAL_HIGH,
+    LOW,
+    RED,
+    Points,
+    Window,
+    cost_points,
+    cross_points,
+    path_points,
+    scan_points,
+)
 
 
 def report(message, key, value):
@@ -52,9 +62,19 @@ def test_path_becomes_close_points():
 
 def test_only_cells_that_cost_something_are_drawn():
     costs = np.array([[0, 100, -1], [1, 0, 0]], dtype=np.int8)
-    points, colours = cost_points(costs, 0.5, 0.0)
+    points, colours = cost_points(costs, 0.5, 0.0, LOCAL_HIGH)
     assert points.tolist() == [[0.75, 0.25, 0.0], [0.25, 0.75, 0.0]]
-    assert colours[0] == pytest.approx(HIGH) and colours[1] == pytest.approx(LOW, abs=0.02)
+    assert colours[0] == pytest.approx(LOCAL_HIGH) and colours[1] == pytest.approx(LOW, abs=0.02)
+
+
+def test_costs_too_many_to_draw_are_drawn_as_squares_with_their_highest_cost():
+    costs = np.full((301, 299), 50, dtype=np.int8)
+    costs[150, 150] = 100
+    points, colours = cost_points(costs, 0.05, 0.0, LOCAL_HIGH)
+    assert 2000 < len(points) <= 4000
+    assert (points[:, 0].max(), points[:, 1].max()) == pytest.approx((299 * 0.05, 301 * 0.05), abs=0.3)
+    highest = points[np.isclose(colours, LOCAL_HIGH).all(axis=1)]
+    assert np.hypot(*(highest[:, :2] - 150.5 * 0.05).T) == pytest.approx([0.0], abs=0.25)
 
 
 def test_drawing_replaces_what_was_drawn_and_takes_it_away(monkeypatch):

@@ -164,7 +164,7 @@ class _Builder:
         for marker in message.markers:
             place = marker.pose.position
             if marker.action == 0 and marker.type == _CUBE and math.isfinite(place.x) and math.isfinite(place.y):
-                self._obstacles[marker.text, round(place.x, 1), round(place.y, 1)] = None
+                self._obstacles[marker.ns, round(place.x, 1), round(place.y, 1)] = None
 
     def _take_map(self, _received: float, message: Any) -> None:
         info = message.info

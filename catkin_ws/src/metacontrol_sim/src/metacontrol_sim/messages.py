@@ -132,8 +132,8 @@ def battery_state(simulation: Simulation, now: genpy.Time) -> BatteryState:
 def obstacle_markers(shown: Iterable[Shown], now: genpy.Time) -> MarkerArray:
     """Return the obstacles that no map shows, after one marker that takes away what was shown before."""
     markers = [Marker(action=Marker.DELETEALL)]
-    for number, obstacle in enumerate(shown):
-        marker = Marker(ns="obstacles", id=number, text=obstacle.name, frame_locked=False)
+    for obstacle in shown:
+        marker = Marker(ns=obstacle.name)
         marker.header.stamp, marker.header.frame_id = now, MAP
         marker.type = Marker.CYLINDER if obstacle.person else Marker.CUBE
         _set_pose(marker.pose, obstacle.pose)

@@ -63,6 +63,8 @@ class Physics:
             RobotFileError: the robot's URDF cannot be used.
         """
         self.client = _connect(gui)
+        if gui:
+            self._look_at(world)
         pybullet.setTimeStep(step, physicsClientId=self.client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=self.client)
         pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=self.client)
@@ -189,6 +191,15 @@ class Physics:
             pybullet.changeDynamics(body, -1, lateralFriction=1.0, physicsClientId=self.client)
         return int(body)
 
+    def _look_at(self, world: World) -> None:
+        """Let the window show the whole floor, seen from above and a little from the south."""
+        pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self.client)
+        pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_SHADOWS, 0, physicsClientId=self.client)
+        length, width = world.x_max - world.x_min, world.y_max - world.y_min
+        middle = ((world.x_max + world.x_min) / 2.0, (world.y_max + world.y_min) / 2.0 - 0.1 * width, 0.0)
+        distance = 0.72 * max(0.75 * length, width)  # the window is 4:3
+        pybullet.resetDebugVisualizerCamera(distance, 0.0, -65.0, middle, physicsClientId=self.client)
+
     def _add_floor(self, world: World) -> None:
         half = ((world.x_max - world.x_min) / 2.0 + 2.0, (world.y_max - world.y_min) / 2.0 + 2.0, 0.5)
         shape = {"halfExtents": half}
@@ -234,9 +245,6 @@ def _connect(gui: bool) -> int:
     client = int(pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT))
     if client < 0:
         raise PhysicsError("PyBullet does not start; run without its window (gui:=false)")
-    if gui:
-        pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=client)
-        pybullet.resetDebugVisualizerCamera(16.0, 0.0, -65.0, (0.0, 0.0, 0.0), physicsClientId=client)
     return client
 
 

@@ -12,8 +12,11 @@ from visualization_msgs.msg import Marker
 from metacontrol_sim.status_text import StatusText
 
 _PERIOD_S = 0.5
-_HEIGHT_M = 2.0
-_SIZE_M = 0.5
+_BEHIND_M, _HEIGHT_M = 1.5, 2.0
+"""Place of the text: what lies ahead of the robot stays in view."""
+_SIZE_M = 0.55
+_CALM, _ALARM = (0.0, 0.0, 0.1), (0.8, 0.0, 0.0)
+"""Colours that can be read on a map's light floor and on a costmap."""
 
 
 class RvizTextNode:
@@ -45,10 +48,10 @@ class RvizTextNode:
             return
         marker = Marker(ns="status", type=Marker.TEXT_VIEW_FACING, text="\n".join(lines), frame_locked=True)
         marker.header.frame_id = "base_link"
-        marker.pose.position.x, marker.pose.position.z = 1.2, _HEIGHT_M
+        marker.pose.position.x, marker.pose.position.z = -_BEHIND_M, _HEIGHT_M
         marker.pose.orientation.w = 1.0
         marker.scale.z = _SIZE_M
-        marker.color.r, marker.color.g, marker.color.b = (1.0, 0.35, 0.25) if alarm else (1.0, 1.0, 1.0)
+        marker.color.r, marker.color.g, marker.color.b = _ALARM if alarm else _CALM
         marker.color.a = 1.0
         self._marker.publish(marker)
 

@@ -1,4 +1,4 @@
-"""What PyBullet's window shows beside the world: scan, cloud, costmap, plans, goal, and a text over the robot."""
+"""What PyBullet's window shows beside the world: scan, cloud, costmaps, plans, goal, and a text over the robot."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 RED, BLUE, GREEN, SKY, PINK = (1.0, 0.1, 0.1), (0.3, 0.5, 1.0), (0.1, 0.9, 0.1), (0.0, 0.7, 1.0), (1.0, 0.1, 0.8)
-LOW, HIGH = (0.45, 0.35, 0.70), (1.0, 0.45, 0.0)
-"""Colours of a costmap's low and high costs."""
-_TEXT_HEIGHT = 1.0
+WHITE = (1.0, 1.0, 1.0)
+LOW, GLOBAL_HIGH, LOCAL_HIGH = (0.45, 0.35, 0.70), (0.75, 0.75, 0.95), (1.0, 0.45, 0.0)
+"""Colours of low costs, and of the high ones of global and local costmap."""
+_TEXT_HEIGHT = 2.5  # over racks
 _LINE_SPACING = 0.7
 _MAX_POINTS = 4000
 _CLOSE_POINT = 0.05
@@ -81,9 +82,9 @@ class Window:
             up = _LINE_SPACING * (len(lines) - 1 - number)
             self._items[name] = pybullet.addUserDebugText(
                 lines[number],
-                (place.x + 0.8, place.y + up, _TEXT_HEIGHT + 0.3 * up),  # the window looks down from the south
-                textColorRGB=RED if alarm else (0.0, 0.0, 0.0),
-                textSize=1.3,
+                (place.x + 0.8, place.y + up, _TEXT_HEIGHT),  # the window looks down from the south
+                textColorRGB=RED if alarm else WHITE,
+                textSize=1.6,
                 replaceItemUniqueId=self._items.get(name, -1),
                 physicsClientId=self.client,
             )
@@ -114,19 +115,34 @@ def path_points(corners: NDArray[np.float64], height: float) -> NDArray[np.float
 
 
 def cost_points(
-    costs: NDArray[np.int8], resolution: float, height: float
+    costs: NDArray[np.int8], resolution: float, height: float, high: tuple[float, float, float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the points of a costmap's cells that cost something, and their colours: both (n, 3).
+
+    Where these are too many to be drawn, squares of cells are drawn as one, which has the highest of their costs.
 
     Args:
         costs: (rows, columns) as of an OccupancyGrid.
         resolution: m per cell.
         height: m over the floor.
+        high: colour of the highest cost.
     """
+    side = math.ceil(math.sqrt(max(1.0, np.count_nonzero(costs > 0) / _MAX_POINTS)))
+    while np.count_nonzero((squares := _highest(costs, side)) > 0) > _MAX_POINTS:
+        side += 1
+    costs, resolution = squares, side * resolution
     rows, columns = np.nonzero(costs > 0)
     share = (costs[rows, columns] / 100.0)[:, np.newaxis]
     xyz = np.column_stack(((columns + 0.5) * resolution, (rows + 0.5) * resolution, np.full(rows.size, height)))
-    return xyz, np.asarray(LOW) * (1.0 - share) + np.asarray(HIGH) * share
+    return xyz, np.asarray(LOW) * (1.0 - share) + np.asarray(high) * share
+
+
+def _highest(costs: NDArray[np.int8], side: int) -> NDArray[np.int8]:
+    """Return the highest cost of each square of `side` x `side` cells; squares at the far edges may be incomplete."""
+    rows, columns = costs.shape
+    padded = np.pad(costs, ((0, -rows % side), (0, -columns % side)))
+    squares: NDArray[np.int8] = padded.reshape(-(-rows // side), side, -(-columns // side), side).max(axis=(1, 3))
+    return squares
 
 
 def cross_points(x: float, y: float) -> NDArray[np.float64]:

@@ -18,7 +18,9 @@ from metacontrol_sim.geometry import ORIGIN, Pose
 from metacontrol_sim.status_text import StatusText
 from metacontrol_sim.window import (
     BLUE,
+    GLOBAL_HIGH,
     GREEN,
+    LOCAL_HIGH,
     PINK,
     RED,
     SKY,
@@ -40,7 +42,6 @@ PERIOD_STEPS = 20
 SENSORS = ("front/scan", "camera/depth/points")
 STALE_S = 1.0
 """What a sensor that is silent for so many simulated seconds has seen is no longer shown."""
-_COST_HEIGHT, _PATH_HEIGHT = 0.02, 0.1
 
 
 class WindowView:
@@ -57,9 +58,10 @@ class WindowView:
         topics: tuple[tuple[str, type, Callable[[Any], Points]], ...] = (
             ("front/scan", LaserScan, self._scan),
             ("camera/depth/points", PointCloud2, self._cloud),
-            ("move_base/local_costmap/costmap", OccupancyGrid, self._costmap),
-            ("move_base/NavfnROS/plan", Path, lambda path: self._path(path, GREEN)),
-            ("move_base/TrajectoryPlannerROS/local_plan", Path, lambda path: self._path(path, SKY)),
+            ("move_base/global_costmap/costmap", OccupancyGrid, lambda grid: self._costmap(grid, 0.02, GLOBAL_HIGH)),
+            ("move_base/local_costmap/costmap", OccupancyGrid, lambda grid: self._costmap(grid, 0.04, LOCAL_HIGH)),
+            ("move_base/NavfnROS/plan", Path, lambda path: self._path(path, 0.1, GREEN)),
+            ("move_base/TrajectoryPlannerROS/local_plan", Path, lambda path: self._path(path, 0.4, SKY)),
             ("move_base/current_goal", PoseStamped, self._goal),
         )
         self._inputs = [
@@ -125,16 +127,16 @@ class WindowView:
         points[:, 2] += self._simulation.robot.camera.mount.z
         return Points(points[points[:, 2] > 0.05], BLUE, self._frame(cloud.header.frame_id), 2)
 
-    def _costmap(self, grid: OccupancyGrid) -> Points:
+    def _costmap(self, grid: OccupancyGrid, height: float, high: tuple[float, float, float]) -> Points:
         costs = np.array(grid.data, dtype=np.int8).reshape(grid.info.height, grid.info.width)
-        points, colours = cost_points(costs, grid.info.resolution, _COST_HEIGHT)
+        points, colours = cost_points(costs, grid.info.resolution, height, high)
         origin = grid.info.origin.position
         corner = self._frame(grid.header.frame_id) @ Pose(origin.x, origin.y, 0.0)
         return Points(points, colours, corner, 2)
 
-    def _path(self, path: Path, colour: tuple[float, float, float]) -> Points:
+    def _path(self, path: Path, height: float, colour: tuple[float, float, float]) -> Points:
         corners = np.array([(stamped.pose.position.x, stamped.pose.position.y) for stamped in path.poses])
-        points = path_points(corners.reshape(-1, 2), _PATH_HEIGHT)
+        points = path_points(corners.reshape(-1, 2), height)
         return Points(points, colour, self._frame(path.header.frame_id), 4)
 
     def _goal(self, goal: PoseStamped) -> Points:
