@@ -150,6 +150,21 @@ def test_map_gives_the_global_costmap_its_size(tree):
     assert at(snapshot, -3.0 + 5.05, -2.0 + 3.05) == UNKNOWN
 
 
+@pytest.mark.parametrize("resolution", [0.025, 0.08, 0.1])
+def test_obstacles_of_a_map_are_inflated_in_metres_whatever_its_resolution(tree, resolution):
+    costmap = Costmap(read_parameters(tree()).global_costmap)
+    cells = round(6.0 / resolution)
+    occupancy = np.zeros((cells, cells), dtype=np.int8)
+    occupancy[cells // 2, cells // 2] = 100
+    costmap.set_map(static_map(occupancy, resolution=resolution))
+    snapshot = costmap.update(Pose(1.0, 1.0, 0.0), [])
+    centre = (cells // 2 + 0.5) * resolution
+    for cost, radius in ((INSCRIBED, 0.5), (1, 0.65)):
+        columns = np.nonzero(snapshot.costs[cells // 2] >= cost)[0]
+        assert (columns + 0.5).max() * resolution - centre == pytest.approx(radius, abs=1.1 * resolution)
+    assert snapshot.clearance[snapshot.geometry.cell(centre + 0.4, centre)] == pytest.approx(0.4, abs=resolution)
+
+
 def test_turned_map_is_placed_by_its_origin(tree):
     costmap = Costmap(read_parameters(tree()).global_costmap)
     occupancy = np.zeros((40, 60), dtype=np.int8)
@@ -177,6 +192,8 @@ def test_local_costmap_shows_the_map_through_the_drift_of_odometry(local):
     [
         (3, 0.05, (0.0, 0.0, 0.0)),
         (2, 0.0, (0.0, 0.0, 0.0)),
+        (2, 1e-9, (0.0, 0.0, 0.0)),
+        (2, math.inf, (0.0, 0.0, 0.0)),
         (2, 0.05, (math.nan, 0.0, 0.0)),
         (0, 0.05, (0.0, 0.0, 0.0)),
     ],

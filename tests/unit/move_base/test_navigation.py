@@ -145,6 +145,13 @@ def test_hopeless_goal_ends_at_once_with_its_reason(simulate, walls, goal, reaso
     assert log.duration < 1.0
 
 
+def test_blocked_goal_is_approached_as_far_as_the_default_tolerance_allows(simulate, walls, tree):
+    simulation = simulate([*walls(), RACK], start=(-3.0, 0.0, 0.0), tree=tree(NavfnROS__default_tolerance=0.8))
+    log = drive(simulation, (-0.6, 0.0, 0.0))
+    assert log.outcome is Outcome.SUCCEEDED
+    assert simulation.pose.distance(Pose(-0.6, 0.0, 0.0)) < 0.8
+
+
 def test_unreachable_goal_is_given_up_after_recovery(simulate, walls):
     simulation = simulate([*walls(), (0.0, 0.0, 0.8, 12.0, 0.0)], start=(-3.0, 0.0, 0.0))
     log = drive(simulation, (3.0, 0.0, 0.0))
@@ -192,6 +199,12 @@ def test_sideways_is_tried_before_backward(simulate, walls):
     controller, robot, path, snapshot = at_a_wall(simulate, walls)
     chosen = controller.follow(robot, Velocity(), path, 3.0, snapshot)
     assert chosen.velocity.x == 0.0 and chosen.velocity.y != 0.0
+
+
+def test_base_that_gets_sideways_slowly_is_not_sent_fast(simulate, walls, tree):
+    controller, robot, path, snapshot = at_a_wall(simulate, walls, tree=tree(TrajectoryPlannerROS__acc_lim_y=0.1))
+    chosen = controller.follow(robot, Velocity(), path, 3.0, snapshot)
+    assert abs(chosen.velocity.y) == pytest.approx(0.08)
 
 
 def test_base_that_cannot_move_sideways_backs_off(simulate, walls, tree):

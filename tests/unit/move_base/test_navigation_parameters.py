@@ -34,6 +34,31 @@ def test_radius_replaces_an_empty_footprint(tree):
     assert footprint[0] == pytest.approx((0.3, 0.0))
 
 
+def test_lateral_samples_may_be_a_text(tree):
+    parameters = read_parameters(tree(TrajectoryPlannerROS__y_vels="[-0.2, 0.2]"))
+    assert parameters.controller.y_vels == (-0.2, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("former", "name", "value"),
+    [
+        ("max_rotational_vel", "max_vel_theta", 0.7),
+        ("min_in_place_rotational_vel", "min_in_place_vel_theta", 0.3),
+        ("acc_lim_th", "acc_lim_theta", 2.0),
+        ("backup_vel", "escape_vel", -0.2),
+        ("pdist_scale", "path_distance_bias", 0.9),
+        ("gdist_scale", "goal_distance_bias", 0.4),
+    ],
+)
+def test_former_names_are_understood_and_yield_to_the_present_ones(tree, former, name, value):
+    given = tree()
+    given["TrajectoryPlannerROS"].pop(name, None)
+    given["TrajectoryPlannerROS"][former] = value
+    assert getattr(read_parameters(given).controller, name) == value
+    given["TrajectoryPlannerROS"][name] = 2 * value
+    assert getattr(read_parameters(given).controller, name) == 2 * value
+
+
 def test_missing_update_period_gets_the_documented_one(tree):
     changed = tree()
     del changed["local_costmap"]["obstacles_layer"]["scan"]["expected_update_rate"]
@@ -55,6 +80,12 @@ def test_lateral_limits_clip_the_samples(tree, samples, limits, expected):
     assert parameters.controller.y_vels == expected
 
 
+def test_costmap_that_no_memory_holds_is_refused(tree):
+    size = {f"local_costmap__{name}": value for name, value in (("width", 900.0), ("height", 900.0))}
+    with pytest.raises(ParameterError, match=r"local_costmap/resolution: gives the costmap over 50,000,000 cells"):
+        read_parameters(tree(local_costmap__resolution=0.01, **size))
+
+
 @pytest.mark.parametrize(
     ("path", "value", "rule"),
     [
@@ -66,6 +97,8 @@ def test_lateral_limits_clip_the_samples(tree, samples, limits, expected):
         ("TrajectoryPlannerROS__min_vel_x", 0.6, "must not be over max_vel_x"),
         ("TrajectoryPlannerROS__vx_samples", 2.5, "must be a whole number"),
         ("TrajectoryPlannerROS__y_vels", [0.1, "left"], "must be a list of numbers"),
+        ("TrajectoryPlannerROS__y_vels", "to the left", "must be a list of numbers"),
+        ("TrajectoryPlannerROS__y_vels", [float("inf")], "must be a list of finite numbers"),
         ("TrajectoryPlannerROS", 3, "must be a group of parameters"),
         ("global_costmap__inflater_layer__inflation_radius", float("inf"), "must be finite"),
         ("global_costmap__plugins", [], "must list the layers"),

@@ -31,6 +31,9 @@ MAX_RAY_GAP = math.radians(3.0)
 CLOUD_BIN = math.radians(1.0)
 """Width of the sectors in which a cloud's nearest return bounds what is cleared: over twice a depth camera's column."""
 
+MIN_RESOLUTION, MAX_RESOLUTION = 0.001, 10.0
+"""Sides of a map's cells that make sense, m."""
+
 SUBPIXEL_BITS = 4
 """Fixed-point digits of cv2's polygon corners: 1/16 cell."""
 
@@ -76,9 +79,10 @@ class Geometry:
             math.floor((x - self.origin_x) / self.resolution),
         )
 
-    def contains(self, row: int, column: int) -> bool:
-        """Whether the cell is in the grid."""
-        return 0 <= row < self.height and 0 <= column < self.width
+    def contains(self, x: float, y: float) -> bool:
+        """Whether a point is in the grid; one that is not finite is not."""
+        along_x, along_y = (x - self.origin_x) / self.resolution, (y - self.origin_y) / self.resolution
+        return 0.0 <= along_x < self.width and 0.0 <= along_y < self.height
 
     def centres(self, rows: NDArray[np.integer], columns: NDArray[np.integer]) -> NDArray[np.float64]:
         """Returns the centres (N, 2) of cells in metres."""
@@ -134,7 +138,7 @@ class StaticMap:
         Raises:
             CostmapError: sizes do not fit, or values are not finite.
         """
-        if not all(math.isfinite(value) for value in (resolution, *origin)) or resolution <= 0.0:
+        if not all(math.isfinite(value) for value in origin) or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
             raise CostmapError(f"the map's resolution ({resolution}) or origin ({origin}) makes no sense")
         if width <= 0 or height <= 0 or len(data) != width * height:
             raise CostmapError(f"the map announces {width} x {height} cells and holds {len(data)}")
@@ -146,12 +150,13 @@ class Costmap:
     """One costmap, built up from the layers of its parameters."""
 
     def __init__(self, parameters: CostmapParameters) -> None:
+        self.parameters = parameters
+        self.geometry = self._initial_geometry()
         self.reconfigure(parameters)
         self._static_layer = next((layer for layer in parameters.layers if layer.kind == "static"), None)
         self._static: StaticMap | None = None
         self._static_costs: NDArray[np.uint8] | None = None
         self._static_placed: tuple[Geometry, Pose] | None = None
-        self.geometry = self._initial_geometry()
         self._obstacles = np.zeros(self.geometry.shape, dtype=np.uint8)
 
     def reconfigure(self, parameters: CostmapParameters) -> None:
@@ -181,6 +186,7 @@ class Costmap:
             if geometry != self.geometry:
                 self.geometry = geometry
                 self._obstacles = np.zeros(geometry.shape, dtype=np.uint8)
+                self._cost_table, self._table_scale = self._make_cost_table()
 
     def update(
         self,
@@ -215,10 +221,9 @@ class Costmap:
 
     def static_cost(self, x: float, y: float) -> int:
         """Returns the static layer's own cost at a point (FREE without a static layer or outside of it)."""
-        row, column = self.geometry.cell(x, y)
-        if self._static_costs is None or not self.geometry.contains(row, column):
+        if self._static_costs is None or not self.geometry.contains(x, y):
             return FREE
-        return int(self._static_costs[row, column])
+        return int(self._static_costs[self.geometry.cell(x, y)])
 
     def _initial_geometry(self) -> Geometry:
         p = self.parameters
@@ -338,7 +343,7 @@ class Costmap:
             256 costs, and the number of entries per cell of distance. The table reaches a cell beyond the larger of the
             inflation and the circumscribed radius.
         """
-        resolution = self.parameters.resolution
+        resolution = self.geometry.resolution  # a static map's own, where the costmap does not roll
         radius = self._inflation.inflation_radius if self._inflation is not None else 0.0
         reach = max(radius, self.circumscribed_radius, self.inscribed_radius) / resolution + 2.0
         scale = 254.0 / reach

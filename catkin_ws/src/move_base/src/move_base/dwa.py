@@ -47,7 +47,6 @@ SPEED_CHANGE_COST = 0.05
 ALIGN_ANGLE = 1.05
 """Off the path's direction by more than this (rad) the robot turns on the spot before it drives, if it can."""
 
-
 NARROW_ALIGN_ANGLE = 0.35
 """The same for a robot that hardly moves in front of a narrow passage, which it can't enter aslant, rad."""
 
@@ -136,7 +135,7 @@ class DwaController:
         if best is None:
             best = self._best(self._arc_samples(velocity), robot, horizon, scene)
         if best is None:
-            best = self._best(self._sideways_samples(), robot, MIN_HORIZON, scene)
+            best = self._best(self._sideways_samples(velocity), robot, MIN_HORIZON, scene)
         if best is None:
             best = self._best(self._backward_samples(), robot, MIN_HORIZON, scene)
             self._backing_from = None if best is None else robot
@@ -210,9 +209,11 @@ class DwaController:
         samples[:, 2] = near
         return self._oscillation.allowed(samples)
 
-    def _sideways_samples(self) -> NDArray[np.float64]:
+    def _sideways_samples(self, velocity: Velocity) -> NDArray[np.float64]:
         p = self.parameters
-        samples = [(forward, lateral, 0.0) for lateral in p.y_vels for forward in (0.0, p.min_vel_x)]
+        reach = p.acc_lim_y * MIN_HORIZON  # what the base gets to while it drives such a sample
+        laterals = sorted({min(max(lateral, velocity.y - reach), velocity.y + reach) for lateral in p.y_vels})
+        samples = [(forward, lateral, 0.0) for lateral in laterals for forward in (0.0, p.min_vel_x)]
         return self._oscillation.allowed(np.array(samples).reshape(-1, 3))
 
     def _backward_samples(self) -> NDArray[np.float64]:

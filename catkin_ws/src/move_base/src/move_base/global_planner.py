@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 import pyastar2d
 
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 COST_FACTOR = 0.8 / 50.0
 """Weight per unit of cost over a free cell's weight of 1: NavFn's COST_FACTOR over its COST_NEUTRAL."""
+
+UNKNOWN_WEIGHT = 253.0 / 50.0
+"""Weight of an unknown cell that may be crossed: NavFn gives it the highest cost below an obstacle's."""
 
 ESCAPE_WEIGHT, PUSH_WEIGHT = 30.0, 300.0
 """Weights of inscribed and of obstacle cells around a start that lies among them; high, for a short way out."""
@@ -78,23 +82,26 @@ def make_plan(
         snapshot: the inflated global costmap.
         start: in the costmap's frame. It may lie in the inflated area, then the plan leaves it by a short way.
         goal: in the same frame.
-        tolerance: how far from a blocked goal the plan may end, m.
+        tolerance: how far from a blocked goal the plan may end, m; it ends at the nearest cell that can be reached.
         escape_radius: within this distance of a blocked start inflated cells may be crossed, m.
         allow_unknown: whether unknown cells may be crossed.
 
     Raises:
-        PlanningError: start or goal outside the map, goal blocked, or no way.
+        PlanningError: start or goal outside the map, goal blocked, no way, or a tolerance that makes no sense.
     """
     g = snapshot.geometry
-    start_cell, goal_cell = g.cell(start.x, start.y), g.cell(goal.x, goal.y)
-    if not g.contains(*start_cell):
+    if not 0.0 <= tolerance < np.inf:
+        raise PlanningError(f"the tolerance must be finite and at least 0, is {tolerance:g}")
+    if not g.contains(start.x, start.y):
         raise PlanningError(f"the robot at ({start.x:.2f}, {start.y:.2f}) is outside the map")
-    if not g.contains(*goal_cell):
+    if not g.contains(goal.x, goal.y):
         raise PlanningError(f"the goal ({goal.x:.2f}, {goal.y:.2f}) is outside the map")
+    start_cell, goal_cell = g.cell(start.x, start.y), g.cell(goal.x, goal.y)
     weights = _weigh(snapshot, snapshot.costs, snapshot.clearance, allow_unknown)
-    end_cell = _reachable_end(snapshot, weights, goal, goal_cell, tolerance)
+    goal_is_free = bool(np.isfinite(weights[goal_cell]))
     if not np.isfinite(weights[start_cell]):
         _open_start(weights, snapshot, start_cell, escape_radius)
+    end_cell = goal_cell if goal_is_free else _nearest_end(snapshot, weights, start_cell, goal, tolerance)
     cells = pyastar2d.astar_path(_biased(weights, start_cell, end_cell), start_cell, end_cell, allow_diagonal=True)
     if cells is None:
         raise PlanningError(f"there is no way to the goal ({goal.x:.2f}, {goal.y:.2f})")
@@ -140,23 +147,24 @@ def _weigh(
     """Returns the weights of cells by their costs and clearances: 1 for a free cell, infinite for a blocked one."""
     table = (1.0 + COST_FACTOR * np.arange(256)).astype(np.float32)
     table[INSCRIBED : LETHAL + 1] = np.inf
-    table[UNKNOWN] = 1.0 if allow_unknown else np.inf
+    table[UNKNOWN] = UNKNOWN_WEIGHT if allow_unknown else np.inf
     weights = table[costs]
     weights[clearance < np.float32(snapshot.inscribed_radius + TIGHT_BAND)] += np.float32(TIGHT_WEIGHT)
     return weights
 
 
-def _reachable_end(
-    snapshot: Snapshot, weights: NDArray[np.float32], goal: Pose, cell: tuple[int, int], tolerance: float
+def _nearest_end(
+    snapshot: Snapshot, weights: NDArray[np.float32], start: tuple[int, int], goal: Pose, tolerance: float
 ) -> tuple[int, int]:
-    """Returns the goal's cell, or the nearest free cell within the tolerance."""
-    if np.isfinite(weights[cell]):
-        return cell
+    """Returns the free cell nearest to a blocked goal, within the tolerance, that can be reached from the start."""
     g = snapshot.geometry
+    cell = g.cell(goal.x, goal.y)
     reach = int(tolerance / g.resolution)
     top, left = max(cell[0] - reach, 0), max(cell[1] - reach, 0)
-    window = weights[top : cell[0] + reach + 1, left : cell[1] + reach + 1]
-    rows, columns = np.nonzero(np.isfinite(window))
+    _, parts = cv2.connectedComponents(np.isfinite(weights).astype(np.uint8), connectivity=8)
+    window = (slice(top, cell[0] + reach + 1), slice(left, cell[1] + reach + 1))
+    opened = (snapshot.costs[window] == INSCRIBED) | (snapshot.costs[window] == LETHAL)  # to let the robot out
+    rows, columns = np.nonzero((parts[window] == parts[start]) & ~opened)
     distances = np.hypot(rows + top - cell[0], columns + left - cell[1]) * g.resolution
     if len(distances) and distances.min() <= tolerance:
         best = int(distances.argmin())

@@ -20,7 +20,7 @@ import numpy as np
 from move_base.costmap import LETHAL, Costmap, Snapshot
 from move_base.dwa import DwaController, Trajectory
 from move_base.geometry import STOP, Pose, Velocity, wrap_angle
-from move_base.global_planner import Plan, PlanningError, make_plan, path_cost
+from move_base.global_planner import PATH_SPACING, Plan, PlanningError, make_plan, path_cost
 from move_base.recovery import Recovery
 
 if TYPE_CHECKING:
@@ -480,7 +480,7 @@ class Navigator:
         self._work.planned = now
         assert self.goal is not None  # noqa: S101
         try:
-            plan = self.plan_between(robot, self.goal, p.controller.xy_goal_tolerance)
+            plan = self.plan_between(robot, self.goal, max(p.controller.xy_goal_tolerance, p.default_tolerance))
         except PlanningError as error:
             self._work.planning_error = str(error)
             self._work.failed_plans += 1
@@ -527,7 +527,7 @@ class Navigator:
         self._advance(robot)
         points = self.plan.points[self._work.progress :]
         to_goal = float(np.hypot(*np.diff(points, axis=0).T).sum())
-        count = round(LOOKAHEAD / 0.05)
+        count = round(LOOKAHEAD / PATH_SPACING)
         ahead = points[: count + 1 : PATH_STEP]
         if len(points) <= count or len(ahead) < 2:
             ahead = np.vstack([ahead, points[-1:]])
@@ -544,7 +544,7 @@ class Navigator:
         if snapshot is None:
             return ""
         goal = self.goal
-        if not snapshot.geometry.contains(*snapshot.geometry.cell(goal.x, goal.y)):
+        if not snapshot.geometry.contains(goal.x, goal.y):
             return f"the goal ({goal.x:.2f}, {goal.y:.2f}) is outside the map"
         if self._global.costmap.static_cost(goal.x, goal.y) == LETHAL:
             return f"the goal ({goal.x:.2f}, {goal.y:.2f}) is in a wall of the map"

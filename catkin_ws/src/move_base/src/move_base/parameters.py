@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 DEFAULT_UPDATE_PERIOD = 1.0
 """Seconds after which a source without `expected_update_rate` counts as silent; costmap_2d would wait for ever."""
 
+MAX_CELLS = 50_000_000
+"""Cells of a costmap that can be worked with: 350 x 350 m at 0.05 m."""
+
 LAYER_TYPES = {
     "costmap_2d::StaticLayer": "static",
     "costmap_2d::ObstacleLayer": "obstacle",
@@ -178,7 +181,8 @@ class RecoveryBehavior:
 class MoveBaseParameters:
     """Everything that move_base is told; frequencies in Hz, times in s, lengths in m.
 
-    `max_planning_retries` is -1 where only `planner_patience` limits them.
+    `max_planning_retries` is -1 where only `planner_patience` limits them; `default_tolerance` is how far a plan may end
+    from a blocked goal.
     """
 
     controller_frequency: float
@@ -193,6 +197,7 @@ class MoveBaseParameters:
     clearing_rotation_allowed: bool
     recovery_behaviors: tuple[RecoveryBehavior, ...]
     allow_unknown: bool
+    default_tolerance: float
     controller: ControllerParameters
     global_costmap: CostmapParameters
     local_costmap: CostmapParameters
@@ -222,6 +227,7 @@ def read_parameters(tree: Mapping[str, Any]) -> MoveBaseParameters:
         clearing_rotation_allowed=top.boolean(_ROTATION, True),
         recovery_behaviors=_read_recovery(top, local),
         allow_unknown=top.child("NavfnROS").boolean("allow_unknown", True),
+        default_tolerance=top.child("NavfnROS").number("default_tolerance", 0.0, low=0.0),
         controller=_read_controller(top.child("TrajectoryPlannerROS")),
         global_costmap=_read_costmap(top.child("global_costmap"), rolling_default=False),
         local_costmap=local,
@@ -236,22 +242,23 @@ def _read_controller(reader: _Reader) -> ControllerParameters:
     min_vel_x = reader.number("min_vel_x", 0.1, low=0.0, high=10.0)
     if min_vel_x > max_vel_x:
         raise reader.error("min_vel_x", f"must not be over max_vel_x ({max_vel_x:g})", min_vel_x)
-    max_vel_theta = reader.number("max_vel_theta", 1.0, low=0.0, above=True, high=20.0)
+    max_vel_theta = reader.number("max_vel_theta", 1.0, low=0.0, above=True, high=20.0, formerly="max_rotational_vel")
+    min_in_place = reader.number(
+        "min_in_place_vel_theta", 0.4, low=0.0, above=True, high=20.0, formerly="min_in_place_rotational_vel"
+    )
     holonomic = reader.boolean("holonomic_robot", True)
     return ControllerParameters(
         odom_topic=reader.text("odom_topic", "odom"),
         acc_lim_x=reader.number("acc_lim_x", 2.5, low=0.0, above=True),
         acc_lim_y=reader.number("acc_lim_y", 2.5, low=0.0, above=True),
-        acc_lim_theta=reader.number("acc_lim_theta", 3.2, low=0.0, above=True),
+        acc_lim_theta=reader.number("acc_lim_theta", 3.2, low=0.0, above=True, formerly="acc_lim_th"),
         max_vel_x=max_vel_x,
         min_vel_x=min_vel_x,
         max_vel_theta=max_vel_theta,
         min_vel_theta=reader.number("min_vel_theta", -max_vel_theta, low=-20.0, high=0.0),
-        min_in_place_vel_theta=min(
-            max_vel_theta, reader.number("min_in_place_vel_theta", 0.4, low=0.0, above=True, high=20.0)
-        ),
+        min_in_place_vel_theta=min(max_vel_theta, min_in_place),
         y_vels=_read_lateral_samples(reader) if holonomic else (),
-        escape_vel=reader.number("escape_vel", -0.1, low=-10.0, high=0.0),
+        escape_vel=reader.number("escape_vel", -0.1, low=-10.0, high=0.0, formerly="backup_vel"),
         xy_goal_tolerance=reader.number("xy_goal_tolerance", 0.10, low=0.0, above=True),
         yaw_goal_tolerance=reader.number("yaw_goal_tolerance", 0.05, low=0.0, above=True),
         latch_xy_goal_tolerance=reader.boolean("latch_xy_goal_tolerance", False),
@@ -259,8 +266,8 @@ def _read_controller(reader: _Reader) -> ControllerParameters:
         sim_granularity=reader.number("sim_granularity", 0.025, low=0.001, high=1.0),
         vx_samples=reader.integer("vx_samples", 3, low=1, high=200),
         vtheta_samples=reader.integer("vtheta_samples", 20, low=1, high=500),
-        path_distance_bias=reader.number("path_distance_bias", reader.number("pdist_scale", 0.6, low=0.0), low=0.0),
-        goal_distance_bias=reader.number("goal_distance_bias", reader.number("gdist_scale", 0.8, low=0.0), low=0.0),
+        path_distance_bias=reader.number("path_distance_bias", 0.6, low=0.0, formerly="pdist_scale"),
+        goal_distance_bias=reader.number("goal_distance_bias", 0.8, low=0.0, formerly="gdist_scale"),
         occdist_scale=reader.number("occdist_scale", 0.01, low=0.0),
         heading_lookahead=reader.number("heading_lookahead", 0.325, low=0.0),
         oscillation_reset_dist=reader.number("oscillation_reset_dist", 0.05, low=0.0),
@@ -313,6 +320,8 @@ def _read_costmap(reader: _Reader, *, rolling_default: bool) -> CostmapParameter
         footprint_padding=reader.number("footprint_padding", 0.01, low=0.0, high=10.0),
         layers=(),
     )
+    if parameters.width * parameters.height > MAX_CELLS * parameters.resolution**2:
+        raise reader.error("resolution", f"gives the costmap over {MAX_CELLS:,} cells", parameters.resolution)
     return replace(parameters, layers=_read_layers(reader))
 
 
@@ -427,8 +436,18 @@ class _Reader:
         return self._tree.get(name, default)
 
     def number(
-        self, name: str, default: float, *, low: float = -math.inf, high: float = math.inf, above: bool = False
+        self,
+        name: str,
+        default: float,
+        *,
+        low: float = -math.inf,
+        high: float = math.inf,
+        above: bool = False,
+        formerly: str = "",
     ) -> float:
+        """A number within bounds; `formerly` is the name that older files have for it."""
+        if formerly and not self.has(name) and self.has(formerly):
+            name = formerly
         value = self.value(name, default)
         if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
             raise self.error(name, "must be a number", value)
@@ -478,7 +497,15 @@ class _Reader:
         return entry["name"], kind
 
     def numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
-        values = self.sequence(name, default)
-        if any(isinstance(v, bool) or not isinstance(v, int | float) or not math.isfinite(v) for v in values):
-            raise self.error(name, "must be a list of numbers", list(values))
-        return tuple(float(value) for value in values)
+        given = self.value(name, default)
+        if isinstance(given, str):  # base_local_planner's own form of a list
+            given = given.strip("[] ").replace(",", " ").split()
+        elif not isinstance(given, list | tuple) or any(isinstance(v, bool | str) for v in given):
+            raise self.error(name, "must be a list of numbers", given)
+        try:
+            values = tuple(float(value) for value in given)
+        except (TypeError, ValueError) as error:
+            raise self.error(name, "must be a list of numbers", given) from error
+        if not all(math.isfinite(value) for value in values):
+            raise self.error(name, "must be a list of finite numbers", given)
+        return values
