@@ -181,8 +181,8 @@ class RecoveryBehavior:
 class MoveBaseParameters:
     """Everything that move_base is told; frequencies in Hz, times in s, lengths in m.
 
-    `max_planning_retries` is -1 where only `planner_patience` limits them; `default_tolerance` is how far a plan may end
-    from a blocked goal.
+    `max_planning_retries` is -1 where only `planner_patience` limits them; `default_tolerance` is how far a plan may
+    end from a blocked goal.
     """
 
     controller_frequency: float
