@@ -2,6 +2,7 @@ import math
 
 import cv2
 import numpy as np
+import pybullet
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -147,6 +148,13 @@ def test_robot_sees_and_touches_a_mapped_wall(make):
         simulation.step()
     assert simulation.pose.x == pytest.approx(2.0 - simulation.robot.length / 2.0, abs=0.01)
     assert (simulation.contacts, simulation.touching()) == (1, ("map",))
+    simulation.close()
+
+
+def test_mapped_walls_rest_on_the_floor_without_contact(make):
+    simulation = Simulation(read_world(make(origin=[-1.5, -1.0, 0.0])))
+    simulation.step()
+    assert pybullet.getContactPoints(physicsClientId=simulation.physics.client) == ()  # each would cost in every step
     simulation.close()
 
 

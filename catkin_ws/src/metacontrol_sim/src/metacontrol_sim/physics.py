@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 GRAVITY = 9.81
 """m/s2."""
 
-_WORLD_GROUP, _ROBOT_GROUP, _FLOOR_GROUP = 1, 2, 4
-_EVERYTHING = _WORLD_GROUP | _ROBOT_GROUP | _FLOOR_GROUP
+_WORLD_GROUP, _ROBOT_GROUP, _FLOOR_GROUP, _MAP_GROUP = 1, 2, 4, 8
+_SEEN = _WORLD_GROUP | _MAP_GROUP  # by rays
+_EVERYTHING = _SEEN | _ROBOT_GROUP | _FLOOR_GROUP
 _BOXES_PER_MESH = 4000  # PyBullet takes no more than 131,072 vertices at once
 _COLOURS = {
     "wall": (0.75, 0.75, 0.72, 1.0),
@@ -115,7 +116,7 @@ class Physics:
             origins: (n, 3), m.
             ends: (n, 3), m.
         """
-        hits = pybullet.rayTestBatch(origins, ends, collisionFilterMask=_WORLD_GROUP, physicsClientId=self.client)
+        hits = pybullet.rayTestBatch(origins, ends, collisionFilterMask=_SEEN, physicsClientId=self.client)
         return np.array([hit[2] for hit in hits])
 
     def depth_image(self, camera: DepthCamera, base: Pose) -> NDArray[np.float32]:
@@ -214,7 +215,12 @@ class Physics:
             vertices, indices = box_mesh(boxes[first : first + _BOXES_PER_MESH])
             visual = {"vertices": vertices, "indices": indices}
             shape = {**visual, "flags": pybullet.GEOM_FORCE_CONCAVE_TRIMESH}
-            bodies.append(self._add(pybullet.GEOM_MESH, shape, visual, _COLOURS["wall"], Pose(0.0, 0.0, 0.0), 0.0))
+            body = self._add(pybullet.GEOM_MESH, shape, visual, _COLOURS["wall"], Pose(0.0, 0.0, 0.0), 0.0)
+            # Neither with the floor nor with each other: PyBullet would test their triangles in every step.
+            pybullet.setCollisionFilterGroupMask(
+                body, -1, _MAP_GROUP, _WORLD_GROUP | _ROBOT_GROUP, physicsClientId=self.client
+            )
+            bodies.append(body)
         return tuple(bodies)
 
     def _add_robot(self, start: Pose) -> int:
@@ -229,7 +235,7 @@ class Physics:
         names = [pybullet.getJointInfo(body, link, physicsClientId=client)[1].decode() for link in links]
         self._joints = tuple(names.index(name) for name in JOINTS)
         for link in links:
-            pybullet.setCollisionFilterGroupMask(body, link, _ROBOT_GROUP, _WORLD_GROUP, physicsClientId=client)
+            pybullet.setCollisionFilterGroupMask(body, link, _ROBOT_GROUP, _SEEN, physicsClientId=client)
             pybullet.changeDynamics(
                 body, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, physicsClientId=client
             )
