@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import statistics
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import psutil
 from mros1_reasoner.knowledge_base import KnowledgeBase
 from mros1_reasoner.model import Facts, Objective
 from mros1_reasoner.owlready_reasoner import run_pellet
 from mros1_reasoner.pellet import PelletReasoner
+from support.figures import LIMIT, entry, seconds
 
 SIZES = {30: 60, 300: 60, 1000: 60}  # number of FunctionDesigns -> samples
 WARM_UP = 40  # analyses; the JVM compiles what runs often
@@ -29,17 +29,15 @@ _HEAD = """<rdf:RDF xml:base="http://example.org/bench" xmlns:rdf="http://www.w3
 MEMORY_LIMIT_MB = 500.0  # node and child together
 
 
-def run() -> list[dict]:
+def run() -> list[dict[str, Any]]:
     """Measure at every size; times in s."""
     entries = [_measure(f"analysis_{count}", count, samples)[0] for count, samples in SIZES.items()]
     count, samples = max(SIZES.items())
     unlike, memory = _measure(f"analysis_{count}_unlike", count, samples, unlike=True)
-    ratio = MEMORY_LIMIT_MB / memory
-    entry = {"name": "analysis_memory", "value": memory, "unit": "MB", "peer": "limit", "peer_value": MEMORY_LIMIT_MB}
-    return [*entries, unlike, {**entry, "ratio": ratio, "samples": 1}]
+    return [*entries, unlike, entry("analysis_memory", memory, "MB", 1, LIMIT, MEMORY_LIMIT_MB)]
 
 
-def _measure(name: str, count: int, samples: int, *, unlike: bool = False) -> tuple[dict, float]:
+def _measure(name: str, count: int, samples: int, *, unlike: bool = False) -> tuple[dict[str, Any], float]:
     """Return the entry, and the memory in MB of this process and of the reasoner's."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.owl"
@@ -50,32 +48,17 @@ def _measure(name: str, count: int, samples: int, *, unlike: bool = False) -> tu
         reasoner.load(knowledge_base.ontology)
         for i in range(WARM_UP):
             knowledge_base.analyse(_facts(i), reasoner)
-        ours = [_timed(lambda i=i: knowledge_base.analyse(_facts(i), reasoner)) for i in range(samples)]
+        ours = [seconds(lambda i=i: knowledge_base.analyse(_facts(i), reasoner)) for i in range(samples)]
         memory = sum(psutil.Process(pid).memory_info().rss for pid in (None, reasoner.pid)) / 1e6
     finally:
         reasoner.close()
     peers = []
     for i in range(PEER_SAMPLES):
         world = knowledge_base.world(_facts(i))
-        peers.append(_timed(lambda world=world: run_pellet(world)))
+        peers.append(seconds(lambda world=world: run_pellet(world)))
         world.close()
     value, peer = statistics.median(ours), statistics.median(peers)
-    entry = {
-        "name": name,
-        "value": value,
-        "unit": "s",
-        "peer": "owlready2 sync_reasoner_pellet",
-        "peer_value": peer,
-        "ratio": peer / value,
-        "samples": samples,
-    }
-    return entry, memory
-
-
-def _timed(action: Callable[[], object]) -> float:
-    began = time.perf_counter()
-    action()
-    return time.perf_counter() - began
+    return entry(name, value, "s", samples, "owlready2 sync_reasoner_pellet", peer), memory
 
 
 def _facts(i: int) -> Facts:

@@ -10,7 +10,8 @@ import threading
 import time
 from typing import Any
 
-from monitor_bench import DEADLINE, NODE, entry, percentile, stand
+from support.figures import entry, percentile
+from support.stand import DEADLINE, NODE, stand
 
 _KILLS = 50
 _BYSTANDERS = 60

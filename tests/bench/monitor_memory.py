@@ -9,7 +9,8 @@ import time
 from typing import Any
 
 import psutil
-from monitor_bench import NODE, entry, stand
+from support.figures import entry
+from support.stand import NODE, stand
 
 _TICKS = 10000
 _WARM_UP = 1000

@@ -9,7 +9,8 @@ import time
 from typing import Any
 
 import psutil
-from monitor_bench import NAIVE, entry, naive_snapshot, percentile, stand
+from support.figures import entry, percentile
+from support.stand import NAIVE, naive_snapshot, stand
 
 _NODES = 300
 _SECONDS = 20.0

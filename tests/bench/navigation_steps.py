@@ -23,6 +23,7 @@ from metacontrol_experiments.settings import Settings
 from move_base.costmap import Costmap
 from move_base.dwa import DwaController
 from move_base.navigator import Navigator
+from support.figures import LIMIT, entry
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,7 +48,10 @@ def run() -> list[dict[str, Any]]:
             patches.enter_context(mock.patch.object(owner, method, timed))
         Lockstep(Settings(route, Path(folder), metacontrol=False, timeout_s=_SECONDS)).run()
     times["global_plan"] = times["global_plan"][:_FIRST_PLANS]
-    return [_entry(name, times[name], limit) for name, _, _, limit in _MEASURED]
+    return [
+        entry(name, statistics.median(times[name]), "ms", len(times[name]), LIMIT, limit)
+        for name, _, _, limit in _MEASURED
+    ]
 
 
 def _timed(method: Callable[..., Any], times: list[float]) -> Callable[..., Any]:
@@ -60,16 +64,3 @@ def _timed(method: Callable[..., Any], times: list[float]) -> Callable[..., Any]
             times.append(1000.0 * (time.perf_counter() - began))
 
     return timed
-
-
-def _entry(name: str, times: list[float], limit: float) -> dict[str, Any]:
-    value = statistics.median(times)
-    return {
-        "name": name,
-        "value": value,
-        "unit": "ms",
-        "peer": "limit",
-        "peer_value": limit,
-        "ratio": limit / value,
-        "samples": len(times),
-    }

@@ -5,11 +5,11 @@ from __future__ import annotations
 import statistics
 import subprocess
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
 from ros_model.reader import read_system
+from support.figures import entry, seconds
 
 _SIZE = 432_000  # bytes, as large as the largest published model
 _SAMPLES = 5
@@ -27,41 +27,18 @@ def _read() -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "large.rossystem"
         path.write_text(_model(), encoding="utf-8")
-        times = []
-        for _ in range(_SAMPLES):
-            began = time.perf_counter()
-            system = read_system(path)
-            times.append(time.perf_counter() - began)
-    if not system.components:
-        raise RuntimeError("the model was read as empty")
-    value = statistics.median(times)
-    return {
-        "name": "read_model",
-        "value": value,
-        "unit": "s",
-        "peer": "published pyparsing reader, measured earlier",
-        "peer_value": _PUBLISHED_S,
-        "ratio": _PUBLISHED_S / value,
-        "samples": _SAMPLES,
-    }
+        if not read_system(path).components:
+            raise RuntimeError("the model was read as empty")
+        value = statistics.median(seconds(lambda: read_system(path)) for _ in range(_SAMPLES))
+    return entry("read_model", value, "s", _SAMPLES, "published pyparsing reader, measured earlier", _PUBLISHED_S)
 
 
 def _check() -> dict[str, Any]:
-    times = []
-    for _ in range(_SAMPLES):
-        began = time.perf_counter()
+    def check() -> None:
         subprocess.run(["rosmodel", "check", str(_D2)], check=True, stdout=subprocess.DEVNULL)
-        times.append(time.perf_counter() - began)
-    value = statistics.median(times)
-    return {
-        "name": "check_models",
-        "value": value,
-        "unit": "s",
-        "peer": "what a user waits for without noticing",
-        "peer_value": _UNNOTICED_S,
-        "ratio": _UNNOTICED_S / value,
-        "samples": _SAMPLES,
-    }
+
+    value = statistics.median(seconds(check) for _ in range(_SAMPLES))
+    return entry("check_models", value, "s", _SAMPLES, "what a user waits for without noticing", _UNNOTICED_S)
 
 
 def _model() -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from metacontrol_experiments.processes import ProcessTree, free_port
+from support.figures import entry
 
 _REQUESTS = 200
 _INTEGRATION = Path(__file__).resolve().parents[1] / "integration"
@@ -35,14 +36,4 @@ def run() -> list[dict[str, Any]]:
             mean = (time.monotonic() - began) / _REQUESTS
         finally:
             tree.close()
-    return [
-        {
-            "name": "reconfigure_random",
-            "value": mean,
-            "unit": "s",
-            "peer": None,
-            "peer_value": None,
-            "ratio": None,
-            "samples": _REQUESTS,
-        }
-    ]
+    return [entry("reconfigure_random", mean, "s", _REQUESTS)]

@@ -1,21 +1,24 @@
 """./mros bench [NAME ...]: runs the benchmarks, shows them beside their peers, writes results/bench.json.
 
-A module of this folder offers `run() -> list[dict]` with the keys name, value, unit, peer, peer_value, ratio, samples.
+A module of this folder offers `run() -> list[dict]`, whose figures are made by `support.figures.entry`.
 """
 
 from __future__ import annotations
 
 import importlib.util
 import json
+import multiprocessing
 import os
 import sys
+import traceback
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
+from support.figures import KEYS
 
 HERE = Path(__file__).parent
-KEYS = {"name", "value", "unit", "peer", "peer_value", "ratio", "samples"}
 
 
 def modules(names: list[str]) -> list[Path]:
@@ -38,31 +41,50 @@ def run(path: Path) -> list[dict]:
     spec.loader.exec_module(module)
     entries = module.run()
     for entry in entries:
-        if set(entry) != KEYS:
-            raise ValueError(f"{path.name}: an entry has the keys {sorted(entry)}, not {sorted(KEYS)}")
+        if tuple(entry) != KEYS:
+            raise ValueError(f"{path.name}: an entry has the keys {list(entry)}, not {list(KEYS)}")
     return entries
 
 
+def run_apart(path: Path) -> list[dict]:
+    """Run a benchmark module in a process of its own: a process can be a node of one master only."""
+    with ProcessPoolExecutor(max_workers=1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(run, path).result()
+
+
+def table(entries: list[dict]) -> Table:
+    """Return what is shown of the figures."""
+    shown = Table(Column("name", no_wrap=True), "ours", "unit", "peer", "its value", "ratio", "samples")
+    for entry in entries:
+        cells = (entry[key] for key in KEYS)
+        shown.add_row(
+            *("-" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)
+        )
+    return shown
+
+
 def main() -> None:
-    """Run what the command line names."""
+    """Run what the command line names; one that fails does not take the others' figures with it."""
     names = sys.argv[1:]
     console = Console(width=None if sys.stdout.isatty() else 110)
     entries: list[dict] = []
+    failed: list[str] = []
     for path in modules(names):
         console.print(f"[dim]{path.stem} ...[/dim]")
-        entries += [entry for entry in run(path) if not names or entry["name"] in names or path.stem in names]
-    table = Table("name", "ours", "unit", "peer", "its value", "ratio", "samples")
-    for entry in entries:
-        cells = (entry[key] for key in ("name", "value", "unit", "peer", "peer_value", "ratio", "samples"))
-        table.add_row(
-            *("-" if cell is None else f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in cells)
-        )
-    console.print(table)
-    results = Path(os.environ["MROS_ROOT"]) / "results"
-    results.mkdir(exist_ok=True)
-    target = results / "bench.json"
+        try:
+            found = run_apart(path)
+        except Exception:  # whatever it is, it is shown
+            traceback.print_exc()
+            failed.append(path.stem)
+            continue
+        entries += [entry for entry in found if not names or entry["name"] in names or path.stem in names]
+    console.print(table(entries))
+    target = Path(os.environ["MROS_ROOT"]) / "results" / "bench.json"
+    target.parent.mkdir(exist_ok=True)
     target.write_text(json.dumps(entries, indent=1) + "\n")
-    console.print(f"written to {target}")
+    console.print(f"written to {target}", soft_wrap=True)
+    if failed:
+        sys.exit(f"mros: bench: failed, see above: {', '.join(failed)}")
 
 
 if __name__ == "__main__":

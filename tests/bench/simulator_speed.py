@@ -11,6 +11,7 @@ from metacontrol_sim.geometry import Pose
 from metacontrol_sim.motion_sensors import REAL
 from metacontrol_sim.simulation import STEP, Settings, Simulation
 from metacontrol_sim.world_file import read_world
+from support.figures import entry
 
 _SECONDS = 60.0
 _SCAN_STEPS = 10
@@ -29,14 +30,4 @@ def run() -> list[dict[str, Any]]:
             simulation.scan(simulation.robot.front_laser)
     value = _SECONDS / (time.perf_counter() - began)
     simulation.close()
-    return [
-        {
-            "name": "simulator_speed",
-            "value": value,
-            "unit": "s/s",
-            "peer": None,
-            "peer_value": None,
-            "ratio": None,
-            "samples": round(_SECONDS / STEP),
-        }
-    ]
+    return [entry("simulator_speed", value, "s/s", round(_SECONDS / STEP))]

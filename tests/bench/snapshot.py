@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import statistics
-import time
 from typing import TYPE_CHECKING, Any
 
-from monitor_bench import NAIVE, entry, naive_snapshot, stand
 from ros_model.snapshot import MasterClient
+from support.figures import entry, seconds
+from support.stand import NAIVE, naive_snapshot, stand
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,9 +31,4 @@ def run() -> list[dict[str, Any]]:
 
 
 def _median(function: Callable[[], object], samples: int) -> float:
-    times = []
-    for _ in range(samples):
-        begin = time.perf_counter()
-        function()
-        times.append(time.perf_counter() - begin)
-    return statistics.median(times)
+    return statistics.median(seconds(function) for _ in range(samples))

@@ -13,6 +13,7 @@ import numpy as np
 from metacontrol_sim.geometry import Pose
 from metacontrol_sim.simulation import Settings, Simulation
 from metacontrol_sim.world_file import read_world
+from support.figures import LIMIT, entry
 
 _CELLS = 1500
 _REPEATS = 5
@@ -30,18 +31,7 @@ def run() -> list[dict[str, Any]]:
             simulation.step()
             times.append(time.perf_counter() - began)
             simulation.close()
-    value = statistics.median(times)
-    return [
-        {
-            "name": "world_from_map",
-            "value": value,
-            "unit": "s",
-            "peer": "limit",
-            "peer_value": _LIMIT_S,
-            "ratio": _LIMIT_S / value,
-            "samples": len(times),
-        }
-    ]
+    return [entry("world_from_map", statistics.median(times), "s", len(times), LIMIT, _LIMIT_S)]
 
 
 def _write_map(folder: Path) -> Path:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import math
 import os
 import statistics
 import tempfile
@@ -23,6 +22,7 @@ from metacontrol_experiments.processes import ProcessTree, free_port, wait_until
 from metacontrol_msgs.msg import ActiveConfiguration, MvpReconfigurationAction, MvpReconfigurationGoal
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry
+from support.figures import entry, percentile
 
 DEADLINE_S = 60.0
 PAPER_S = 4.3  # mean time of a reconfiguration in the paper
@@ -203,16 +203,5 @@ def entries(
     """Return what `./mros bench` writes: the median, and the 95th percentile as NAME_p95."""
     figures = {name: statistics.median(values)}
     if tail:
-        figures[f"{name}_p95"] = sorted(values)[math.ceil(0.95 * len(values)) - 1]
-    return [
-        {
-            "name": key,
-            "value": value,
-            "unit": unit,
-            "peer": peer,
-            "peer_value": peer_value,
-            "ratio": peer_value / value if peer_value else None,
-            "samples": len(values),
-        }
-        for key, value in figures.items()
-    ]
+        figures[f"{name}_p95"] = percentile(values, 0.95)
+    return [entry(key, value, unit, len(values), peer, peer_value) for key, value in figures.items()]

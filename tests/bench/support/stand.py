@@ -1,11 +1,10 @@
-"""What the monitor's benchmarks share: a master and a monitor of their own, and many live nodes in one process."""
+"""A master of its own for the benchmarks of single nodes, with a monitor or many live nodes beside it."""
 
 from __future__ import annotations
 
 import contextlib
 import json
 import os
-import socket
 import subprocess
 import sys
 import tempfile
@@ -13,6 +12,8 @@ import time
 import xmlrpc.client
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from metacontrol_experiments.processes import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,48 +24,38 @@ NAIVE = "one call per node, service and parameter"
 NODE = "import rospy, sys; rospy.init_node(sys.argv[1], disable_rosout=True); rospy.spin()"
 
 
-def entry(name: str, value: float, unit: str, samples: int, peer: str | None = None, peer_value: float | None = None):
-    """Return an entry of the results."""
-    ratio = peer_value / value if peer_value and value else None
-    return {
-        "name": name,
-        "value": value,
-        "unit": unit,
-        "peer": peer,
-        "peer_value": peer_value,
-        "ratio": ratio,
-        "samples": samples,
-    }
-
-
-def percentile(values: list[float], share: float) -> float:
-    """Return the value below which that share of the values lies."""
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, round(share * (len(ordered) - 1)))]
-
-
 class Stand:
     """A master with a monitor, and whatever is started beside it; all of it ends with the stand."""
 
     def __init__(self, folder: Path, stack: contextlib.ExitStack) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = free_port()
         self.folder = folder
         self.uri = f"http://localhost:{port}"
-        self.environment = os.environ | {"ROS_MASTER_URI": self.uri, "ROS_LOG_DIR": str(folder)}
+        self.environment = os.environ | {
+            "ROS_MASTER_URI": self.uri,
+            "ROS_LOG_DIR": str(folder),
+            "ROS_HOME": str(folder),
+        }
         self.environment.pop("ROS_NAMESPACE", None)
         self._stack = stack
         self.proxy: Any = xmlrpc.client.ServerProxy(self.uri)
         self.master = self.start("rosmaster", "--core", "-p", str(port))
-        wait_until(self._answers)
+        wait_until(lambda: self.ask_master("getPid") is not None)
 
     def start(self, *command: str, **options: Any) -> subprocess.Popen[Any]:
         """Start a process."""
         options = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, **options}
         process = subprocess.Popen(command, env=self.environment, **options)
-        self._stack.callback(_end, process)
+        self._stack.callback(end, process)
         return process
+
+    def ask_master(self, call: str, *arguments: str) -> Any:
+        """Return what the master answers, None where it refuses or is not there."""
+        try:
+            code, _, value = getattr(self.proxy, call)("/bench", *arguments)
+        except OSError:
+            return None
+        return value if code == 1 else None
 
     def start_nodes(self, count: int) -> None:
         """Start so many live nodes: registered, each with an API that answers."""
@@ -94,14 +85,8 @@ class Stand:
         )
         return json.loads(done.stdout.splitlines()[-1])
 
-    def _answers(self) -> bool:
-        try:
-            return self.proxy.getPid("/bench")[0] == 1
-        except OSError:
-            return False
-
     def _registered(self, topic: str) -> bool:
-        state = self.proxy.getSystemState("/bench")[2]
+        state = self.ask_master("getSystemState")
         return any(topic == name for part in state[:2] for name, _ in part)
 
 
@@ -138,11 +123,12 @@ def wait_until(condition: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def _end(process: subprocess.Popen[Any]) -> None:
+def end(process: subprocess.Popen[Any]) -> None:
+    """End a process, by force where it does not within seconds."""
     if process.poll() is None:
         process.terminate()
     try:
-        process.wait(timeout=5.0)
+        process.wait(timeout=10.0)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
