@@ -138,6 +138,9 @@ def test_periods_without_a_command_are_missed():
     assert periods_missed([0.0, 0.1, 0.2, 0.3], 10.0) == 0.0
     assert periods_missed([0.0, 0.18, 0.2, 0.31], 10.0) == 0.0  # late, but within its period
     assert periods_missed([0.0, 0.1, 0.4, 0.5], 10.0) == pytest.approx(2 / 5)
+    assert periods_missed([0.0, 0.01, 0.02, 0.3], 10.0) == pytest.approx(1 / 3)  # early ones make up for nothing
+    slow = [0.15 * number for number in range(21)]
+    assert periods_missed(slow, 10.0) == pytest.approx(1 / 3)  # though no gap has an empty period
     assert periods_missed([0.0], 10.0) is None
 
 
@@ -169,9 +172,19 @@ def test_no_configuration_is_known_of_an_empty_record():
     assert summarise(MissionRecord())["outcome"] == "unknown"
 
 
-def test_nonsense_in_an_event_is_named():
-    record = MissionRecord(events=(Event(1.0, "MISSION_START", "r1", {"seed": "one"}),))
-    with pytest.raises(MetricsError, match="seed is 'one'"):
+def test_summary_tells_where_clutter_lay():
+    record = MissionRecord(events=(Event(1.0, "PERTURBATION", "clutter:2", {"places": "1.5,-2.000 3,4"}),))
+    (entry,) = summarise(record)["perturbations"]
+    assert entry["places"] == [[1.5, -2.0], [3.0, 4.0]]
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "said"),
+    [("MISSION_START", {"seed": "one"}, "seed is 'one'"), ("PERTURBATION", {"places": "here"}, "places is 'here'")],
+)
+def test_nonsense_in_an_event_is_named(kind, values, said):
+    record = MissionRecord(events=(Event(1.0, kind, "r1", values),))
+    with pytest.raises(MetricsError, match=said):
         summarise(record)
 
 

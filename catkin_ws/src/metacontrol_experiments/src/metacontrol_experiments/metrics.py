@@ -10,8 +10,8 @@ Definitions
   above it then.
 - `decide_s`: from that diagnostic to the Decision DECIDED. `execute_s`: from DECIDED to EXECUTED.
 - `control` is of the initial configuration, until the first change: the rate that its controller was set to, and the
-  share of its periods in which no velocity command came: between two commands that are n periods apart, or more but
-  less than n + 1, these are n - 1. A command that is late within its period is none of them.
+  share of its periods in which no velocity command came. A command that is late within its period is none of them; a
+  controller that lags behind its schedule by a whole period, at once or little by little, has missed one.
 - `success` is the paper's: goal reached, mean safety risk < 0.4, risk below its threshold for more than 95 % of the
   time, energy below its threshold for more than 90 % of the time; and not longer than 250 s.
 """
@@ -273,8 +273,22 @@ def _perturbations(record: MissionRecord) -> list[dict[str, Any]]:
                 entry["share"] = _number(event.values, "share", 0.0)
             if "pid" in event.values:
                 entry["pid"] = int(_number(event.values, "pid", 0))
+            if "places" in event.values:
+                entry["places"] = _places(event.values["places"])
             found.append(entry)
     return found
+
+
+def _places(text: str) -> list[list[float]]:
+    """Places x,y of clutter, m in the map frame.
+
+    Raises:
+        MetricsError: they are none.
+    """
+    try:
+        return [[float(number) for number in place.split(",")] for place in text.split()]
+    except ValueError as error:
+        raise MetricsError(f"mission/event: places is {text!r}; expected x,y in m, space between them") from error
 
 
 def _observed(record: MissionRecord, name: str, limit: float, start: float, end: float) -> dict[str, float | None]:
@@ -295,9 +309,12 @@ def periods_missed(stamps: Sequence[float], rate: float) -> float | None:
     """Share of a controller's periods (rate in Hz) in which no command came; None with fewer than two commands."""
     if len(stamps) < 2:
         return None
-    gaps = np.diff(np.asarray(stamps)) * rate
-    empty = np.maximum(np.floor(gaps + _ROUNDING) - 1.0, 0.0)
-    return float(empty.sum() / max(gaps.sum(), 1.0))
+    lag, missed, periods = 0.0, 0.0, np.diff(np.asarray(stamps)) * rate
+    for period in periods:
+        lag = max(lag + float(period) - 1.0, 0.0)  # an early command gives no credit for later ones
+        missed += math.floor(lag + _ROUNDING)
+        lag -= math.floor(lag + _ROUNDING)
+    return missed / max(float(periods.sum()), 1.0)
 
 
 def _control(record: MissionRecord, told: dict[str, str], start: float, end: float) -> dict[str, float | None]:
