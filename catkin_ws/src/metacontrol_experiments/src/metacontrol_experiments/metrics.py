@@ -18,6 +18,7 @@ Definitions
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
