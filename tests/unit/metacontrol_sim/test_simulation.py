@@ -279,16 +279,17 @@ def test_person_walks_to_and_fro_and_waits_for_the_robot(simulate):
 @pytest.mark.parametrize(
     ("walker", "said"),
     [
-        (Walker("a", ((1.0, 1.0),)), "two or more waypoints"),
-        (Walker("a", ((1.0, math.inf), (1.0, 2.0))), "two or more waypoints, of finite"),
-        (Walker("a", ((1.0, 1.0), (1.0, 2.0)), 9.0), "speed must be"),
+        (Walker("a", ((1.0, 1.0),)), "waypoints: give two or more"),
+        (Walker("a", ((1.0, math.inf), (1.0, 2.0))), "of finite numbers"),
+        (Walker("a", ((1.0, 1.0), (1.0, 2.0)), 9.0), "speed: is 9; give"),
         (Walker("a", ((1.0, 1.0), (1.0, 90.0))), "off the floor"),
         (Walker("a", ((0.0, 0.0), (3.0, 0.0))), "the robot stands at the first waypoint"),
+        (Walker("a", ((3.0, 2.0), (7.0, 2.0))), r"the way leads into 'wall' at \(4, 2\)"),
     ],
 )
 def test_person_without_a_way_is_refused(simulate, walker, said):
     with pytest.raises(ObstacleError, match=said):
-        simulate(boxes=()).spawn_walker(walker)
+        simulate().spawn_walker(walker)
 
 
 def test_deleting_what_is_not_there_names_what_is(simulate):

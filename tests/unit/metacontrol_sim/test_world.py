@@ -11,6 +11,7 @@ from metacontrol_sim.world_file import read_world
 
 WORLDS = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim/worlds"
 FLOOR = "floor: {x: [-5, 5], y: [-5, 5]}\n"
+RACK = "racks: [{name: rack, position: [2, 0], size: [0.05, 1], height: 1}]\n"
 
 
 def world_of(tmp_path, text):
@@ -49,10 +50,11 @@ def gap(one, other):
         (FLOOR + "boxes: [{name: a, position: [9, 0], size: [1, 1], height: 1}]", "'a': position .* off the floor"),
         (FLOOR + "racks: [&a {name: a, position: [0, 0], size: [1, 1], height: 1}, *a]", "'a': the name stands twice"),
         (FLOOR + "people: [3]", r"people\[0\]: must be a person with a name"),
-        (FLOOR + "people: [{name: a, waypoints: [[0, 0]]}]", r"people\[0\] 'a': waypoints: must be two or more"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0]]}]", r"'a': waypoints: give two or more"),
         (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, x]]}]", r"'a': waypoints: must be 2 finite"),
         (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 9]]}]", "'a': waypoint .* off the floor"),
-        (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 1]], speed: 0}]", "'a': speed: 0 must be more"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 1]], speed: 0}]", "'a': speed: is 0; give more"),
+        (FLOOR + RACK + "people: [{name: a, waypoints: [[0, 0], [4, 0]]}]", "'a': the way leads into 'rack'"),
         (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 1]], age: 7}]", "'a': unknown key age"),
     ],
 )

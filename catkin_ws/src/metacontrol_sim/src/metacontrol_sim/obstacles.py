@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from metacontrol_sim.walking import CLEARANCE, HEIGHT, MAX_SPEED, RADIUS, Walker
-from metacontrol_sim.world import Box
+from metacontrol_sim.walking import CLEARANCE, HEIGHT, RADIUS, Walker
+from metacontrol_sim.world import Box, way_problem
 
 if TYPE_CHECKING:
     from metacontrol_sim.geometry import Pose
@@ -125,15 +125,10 @@ class Obstacles:
         """Put a person on their way and return their name; an empty one is made up.
 
         Raises:
-            ObstacleError: a waypoint or the speed makes no sense, or the robot stands at the first one.
+            ObstacleError: the way or the speed makes no sense, or the robot stands at the first waypoint.
         """
-        if len(walker.waypoints) < 2 or not all(math.isfinite(n) for point in walker.waypoints for n in point):
-            raise ObstacleError(f"person {walker.name!r}: give two or more waypoints, of finite numbers")
-        if not 0.0 < walker.speed <= MAX_SPEED:
-            raise ObstacleError(f"person {walker.name!r}: speed must be more than 0 and at most {MAX_SPEED:g} m/s")
-        for x, y in walker.waypoints:
-            if not self._world.contains(x, y):
-                raise ObstacleError(f"person {walker.name!r}: waypoint ({x:g}, {y:g}) is off the floor")
+        if problem := way_problem(self._world, walker):
+            raise ObstacleError(f"person {walker.name!r}: {problem}")
         name = self._new_name(walker.name, "person")
         if self._gap_to_robot(*walker.waypoints[0], robot) < RADIUS:
             raise ObstacleError(f"person {walker.name!r}: the robot stands at the first waypoint")

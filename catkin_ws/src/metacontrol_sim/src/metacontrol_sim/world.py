@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from metacontrol_sim.grid import FREE, OCCUPIED, UNKNOWN, Grid, cover
+from metacontrol_sim.walking import MAX_SPEED, RADIUS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -119,6 +120,24 @@ class World:
     def _columns(self) -> NDArray[np.float64]:
         """Centre x, y, length, width and yaw of all boxes: (5, n)."""
         return np.array([(box.x, box.y, box.length, box.width, box.yaw) for box in self.boxes]).T
+
+
+def way_problem(world: World, walker: Walker) -> str | None:
+    """Return why a person cannot walk their way, None where they can."""
+    if len(walker.waypoints) < 2 or not all(math.isfinite(number) for point in walker.waypoints for number in point):
+        return "waypoints: give two or more [x, y], of finite numbers"
+    if not 0.0 < walker.speed <= MAX_SPEED:
+        return f"speed: is {walker.speed:g}; give more than 0 and at most {MAX_SPEED:g} m/s"
+    for x, y in walker.waypoints:
+        if not world.contains(x, y):
+            return f"waypoint ({x:g}, {y:g}) is off the floor"
+    places = math.ceil(walker.length / RADIUS) + 1
+    for walked in np.linspace(0.0, walker.length, places).tolist():
+        x, y = walker.place(walked)
+        box, distance = world.nearest(x, y)
+        if box is not None and distance < RADIUS:
+            return f"the way leads into {box.name!r} at ({x:.2g}, {y:.2g})"
+    return None
 
 
 def rasterise(world: World, resolution: float = 0.05, margin: float = 0.5) -> Grid:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from metacontrol_sim.map_file import MapError, read_map
-from metacontrol_sim.walking import MAX_SPEED, SPEED, Walker
-from metacontrol_sim.world import KINDS, Box, World, WorldError, extrude
+from metacontrol_sim.walking import SPEED, Walker
+from metacontrol_sim.world import KINDS, Box, World, WorldError, extrude, way_problem
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -96,12 +96,10 @@ def _walker(entry: Any, where: str) -> Walker:
     if unknown := sorted(map(str, set(entry) - {"name", "waypoints", "speed"})):
         raise WorldError(f"{where}: unknown key {', '.join(unknown)}")
     points = entry.get("waypoints")
-    if not isinstance(points, list) or len(points) < 2:
+    if not isinstance(points, list):
         raise WorldError(f"{where}: waypoints: must be two or more [x, y]")
     waypoints = tuple((x, y) for x, y in (_numbers(point, 2, f"{where}: waypoints") for point in points))
     (speed,) = _numbers([entry.get("speed", SPEED)], 1, f"{where}: speed")
-    if not 0.0 < speed <= MAX_SPEED:
-        raise WorldError(f"{where}: speed: {speed:g} must be more than 0 and at most {MAX_SPEED:g} m/s")
     return Walker(entry["name"], waypoints, speed)
 
 
@@ -113,9 +111,8 @@ def _check(world: World, path: Path) -> None:
             raise WorldError(f"{path}: {name!r}: the name stands twice; rename one of them")
         seen.add(name)
     for walker in world.walkers:
-        for x, y in walker.waypoints:
-            if not world.contains(x, y):
-                raise WorldError(f"{path}: {walker.name!r}: waypoint ({x}, {y}) is off the floor")
+        if problem := way_problem(world, walker):
+            raise WorldError(f"{path}: {walker.name!r}: {problem}")
     for box in world.boxes:
         if box.kind != "wall" and not world.contains(box.x, box.y):
             raise WorldError(f"{path}: {box.name!r}: position ({box.x}, {box.y}) is off the floor")
