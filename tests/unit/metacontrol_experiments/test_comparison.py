@@ -9,6 +9,7 @@ from metacontrol_experiments import comparison
 from metacontrol_experiments.cli import metacontrol
 from metacontrol_experiments.comparison import Pair
 from metacontrol_experiments.delays import KINDS, DelayError, Delays, delays_of, read_delays, write_delays
+from metacontrol_experiments.runner import RunError
 
 
 def change(trigger="component:front_laser", to="f2_v1_r3_k", **times):
@@ -27,6 +28,12 @@ def a_summary(**changes):
         "reconfigurations": [change()],
         "control": {"rate_hz": 20.0, "periods_missed": 0.01},
         "initial_configuration": "f2_v2_r2",
+        "route": "r1",
+        "metacontrol": True,
+        "perturbations": [{"stamp_s": 8.0, "name": "component:front_laser"}],
+        "real_time_factor": 1.0,
+        "outcome": "reached",
+        "commit": "0123456789abcdef",
     }
     return usual | changes
 
@@ -36,14 +43,31 @@ def test_table_holds_both_engines_and_the_paired_difference():
         Pair(seed, a_summary(duration_s=40.0 + seed), a_summary(duration_s=39.5 + seed, reconfigurations=[]))
         for seed in (1, 2, 3)
     ]
-    lines = comparison.markdown(pairs).splitlines()
-    assert "| duration, s | 42.000 ± 2.484 | 41.500 ± 2.484 | -0.500 ± 0.000 |" in lines
-    assert "| reconfigurations | 1.000 ± 0.000 | 0.000 ± 0.000 | -1.000 ± 0.000 |" in lines
+    text = comparison.markdown(pairs)
+    lines = text.splitlines()
+    assert "| duration, s | 3 | 42.000 ± 2.484 | 41.500 ± 2.484 | -0.500 ± 0.000 | differs by -1.2% |" in lines
+    assert "| reconfigurations | 3 | 1.000 ± 0.000 | 0.000 ± 0.000 | -1.000 ± 0.000 | differs by -100.0% |" in lines
+    assert "| way, m | 3 | 19.000 ± 0.000 | 19.000 ± 0.000 | 0.000 ± 0.000 | no difference seen |" in lines
     assert not [line for line in lines if line.startswith("| execute")]  # only one of the engines tells it
-    assert "- seed 2: ros f2_v2_r2 → f2_v1_r3_k (9.0); lockstep f2_v2_r2" in lines
+    assert "- seed 2: ROS f2_v2_r2 → f2_v1_r3_k (9.0); lockstep f2_v2_r2" in lines
+    assert "with 0 of 3 seeds. Of 10 figures, 2 differ by more than chance: duration, s (-0.500 ± 0.000), " in text
 
 
-def test_command_runs_each_mission_once_with_the_options_of_run(tmp_path, monkeypatch):
+def test_difference_within_its_interval_is_none():
+    pairs = [Pair(seed, a_summary(), a_summary(duration_s=40.0 + (-1) ** seed)) for seed in (1, 2, 3, 4)]
+    text = comparison.markdown(pairs)
+    assert "| 0.000 ± 1.837 | no difference seen |" in text
+    assert "with 4 of 4 seeds. None of the 13 figures differs by more than chance." in text
+
+
+def test_one_seed_tells_no_difference():
+    text = comparison.markdown([Pair(1, a_summary(), a_summary(duration_s=50.0))])
+    assert "| 40.000 | 50.000 | 10.000 | needs more seeds |" in text and "takes more seeds." in text
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """The missions that a comparison has run."""
     asked = []
 
     def drive(engine, seed, output, arguments):
@@ -52,20 +76,59 @@ def test_command_runs_each_mission_once_with_the_options_of_run(tmp_path, monkey
         (output / "summary.json").write_text(json.dumps(a_summary()))
 
     monkeypatch.setattr(comparison, "drive", drive)
-    arguments = ["compare", "--seeds", "2", "--output", str(tmp_path), "--route", "r2", "--contingency", "power:1.4"]
+    return asked
+
+
+def compare(folder, *arguments):
+    return CliRunner().invoke(metacontrol, ["compare", "--runs", str(folder), *arguments])
+
+
+def test_command_runs_each_mission_once_and_goes_on_with_more_seeds(tmp_path, asked):
     options = ("--route", "r2", "--contingency", "power:1.4")
-    for _ in range(2):
-        result = CliRunner().invoke(metacontrol, arguments)
+    for seeds in ("1", "2", "2"):
+        result = compare(tmp_path, "--seeds", seeds, *options)
         assert result.exit_code == 0, result.output
     assert asked == [(engine, seed, options) for seed in (1, 2) for engine in ("ros", "lockstep")]
-    assert "| goal reached | 1.000" in (tmp_path / "comparison.md").read_text()
+    assert "| goal reached | 2 | 1.000" in result.stdout and "seed 2, lockstep: reached after 40.0 s" in result.output
+
+
+def test_page_says_how_it_was_made_and_what_was_compared(tmp_path, asked):
+    page = tmp_path / "docs" / "engines.md"
+    assert compare(tmp_path / "runs", "--seeds", "2", "--output", str(page), "--failure", "front_laser").exit_code == 0
+    text = page.read_text()
+    assert f"Made by `metacontrol compare --seeds 2 --output {page} --failure front_laser`." in text
+    assert "Route r1 from configuration f2_v2_r2, with the meta-controller" in text
+    assert "component:front_laser; seeds 1, 2, each on ROS (at 1.00 simulated" in text and "code 0123456789ab" in text
+
+
+def test_folder_of_other_missions_is_refused(tmp_path, asked):
+    assert compare(tmp_path, "--seeds", "1", "--route", "r2").exit_code == 0
+    result = compare(tmp_path, "--seeds", "1", "--route", "r3")
+    assert result.exit_code == 2 and "holds other missions (--route r2)" in result.output
+    assert len(asked) == 2
+
+
+@pytest.mark.parametrize("text", ["", "{", "{}", "[]"])
+def test_summary_that_is_none_is_named(tmp_path, asked, text):
+    (tmp_path / "ros_1").mkdir()
+    (tmp_path / "ros_1" / "summary.json").write_text(text)
+    result = compare(tmp_path, "--seeds", "1")
+    assert result.exit_code == 2 and "ros_1/summary.json: is no" in result.output and asked == []
 
 
 def test_mission_that_is_refused_ends_the_comparison_with_its_reason(tmp_path):
-    arguments = ["compare", "--seeds", "1", "--output", str(tmp_path), "--route", "r99"]
-    result = CliRunner().invoke(metacontrol, arguments)
+    result = compare(tmp_path, "--seeds", "1", "--route", "r99")
     assert result.exit_code == 2
     assert "no route 'r99'" in result.output
+
+
+def test_mission_that_breaks_is_told(tmp_path, monkeypatch):
+    broken = tmp_path / "broken"
+    broken.write_text("#!/bin/sh\necho 'ImportError: no such module' >&2\nexit 1\n")
+    broken.chmod(0o755)
+    monkeypatch.setattr(comparison.sys, "executable", str(broken))
+    with pytest.raises(RunError, match="ended with status 1: ImportError: no such module"):
+        comparison.drive("lockstep", 1, tmp_path / "out", ())
 
 
 def test_lockstep_alone_leaves_the_summary_that_is_compared(tmp_path):

@@ -18,11 +18,13 @@ import multiprocessing
 import signal
 import statistics
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from metacontrol_experiments.metrics import MAX_SHARE, quantile, share_above, summarise
+from metacontrol_experiments.mission import MissionError
 from metacontrol_experiments.routes import read_route
 from metacontrol_experiments.settings import Settings
 
@@ -44,6 +46,9 @@ class Job:
     variant: str
     route: str
     seed: int
+
+    def __str__(self) -> str:
+        return f"{self.variant} on {self.route} with seed {self.seed}"
 
 
 @dataclass(frozen=True)
@@ -120,6 +125,9 @@ def drive(jobs: Sequence[Job], routes: Path, commit: str, processes: int) -> Ite
         routes: YAML file of routes.
         commit: of the code that runs.
         processes: how many drive side by side.
+
+    Raises:
+        CalibrationError: one cannot be driven, or its process has died.
     """
     if processes == 1 or len(jobs) < 2:
         yield from (_drive(job, routes, commit) for job in jobs)
@@ -131,13 +139,20 @@ def drive(jobs: Sequence[Job], routes: Path, commit: str, processes: int) -> Ite
         try:
             for run in pending:
                 yield run.result()
+        except BrokenProcessPool as error:
+            raise CalibrationError(
+                f"a process that drives missions has died ({error}); run it again to go on"
+            ) from error
         finally:
             for run in pending:
                 run.cancel()
 
 
 def _drive(job: Job, routes: Path, commit: str) -> Run:
-    from metacontrol_experiments.lockstep import Lockstep  # PyBullet and navigation take a while to import
+    from metacontrol_experiments.lockstep import (
+        Lockstep,
+        LockstepError,
+    )  # PyBullet and navigation take a while to import
 
     asked = Settings(
         route=read_route(routes, job.route),
@@ -147,7 +162,10 @@ def _drive(job: Job, routes: Path, commit: str) -> Run:
         initial_configuration=job.variant,
         commit=commit,
     )
-    record = Lockstep(asked).run().record
+    try:
+        record = Lockstep(asked).run().record
+    except (LockstepError, MissionError) as error:
+        raise CalibrationError(f"{job}: {error}") from error
     summary = summarise(record)
     start, end = record.start_stamp, record.end_stamp
     risk, load = record.true_quality["safety"], record.true_quality["energy"]

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from metacontrol_experiments.calibration import (
@@ -19,8 +18,13 @@ from metacontrol_experiments.calibration import (
     write_levels,
 )
 from metacontrol_experiments.commit import current_commit
-from metacontrol_experiments.package import refused, simulation_package
+from metacontrol_experiments.display import CONSOLE, refusing, tell
+from metacontrol_experiments.package import simulation_package
 from metacontrol_experiments.routes import RouteError, read_route, route_names
+from metacontrol_experiments.runner import RunError
+
+if TYPE_CHECKING:
+    from metacontrol_experiments.calibration import Run
 
 RUNS = Path("results/calibration/runs.csv")
 
@@ -46,8 +50,7 @@ def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tu
     A line is added to the file of runs for each mission; what is in it already is not driven again. Then run
     `rosmodel generate all` to take the levels into variants and ontology.
     """
-    console = Console(highlight=False)
-    try:
+    with refusing(CalibrationError, RouteError, RunError):
         package = simulation_package()
         known = sorted(path.stem for path in (package / "models" / "variants").glob("*.rossystem"))
         file = package / "worlds" / "routes.yaml"
@@ -58,22 +61,20 @@ def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tu
         done = read_runs(runs)
         driven = {run.job for run in done}
         missing = [job for job in plan(variants, routes, seeds) if job not in driven]
-        with _progress(console) as bar:
+        with _progress() as bar:
             task = bar.add_task("missions", total=len(missing))
             for run in append_runs(runs, drive(missing, file, current_commit(), jobs)):
                 done.append(run)
                 bar.update(task, advance=1, description=f"{run.variant} {run.route} seed {run.seed}: {run.outcome}")
-        _tell(console, done, len(missing), runs)
+        _tell_runs(done, len(missing), runs)
         lacking = missing_runs(done, known)
         if lacking:
-            first = ", ".join(f"{job.variant} on {job.route} with seed {job.seed}" for job in lacking[:3])
-            console.print(f"no levels written: {len(lacking)} missions are missing, {first} ...", soft_wrap=True)
+            first = ", ".join(map(str, lacking[:3]))
+            tell(f"no levels written: {len(lacking)} missions are missing, {first} ...")
             return
         target = levels or package / "models" / "qa.csv"
         write_levels(target, done)
-    except (CalibrationError, RouteError, RuntimeError, OSError) as error:
-        raise refused(error) from error
-    console.print(f"measured levels are in {target}; now: rosmodel generate all", soft_wrap=True)
+    tell(f"measured levels are in {target}; now: rosmodel generate all")
 
 
 @click.command()
@@ -83,19 +84,16 @@ def variants(runs: Path, output: Path | None) -> None:
     """Print tables of a calibration's runs as Markdown, with 95 % confidence intervals over seeds."""
     from metacontrol_experiments.variant_table import markdown  # scipy takes a while to import
 
-    try:
+    with refusing(CalibrationError):
         done = read_runs(runs)
         if not done:
             raise CalibrationError(f"{runs}: no runs; metacontrol calibrate makes some")
         text = markdown(done)
         if output:
-            output.write_text(
-                f"# Variants\n\nMade by `metacontrol variants --output {output}`.\n\n{text}", encoding="utf-8"
-            )
-    except (CalibrationError, OSError) as error:
-        raise refused(error) from error
-    if not output:
-        click.echo(text, nl=False)
+            text = f"# Variants\n\nMade by `metacontrol variants --output {output}`.\n\n{text}"
+            output.write_text(text, encoding="utf-8")
+            return
+    click.echo(text, nl=False)
 
 
 def _chosen(option: str, asked: tuple[str, ...], known: list[str]) -> list[str]:
@@ -110,19 +108,15 @@ def _chosen(option: str, asked: tuple[str, ...], known: list[str]) -> list[str]:
     return list(asked) or known
 
 
-def _progress(console: Console) -> Progress:
+def _progress() -> Progress:
     columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
-    return Progress(*columns, console=console)
+    return Progress(*columns, console=CONSOLE)
 
 
-def _tell(console: Console, done: list[Any], driven: int, path: Path) -> None:
+def _tell_runs(done: list[Run], driven: int, path: Path) -> None:
     bad = [run for run in done if not run.reached or run.collisions]
-    console.print(
-        f"{driven} missions driven, {len(done)} in {path}, {len(bad)} of them without success or with a collision"
-    )
+    tell(f"{driven} missions driven, {len(done)} in {path}, {len(bad)} of them without success or with a collision")
     for run in bad[:10]:
-        console.print(
-            f"  {run.variant} on {run.route} with seed {run.seed}: {run.outcome}, {run.collisions} collisions"
-        )
+        tell(f"  {run.job}: {run.outcome}, {run.collisions} collisions")
     if len({run.commit for run in done}) > 1:
-        console.print(f"{path} holds runs of different commits: delete it to measure one", style="yellow")
+        tell(f"{path} holds runs of different commits: delete it to measure one", "yellow")

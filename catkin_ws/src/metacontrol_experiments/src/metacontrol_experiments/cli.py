@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from rich.console import Console
 
 from metacontrol_experiments.bag import BagError, read_record
 from metacontrol_experiments.calibration_cli import calibrate, variants
@@ -26,10 +24,10 @@ from metacontrol_experiments.contingency import (
     parse_contingency,
     read_contingencies,
 )
-from metacontrol_experiments.display import Display
+from metacontrol_experiments.display import Display, refusing
 from metacontrol_experiments.metrics import DEFAULT_THRESHOLDS, MetricsError, summarise
 from metacontrol_experiments.mission import TIMEOUT_S, Outcome
-from metacontrol_experiments.package import refused, simulation_package
+from metacontrol_experiments.package import simulation_package
 from metacontrol_experiments.routes import RouteError, read_route
 from metacontrol_experiments.runner import BAG_NAME, RunError, run_mission
 from metacontrol_experiments.settings import Settings
@@ -44,7 +42,8 @@ SUMMARY_NAME = "summary.json"
 FIGURE_NAME = "mission.png"
 LOG_NAME = "mission.log"
 
-_FAILED, _INTERRUPTED = 1, 130
+_FAILED = 1
+"""Exit status of a mission that did not reach its goal."""
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -139,12 +138,11 @@ def run(quiet: bool, output: Path, engine: str, **options: Any) -> None:
 
     Exit status: 0 the goal was reached, 1 it was not, 2 bad input or a system that did not start, 130 interrupted.
     """
-    console = Console(highlight=False)
-    try:
+    with refusing(RunError, RouteError, ContingencyError, ComponentError, BagError, MetricsError):
         settings = _settings(output, options)
         for name in (SUMMARY_NAME, FIGURE_NAME):  # those of an earlier run
             (output / name).unlink(missing_ok=True)
-        with Display(console, quiet) as display:
+        with Display(quiet) as display:
             if engine == "lockstep":
                 if options["gui"] or options["rviz"]:
                     raise RunError("--engine lockstep has no window; leave --gui and --rviz out")
@@ -155,15 +153,10 @@ def run(quiet: bool, output: Path, engine: str, **options: Any) -> None:
         summary = summarise(record)
         _write_summary(summary, output / SUMMARY_NAME)
         _draw(record, output / FIGURE_NAME)
-    except (RunError, RouteError, ContingencyError, ComponentError, BagError, MetricsError, OSError) as error:
-        raise refused(error) from error
-    except KeyboardInterrupt:
-        click.echo("metacontrol: interrupted; every process was ended", err=True)
-        sys.exit(_INTERRUPTED)
     display.summary(summary)
     for name in (LOG_NAME if engine == "lockstep" else BAG_NAME, SUMMARY_NAME, FIGURE_NAME):
         display.say(str(output / name))
-    sys.exit(0 if state.outcome is Outcome.REACHED else _FAILED)
+    raise click.exceptions.Exit(0 if state.outcome is Outcome.REACHED else _FAILED)
 
 
 @metacontrol.command("summary")
@@ -171,14 +164,12 @@ def run(quiet: bool, output: Path, engine: str, **options: Any) -> None:
 @click.option("--output", type=click.Path(dir_okay=False, path_type=Path), help="Write to a file instead.")
 def summary_command(bag: Path, output: Path | None) -> None:
     """Print the summary of a mission's BAG as JSON."""
-    try:
+    with refusing(BagError, MetricsError):
         summary = summarise(read_record(bag))
         if output:
             _write_summary(summary, output)
-            return
-    except (BagError, MetricsError, OSError) as error:
-        raise refused(error) from error
-    click.echo(json.dumps(summary, indent=2))
+        else:
+            click.echo(json.dumps(summary, indent=2))
 
 
 @metacontrol.command("figure")
@@ -187,10 +178,8 @@ def summary_command(bag: Path, output: Path | None) -> None:
 def figure_command(bag: Path, output: Path | None) -> None:
     """Draw the map, the path and the quality series of a mission's BAG."""
     target = output or bag.with_name(FIGURE_NAME)
-    try:
+    with refusing(BagError, MetricsError):
         _draw(read_record(bag), target)
-    except (BagError, MetricsError, OSError) as error:
-        raise refused(error) from error
     click.echo(target)
 
 

@@ -27,7 +27,7 @@ from metacontrol_experiments.contingency import (
     strikes_due,
     with_seed,
 )
-from metacontrol_experiments.striker import StrikeError, Striker, serve
+from metacontrol_experiments.striker_node import StrikeError, Striker, serve
 
 if TYPE_CHECKING:
     from metacontrol_experiments.contingency import Contingency

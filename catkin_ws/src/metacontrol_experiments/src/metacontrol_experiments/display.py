@@ -1,40 +1,64 @@
-"""What a person sees of a mission: the way as a bar, the timeline as it happens, a table at the end."""
+"""What a person sees: notes and refusals of any command; of a mission the way, the timeline, a table at the end."""
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+import click
+from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from types import TracebackType
-
-    from rich.console import Console
 
     from metacontrol_experiments.timeline import Entry
 
+REFUSED, INTERRUPTED = 2, 130
+"""Exit status of a command."""
+
+CONSOLE = Console(highlight=False)
 _STYLES = {"R1": "yellow", "R2": "cyan", "R3": "cyan", "R4": "green", "!": "bold red", "-": "bold"}
 
 
-class Display:
-    """Writes to a console: with a live bar on a terminal, else plain lines; silent if quiet."""
+def tell(text: str, style: str = "") -> None:
+    """Shows a line."""
+    CONSOLE.print(Text(text, style), soft_wrap=True)
 
-    def __init__(self, console: Console, quiet: bool = False) -> None:
-        """Takes the console to write to."""
-        self._console = console
+
+@contextmanager
+def refusing(*kinds: type[Exception]) -> Iterator[None]:
+    """Ends a command with one line: where such an error, or one of the file system, comes up, or on Ctrl-C."""
+    refused: tuple[type[Exception], ...] = (*kinds, OSError)
+    try:
+        yield
+    except refused as error:
+        click.echo(f"metacontrol: {' '.join(str(error).split())}", err=True)
+        raise click.exceptions.Exit(REFUSED) from error
+    except KeyboardInterrupt as interrupt:
+        click.echo("metacontrol: interrupted; every process was ended", err=True)
+        raise click.exceptions.Exit(INTERRUPTED) from interrupt
+
+
+class Display:
+    """A mission: with a live bar on a terminal, else plain lines; silent if quiet."""
+
+    def __init__(self, quiet: bool = False) -> None:
+        """Shows nothing yet."""
         self._quiet = quiet
         self._bar: Progress | None = None
         self._start = 0.0
         self._tenth = 0
-        if console.is_terminal and not quiet:
+        if CONSOLE.is_terminal and not quiet:
             self._bar = Progress(
                 TextColumn("way"),
                 BarColumn(None),
                 TaskProgressColumn(),
                 TextColumn("{task.description}"),
-                console=console,
+                console=CONSOLE,
             )
             self._task = self._bar.add_task("starting", total=1.0)
 
@@ -54,7 +78,7 @@ class Display:
     def say(self, text: str) -> None:
         """A line of its own."""
         if not self._quiet:
-            self._console.print(Text(text), soft_wrap=True)
+            tell(text)
 
     def start(self, stamp: float) -> None:
         """The mission starts: from here on, times count from this stamp."""
@@ -66,7 +90,7 @@ class Display:
         line.append(f"{entry.step:<2}", _STYLES.get(entry.step, ""))
         line.append("  " + entry.text, "red" if entry.bad else "")
         if not self._quiet:
-            self._console.print(line, soft_wrap=True)
+            CONSOLE.print(line, soft_wrap=True)
 
     def progress(self, share: float, stamp: float, left_m: float) -> None:
         """How much of the way is done (0..1), and how many metres are left as the crow flies."""
@@ -80,9 +104,9 @@ class Display:
     def summary(self, summary: dict[str, Any]) -> None:
         """The closing tables."""
         if not self._quiet:
-            self._console.print(_figures(summary))
+            CONSOLE.print(_figures(summary))
             if summary["reconfigurations"]:
-                self._console.print(_reconfigurations(summary["reconfigurations"]))
+                CONSOLE.print(_reconfigurations(summary["reconfigurations"]))
 
 
 def _figures(summary: dict[str, Any]) -> Table:

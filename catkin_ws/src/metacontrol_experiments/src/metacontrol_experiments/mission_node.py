@@ -28,7 +28,7 @@ from metacontrol_experiments.bag import TOPICS
 from metacontrol_experiments.mission import Action, GoalStatus, Strike
 from metacontrol_experiments.processes import wait_until
 from metacontrol_experiments.record import CostReport, Event, QualityReport
-from metacontrol_experiments.striker import ImpatientTransport, StrikeError, Striker, serve
+from metacontrol_experiments.striker_node import ImpatientTransport, StrikeError, Striker, serve
 from metacontrol_experiments.timeline import Timeline
 
 if TYPE_CHECKING:

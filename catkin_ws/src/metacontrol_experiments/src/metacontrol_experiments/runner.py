@@ -67,7 +67,7 @@ def run_mission(settings: Settings, display: Display) -> State:
     os.environ.pop("ROS_IP", None)
     os.environ.update(environment)
     tree = ProcessTree(environment)
-    with _signals_as_interrupts(), _closing(tree):
+    with signals_as_interrupts(), _closing(tree):
         return _run(settings, display, tree, port, bag)
 
 
@@ -140,7 +140,7 @@ def _closing(tree: ProcessTree) -> Iterator[None]:
 
 
 @contextmanager
-def _signals_as_interrupts() -> Iterator[None]:
+def signals_as_interrupts() -> Iterator[None]:
     """SIGTERM and SIGHUP end a run as Ctrl-C does."""
 
     def interrupt(_number: int, _frame: object) -> None:
