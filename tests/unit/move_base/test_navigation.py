@@ -54,6 +54,20 @@ def test_hidden_obstacle_is_driven_round_on_the_camera_alone(simulate, walls, va
     log = drive(simulation, (4.0, 0.0, 0.0))
     assert log.outcome is Outcome.SUCCEEDED
     assert log.contacts == 0
+    snapshot = simulation.navigator.global_snapshot
+    assert snapshot.costs[snapshot.geometry.cell(-0.14, 0.1)] == LETHAL  # out of sight for long, and kept
+
+
+def test_robot_with_a_camera_alone_looks_where_it_goes(simulate, walls, variant):
+    tree = variant(0.5, 0.65, "point_cloud")
+    simulation = simulate([*walls(), RACK], start=(-3.0, -3.0, -1.57), tree=tree)
+    log = drive(simulation, (-3.0, 3.0, 1.57))  # behind it
+    assert log.outcome is Outcome.SUCCEEDED
+    moving = [(pose, command) for (_, pose, _), (_, command) in zip(log.states, log.commands, strict=True) if command.x]
+    assert {command.y for _, command in log.commands} == {0.0}
+    assert min(command.x for _, command in moving) > 0.0
+    first = moving[0][0]
+    assert abs(first.yaw - math.pi / 2) < 1.2  # turned towards the way before it drove
 
 
 def test_robot_gets_into_a_narrow_gap_that_it_meets_aslant(simulate, walls, variant):
@@ -327,6 +341,15 @@ def test_scan_that_repeats_is_old_after_a_while(simulate, walls):
     log = simulation.run(30.0)
     assert log.outcome is Outcome.ABORTED
     assert log.text == "no current data from front/scan for 15.0 s"
+
+
+def test_scan_in_an_unknown_frame_is_the_reason(simulate, walls):
+    simulation = simulate(walls(), start=(-4.0, 0.0, 0.0))
+    observe = simulation.navigator.observe
+    simulation.navigator.observe = lambda seen, now: observe(replace(seen, frame="attic"), now)
+    log = drive(simulation, (4.0, 0.0, 0.0))
+    assert log.outcome is Outcome.ABORTED
+    assert log.text == "no transform for front/scan from its frame 'attic' for 15.0 s"
 
 
 def test_scan_whose_stamp_jumps_does_not_shut_out_later_ones(simulate, walls):

@@ -124,6 +124,18 @@ class _Sensor:
                 return observation, transform
         return None
 
+    def trouble(self, now: float) -> str:
+        """Why nothing current of it is in a costmap, or an empty text.
+
+        The age that counts is that of the newest measurement in a costmap, not of one that can't be transformed.
+        """
+        period = self.source.expected_update_rate
+        if now - self.used <= period:
+            return ""
+        if self.recent and now - self.recent[-1].stamp <= period:
+            return f"no transform for {self.source.topic} from its frame {self.recent[-1].frame!r}"
+        return f"no current data from {self.source.topic}"
+
 
 @dataclass
 class _Work:
@@ -379,14 +391,8 @@ class Navigator:
         return Result(velocity=STOP, robot=robot, warning=f"Waiting: {reason}" if waited > QUIET_WAIT else "")
 
     def _stale_reason(self, now: float) -> str:
-        """Names the source whose data are too old, or returns an empty text.
-
-        The data's age is that of the newest measurement in a costmap: one that can't be transformed does not count.
-        """
-        for sensor in self._sensors.values():
-            if now - sensor.used > sensor.source.expected_update_rate:
-                return f"no current data from {sensor.source.topic}"
-        return ""
+        """Names the first source whose data are too old, or returns an empty text."""
+        return next(filter(None, (sensor.trouble(now) for sensor in self._sensors.values())), "")
 
     def _hold(self, now: float, robot: Pose, reason: str) -> Result:
         """Stands still on old data: neither drives nor turns, and no other patience runs meanwhile."""
