@@ -141,7 +141,7 @@ def test_repeated_messages_do_not_count_as_current(simulate, walls):
     simulation = simulate(walls())
     simulation.sense()
     (source,) = simulation.navigator.sources
-    old = simulation.navigator._sensors[source.topic, source.data_type].recent[-1]
+    old = simulation.navigator._surroundings._sensors[source.topic, source.data_type].recent[-1]
     assert "not newer" in simulation.navigator.observe(old, simulation.time)
     assert "ahead of the clock" in simulation.navigator.observe(
         type(old)(**{**vars(old), "stamp": simulation.time + 5.0}), simulation.time
@@ -336,7 +336,7 @@ def test_scan_that_repeats_is_old_after_a_while(simulate, walls):
     simulation = simulate(walls(), start=(-4.0, 0.0, 0.0))
     drive(simulation, (4.0, 0.0, 0.0), seconds=2.0)
     observe, (source,) = simulation.navigator.observe, simulation.navigator.sources
-    stuck = simulation.navigator._sensors[source.topic, source.data_type].recent[-1]
+    stuck = simulation.navigator._surroundings._sensors[source.topic, source.data_type].recent[-1]
     simulation.navigator.observe = lambda _, now: observe(stuck, now)
     log = simulation.run(30.0)
     assert log.outcome is Outcome.ABORTED
@@ -356,7 +356,7 @@ def test_scan_whose_stamp_jumps_does_not_shut_out_later_ones(simulate, walls):
     simulation = simulate(walls(), start=(-4.0, 0.0, 0.0))
     drive(simulation, (4.0, 0.0, 0.0), seconds=2.0)
     (source,) = simulation.navigator.sources
-    newest = simulation.navigator._sensors[source.topic, source.data_type].recent[-1]
+    newest = simulation.navigator._surroundings._sensors[source.topic, source.data_type].recent[-1]
     for jump in (1e9, -50.0):
         assert simulation.navigator.observe(replace(newest, stamp=newest.stamp + jump), simulation.time)
     assert simulation.run(40.0).outcome is Outcome.SUCCEEDED

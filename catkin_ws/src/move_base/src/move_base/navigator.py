@@ -13,40 +13,24 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from move_base.costmap import LETHAL, Costmap, Snapshot
+from move_base.costmap import LETHAL
 from move_base.dwa import DwaController, Trajectory
+from move_base.followed_plan import FollowedPlan
 from move_base.geometry import STOP, Pose, Velocity, wrap_angle
-from move_base.global_planner import PATH_SPACING, Plan, PlanningError, make_plan, path_cost
+from move_base.global_planner import Plan, PlanningError, make_plan
 from move_base.recovery import Recovery
+from move_base.surroundings import Surroundings
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
-    from move_base.costmap import StaticMap
-    from move_base.parameters import CostmapParameters, MoveBaseParameters, ObservationSource
+    from move_base.costmap import Snapshot, StaticMap
+    from move_base.parameters import MoveBaseParameters, ObservationSource
     from move_base.sensors import Observation
-
-LOOKAHEAD = 3.0
-"""Length of the plan that the controller is given, m: twice what 0.75 m/s covers in a sim_time of 2 s."""
-
-PATH_STEP = 2
-"""The controller is given every second point of the plan (0.1 m)."""
-
-KEEP_RATIO = 0.9
-"""A new plan replaces a free one only if it costs less than this share of it: equal ways must not alternate."""
-
-KEEP_DISTANCE = 0.3
-"""Farther than this from its plan (m) the robot takes the new one in any case."""
-
-FUTURE_LIMIT = 0.5
-"""A measurement whose stamp is this far ahead of the clock (s) is not believed."""
-
-KEPT_OBSERVATIONS = 5
-"""Per source: as many as can be waiting for their transform at any usual rate."""
+    from move_base.surroundings import Transformer
 
 ROTATE_SPEED = 1.0
 """Speed of the recovery's turn, rad/s: rotate_recovery's default."""
@@ -69,16 +53,6 @@ class Outcome(Enum):
 
     SUCCEEDED = "succeeded"
     ABORTED = "aborted"
-
-
-class Transformer(Protocol):
-    """Access to the tree of frames."""
-
-    def lookup(self, target: str, source: str, stamp: float | None) -> NDArray[np.float64] | None:
-        """Returns the 4 x 4 transform from `source` to `target` at a time (None: newest), or None if there is none."""
-
-    def newest(self, target: str, source: str) -> float | None:
-        """Returns the time of the newest transform between two frames, s; None where they are not connected."""
 
 
 @dataclass(frozen=True)
@@ -107,37 +81,6 @@ class Result:
 
 
 @dataclass
-class _Sensor:
-    """What is known of one source."""
-
-    source: ObservationSource
-    recent: list[Observation] = field(default_factory=list)
-    used: float = -math.inf  # stamp of the newest observation in a costmap
-
-    def newest(self, after: float, target: str, frames: Transformer) -> tuple[Observation, NDArray[np.float64]] | None:
-        """Returns the newest observation later than `after` that can be transformed."""
-        for observation in reversed(self.recent):
-            if observation.stamp <= after:
-                return None
-            transform = frames.lookup(target, observation.frame, observation.stamp)
-            if transform is not None:
-                return observation, transform
-        return None
-
-    def trouble(self, now: float) -> str:
-        """Why nothing current of it is in a costmap, or an empty text.
-
-        The age that counts is that of the newest measurement in a costmap, not of one that can't be transformed.
-        """
-        period = self.source.expected_update_rate
-        if now - self.used <= period:
-            return ""
-        if self.recent and now - self.recent[-1].stamp <= period:
-            return f"no transform for {self.source.topic} from its frame {self.recent[-1].frame!r}"
-        return f"no current data from {self.source.topic}"
-
-
-@dataclass
 class _Work:
     """What is remembered for one goal; times in s.
 
@@ -149,7 +92,6 @@ class _Work:
         planned: when planning was last tried.
         planning_error: why it failed.
         failed_plans: how often, since `planned_well`.
-        progress: index of the plan's point nearest to the robot.
         stale_since: since when sensor data are too old.
         not_ready_since: since when map or transforms are missing.
         reached_xy: whether the robot was within the goal's position tolerance.
@@ -163,7 +105,6 @@ class _Work:
     planned: float = -math.inf
     planning_error: str = ""
     failed_plans: int = 0
-    progress: int = 0
     stale_since: float | None = None
     not_ready_since: float | None = None
     reached_xy: bool = False
@@ -180,20 +121,6 @@ class _Work:
         self.anchor = None
 
 
-class _MappedArea:
-    """A costmap with its rate and the stamps of what it has used."""
-
-    def __init__(self, parameters: CostmapParameters) -> None:
-        self.parameters = parameters
-        self.costmap = Costmap(parameters)
-        self.snapshot: Snapshot | None = None
-        self.updated = -math.inf
-        self.used: dict[tuple[str, str], float] = {}
-
-    def due(self, now: float) -> bool:
-        return self.snapshot is None or now - self.updated >= 1.0 / self.parameters.update_frequency - 1e-3
-
-
 class Navigator:
     """Costmaps, planner, controller and recovery behind one `step`."""
 
@@ -201,13 +128,10 @@ class Navigator:
         self.parameters = parameters
         self.state = State.IDLE
         self.goal: Pose | None = None
-        self.plan: Plan | None = None
-        self._global = _MappedArea(parameters.global_costmap)
-        self._local = _MappedArea(parameters.local_costmap)
-        sources = [*parameters.global_costmap.sources, *parameters.local_costmap.sources]
-        self._sensors = {(source.topic, source.data_type): _Sensor(source) for source in sources}
+        self._followed: FollowedPlan | None = None
+        self._surroundings = Surroundings(parameters)
+        self._global, self._local = self._surroundings.global_area, self._surroundings.local_area
         self._controller = DwaController(parameters)
-        self._map_frame = ""
         self._work = _Work.begun(0.0)
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
@@ -216,11 +140,7 @@ class Navigator:
         Frames, sizes and sensors are the same as before (`move_base.reconfiguration` offers no others).
         """
         self.parameters = parameters
-        for area, new in ((self._global, parameters.global_costmap), (self._local, parameters.local_costmap)):
-            if new != area.parameters:
-                area.parameters = new
-                area.costmap.reconfigure(new)
-                area.updated = -math.inf
+        self._surroundings.reconfigure(parameters)
         self._controller.reconfigure(parameters)
 
     # -- what comes in ---------------------------------------------------------------------------------------------
@@ -228,7 +148,7 @@ class Navigator:
     @property
     def sources(self) -> list[ObservationSource]:
         """The sources to listen to, each topic once."""
-        return [sensor.source for sensor in self._sensors.values()]
+        return self._surroundings.sources
 
     @property
     def global_snapshot(self) -> Snapshot | None:
@@ -242,10 +162,7 @@ class Navigator:
 
     def set_map(self, static: StaticMap, frame: str) -> None:
         """Takes the static map."""
-        self._map_frame = frame.removeprefix("/")
-        for area in (self._global, self._local):
-            area.costmap.set_map(static)
-            area.snapshot = None
+        self._surroundings.set_map(static, frame)
 
     def observe(self, observation: Observation, now: float) -> str:
         """Takes a measurement.
@@ -253,18 +170,12 @@ class Navigator:
         Returns:
             Why it was ignored, or an empty text.
         """
-        sensor = self._sensors[(observation.source.topic, observation.source.data_type)]
-        if observation.stamp > now + FUTURE_LIMIT:
-            return f"{observation.source.topic}: the stamp is more than {FUTURE_LIMIT:g} s ahead of the clock"
-        if sensor.recent and observation.stamp <= sensor.recent[-1].stamp:
-            return f"{observation.source.topic}: the stamp is not newer than the last message's"
-        sensor.recent = [*sensor.recent[1 - KEPT_OBSERVATIONS :], observation]
-        return ""
+        return self._surroundings.observe(observation, now)
 
     def set_goal(self, goal: Pose, now: float) -> None:
         """Starts on a goal in the global frame, in place of the present one."""
         self.goal = goal
-        self.plan = None
+        self._followed = None
         self.state = State.PLANNING
         self._controller.reset()
         self._work = _Work.begun(now)
@@ -272,20 +183,16 @@ class Navigator:
     def cancel(self) -> None:
         """Drops the goal; the caller stops the robot."""
         self.goal = None
-        self.plan = None
+        self._followed = None
         self.state = State.IDLE
 
     def clear_costmaps(self) -> None:
         """Forgets all obstacles but those of the static map."""
-        self._global.costmap.clear()
-        self._local.costmap.clear()
+        self._surroundings.clear()
 
     def reset_time(self, now: float) -> None:
         """Forgets all stamps, after the clock was set back; the goal stays."""
-        for sensor in self._sensors.values():
-            sensor.recent, sensor.used = [], -math.inf
-        for area in (self._global, self._local):
-            area.updated, area.used = -math.inf, {}
+        self._surroundings.reset_time()
         self._work = _Work.begun(now)
 
     # -- the step --------------------------------------------------------------------------------------------------
@@ -298,15 +205,14 @@ class Navigator:
             frames: the transforms.
             velocity: of the base, measured, in its own frame.
         """
-        robot = self._robot_pose(self._global, now, frames)
-        local_robot = self._robot_pose(self._local, now, frames)
-        missing = self._update_costmaps(now, frames, robot, local_robot)
+        robot, local_robot = self._global.robot_pose(now, frames), self._local.robot_pose(now, frames)
+        missing = self._surroundings.update(now, frames, robot, local_robot)
         if self.goal is None:
             return Result(robot=robot)
         if missing or robot is None or local_robot is None:
-            return self._not_ready(now, robot, missing or self._missing_transform(robot))
+            return self._not_ready(now, robot, missing)
         self._work.not_ready_since = None
-        stale = self._stale_reason(now)
+        stale = self._surroundings.stale_reason(now)
         if stale:
             return self._hold(now, robot, stale)
         self._fresh_again(now)
@@ -334,53 +240,6 @@ class Navigator:
             allow_unknown=self.parameters.allow_unknown,
         )
 
-    def _robot_pose(self, area: _MappedArea, now: float, frames: Transformer) -> Pose | None:
-        """Returns the robot's pose in the area's frame; None where there is none, or it is too old."""
-        p = area.parameters
-        matrix = frames.lookup(p.global_frame, p.robot_base_frame, None)
-        stamp = frames.newest(p.global_frame, p.robot_base_frame)
-        if matrix is None or stamp is None or now - stamp > p.transform_tolerance:
-            return None
-        return Pose.from_matrix(matrix)
-
-    def _update_costmaps(self, now: float, frames: Transformer, robot: Pose | None, local: Pose | None) -> str:
-        """Updates what is due, and returns what is missing for it."""
-        for area, pose in ((self._local, local), (self._global, robot)):
-            if area.costmap.needs_map:
-                return f"no map received on {self._map_topic(area)}"
-            if pose is None or not area.due(now):
-                continue
-            map_pose = self._map_pose(area, frames)
-            if map_pose is None:
-                return f"no transform from {self._map_frame!r} to {area.parameters.global_frame!r}"
-            observations = []
-            for source in area.parameters.sources:
-                key = (source.topic, source.data_type)
-                found = self._sensors[key].newest(area.used.get(key, -math.inf), area.parameters.global_frame, frames)
-                if found is not None:
-                    observations.append(found)
-                    area.used[key] = found[0].stamp
-                    self._sensors[key].used = max(self._sensors[key].used, found[0].stamp)
-            area.snapshot = area.costmap.update(pose, observations, map_pose)
-            # Rates are kept on average even if steps and updates do not divide evenly.
-            period = 1.0 / area.parameters.update_frequency
-            area.updated = max(area.updated + period, now - period) if math.isfinite(area.updated) else now
-        return ""
-
-    def _map_topic(self, area: _MappedArea) -> str:
-        return next((layer.map_topic for layer in area.parameters.layers if layer.kind == "static"), "map")
-
-    def _map_pose(self, area: _MappedArea, frames: Transformer) -> Pose | None:
-        """Pose of the map's frame in the area's frame."""
-        if not self._map_frame or self._map_frame == area.parameters.global_frame:
-            return Pose(0.0, 0.0, 0.0)
-        matrix = frames.lookup(area.parameters.global_frame, self._map_frame, None)
-        return None if matrix is None else Pose.from_matrix(matrix)
-
-    def _missing_transform(self, robot: Pose | None) -> str:
-        p = (self._global if robot is None else self._local).parameters
-        return f"no current transform from {p.robot_base_frame!r} to {p.global_frame!r}"
-
     def _not_ready(self, now: float, robot: Pose | None, reason: str) -> Result:
         if self._work.not_ready_since is None:
             self._work.not_ready_since = now
@@ -389,10 +248,6 @@ class Navigator:
         if waited >= max(self.parameters.planner_patience, 5.0):
             return self._abort(robot, f"{reason} for {waited:.1f} s")
         return Result(velocity=STOP, robot=robot, warning=f"Waiting: {reason}" if waited > QUIET_WAIT else "")
-
-    def _stale_reason(self, now: float) -> str:
-        """Names the first source whose data are too old, or returns an empty text."""
-        return next(filter(None, (sensor.trouble(now) for sensor in self._sensors.values())), "")
 
     def _hold(self, now: float, robot: Pose, reason: str) -> Result:
         """Stands still on old data: neither drives nor turns, and no other patience runs meanwhile."""
@@ -413,7 +268,7 @@ class Navigator:
     def _at_goal(self, robot: Pose) -> bool:
         p = self.parameters.controller
         assert self.goal is not None  # noqa: S101
-        target = self.plan.goal if self.plan is not None else self.goal
+        target = self._followed.plan.goal if self._followed is not None else self.goal
         if robot.distance(target) <= p.xy_goal_tolerance:
             self._work.reached_xy = True
             return True
@@ -436,7 +291,7 @@ class Navigator:
     def _drive(self, now: float, frames: Transformer, robot: Pose, local_robot: Pose, velocity: Velocity) -> Result:
         p = self.parameters
         new_plan = self._plan_if_due(now, robot)
-        if self.plan is None:
+        if self._followed is None:
             hopeless = self._hopeless_goal()
             if hopeless:
                 return self._abort(robot, hopeless)
@@ -461,7 +316,9 @@ class Navigator:
         local_robot: Pose,
         velocity: Velocity,
     ) -> Result:
-        path, to_goal = self._path_ahead(robot, frames)
+        assert self._followed is not None  # noqa: S101
+        ahead, to_goal = self._followed.ahead(robot)
+        path = self._in_local_frame(ahead, frames)
         if path is None or self._local.snapshot is None:
             return Result(velocity=STOP, robot=robot, warning="No transform for the plan")
         trajectory = self._controller.follow(local_robot, velocity, path, to_goal, self._local.snapshot)
@@ -479,7 +336,7 @@ class Navigator:
         """Plans at planner_frequency, and at once where there is no plan; returns a plan that was newly taken."""
         p = self.parameters
         period = 1.0 / p.planner_frequency if p.planner_frequency > 0.0 else math.inf
-        if self.plan is None or now - self._work.controlled > 1.0:  # the controller is stuck: look for another way
+        if self._followed is None or now - self._work.controlled > 1.0:  # the controller is stuck: look for another way
             period = min(period, 0.25)
         if now - self._work.planned < period - 1e-3:
             return None
@@ -491,57 +348,36 @@ class Navigator:
             self._work.planning_error = str(error)
             self._work.failed_plans += 1
             if not self._plan_is_free(robot):
-                self.plan = None
+                self._followed = None
             return None
         self._work.planned_well = now
         self._work.failed_plans = 0
         if self._keeps_plan(robot, plan):
             return None
-        self.plan, self._work.progress = plan, 0
+        self._followed = FollowedPlan(plan)
         return plan
 
     def _plan_is_free(self, robot: Pose) -> bool:
-        return self._remaining_cost(robot) < math.inf
-
-    def _remaining_cost(self, robot: Pose) -> float:
-        """Cost of what remains of the present plan, in weighted metres; infinite where it is blocked or far away."""
-        if self.plan is None or self._global.snapshot is None:
-            return math.inf
-        self._advance(robot)
-        points = self.plan.points[self._work.progress :]
-        if math.hypot(points[0, 0] - robot.x, points[0, 1] - robot.y) > KEEP_DISTANCE:
-            return math.inf
-        return path_cost(points, self._global.snapshot, allow_unknown=self.parameters.allow_unknown)
+        if self._followed is None or self._global.snapshot is None:
+            return False
+        return (
+            self._followed.cost_left(robot, self._global.snapshot, allow_unknown=self.parameters.allow_unknown)
+            < math.inf
+        )
 
     def _keeps_plan(self, robot: Pose, plan: Plan) -> bool:
-        if self.plan is None or self.plan.goal != plan.goal or self._global.snapshot is None:
+        if self._followed is None or self._global.snapshot is None:
             return False
-        kept = self._remaining_cost(robot)
-        new = path_cost(plan.points, self._global.snapshot, allow_unknown=self.parameters.allow_unknown)
-        return kept < math.inf and new > KEEP_RATIO * kept
+        allow_unknown = self.parameters.allow_unknown
+        return self._followed.is_better_than(plan, robot, self._global.snapshot, allow_unknown=allow_unknown)
 
-    def _advance(self, robot: Pose) -> None:
-        """Moves the progress along the plan to its nearest point within the next few metres."""
-        assert self.plan is not None  # noqa: S101
-        window = self.plan.points[self._work.progress : self._work.progress + 60]
-        squared = (window[:, 0] - robot.x) ** 2 + (window[:, 1] - robot.y) ** 2
-        self._work.progress += int(squared.argmin())
-
-    def _path_ahead(self, robot: Pose, frames: Transformer) -> tuple[NDArray[np.float64] | None, float]:
-        """Returns the next metres of the plan in the local frame, and the length left to the goal (m)."""
-        assert self.plan is not None  # noqa: S101
-        self._advance(robot)
-        points = self.plan.points[self._work.progress :]
-        to_goal = float(np.hypot(*np.diff(points, axis=0).T).sum())
-        count = round(LOOKAHEAD / PATH_SPACING)
-        ahead = points[: count + 1 : PATH_STEP]
-        if len(points) <= count or len(ahead) < 2:
-            ahead = np.vstack([ahead, points[-1:]])
+    def _in_local_frame(self, path: NDArray[np.float64], frames: Transformer) -> NDArray[np.float64] | None:
+        """Returns points (N, 2) of the global frame in the local one, or None without a transform."""
         local, planned = self._local.parameters.global_frame, self._global.parameters.global_frame
         if local == planned:
-            return ahead, to_goal
+            return path
         matrix = frames.lookup(local, planned, None)
-        return (None if matrix is None else Pose.from_matrix(matrix).apply(ahead)), to_goal
+        return None if matrix is None else Pose.from_matrix(matrix).apply(path)
 
     def _hopeless_goal(self) -> str:
         """Why waiting or recovery can't help: the goal is outside the map or in one of its walls."""
@@ -592,7 +428,7 @@ class Navigator:
             self._global.costmap.clear(robot, keep)
             self._local.costmap.clear(local_robot, keep)
         self.state = State.PLANNING
-        self.plan = None
+        self._followed = None
         self._work.planned = -math.inf
         self._work.restart_patience(now)
         return Result(velocity=STOP, robot=robot)
