@@ -6,15 +6,10 @@ Callbacks only queue what they got; one thread, the caller's, feeds the state ma
 from __future__ import annotations
 
 import math
-import queue
 import time
-import xmlrpc.client
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeout
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import rosgraph
 import rospy
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
@@ -24,11 +19,12 @@ from metacontrol_sim.geometry import Pose
 from move_base_msgs.msg import MoveBaseActionGoal, MoveBaseActionResult
 
 from metacontrol_experiments import messages, mission
-from metacontrol_experiments.bag import TOPICS
+from metacontrol_experiments.inbox import Inbox
 from metacontrol_experiments.mission import Action, GoalStatus, Strike
 from metacontrol_experiments.processes import wait_until
 from metacontrol_experiments.record import CostReport, Event, QualityReport
-from metacontrol_experiments.striker_node import ImpatientTransport, StrikeError, Striker, serve
+from metacontrol_experiments.startup_node import DECISION_TOPIC, StartError, Startup
+from metacontrol_experiments.striker_node import StrikeError, Striker, serve
 from metacontrol_experiments.timeline import Timeline
 
 if TYPE_CHECKING:
@@ -41,12 +37,7 @@ if TYPE_CHECKING:
     from metacontrol_experiments.settings import Settings
     from metacontrol_experiments.timeline import Report
 
-REASONER = "/reasoner"
 MANIPULATOR_TOPIC = "rosgraph_manipulator/active_configuration"
-DECISION_TOPIC = "mros1_reasoner/decision"
-
-START_S = 90.0
-"""Wall seconds that the whole system has to come up; on two busy cores it takes 10 to 20."""
 
 STANDSTILL_S = 20.0
 """A clock that does not move for so many wall seconds means that the simulator is gone."""
@@ -56,10 +47,6 @@ TAIL_S = 0.5
 
 _REQUEST_S = 30.0
 """Wall seconds that a call of `contingency/strike` waits for the mission's thread."""
-
-
-class StartError(RuntimeError):
-    """The system did not come up; the message says what was waited for."""
 
 
 class MissionNode:
@@ -78,13 +65,12 @@ class MissionNode:
             StartError: the master did not come up in time, or does not run on simulated time.
         """
         self._settings = settings
-        self._tree = tree
         self._display = display
         self._check = check
         self._plan = settings.plan
         self._state: State | None = None
         self._timeline = Timeline(settings.thresholds)
-        self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._inbox = Inbox()
         self._position: tuple[float, float] | None = None
         self._stable = False
         self._failed: str | None = None
@@ -92,8 +78,8 @@ class MissionNode:
         self._observed: set[str] = set()  # quality attributes of which a level came in
         self._goal: MoveBaseActionGoal | None = None
         self._began_wall = time.monotonic()
-        self._master = rosgraph.Master("/mission")
-        self._wait(self._simulated_time, "the ROS master with /use_sim_time")
+        self._startup = Startup(self._attend)
+        self._startup.wait_for_master()
         rospy.init_node("mission", disable_signals=True)
         self._striker = Striker(settings.components, tree.owns)
         self._service = serve(self._on_request, settings.seed)
@@ -113,14 +99,16 @@ class MissionNode:
         Raises:
             StartError: it is not, in time; or the manipulator gave up.
         """
-        self._wait(lambda: rospy.get_time() > 0, "/clock, from the simulator")
-        self._wait(lambda: self._position is not None, "the robot's pose on amcl_pose")
-        self._wait(lambda: self._stable, f"a STABLE configuration on {MANIPULATOR_TOPIC}")
-        self._wait(self._server_ready, "the action server of move_base")
+        wait = self._startup.wait
+        wait(lambda: rospy.get_time() > 0, "/clock, from the simulator")
+        wait(lambda: self._position is not None, "the robot's pose on amcl_pose")
+        wait(lambda: self._stable, f"a STABLE configuration on {MANIPULATOR_TOPIC}")
+        wait(lambda: self._server_seen and self._goals.get_num_connections() > 0, "the action server of move_base")
         for quality in self._settings.thresholds:
-            self._wait(partial(self._is_observed, quality), f"a level of {quality} on /diagnostics, from its observer")
+            heard = partial(self._observed.__contains__, quality)
+            wait(heard, f"a level of {quality} on /diagnostics, from its observer")
         if self._settings.metacontrol:
-            self._wait(self._reasoner_ready, f"the node {REASONER} with its topic {DECISION_TOPIC}")
+            self._startup.wait_for_reasoner()
 
     def wait_recorded(self, recorder: str) -> None:
         """Waits until the node `recorder` has subscribed to everything that is to be recorded.
@@ -128,7 +116,7 @@ class MissionNode:
         Raises:
             StartError: it has not, in time.
         """
-        self._wait(partial(self._recorded, recorder), f"the recorder {recorder}")
+        self._startup.wait_for_recorder(recorder, self._events, self._goals)
 
     def drive(self) -> State:
         """Sends the goal and sees the mission through; returns its last state.
@@ -164,41 +152,16 @@ class MissionNode:
             raise RuntimeError("the mission has not started")
         return self._goal.goal_id
 
-    # Waiting
+    def _attend(self) -> None:
+        """Does what is to be done while the system starts.
 
-    def _wait(self, condition: Callable[[], bool], what: str) -> None:
-        def met() -> bool:
-            self._check()
-            self._drain()
-            if self._failed:
-                raise StartError(self._failed)
-            return condition()
-
-        if not wait_until(met, START_S):
-            raise StartError(f"waited {START_S:g} s in vain for {what}")
-
-    def _simulated_time(self) -> bool:
-        try:
-            return bool(self._master.getParam("/use_sim_time"))
-        except (OSError, rosgraph.MasterException):  # not up yet, or not set yet
-            return False
-
-    def _server_ready(self) -> bool:
-        return self._server_seen and self._goals.get_num_connections() > 0
-
-    def _is_observed(self, quality: str) -> bool:
-        return quality in self._observed
-
-    def _reasoner_ready(self) -> bool:
-        publishers, _, _ = self._master.getSystemState()
-        return any(topic == rospy.resolve_name(DECISION_TOPIC) and REASONER in nodes for topic, nodes in publishers)
-
-    def _recorded(self, recorder: str) -> bool:
-        _, subscribers, _ = self._master.getSystemState()
-        taken = {topic for topic, nodes in subscribers if recorder in nodes}
-        return taken.issuperset(TOPICS) and {self._events.resolved_name, self._goals.resolved_name} <= _topics_to(
-            recorder
-        )
+        Raises:
+            StartError: it will not come up.
+        """
+        self._check()
+        self._inbox.drain()
+        if self._failed:
+            raise StartError(self._failed)
 
     # The mission
 
@@ -221,7 +184,7 @@ class MissionNode:
     def _loop(self) -> None:
         clock, moved = rospy.get_time(), time.monotonic()
         while not self._mission.over:
-            self._drain(0.05)
+            self._inbox.drain(0.05)
             now = rospy.get_time()
             if now != clock:
                 clock, moved = now, time.monotonic()
@@ -309,39 +272,20 @@ class MissionNode:
             for entry in entries:
                 self._display.entry(entry)
 
-    # Callbacks: `_subscribe` queues them, `_drain` runs them in the mission's thread
+    # Callbacks: the inbox brings them to the mission's thread
 
     def _subscribe(self, topic: str, kind: type, handler: Callable[[Any], None]) -> None:
-        rospy.Subscriber(topic, kind, lambda message: self._work.put(partial(handler, message)))
-
-    def _drain(self, wait_s: float = 0.0) -> None:
-        """Runs what callbacks have queued; waits for the first so many wall seconds."""
-        try:
-            self._work.get(timeout=wait_s)() if wait_s else self._work.get_nowait()()
-            while True:
-                self._work.get_nowait()()
-        except queue.Empty:
-            return
+        rospy.Subscriber(topic, kind, lambda message: self._inbox.put(partial(handler, message)))
 
     def _on_request(self, contingency: Contingency) -> None:
-        """A call of the service: done in the mission's thread.
+        """A call of the service.
 
         Raises:
             StrikeError: it could not happen.
         """
-        future: Future[None] = Future()
-
-        def work() -> None:
-            try:
-                self._strike_now(contingency)
-                future.set_result(None)
-            except StrikeError as error:
-                future.set_exception(error)
-
-        self._work.put(work)
         try:
-            future.result(_REQUEST_S)
-        except FutureTimeout as error:
+            self._inbox.call(partial(self._strike_now, contingency), _REQUEST_S)
+        except TimeoutError as error:
             raise StrikeError(f"the mission did not answer within {_REQUEST_S:g} s") from error
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
@@ -388,10 +332,3 @@ class MissionNode:
                 self._observed.add(report.name)
             if not isinstance(report, CostReport):
                 self._tell(report)
-
-
-def _topics_to(node: str) -> set[str]:
-    """The topics of this node over which it is connected to a subscriber."""
-    with xmlrpc.client.ServerProxy(rospy.get_node_uri(), transport=ImpatientTransport()) as proxy:
-        answer: Any = proxy.getBusInfo(rospy.get_name())
-    return {topic for _, subscriber, direction, _, topic, *_ in answer[2] if subscriber == node and direction == "o"}

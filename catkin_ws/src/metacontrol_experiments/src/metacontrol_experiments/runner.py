@@ -73,10 +73,8 @@ def run_mission(settings: Settings, display: Display) -> State:
 
 def _run(settings: Settings, display: Display, tree: ProcessTree, port: int, bag: Path) -> State:
     from metacontrol_experiments.mission import MissionError
-    from metacontrol_experiments.mission_node import (
-        MissionNode,
-        StartError,
-    )  # rospy reads the environment when imported
+    from metacontrol_experiments.mission_node import MissionNode  # rospy reads the environment when imported
+    from metacontrol_experiments.startup_node import StartError
 
     console = settings.output / "log" / "console.log"
     display.say(f"starting the system on port {port}, its console is {console}")
