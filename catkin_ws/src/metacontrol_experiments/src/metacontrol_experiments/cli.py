@@ -26,7 +26,7 @@ from metacontrol_experiments.contingency import (
 )
 from metacontrol_experiments.display import Display, refusing
 from metacontrol_experiments.metrics import DEFAULT_THRESHOLDS, MetricsError, summarise
-from metacontrol_experiments.mission import TIMEOUT_S, Outcome
+from metacontrol_experiments.mission import TIMEOUT_S, MissionError, Outcome
 from metacontrol_experiments.package import simulation_package
 from metacontrol_experiments.routes import RouteError, read_route
 from metacontrol_experiments.runner import BAG_NAME, RunError, run_mission
@@ -231,13 +231,13 @@ def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionR
     Raises:
         RunError: it cannot be run in lockstep.
     """
-    from metacontrol_experiments import lockstep  # PyBullet and navigation take a while to import
-    from metacontrol_experiments.mission import MissionError
+    from metacontrol_experiments.lockstep import Lockstep, LockstepError  # PyBullet takes a while to import
+    from metacontrol_experiments.lockstep_memory import with_wall_time
 
     began = time.monotonic()
     try:
-        outcome = lockstep.Lockstep(settings).run()
-    except (lockstep.LockstepError, MissionError) as error:
+        outcome = Lockstep(settings).run()
+    except (LockstepError, MissionError) as error:
         raise RunError(str(error)) from error
     settings.output.mkdir(parents=True, exist_ok=True)
     (settings.output / LOG_NAME).write_text(outcome.log, encoding="utf-8")
@@ -249,7 +249,7 @@ def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionR
     for report in sorted(reports, key=lambda report: report.stamp):
         for entry in told.tell(report):
             display.entry(entry)
-    return outcome.state, lockstep.with_wall_time(record, time.monotonic() - began)
+    return outcome.state, with_wall_time(record, time.monotonic() - began)
 
 
 def _contingencies(options: dict[str, Any], components: dict[str, str]) -> tuple[Contingency, ...]:

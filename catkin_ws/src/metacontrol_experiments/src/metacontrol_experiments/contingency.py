@@ -29,6 +29,10 @@ class ContingencyError(ValueError):
     """A contingency that makes no sense; the message names where it stands and what is expected."""
 
 
+class StrikeError(RuntimeError):
+    """A contingency that could not happen; the message says why."""
+
+
 class Kind(Enum):
     """What goes wrong: what happens to a component's node, to the power load, to the floor, or to the light."""
 

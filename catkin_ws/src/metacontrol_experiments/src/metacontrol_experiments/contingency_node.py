@@ -22,12 +22,13 @@ from move_base_msgs.msg import MoveBaseActionGoal
 from metacontrol_experiments.components import ComponentError, node_of, read_components
 from metacontrol_experiments.contingency import (
     ContingencyError,
+    StrikeError,
     parse_contingency,
     read_contingencies,
     strikes_due,
     with_seed,
 )
-from metacontrol_experiments.striker_node import StrikeError, Striker, serve
+from metacontrol_experiments.striker_node import Striker, serve
 
 if TYPE_CHECKING:
     from metacontrol_experiments.contingency import Contingency

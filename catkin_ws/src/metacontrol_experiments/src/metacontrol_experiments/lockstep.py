@@ -7,34 +7,20 @@ ever waits for a processor, and detection and reconfiguration take times drawn a
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cv2
-import numpy as np
 import rospkg
 import yaml
-from metacontrol_sim.clutter import ClutterError, scatter
-from metacontrol_sim.faults import Fault, Outlet
 from metacontrol_sim.geometry import Pose
 from metacontrol_sim.grid_messages import occupancy_grid
 from metacontrol_sim.messages import stamp
 from metacontrol_sim.motion_sensors import REAL
-from metacontrol_sim.obstacles import CLUTTER_MASS, CLUTTER_SIZE, ObstacleError
-from metacontrol_sim.sensor_messages import laser_scan, point_cloud
-from metacontrol_sim.sensors import DepthProjector, measure_depth, measure_ranges
-from metacontrol_sim.simulation import (
-    ENERGY_STEPS,
-    LOCALISATION_STEPS,
-    MOTION_STEPS,
-    SAFETY_STEPS,
-    STEP,
-    Simulation,
-    SimulationError,
-)
+from metacontrol_sim.simulation import LOCALISATION_STEPS, MOTION_STEPS, STEP, Simulation, SimulationError
 from metacontrol_sim.simulation import Settings as SimulationSettings
-from metacontrol_sim.world import Box, WorldError, rasterise
+from metacontrol_sim.world import WorldError, rasterise
 from metacontrol_sim.world_file import read_world
 from move_base import geometry
 from move_base.costmap import StaticMap
@@ -45,24 +31,19 @@ from move_base.sensors import cloud_observation, scan_observation
 from ros_model.reader import read_system
 
 from metacontrol_experiments import mission
-from metacontrol_experiments.contingency import Kind
+from metacontrol_experiments.contingency import Kind, StrikeError
+from metacontrol_experiments.lockstep_drivers import Drivers
 from metacontrol_experiments.lockstep_frames import Frames
 from metacontrol_experiments.lockstep_manager import Manager, ManagerError
+from metacontrol_experiments.lockstep_memory import Memory
+from metacontrol_experiments.lockstep_striker import Striker, check
 from metacontrol_experiments.mission import GoalStatus, Strike
-from metacontrol_experiments.record import (
-    ComponentReport,
-    ConfigurationReport,
-    DecisionReport,
-    Event,
-    GoalReport,
-    MissionRecord,
-    OccupancyMap,
-    QualityReport,
-)
+from metacontrol_experiments.record import ConfigurationReport, Event, GoalReport, MissionRecord, OccupancyMap
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from metacontrol_experiments import routes
     from metacontrol_experiments.contingency import Contingency
     from metacontrol_experiments.mission import State
     from metacontrol_experiments.settings import Settings
@@ -71,8 +52,6 @@ SENSOR_STEPS = 10
 """Steps between two scans or images: 10 Hz, as the simulator node's defaults."""
 SETTLE_S = 2.0
 """Simulated seconds before the goal, in which sensors and costmaps come up."""
-LASER_NOISE, DEPTH_NOISE = 0.01, 0.001
-"""Defaults of the driver nodes."""
 
 _GOAL_ID = "lockstep-1"
 _OCCUPIED = 50
@@ -97,51 +76,6 @@ class Outcome:
     log: str
 
 
-class Drivers:
-    """The front laser's and the camera's driver; one that does not run is silent."""
-
-    TOPICS = ("front/scan", "camera/depth/points")
-
-    def __init__(self, simulation: Simulation, seed: int) -> None:
-        """Start both, with the random numbers that the nodes have."""
-        self._simulation = simulation
-        self._laser_rng = np.random.default_rng([seed, 3])
-        self._camera_rng = np.random.default_rng([seed, 8])
-        camera = simulation.robot.camera
-        self._projector = DepthProjector(camera.width, camera.height, camera.field_of_view)
-        self._silent: dict[str, Kind] = {}  # component -> what made it so
-        self._outlets = {"front_laser": Outlet(), "camera": Outlet(), "rear_laser": Outlet()}
-
-    def strike(self, kind: Kind, component: str) -> None:
-        """Let something happen to a driver; only what was frozen thaws."""
-        if kind.spoils_data:
-            self._outlets[component].fault = Fault(kind.value)
-        elif kind is not Kind.THAW:
-            self._silent[component] = kind
-        else:
-            self._outlets[component].fault = None
-            if self._silent.get(component) is Kind.FREEZE:
-                del self._silent[component]
-
-    def message(self, topic: str, stamp: Any) -> Any | None:
-        """Return a driver's message, a ROS one so that navigation takes it as on ROS; None where it is silent."""
-        robot = self._simulation.robot
-        if topic == "front/scan":
-            if "front_laser" in self._silent:
-                return None
-            laser = robot.front_laser
-            ranges = self._simulation.scan(laser)
-            noisy = measure_ranges(ranges, laser.range_min, laser.range_max, LASER_NOISE, self._laser_rng)
-            return self._outlets["front_laser"].pass_on(laser_scan(laser, noisy, stamp))
-        if topic.strip("/") == "camera/depth/points":
-            if "camera" in self._silent:
-                return None
-            depth = measure_depth(self._simulation.depth_image(), self._simulation.light, DEPTH_NOISE, self._camera_rng)
-            points = self._projector.points(depth, robot.camera.range_min, robot.camera.range_max)
-            return self._outlets["camera"].pass_on(point_cloud(points, robot.camera.mount.frame, stamp))
-        raise LockstepError(f"navigation wants {topic}, which no driver publishes in lockstep")
-
-
 class Lockstep:
     """One mission, stepped."""
 
@@ -154,18 +88,18 @@ class Lockstep:
         package = simulation_package or Path(rospkg.RosPack().get_path("metacontrol_sim"))
         self._settings = settings
         self._plan = settings.plan
-        for contingency in self._plan.contingencies:
-            _check_target(contingency)
-        start = settings.route.start
-        errors = SimulationSettings(Pose(start.x, start.y, start.yaw), settings.seed, REAL)
+        way = _pose(settings.route.start), _pose(settings.route.goal)
         try:
+            for contingency in self._plan.contingencies:
+                check(contingency)
             world = read_world(settings.world or package / "worlds" / "factory.yaml")
             self._grid = rasterise(world)
-            self._simulation = Simulation(world, errors)
-        except (WorldError, SimulationError) as error:
+            self._simulation = Simulation(world, SimulationSettings(way[0], settings.seed, REAL))
+        except (StrikeError, WorldError, SimulationError) as error:
             raise LockstepError(str(error)) from error
         self._frames = Frames(self._simulation.robot)
         self._drivers = Drivers(self._simulation, settings.seed)
+        self._striker = Striker(self._simulation, self._drivers, self._grid, way)
         self._package = package
         self._parameters = navigation_parameters(package, settings.initial_configuration)
         self._navigator: Navigator | None = self._new_navigator()
@@ -180,7 +114,7 @@ class Lockstep:
         self._steps = 0
         self._next_tick = 0.0
         self._state: State | None = None
-        self._memory = _Memory()
+        self._memory = Memory()
 
     def run(self) -> Outcome:
         """Run the mission to its end.
@@ -204,7 +138,8 @@ class Lockstep:
         if self._manager is not None:
             self._memory.decisions, self._memory.observed = self._manager.decisions, self._manager.observed
             self._memory.components = self._manager.components
-        return Outcome(self._mission, self._memory.record(self._map()), "\n".join(self._memory.lines) + "\n")
+        record = self._memory.record(self._map(), self._striker.obstacles)
+        return Outcome(self._mission, record, "\n".join(self._memory.lines) + "\n")
 
     @property
     def _mission(self) -> State:
@@ -213,8 +148,17 @@ class Lockstep:
         return self._state
 
     def _begin(self) -> None:
-        """Let clutter lie there, then send the goal."""
-        struck = [(entry.event, self._strike(entry)) for entry in self._plan.contingencies if entry.when.at_start]
+        """Let clutter lie there, then send the goal.
+
+        Raises:
+            LockstepError: something of the start cannot happen.
+            MissionError: the goal is no goal from here.
+        """
+        due = [entry for entry in self._plan.contingencies if entry.when.at_start]
+        try:
+            struck = [(entry.event, self._strike(entry)) for entry in due]
+        except StrikeError as error:
+            raise LockstepError(str(error)) from error
         now, pose = self._simulation.time, self._simulation.localised
         self._state = mission.start(self._plan, now, pose.x, pose.y)
         told = self._settings.describe() | {
@@ -280,22 +224,20 @@ class Lockstep:
             raise LockstepError(str(error)) from error
         if change is None:
             return
-        configuration, state = change
-        new = navigation_parameters(self._package, configuration)
-        restarts = _sources(new) != _sources(self._parameters)
-        self._memory.configurations.append(ConfigurationReport(now, self._manager.function, configuration, state))
-        self._memory.lines.append(f"{now:.2f} {configuration} {state}")
+        name, state = change.configuration, change.state
+        self._memory.configurations.append(ConfigurationReport(now, self._manager.function, name, state))
+        self._memory.lines.append(f"{now:.2f} {name} {state}")
         self._state, _ = mission.on_configuration(self._mission, now, state == "STABLE")
         if state != "STABLE":
-            if restarts:
+            if change.restarts:
                 self._navigator = None  # its process is stopped first
             return
-        self._parameters = new
+        self._parameters = navigation_parameters(self._package, name)
         if self._navigator is None:
             self._navigator = self._new_navigator()
             self._set_goal(now)
         else:
-            self._navigator.reconfigure(new)
+            self._navigator.reconfigure(self._parameters)
 
     def _new_navigator(self) -> Navigator:
         navigator = Navigator(self._parameters)
@@ -341,7 +283,7 @@ class Lockstep:
                 share = {"share": f"{self._mission.share:.4f}"}
                 try:
                     values = self._strike(contingency)
-                except LockstepError as error:
+                except StrikeError as error:
                     reason = f"a contingency could not strike: {error}"
                     self._state = mission.abort(self._mission, self._simulation.time, reason)
                     return
@@ -352,112 +294,17 @@ class Lockstep:
         """Let a contingency happen now; return what is worth telling of it.
 
         Raises:
-            LockstepError: it cannot.
+            StrikeError: it cannot.
         """
-        simulation, kind = self._simulation, contingency.kind
-        if kind.hits_component:
-            self._drivers.strike(kind, contingency.target)
-            if self._manager is not None and not kind.spoils_data:
-                self._manager.component_changed(simulation.time, contingency.target, kind is Kind.THAW)
-            return {"how": kind.value}
-        if kind is Kind.POWER:
-            simulation.set_consumption_factor(contingency.value)
-            return {"factor": f"{contingency.value:g}"}
-        if kind is Kind.LIGHT:
-            simulation.set_light(contingency.value)
-            return {"light": f"{contingency.value:g}"}
-        return self._clutter(contingency)
-
-    def _clutter(self, contingency: Contingency) -> dict[str, str]:
-        start, goal = self._settings.route.start, self._settings.route.goal
-        places = tuple(Pose(x, y, 0.0) for x, y in contingency.places)
-        try:
-            if not places:
-                way = (Pose(start.x, start.y, start.yaw), Pose(goal.x, goal.y, goal.yaw))
-                places = scatter(self._grid, *way, contingency.count, contingency.seed or 0)
-            for place in places:
-                box = Box("", "clutter", place.x, place.y, *CLUTTER_SIZE, place.yaw)
-                self._simulation.spawn(box, CLUTTER_MASS)
-        except (ClutterError, ObstacleError) as error:
-            raise LockstepError(f"{contingency}: {error}") from error
-        self._memory.obstacles += [(round(place.x, 1), round(place.y, 1)) for place in places]
-        return {"places": " ".join(f"{place.x:.3f},{place.y:.3f}" for place in places)}
+        values = self._striker.strike(contingency)
+        kind = contingency.kind
+        if self._manager is not None and kind.hits_component and not kind.spoils_data:
+            self._manager.component_changed(self._simulation.time, contingency.target, kind is Kind.THAW)
+        return values
 
     def _map(self) -> OccupancyMap:
         grid = self._grid
         return OccupancyMap(grid.resolution, grid.origin_x, grid.origin_y, grid.cells >= _OCCUPIED)
-
-
-class _Memory:
-    """Collects what a bag would hold."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.commands: list[float] = []
-        self.obstacles: list[tuple[float, float]] = []
-        self.goals: list[GoalReport] = []
-        self.results: list[GoalReport] = []
-        self.configurations: list[ConfigurationReport] = []
-        self.decisions: list[DecisionReport] = []
-        self.observed: list[QualityReport] = []
-        self.components: list[ComponentReport] = []
-        self._events: list[Event] = []
-        self._poses: list[tuple[float, float, float]] = []
-        self._safety: list[tuple[float, float]] = []
-        self._energy: list[tuple[float, float]] = []
-        self._contacts: list[tuple[float, float]] = []
-
-    def event(self, event: Event) -> None:
-        """Keep an event."""
-        self._events.append(event)
-        values = " ".join(f"{key}={value}" for key, value in event.values.items() if key != "commit")
-        self.lines.append(f"{event.stamp:.2f} {event.kind} {event.name} {values}".rstrip())
-
-    def sample(self, simulation: Simulation, step: int, *, started: bool) -> None:
-        """Keep what the simulator node would publish after a step."""
-        now, pose = simulation.time, simulation.pose
-        if step % MOTION_STEPS == 0:
-            self._poses.append((now, pose.x, pose.y))
-        if step % SAFETY_STEPS == 0:
-            self._safety.append((now, simulation.safety))
-        if step % ENERGY_STEPS == 0:
-            self._energy.append((now, simulation.energy))
-        if step % ENERGY_STEPS == 0 or not self._contacts or self._contacts[-1][1] != simulation.contacts:
-            self._contacts.append((now, float(simulation.contacts)))
-        if started and step % SENSOR_STEPS == 0:
-            numbers = (pose.x, pose.y, pose.yaw, *simulation.velocity, simulation.safety, simulation.energy)
-            self.lines.append(f"{now:.2f} " + " ".join(f"{number:.6f}" for number in numbers))
-
-    def record(self, drawn: OccupancyMap) -> MissionRecord:
-        """Return it as plain data."""
-        return MissionRecord(
-            events=tuple(self._events),
-            poses=np.array(self._poses, dtype=np.float64).reshape(-1, 3),
-            true_quality={"safety": tuple(self._safety), "energy": tuple(self._energy)},
-            contacts=tuple(self._contacts),
-            configurations=tuple(self.configurations),
-            decisions=tuple(self.decisions),
-            observed=tuple(self.observed),
-            components=tuple(self.components),
-            goals=tuple(self.goals),
-            results=tuple(self.results),
-            commands=tuple(self.commands),
-            obstacles=tuple(self.obstacles),
-            map=drawn,
-            first_stamp=self._poses[0][0],
-            last_stamp=self._poses[-1][0],
-        )
-
-
-def with_wall_time(record: MissionRecord, wall_s: float) -> MissionRecord:
-    """Return a record whose end tells how long the run took (wall s); the log never does."""
-    events = tuple(
-        replace(event, values=event.values | {"wall_duration_s": f"{wall_s:.3f}"})
-        if event.kind == "MISSION_END"
-        else event
-        for event in record.events
-    )
-    return replace(record, events=events)
 
 
 def navigation_parameters(package: Path, configuration: str) -> MoveBaseParameters:
@@ -487,15 +334,8 @@ def _values(component: Any) -> Iterator[tuple[str, Any]]:
             yield parameter.key, parameter.value
 
 
-def _sources(parameters: MoveBaseParameters) -> tuple[str, ...]:
-    return tuple(source.topic for source in parameters.global_costmap.sources)
-
-
-def _check_target(contingency: Contingency) -> None:
-    """Raise LockstepError for a component that does not run in lockstep."""
-    known = ("front_laser", "rear_laser", "camera")
-    if contingency.kind.hits_component and contingency.target not in known:
-        raise LockstepError(f"{contingency}: in lockstep there are only the components {', '.join(known)}")
+def _pose(pose: routes.Pose) -> Pose:
+    return Pose(pose.x, pose.y, pose.yaw)
 
 
 def _stamp(now: float) -> Any:

@@ -48,14 +48,28 @@ class ManagerError(RuntimeError):
     """The meta-controller cannot run."""
 
 
+@dataclass(frozen=True)
+class Change:
+    """A configuration that is RECONFIGURING or STABLE from now on, and whether that takes navigation to start anew."""
+
+    configuration: str
+    state: str
+    restarts: bool
+
+
 @dataclass
 class _Pending:
-    """A decision under way: when it is decided and done, s."""
+    """A decision under way: when it is decided and done, s, and whether navigation is started anew."""
 
     decision: Decision
     decided: float
     done: float
+    restarts: bool
     begun: bool = False
+
+    def change(self, state: str) -> Change:
+        """What it does to the system."""
+        return Change(self.decision.to_configuration, state, self.restarts)
 
 
 class Manager:
@@ -136,7 +150,7 @@ class Manager:
         """A component's node died or came back; the monitor finds out after a while."""
         self._due.append((now + self._delays.draw("detect", self._rng), component, "RECOVERED" if works else "FALSE"))
 
-    def step(self, now: float, step: int, simulation: Simulation, stamp: genpy.Time) -> tuple[str, str] | None:
+    def step(self, now: float, step: int, simulation: Simulation, stamp: genpy.Time) -> Change | None:
         """Observe, reason, and carry out.
 
         Args:
@@ -146,7 +160,7 @@ class Manager:
             stamp: the same time for messages.
 
         Returns:
-            A configuration and RECONFIGURING or STABLE where that has just begun or ended, else None.
+            The change that has just begun or ended, else None.
 
         Raises:
             ManagerError: the analysis failed.
@@ -197,13 +211,13 @@ class Manager:
             if decision.state == DECIDED:
                 decided = now + self._delays.draw("decide", self._rng)
                 names = (decision.from_configuration, decision.to_configuration)
-                same = len({observation_sources(self._package, name) for name in names}) == 1
-                done = decided + self._delays.draw("parameters" if same else "restart", self._rng)
-                self._pending = _Pending(decision, decided, done)
+                restarts = len({observation_sources(self._package, name) for name in names}) > 1
+                done = decided + self._delays.draw("restart" if restarts else "parameters", self._rng)
+                self._pending = _Pending(decision, decided, done, restarts)
             else:
                 self.decisions.append(_report(decision, now))
 
-    def _carry_out(self, now: float) -> tuple[str, str] | None:
+    def _carry_out(self, now: float) -> Change | None:
         """Begin what is decided by now, and report what is done by now."""
         pending = self._pending
         if pending is None:
@@ -211,7 +225,7 @@ class Manager:
         if not pending.begun and now >= pending.decided:
             pending.begun = True
             self.decisions.append(_report(pending.decision, now))
-            return pending.decision.to_configuration, "RECONFIGURING"
+            return pending.change("RECONFIGURING")
         if now < pending.done:
             return None
         self._pending = None
@@ -219,7 +233,7 @@ class Manager:
         self._core.observe_active(now, self.function, self.configuration, "STABLE")
         self.decisions.append(_report(self._core.report(now, pending.decision.id, True), now))
         self._follow()
-        return self.configuration, "STABLE"
+        return pending.change("STABLE")
 
     def _follow(self) -> None:
         """Let the observers know which system is active."""

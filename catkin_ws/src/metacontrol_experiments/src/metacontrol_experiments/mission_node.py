@@ -19,12 +19,13 @@ from metacontrol_sim.geometry import Pose
 from move_base_msgs.msg import MoveBaseActionGoal, MoveBaseActionResult
 
 from metacontrol_experiments import messages, mission
+from metacontrol_experiments.contingency import StrikeError
 from metacontrol_experiments.inbox import Inbox
 from metacontrol_experiments.mission import Action, GoalStatus, Strike
 from metacontrol_experiments.processes import wait_until
 from metacontrol_experiments.record import CostReport, Event, QualityReport
 from metacontrol_experiments.startup_node import DECISION_TOPIC, StartError, Startup
-from metacontrol_experiments.striker_node import StrikeError, Striker, serve
+from metacontrol_experiments.striker_node import Striker, serve
 from metacontrol_experiments.timeline import Timeline
 
 if TYPE_CHECKING:

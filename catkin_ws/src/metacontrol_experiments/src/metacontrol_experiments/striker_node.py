@@ -27,7 +27,7 @@ from metacontrol_sim.srv import (
 from nav_msgs.msg import OccupancyGrid
 
 from metacontrol_experiments.components import ComponentError, node_of
-from metacontrol_experiments.contingency import AT_START, ContingencyError, Kind, make
+from metacontrol_experiments.contingency import AT_START, ContingencyError, Kind, StrikeError, make
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -46,10 +46,6 @@ _SIGNALS = {
 _WAIT_S = 10.0
 _CALL_S = 2.0
 """Wall seconds for a service or the map to be there, and for a call to a node's own API."""
-
-
-class StrikeError(RuntimeError):
-    """A contingency that could not happen; the message says why."""
 
 
 class ImpatientTransport(xmlrpc.client.Transport):
