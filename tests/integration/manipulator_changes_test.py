@@ -10,7 +10,8 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
 from dynamic_reconfigure.msg import Config
-from manipulator_harness import DEADLINE_S, PairTest, is_alive, pid_of, wait_for
+from manipulator_harness import PairTest, is_alive, pid_of
+from waiting import DEADLINE_S, wait_for
 
 RANDOM_REQUESTS = int(os.environ.get("MROS_RANDOM_REQUESTS", "10"))  # the benchmark makes 200
 

@@ -25,20 +25,10 @@ from metacontrol_msgs.msg import (
     MvpReconfigurationGoal,
 )
 from rosgraph_manipulator.processes import MARK
+from waiting import DEADLINE_S, wait_for
 
-DEADLINE_S = 50
 HERE = Path(__file__).resolve().parent / "manipulator"
 SERVER = str(HERE / "server.launch")
-
-
-def wait_for(condition, what, deadline=DEADLINE_S):
-    end = time.monotonic() + deadline
-    while time.monotonic() < end:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.02)
-    raise AssertionError(f"not within {deadline} s: {what}")
 
 
 def pid_of(node):

@@ -6,7 +6,8 @@ import rospy
 import rostest
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
-from manipulator_harness import DEADLINE_S, PairTest, pid_of, wait_for
+from manipulator_harness import PairTest, pid_of
+from waiting import DEADLINE_S, wait_for
 
 
 class RelayTest(PairTest):

@@ -8,8 +8,9 @@ import actionlib
 import rospy
 import rostest
 from actionlib_msgs.msg import GoalID, GoalStatus
-from manipulator_harness import CONFIGURATIONS, DEADLINE_S, PairTest, pid_of, wait_for
+from manipulator_harness import CONFIGURATIONS, PairTest, pid_of
 from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
+from waiting import DEADLINE_S, wait_for
 
 
 class RequestsTest(PairTest):

@@ -9,9 +9,10 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import Twist
-from manipulator_harness import DEADLINE_S, Node, wait_for
+from manipulator_harness import Node
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry
+from waiting import DEADLINE_S, wait_for
 
 
 class RobotTest(unittest.TestCase):

@@ -13,9 +13,10 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist
-from manipulator_harness import DEADLINE_S, Node, PairTest, is_alive, later, pid_of, wait_for
+from manipulator_harness import Node, PairTest, is_alive, later, pid_of
 from metacontrol_experiments.processes import free_port
 from metacontrol_msgs.msg import MvpReconfigurationGoal
+from waiting import DEADLINE_S, wait_for
 
 
 class SurvivalTest(PairTest):

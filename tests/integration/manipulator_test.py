@@ -10,8 +10,9 @@ import rospy
 import rostest
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
-from manipulator_harness import DEADLINE_S, is_alive, pid_of, wait_for
+from manipulator_harness import is_alive, pid_of
 from metacontrol_msgs.msg import ActiveConfiguration, MvpReconfigurationAction, MvpReconfigurationGoal
+from waiting import DEADLINE_S, wait_for
 
 
 class ManipulatorTest(unittest.TestCase):

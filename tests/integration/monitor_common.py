@@ -1,13 +1,17 @@
 """What the monitor's tests share: diagnostics as they arrive, and nodes that are processes of their own."""
 
+import os
 import subprocess
 import sys
 import threading
 import time
+import unittest
+from pathlib import Path
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 
+SCRIPT = Path(__file__).parent / "monitor_node.py"
 NODE = "import rospy, sys; rospy.init_node(sys.argv[1]); rospy.spin()"
 
 
@@ -59,6 +63,54 @@ class Diagnostics:
 def start_node(name, *, code=NODE, arguments=(), prefix=(), **options):
     """Start a node as a process."""
     return subprocess.Popen([*prefix, sys.executable, "-c", code, name, *arguments], **options)
+
+
+class GraphTest(unittest.TestCase):
+    """Tests of a monitor beside nodes whose interfaces are chosen; each begins with a graph as the model has it.
+
+    A class gives NODES: full name -> what `monitor_node.py` takes.
+    """
+
+    NODES = {}
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("monitor_test", anonymous=True)
+        cls.seen = Diagnostics()
+        cls.nodes = {}
+
+    @classmethod
+    def tearDownClass(cls):
+        for process in cls.nodes.values():
+            end(process)
+
+    @classmethod
+    def start(cls, name, *interfaces):
+        """Start a node, by default as the model has it, in place of the one of that name."""
+        if name in cls.nodes:
+            cls.nodes[name].terminate()  # it unregisters: what it was remains nowhere
+            cls.nodes.pop(name).wait()
+        namespace, _, base = name.rpartition("/")
+        cls.nodes[name] = subprocess.Popen(
+            [sys.executable, str(SCRIPT), base, *(interfaces or cls.NODES.get(name, ()))],
+            env=os.environ | {"ROS_NAMESPACE": namespace or "/"},
+        )
+
+    @classmethod
+    def start_all(cls):
+        for name in cls.NODES:
+            cls.start(name)
+
+    def setUp(self):
+        self.expect_order()
+
+    def expect_order(self):
+        self.seen.forget()
+        self.seen.wait_status("ROS Graph", "running OK", timeout=60.0)
+
+    def restore(self, name):
+        self.start(name)
+        self.expect_order()
 
 
 def end(process):

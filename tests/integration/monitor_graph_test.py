@@ -1,125 +1,97 @@
 #!/usr/bin/env python3
 """The monitor's findings on interfaces and topics, with real nodes whose interfaces are not those of the model."""
 
-import subprocess
-import sys
-import unittest
-from pathlib import Path
-
 import rospy
 import rostest
-from monitor_common import Diagnostics, end, value_of
+from monitor_common import GraphTest, value_of
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import String
 
-SCRIPT = Path(__file__).parent / "monitor_node.py"
 AS_MODELLED = {
-    "laser": ("pub=scan:sensor_msgs/LaserScan@20",),
-    "nav": ("pub=cmd:std_msgs/Int32@10", "sub=scan:sensor_msgs/LaserScan", "srv=clear"),
-    "base": ("sub=cmd:std_msgs/Int32",),
+    "/laser": ("pub=scan:sensor_msgs/LaserScan@20",),
+    "/nav": ("pub=cmd:std_msgs/Int32@10", "sub=scan:sensor_msgs/LaserScan", "srv=clear"),
+    "/base": ("sub=cmd:std_msgs/Int32",),
 }
 
 
-class MonitorGraphTest(unittest.TestCase):
+class MonitorGraphTest(GraphTest):
+    NODES = AS_MODELLED
+
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("monitor_graph_test")
-        cls.seen = Diagnostics()
-        cls.modes = {name: rospy.Publisher(f"/{name}/mode", String, queue_size=1, latch=True) for name in AS_MODELLED}
-        cls.nodes = {}
+        super().setUpClass()
+        cls.modes = {name: rospy.Publisher(f"{name}/mode", String, queue_size=1, latch=True) for name in AS_MODELLED}
         _, status = cls.seen.wait_status("laser", "Missing node")
         assert value_of(status, "actual") == "absent", status  # it never came
-        for name in AS_MODELLED:
-            cls.start(name)
-
-    @classmethod
-    def tearDownClass(cls):
-        for process in cls.nodes.values():
-            end(process)
-
-    @classmethod
-    def start(cls, name, *interfaces):
-        if name in cls.nodes:
-            cls.nodes[name].terminate()  # it unregisters: what it was remains nowhere
-            cls.nodes.pop(name).wait()
-        command = [sys.executable, str(SCRIPT), name, *(interfaces or AS_MODELLED[name])]
-        cls.nodes[name] = subprocess.Popen(command)
+        cls.start_all()
 
     def setUp(self):
         for mode in self.modes.values():
             mode.publish("")
-        self.expect_order()
-
-    def expect_order(self):
-        self.seen.forget()
-        self.seen.wait_status("ROS Graph", "running OK", timeout=60.0)
-
-    def restore(self, name):
-        self.start(name)
-        self.expect_order()
+        super().setUp()
 
     def test_port_that_a_node_lacks_and_its_connection(self):
-        self.start("laser", "pub=front_scan:sensor_msgs/LaserScan@20")
+        self.start("/laser", "pub=front_scan:sensor_msgs/LaserScan@20")
         _, status = self.seen.wait_status("laser", "Missing port")
         self.assertEqual([v.value for v in status.values], ["scan", "publisher", "none"])
         _, status = self.seen.wait_status("scan", "Missing connection")
         self.assertEqual(value_of(status, "expected"), "laser.scan -> nav.scan")
         _, status = self.seen.wait_status("laser", "Additional port", "front_scan")
         self.assertEqual(value_of(status, "actual"), "publisher")
-        self.restore("laser")
+        self.restore("/laser")
 
     def test_service_that_a_node_lacks(self):
-        self.start("nav", *AS_MODELLED["nav"][:2])
+        self.start("/nav", *AS_MODELLED["/nav"][:2])
         self.seen.wait_status("nav", "Missing port", "clear")
-        self.restore("nav")
+        self.restore("/nav")
 
     def test_ends_of_a_connection_on_different_topics(self):
-        self.start("base", "sub=cmd_vel:std_msgs/Int32")
+        self.start("/base", "sub=cmd_vel:std_msgs/Int32")
         _, status = self.seen.wait_status("cmd", "Missing connection")
         self.assertIn("base.cmd takes nothing", value_of(status, "actual"))
         _, status = self.seen.wait_status("base", "Missing port", "cmd")
         self.assertEqual(value_of(status, "expected"), "subscriber")
-        self.restore("base")
+        self.restore("/base")
 
     def test_topic_of_another_type(self):
-        self.start("laser", "pub=scan:std_msgs/String@20")
+        self.start("/laser", "pub=scan:std_msgs/String@20")
         _, status = self.seen.wait_status("laser", "Wrong type")
         self.assertEqual(value_of(status, "expected"), "sensor_msgs/LaserScan")
         self.assertEqual(value_of(status, "actual"), "std_msgs/String")
-        self.restore("laser")
+        self.restore("/laser")
 
     def test_silent_topic_fails_its_component_though_the_node_lives(self):
-        self.modes["laser"].publish("quiet")
+        self.modes["/laser"].publish("quiet")
         _, status = self.seen.wait_status("scan", "Silent topic")
         self.assertEqual(value_of(status, "expected"), "max_age 2")
         self.seen.wait_status("laser", "Component status", "FALSE")
         self.assertEqual(self.seen.statuses("laser", "Missing node"), [])
         self.seen.forget()
-        self.modes["laser"].publish("")
+        self.modes["/laser"].publish("")
         self.seen.wait_status("laser", "Component status", "RECOVERED")
 
     def test_limit_that_the_model_gives(self):
-        self.modes["nav"].publish("quiet")
+        self.modes["/nav"].publish("quiet")
         self.seen.wait_status("cmd", "Silent topic")
         self.seen.wait_status("nav", "Component status", "FALSE")
         self.seen.forget()
-        self.modes["nav"].publish("")
+        self.modes["/nav"].publish("")
         self.seen.wait_status("nav", "Component status", "RECOVERED")
 
     def test_stuck_sensor(self):
-        self.modes["laser"].publish("stuck")
+        self.modes["/laser"].publish("stuck")
         _, status = self.seen.wait_status("scan", "Stuck topic")
         self.assertEqual(value_of(status, "expected"), "stuck_after 40")
         self.seen.wait_status("laser", "Component status", "FALSE")
         self.seen.forget()
-        self.modes["laser"].publish("")
+        self.modes["/laser"].publish("")
         self.seen.wait_status("laser", "Component status", "RECOVERED")
 
     def test_slow_topic(self):
-        self.start("laser", "pub=scan:sensor_msgs/LaserScan@1")
+        self.start("/laser", "pub=scan:sensor_msgs/LaserScan@1")
         _, status = self.seen.wait_status("scan", "Slow topic")
         self.assertLessEqual(float(value_of(status, "actual")), 5.0)  # it is rounded
-        self.restore("laser")
+        self.restore("/laser")
 
     def test_battery_below_its_limit(self):
         battery = rospy.Publisher("battery_state", BatteryState, queue_size=1, latch=True)

@@ -1,18 +1,13 @@
 #!/usr/bin/env python3
 """The monitor of a robot in a namespace: anonymous nodes, another robot beside it, deep parameters, actions."""
 
-import os
-import subprocess
-import sys
-import unittest
-from pathlib import Path
-
+import rosgraph
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
-from monitor_common import Diagnostics, end, value_of
+from monitor_common import GraphTest, end, value_of
+from waiting import wait_for
 
-SCRIPT = Path(__file__).parent / "monitor_node.py"
 ACTION = "move_base_msgs/MoveBaseAction"
 RVIZ = "/robot/rviz_1700000000"
 NODES = {
@@ -31,35 +26,15 @@ PARAMETERS = {
 }
 
 
-class MonitorNamesTest(unittest.TestCase):
+class MonitorNamesTest(GraphTest):
+    NODES = NODES
+
     @classmethod
     def setUpClass(cls):
-        rospy.init_node("monitor_names_test")
-        cls.seen = Diagnostics()
+        super().setUpClass()
         for name, value in PARAMETERS.items():
             rospy.set_param(name, value)
-        cls.nodes = {}
-        for name, interfaces in NODES.items():
-            cls.start(name, *interfaces)
-
-    @classmethod
-    def tearDownClass(cls):
-        for process in cls.nodes.values():
-            end(process)
-
-    @classmethod
-    def start(cls, name, *interfaces):
-        namespace, _, base = name.rpartition("/")
-        cls.nodes[name] = subprocess.Popen(
-            [sys.executable, str(SCRIPT), base, *interfaces], env=os.environ | {"ROS_NAMESPACE": namespace or "/"}
-        )
-
-    def setUp(self):
-        self.expect_order()
-
-    def expect_order(self):
-        self.seen.forget()
-        self.seen.wait_status("ROS Graph", "running OK", timeout=60.0)
+        cls.start_all()
 
     def expect_wrong(self, parameter, value, name, key, shown):
         """Set a parameter, expect it to be found wrong under that name and key, and set it back."""
@@ -82,11 +57,14 @@ class MonitorNamesTest(unittest.TestCase):
         self.seen.wait_status("rviz", "Component status", "RECOVERED")
 
     def test_only_nodes_of_the_namespace_that_are_not_anonymous_are_additional(self):
-        self.start("/robot/tool_1700000000")
+        tool = "/robot/tool_1700000000"
+        self.start(tool)
+        master = rosgraph.Master("/monitor_test")
+        wait_for(lambda: any(tool in nodes for part in master.getSystemState() for _, nodes in part), "the tool")
         self.start("/robot/arm/stray")
         _, status = self.seen.wait_status("arm/stray", "Additional node")
         self.assertEqual(status.level, DiagnosticStatus.WARN)
-        for name in ("/robot/arm/stray", "/robot/tool_1700000000"):
+        for name in ("/robot/arm/stray", tool):
             end(self.nodes.pop(name))
         found = {s.name for s in self.seen.all() if s.message == "Additional node"}
         self.assertEqual(found, {"arm/stray"})
@@ -108,16 +86,11 @@ class MonitorNamesTest(unittest.TestCase):
 
     def test_action_that_nobody_serves_is_a_missing_port_and_connection(self):
         nav = "/robot/arm/nav"
-        self.nodes[nav].terminate()
-        self.nodes.pop(nav).wait()
         self.start(nav, "sub=move/goal:move_base_msgs/MoveBaseActionGoal")  # it listens, but serves nothing
         _, status = self.seen.wait_status("arm/nav", "Missing port")
         self.assertEqual([v.value for v in status.values], ["move", "action server", "none"])
         self.seen.wait_status("arm/move", "Missing connection")
-        self.nodes[nav].terminate()
-        self.nodes.pop(nav).wait()
-        self.start(nav, *NODES[nav])
-        self.expect_order()
+        self.restore(nav)
 
 
 if __name__ == "__main__":

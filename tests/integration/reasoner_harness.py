@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import time
 import xmlrpc.client
 from pathlib import Path
 
@@ -18,8 +17,8 @@ from metacontrol_msgs.msg import (
     MvpReconfigurationResult,
 )
 from rosgraph_msgs.msg import Log
+from waiting import DEADLINE_S, wait_for
 
-DEADLINE_S = 40.0
 HERE = Path(__file__).resolve().parent
 MODEL = HERE / "reasoner" / "application.owl"
 NODE = HERE.parents[1] / "catkin_ws" / "src" / "mros1_reasoner" / "nodes" / "reasoner"
@@ -35,16 +34,6 @@ PARAMETERS = {
     "start_grace": 1.0,
     "reasoning_rate": 0.5,
 }
-
-
-def wait_for(condition, what, deadline=DEADLINE_S):
-    """Wait, at most until the deadline, until the condition holds; return what it gave."""
-    until = time.monotonic() + deadline
-    while not (found := condition()):
-        if time.monotonic() > until:
-            raise AssertionError(f"not within {deadline:g} s: {what}")
-        time.sleep(0.02)
-    return found
 
 
 def node_api(node):

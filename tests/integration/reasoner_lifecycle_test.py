@@ -9,9 +9,10 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
 from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
 from metacontrol_msgs.srv import Feasible
-from reasoner_harness import DEADLINE_S, Diagnostics, Manipulator, Reasoner, status, wait_for
+from reasoner_harness import Diagnostics, Manipulator, Reasoner, status
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
+from waiting import DEADLINE_S, wait_for
 
 PACKAGE = "metacontrol_tests"
 

@@ -22,9 +22,10 @@ from metacontrol_msgs.srv import (
     SetNfr,
 )
 from mros1_reasoner.knowledge_base import KnowledgeBase
-from reasoner_harness import DEADLINE_S, MODEL, NODE, Diagnostics, Manipulator, Reasoner, status, wait_for
+from reasoner_harness import MODEL, NODE, Diagnostics, Manipulator, Reasoner, status
 from rosgraph_msgs.msg import Log
 from std_srvs.srv import Trigger
+from waiting import DEADLINE_S, wait_for
 
 PACKAGE = "metacontrol_tests"
 

@@ -11,7 +11,8 @@ import unittest
 import psutil
 import rospy
 import rostest
-from reasoner_harness import DEADLINE_S, MODEL, NODE, Diagnostics, Listener, Manipulator, node_pid, status, wait_for
+from reasoner_harness import MODEL, NODE, Diagnostics, Listener, Manipulator, node_pid, status
+from waiting import DEADLINE_S, wait_for
 
 PACKAGE = "metacontrol_tests"
 
@@ -187,7 +188,7 @@ class ReasonerTest(unittest.TestCase):
             }
             for name, process in processes.items():
                 _, error = process.communicate(timeout=DEADLINE_S)
-                lines = [line for line in error.splitlines() if line.startswith("reasoner: ")]
+                lines = [line for line in error.splitlines() if line.startswith("reasoner")]
                 self.assertEqual(process.returncode, 2, f"{name}: {error}")
                 self.assertEqual(len(lines), 1, f"{name}: {error}")
                 self.assertIn(cases[name][2], lines[0])
