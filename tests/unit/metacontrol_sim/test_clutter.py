@@ -7,8 +7,8 @@ import pytest
 from metacontrol_sim.clutter import KEEP_OUT, ClutterError, scatter
 from metacontrol_sim.geometry import Pose
 from metacontrol_sim.grid import Grid
-from metacontrol_sim.obstacles import CLUTTER_SIZE, overlap
-from metacontrol_sim.world import Box, rasterise
+from metacontrol_sim.obstacles import CLUTTER_SIZE
+from metacontrol_sim.world import Box, overlap, rasterise
 from metacontrol_sim.world_file import read_world
 
 FACTORY = read_world(Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim/worlds/factory.yaml")

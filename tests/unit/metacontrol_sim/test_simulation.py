@@ -176,6 +176,7 @@ def test_energy_follows_the_consumption_factor(simulate):
     assert 0.35 < usual < 0.65
     assert simulation.energy > 1.3 * usual
     assert simulation.battery.charge < 1.0
+    assert simulate(boxes=(), charge=0.25).battery.charge == 0.25
 
 
 def test_odometry_starts_at_zero_and_localisation_closes_the_chain(simulate):

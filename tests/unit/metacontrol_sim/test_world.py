@@ -2,7 +2,6 @@ import itertools
 import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 import yaml
 from metacontrol_sim.grid import FREE, OCCUPIED, UNKNOWN
@@ -20,16 +19,8 @@ def world_of(tmp_path, text):
     return read_world(path)
 
 
-def outline(box):
-    along, across = np.meshgrid(
-        np.linspace(-box.length / 2, box.length / 2, 80), np.linspace(-box.width / 2, box.width / 2, 80)
-    )
-    cos, sin = math.cos(box.yaw), math.sin(box.yaw)
-    return box.x + cos * along - sin * across, box.y + sin * along + cos * across
-
-
 def gap(one, other):
-    return min(one.distance(*outline(other)).min(), other.distance(*outline(one)).min())
+    return min(one.distance(*other.points()).min(), other.distance(*one.points()).min())
 
 
 @pytest.mark.parametrize(

@@ -28,8 +28,8 @@ class CameraNode(rospy.SubscribeListener):
         super().__init__()
         degrees = number(rospy.get_param("~field_of_view", 60.0), "~field_of_view", 1.0, 170.0)
         self._field_of_view = math.radians(degrees)
-        self._range_min = number(rospy.get_param("~range_min", 0.05), "~range_min", 0.0, 100.0)
-        self._range_max = number(rospy.get_param("~range_max", 8.0), "~range_max", 0.1, 100.0)
+        self._range_min = number(rospy.get_param("~range_min", 0.05), "~range_min", 0.0, 99.0)
+        self._range_max = number(rospy.get_param("~range_max", 8.0), "~range_max", self._range_min + 0.1, 100.0)
         self._noise = number(rospy.get_param("~noise", 0.001), "~noise", 0.0, 1.0)
         self._rng = np.random.default_rng([seed(rospy.get_param("~seed", 0)), 8])
         self._light = 1.0
@@ -79,7 +79,7 @@ def main() -> int:
     try:
         CameraNode()
     except ParameterError as error:
-        rospy.logfatal(str(error))
+        rospy.logfatal(f"{rospy.get_name()}: {error}")
         return 2
     rospy.spin()
     return 0

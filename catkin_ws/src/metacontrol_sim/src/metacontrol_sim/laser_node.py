@@ -68,7 +68,7 @@ def main(side: str) -> int:
     try:
         LaserNode(side)
     except ParameterError as error:
-        rospy.logfatal(str(error))
+        rospy.logfatal(f"{rospy.get_name()}: {error}")
         return 2
     rospy.spin()
     return 0

@@ -6,16 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from metacontrol_sim.walking import CLEARANCE, HEIGHT, RADIUS, Walker
-from metacontrol_sim.world import Box, way_problem
+from metacontrol_sim.world import overlap, way_problem
 
 if TYPE_CHECKING:
     from metacontrol_sim.geometry import Pose
     from metacontrol_sim.physics import Physics
     from metacontrol_sim.robot import Robot
-    from metacontrol_sim.world import World
+    from metacontrol_sim.world import Box, World
 
 CLUTTER_SIZE = (0.3, 0.3, 0.95)
 CLUTTER_MASS = 500.0
@@ -185,32 +183,12 @@ class Obstacles:
         """Raise ObstacleError where the box would stand in something."""
         if not self._world.contains(box.x, box.y):
             raise ObstacleError(f"obstacle {name!r}: ({box.x:g}, {box.y:g}) is off the floor")
-        body = Box("robot", "robot", robot.x, robot.y, self._robot.length, self._robot.width, 1.0, robot.yaw)
-        if overlap(box, body):
+        if overlap(box, self._robot.body(robot)):
             raise ObstacleError(f"obstacle {name!r}: the robot stands at ({box.x:g}, {box.y:g})")
-        for x, y in zip(*outline(box), strict=True):
-            other, distance = self._world.nearest(float(x), float(y))
-            if other is not None and distance <= 0.0:
-                raise ObstacleError(f"obstacle {name!r}: ({box.x:g}, {box.y:g}) lies in {other.name!r}")
-        for other, _ in self._boxes.values():
-            if overlap(box, other):
-                raise ObstacleError(f"obstacle {name!r}: ({box.x:g}, {box.y:g}) lies in {other.name!r}")
+        placed = (other for other, _ in self._boxes.values() if overlap(box, other))
+        if other := self._world.under(box) or next(placed, None):
+            raise ObstacleError(f"obstacle {name!r}: ({box.x:g}, {box.y:g}) lies in {other.name!r}")
 
     def _gap_to_robot(self, x: float, y: float, robot: Pose) -> float:
         """Return the distance of a point to the robot's footprint, m."""
-        body = Box("robot", "robot", robot.x, robot.y, self._robot.length, self._robot.width, 1.0, robot.yaw)
-        return float(body.distance(x, y))
-
-
-def outline(box: Box, spacing: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
-    """Return points of a box, edges included, at most `spacing` m apart: x and y in the map frame."""
-    along = np.linspace(-box.length / 2.0, box.length / 2.0, math.ceil(box.length / spacing) + 1)
-    across = np.linspace(-box.width / 2.0, box.width / 2.0, math.ceil(box.width / spacing) + 1)
-    along, across = (axis.ravel() for axis in np.meshgrid(along, across))
-    cos, sin = math.cos(box.yaw), math.sin(box.yaw)
-    return box.x + cos * along - sin * across, box.y + sin * along + cos * across
-
-
-def overlap(one: Box, other: Box) -> bool:
-    """Tell whether two boxes share a part of the floor."""
-    return bool((one.distance(*outline(other)) <= 0.0).any() or (other.distance(*outline(one)) <= 0.0).any())
+        return float(self._robot.body(robot).distance(x, y))

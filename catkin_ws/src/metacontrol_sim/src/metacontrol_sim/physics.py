@@ -18,7 +18,7 @@ from metacontrol_sim.world import box_mesh
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from metacontrol_sim.robot import DepthCamera, Robot
     from metacontrol_sim.world import Box, World
@@ -107,17 +107,23 @@ class Physics:
         points = pybullet.getContactPoints(self._robot, physicsClientId=self.client)
         return {point[2] for point in points if point[9] > 0.0}
 
-    def cast(self, origins: ArrayLike, ends: ArrayLike) -> NDArray[np.float64]:
-        """Return how far rays get before they hit something: (n,) shares of their lengths, 1 for those that do not.
-
-        Neither robot nor floor is seen.
+    def sweep(self, start: Pose, height: float, angles: NDArray[np.float64], length: float) -> NDArray[np.float64]:
+        """Return the distances that level rays get: (n,) m, inf where nothing is hit. Neither robot nor floor is seen.
 
         Args:
-            origins: (n, 3), m.
-            ends: (n, 3), m.
+            start: of the rays, on the map; its yaw does not matter.
+            height: of the rays, m.
+            angles: (n,) directions in the map frame, rad.
+            length: of the rays, m.
         """
+        ends = np.empty((angles.size, 3))
+        ends[:, 0] = start.x + length * np.cos(angles)
+        ends[:, 1] = start.y + length * np.sin(angles)
+        ends[:, 2] = height
+        origins = np.broadcast_to((start.x, start.y, height), ends.shape)
         hits = pybullet.rayTestBatch(origins, ends, collisionFilterMask=_SEEN, physicsClientId=self.client)
-        return np.array([hit[2] for hit in hits])
+        shares = np.array([hit[2] for hit in hits])
+        return np.where(shares < 1.0, shares * length, math.inf)
 
     def depth_image(self, camera: DepthCamera, base: Pose) -> NDArray[np.float32]:
         """Return a camera's image from a pose of base_link: (height, width), m along the optical axis, inf beyond."""

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from metacontrol_sim.world import Box
+
+if TYPE_CHECKING:
+    from metacontrol_sim.geometry import Pose
 
 
 @dataclass(frozen=True)
@@ -84,13 +90,6 @@ class Robot:
     rear_laser: Laser = Laser(Mount("rear_laser", -0.393, 0.0, 0.18, math.pi))
     camera: DepthCamera = DepthCamera(Mount("camera_link", 0.42, 0.0, 0.50))
 
-    @property
-    def inscribed_radius(self) -> float:
-        """Radius in m of the largest circle about base_link within the footprint."""
-        return min(self.length, self.width) / 2.0
-
-    @property
-    def corners(self) -> tuple[tuple[float, float], ...]:
-        """Corners of the footprint in base_link, m."""
-        x, y = self.length / 2.0, self.width / 2.0
-        return ((x, y), (x, -y), (-x, -y), (-x, y))
+    def body(self, pose: Pose) -> Box:
+        """Return the floor that it takes at a pose of base_link (map frame)."""
+        return Box("robot", "robot", pose.x, pose.y, self.length, self.width, self.height, pose.yaw)

@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rosgraph_monitor.quality import braking_distance, closest_in_direction, energy_level, safety_risk
 
+from metacontrol_sim.drive import Drive
 from metacontrol_sim.geometry import ORIGIN, Pose
 from metacontrol_sim.motion_sensors import PERFECT, Errors, Imu, Localisation, Odometry, Slip
-from metacontrol_sim.obstacles import Obstacles, outline
+from metacontrol_sim.obstacles import Obstacles
 from metacontrol_sim.physics import Physics, PhysicsError
 from metacontrol_sim.power import Battery, PowerMeter, check_factor
 from metacontrol_sim.robot import Robot
 from metacontrol_sim.robot_file import RobotFileError
-from metacontrol_sim.world import Box
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from metacontrol_sim.robot import DepthCamera, Laser
     from metacontrol_sim.walking import Walker
-    from metacontrol_sim.world import World
+    from metacontrol_sim.world import Box, World
 
 STEP_NS = 10_000_000
 """ns of simulated time per step: 100 Hz."""
@@ -61,12 +61,14 @@ class Settings:
         initial_pose: of base_link in the map frame.
         seed: of every random number.
         errors: of the sensors of motion; perfect ones by default.
+        charge: of the battery at the start, 0..1.
         gui: show PyBullet's window.
     """
 
     initial_pose: Pose = ORIGIN
     seed: int = 0
     errors: Errors = PERFECT
+    charge: float = 1.0
     gui: bool = False
 
 
@@ -117,13 +119,11 @@ class Simulation:
         self.contacts = 0
         self.safety = 0.0
         self.energy = 0.0
-        self.battery = Battery()
+        self.battery = Battery(self.settings.charge)
         self.light = 1.0
 
         self._steps = 0
-        self._target = (0.0, 0.0, 0.0)
-        self._setpoint = (0.0, 0.0, 0.0)
-        self._command_ns = -1
+        self._base = Drive(self.robot)
         self._world_velocity = (0.0, 0.0)
         self._measured = (start, (0.0, 0.0))  # pose and velocity (map frame) at the last sample of IMU and odometry
         self._last_touch: dict[int, int] = {}
@@ -155,10 +155,7 @@ class Simulation:
         """
         if not (math.isfinite(forward) and math.isfinite(left) and math.isfinite(turn)):
             raise SimulationError(f"velocity command ({forward}, {left}, {turn}) is not finite")
-        scale = min(1.0, self.robot.max_speed / max(math.hypot(forward, left), 1e-9))
-        turn = min(max(turn, -self.robot.max_turn_rate), self.robot.max_turn_rate)
-        self._target = (forward * scale, left * scale, turn)
-        self._command_ns = self.time_ns
+        self._base.command(forward, left, turn, self.time_ns)
         self._meter.add_command()
 
     def set_consumption_factor(self, factor: float) -> None:
@@ -229,7 +226,7 @@ class Simulation:
     def scan(self, laser: Laser) -> NDArray[np.float32]:
         """Return the true ranges of one of the robot's lasers: (rays,) in m, inf where nothing is hit."""
         mount = self.pose @ Pose(laser.mount.x, laser.mount.y, laser.mount.yaw)
-        distances = self._cast(mount, laser.mount.z, self._rays[laser.mount.frame] + mount.yaw, laser.range_max)
+        distances = self.physics.sweep(mount, laser.mount.z, self._rays[laser.mount.frame] + mount.yaw, laser.range_max)
         return distances.astype(np.float32)
 
     def depth_image(self, camera: DepthCamera | None = None) -> NDArray[np.float32]:
@@ -246,19 +243,9 @@ class Simulation:
         self.physics.close()
 
     def _drive(self) -> None:
-        """Move the set point towards the command within the acceleration limits, and hand it to the motors."""
-        robot = self.robot
-        expired = self.time_ns - self._command_ns > robot.command_timeout * 1e9 or self._command_ns < 0
-        target = (0.0, 0.0, 0.0) if expired else self._target
-        forward, left, turn = self._setpoint
-        if (forward, left, turn) != target:
-            change_x, change_y = target[0] - forward, target[1] - left
-            change = math.hypot(change_x, change_y)
-            share = min(1.0, robot.max_acceleration * STEP / change) if change > 0.0 else 1.0
-            limit = robot.max_turn_acceleration * STEP
-            change_turn = min(max(target[2] - turn, -limit), limit)
-            self._setpoint = (forward + share * change_x, left + share * change_y, turn + change_turn)
-        forward, left, turn = (value * grip for value, grip in zip(self._setpoint, self._slip.factors, strict=True))
+        """Hand the motors the velocity that is left of the wheels' when they slip."""
+        wheels = self._base.advance(self.time_ns, STEP)
+        forward, left, turn = (value * grip for value, grip in zip(wheels, self._slip.factors, strict=True))
         cos, sin = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
         self.physics.drive(cos * forward - sin * left, sin * forward + cos * left, turn)
 
@@ -308,20 +295,10 @@ class Simulation:
         mount = self.robot.front_laser.mount
         sensor = self.pose @ Pose(mount.x, mount.y, 0.0)
         angles = _TRUTH_ANGLES + math.atan2(velocity_y, velocity_x)
-        distances = self._cast(sensor, _TRUTH_RAY_HEIGHT, angles, d_break)
+        distances = self.physics.sweep(sensor, _TRUTH_RAY_HEIGHT, angles, d_break)
         hit = np.isfinite(distances)
         x, y = distances[hit] * np.cos(_TRUTH_ANGLES[hit]), distances[hit] * np.sin(_TRUTH_ANGLES[hit])
         return safety_risk(closest_in_direction(x, y, 0.0), d_break)
-
-    def _cast(self, start: Pose, height: float, angles: NDArray[np.float64], length: float) -> NDArray[np.float64]:
-        """Return the distances that level rays get: (n,) m, inf where nothing is hit; angles in the map frame."""
-        ends = np.empty((angles.size, 3))
-        ends[:, 0] = start.x + length * np.cos(angles)
-        ends[:, 1] = start.y + length * np.sin(angles)
-        ends[:, 2] = height
-        origins = np.broadcast_to((start.x, start.y, height), ends.shape)
-        shares = self.physics.cast(origins, ends)
-        return np.where(shares < 1.0, shares * length, math.inf)
 
 
 def _ray_angles(laser: Laser) -> NDArray[np.float64]:
@@ -337,8 +314,5 @@ def _check_initial_pose(world: World, pose: Pose, robot: Robot) -> None:
             f"{where} is off the floor of world {world.name!r} "
             f"({world.x_min:g}..{world.x_max:g}, {world.y_min:g}..{world.y_max:g}); choose one on it"
         )
-    body = Box("robot", "robot", pose.x, pose.y, robot.length, robot.width, robot.height, pose.yaw)
-    for x, y in zip(*outline(body), strict=True):
-        box, distance = world.nearest(float(x), float(y))
-        if box is not None and distance <= 0.0:
-            raise SimulationError(f"{where} puts the robot into {box.name!r}; choose a free place")
+    if box := world.under(robot.body(pose)):
+        raise SimulationError(f"{where} puts the robot into {box.name!r}; choose a free place")

@@ -12,32 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 import rospkg
 import rospy
-from geometry_msgs.msg import PoseWithCovarianceStamped, Twist
-from nav_msgs.msg import OccupancyGrid, Odometry
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan
-from std_msgs.msg import Float32, Int32
-from tf2_msgs.msg import TFMessage
-from visualization_msgs.msg import MarkerArray
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Float32
 
-from metacontrol_sim import messages, sensor_messages
 from metacontrol_sim.geometry import Pose
-from metacontrol_sim.grid_messages import occupancy_grid
 from metacontrol_sim.motion_sensors import REAL, Errors
 from metacontrol_sim.obstacles import CLUTTER_MASS, CLUTTER_SIZE, ObstacleError
 from metacontrol_sim.pacing import Pacer
 from metacontrol_sim.parameters import ParameterError, file_path, flag, number, seed
 from metacontrol_sim.power import PowerError
-from metacontrol_sim.simulation import (
-    ENERGY_STEPS,
-    LOCALISATION_STEPS,
-    MOTION_STEPS,
-    SAFETY_STEPS,
-    STEP,
-    Settings,
-    Simulation,
-    SimulationError,
-)
+from metacontrol_sim.simulation import STEP, Settings, Simulation, SimulationError
+from metacontrol_sim.simulator_output_node import Output
 from metacontrol_sim.srv import (
     DeleteObstacle,
     DeleteObstacleRequest,
@@ -51,14 +36,12 @@ from metacontrol_sim.srv import (
 )
 from metacontrol_sim.walking import SPEED, Walker
 from metacontrol_sim.window_node import PERIOD_STEPS, WindowView
-from metacontrol_sim.world import Box, World, WorldError, rasterise
+from metacontrol_sim.world import Box, WorldError
 from metacontrol_sim.world_file import read_world
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-WALKING_STEPS = 20
-"""Steps between two messages with the places of people who walk."""
 _SERVICE_S = 10.0
 """Wall seconds that a service call waits for the loop."""
 
@@ -76,14 +59,11 @@ class SimulatorNode:
         """
         factor = number(rospy.get_param("~real_time_factor", 1.0), "~real_time_factor", 0.0, 1000.0)
         world = read_world(_world_path(rospy.get_param("~world", "")))
-        self._laser_steps = _steps("~laser_rate", 10.0, 50.0)
-        self._camera_steps = _steps("~camera_rate", 10.0, 50.0)
+        laser_steps, camera_steps = _steps("~laser_rate", 10.0, 50.0), _steps("~camera_rate", 10.0, 50.0)
         self._simulation = Simulation(world, _settings())
         self._pacer = Pacer(STEP / factor if factor > 0.0 else 0.0)
-        self._contacts = -1
-        self._changes = -1
         self._work: deque[Callable[[], None]] = deque()
-        self._advertise(world)
+        self._output = Output(self._simulation, world, laser_steps, camera_steps)
         self._view = WindowView(self._simulation) if self._simulation.settings.gui else None
         self._inputs = (
             rospy.Subscriber("cmd_vel", Twist, self._on_command, queue_size=10, tcp_nodelay=True),
@@ -107,40 +87,13 @@ class SimulatorNode:
                 self._work.popleft()()
             self._simulation.step()
             step += 1
-            self._publish(step)
+            self._output.publish(step)
             if self._view is not None and step % PERIOD_STEPS == 0:
                 self._view.draw()
 
     def close(self) -> None:
         """Free the simulation."""
         self._simulation.close()
-
-    def _advertise(self, world: World) -> None:
-        self._clock = rospy.Publisher("/clock", Clock, queue_size=10, tcp_nodelay=True)
-        self._odom = rospy.Publisher("odom", Odometry, queue_size=10, tcp_nodelay=True)
-        self._filtered = rospy.Publisher("odometry/filtered", Odometry, queue_size=10, tcp_nodelay=True)
-        self._imu = rospy.Publisher("imu/data", Imu, queue_size=20, tcp_nodelay=True)
-        self._battery = rospy.Publisher("battery_state", BatteryState, queue_size=1)
-        self._localised = rospy.Publisher("amcl_pose", PoseWithCovarianceStamped, queue_size=5, latch=True)
-        self._tf = rospy.Publisher("/tf", TFMessage, queue_size=20, tcp_nodelay=True)
-        self._state = rospy.Publisher("ground_truth/state", Odometry, queue_size=10)
-        self._safety = rospy.Publisher("ground_truth/safety", Float32, queue_size=10)
-        self._energy = rospy.Publisher("ground_truth/energy", Float32, queue_size=10)
-        self._contact_count = rospy.Publisher("ground_truth/contacts", Int32, queue_size=10, latch=True)
-        self._obstacles = rospy.Publisher("ground_truth/obstacles", MarkerArray, queue_size=2, latch=True)
-        self._front = rospy.Publisher("simulator/front_rays", LaserScan, queue_size=1, tcp_nodelay=True)
-        self._rear = rospy.Publisher("simulator/rear_rays", LaserScan, queue_size=1, tcp_nodelay=True)
-        self._depth = rospy.Publisher("simulator/depth", Image, queue_size=1, tcp_nodelay=True)
-        self._light = rospy.Publisher("simulator/light", Float32, queue_size=1, latch=True)
-        errors = self._simulation.settings.errors
-        self._odometry_writer = messages.OdometryWriter(messages.ODOM, errors.slip)
-        self._state_writer = messages.OdometryWriter(messages.MAP)
-        self._imu_writer = messages.ImuWriter(errors)
-        self._transform_writer = messages.TransformWriter()
-        now = messages.stamp(self._simulation.time_ns)
-        self._map = rospy.Publisher("map", OccupancyGrid, queue_size=1, latch=True)
-        self._map.publish(occupancy_grid(rasterise(world), now))
-        self._light.publish(self._simulation.light)
 
     # Input: called in rospy's threads, done in the loop's
 
@@ -182,7 +135,7 @@ class SimulatorNode:
     def _on_set_light(self, request: SetLightRequest) -> SetLightResponse:
         _, problem = self._in_loop(lambda: self._simulation.set_light(request.light))
         if not problem:
-            self._light.publish(request.light)
+            self._output.tell_light()
         return SetLightResponse(not problem, problem)
 
     def _in_loop(self, do: Callable[[], Any]) -> tuple[Any, str]:
@@ -203,63 +156,6 @@ class SimulatorNode:
         except FutureTimeout:
             return None, f"the simulation did not answer within {_SERVICE_S:g} s"
 
-    # Output
-
-    def _publish(self, step: int) -> None:
-        """Publish what is due after a step, /clock first."""
-        simulation = self._simulation
-        now = messages.stamp(simulation.time_ns)
-        self._clock.publish(now)
-        if step % MOTION_STEPS == 0:
-            self._publish_motion(now)
-        if simulation.contacts != self._contacts or step % ENERGY_STEPS == 0:
-            self._report_contacts()
-        self._publish_sensors(step, now)
-        if step % SAFETY_STEPS == 0:
-            self._safety.publish(simulation.safety)
-        if step % LOCALISATION_STEPS == 0:
-            deviation = simulation.settings.errors.localisation
-            self._localised.publish(messages.localised_pose(simulation.localised, deviation, now))
-        if step % ENERGY_STEPS == 0:
-            self._energy.publish(simulation.energy)
-            self._battery.publish(messages.battery_state(simulation, now))
-        obstacles = simulation.obstacles
-        if obstacles.changes != self._changes or (obstacles.walking and step % WALKING_STEPS == 0):
-            self._changes = obstacles.changes
-            self._obstacles.publish(messages.obstacle_markers(obstacles.shown(), now))
-
-    def _publish_motion(self, now: rospy.Time) -> None:
-        """Publish what the robot measures of its motion, and what it truly is."""
-        simulation = self._simulation
-        odometry = simulation.odometry
-        self._imu.publish(self._imu_writer.write(now, simulation))
-        self._tf.publish(self._transform_writer.write(now, simulation.map_to_odom, odometry.filtered))
-        self._odom.publish(self._odometry_writer.write(now, odometry.wheels, odometry.velocity))
-        velocity = (*odometry.velocity[:2], odometry.turn_rate)
-        self._filtered.publish(self._odometry_writer.write(now, odometry.filtered, velocity))
-        self._state.publish(self._state_writer.write(now, simulation.pose, simulation.velocity))
-
-    def _publish_sensors(self, step: int, now: rospy.Time) -> None:
-        """Publish the raw data that are due and that somebody listens to."""
-        robot = self._simulation.robot
-        if step % self._laser_steps == 0:
-            for publisher, laser in ((self._front, robot.front_laser), (self._rear, robot.rear_laser)):
-                if publisher.get_num_connections() > 0:
-                    ranges = self._simulation.scan(laser)
-                    publisher.publish(sensor_messages.laser_scan(laser, ranges, now, self._laser_steps * STEP))
-        if step % self._camera_steps == 0 and self._depth.get_num_connections() > 0:
-            image = self._simulation.depth_image()
-            self._depth.publish(sensor_messages.depth_image(robot.camera, image, now))
-
-    def _report_contacts(self) -> None:
-        """Publish the count of contacts, and say what was touched when it has grown."""
-        contacts = self._simulation.contacts
-        if contacts > max(self._contacts, 0):
-            touched = ", ".join(self._simulation.touching())
-            rospy.logwarn(f"contact {contacts}: the robot touches {touched or 'something'}")
-        self._contacts = contacts
-        self._contact_count.publish(contacts)
-
 
 def _settings() -> Settings:
     """Return the simulation's settings from the node's parameters.
@@ -277,7 +173,13 @@ def _settings() -> Settings:
             rospy.get_param("~localisation_noise", REAL.localisation), "~localisation_noise", 0.0, 10.0
         ),
     )
-    return Settings(pose, seed(rospy.get_param("~seed", 0)), errors, flag(rospy.get_param("~gui", False), "~gui"))
+    return Settings(
+        pose,
+        seed(rospy.get_param("~seed", 0)),
+        errors,
+        number(rospy.get_param("~battery_charge", 1.0), "~battery_charge", 0.0, 1.0),
+        flag(rospy.get_param("~gui", False), "~gui"),
+    )
 
 
 def _steps(name: str, default: float, fastest: float) -> int:
@@ -300,7 +202,7 @@ def main() -> int:
     try:
         node = SimulatorNode()
     except (ParameterError, WorldError, SimulationError) as error:
-        rospy.logfatal(str(error))
+        rospy.logfatal(f"{rospy.get_name()}: {error}")
         return 2
     try:
         node.run()

@@ -71,6 +71,14 @@ class Box:
         """Return the distance in m of points (floats or arrays, map frame) to the box's outline, 0 inside."""
         return _distance(self.x, self.y, self.length, self.width, self.yaw, x, y)
 
+    def points(self, spacing: float = 0.1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return points of the floor under it, edges included, at most `spacing` m apart: x and y in the map frame."""
+        along = np.linspace(-self.length / 2.0, self.length / 2.0, math.ceil(self.length / spacing) + 1)
+        across = np.linspace(-self.width / 2.0, self.width / 2.0, math.ceil(self.width / spacing) + 1)
+        along, across = (axis.ravel() for axis in np.meshgrid(along, across))
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return self.x + cos * along - sin * across, self.y + sin * along + cos * across
+
 
 @dataclass(frozen=True)
 class World:
@@ -104,6 +112,14 @@ class World:
         index = int(np.argmin(distances))
         return self.boxes[index], float(distances[index])
 
+    def under(self, box: Box) -> Box | None:
+        """Return a box of the world that shares a part of the floor with another one, None where none does."""
+        for x, y in zip(*box.points(), strict=True):
+            other, distance = self.nearest(float(x), float(y))
+            if distance <= 0.0:
+                return other
+        return None
+
     def contains(self, x: float, y: float) -> bool:
         """Tell whether a point of the map frame lies on the floor."""
         if self.grid is not None:
@@ -120,6 +136,11 @@ class World:
     def _columns(self) -> NDArray[np.float64]:
         """Centre x, y, length, width and yaw of all boxes: (5, n)."""
         return np.array([(box.x, box.y, box.length, box.width, box.yaw) for box in self.boxes]).T
+
+
+def overlap(one: Box, other: Box) -> bool:
+    """Tell whether two boxes share a part of the floor."""
+    return bool((one.distance(*other.points()) <= 0.0).any() or (other.distance(*one.points()) <= 0.0).any())
 
 
 def way_problem(world: World, walker: Walker) -> str | None:
