@@ -4,19 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from move_base.costmap import (
-    FREE,
-    INSCRIBED,
-    LETHAL,
-    UNKNOWN,
-    Costmap,
-    CostmapError,
-    StaticMap,
-    occupancy_values,
-)
+from move_base.costmap import Costmap
 from move_base.geometry import Pose, planar_matrix
+from move_base.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, occupancy_values
 from move_base.parameters import read_parameters
 from move_base.sensors import Observation
+from move_base.static_map import MapError, StaticMap
 
 ORIGIN = Pose(0.0, 0.0, 0.0)
 
@@ -199,7 +192,7 @@ def test_local_costmap_shows_the_map_through_the_drift_of_odometry(local):
     ],
 )
 def test_map_that_makes_no_sense_is_refused(width, resolution, origin):
-    with pytest.raises(CostmapError, match="map"):
+    with pytest.raises(MapError, match="map"):
         StaticMap.create([0, 0, 0, 0], width, 2, resolution, origin)
 
 

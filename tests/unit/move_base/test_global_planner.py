@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
-from move_base.costmap import INSCRIBED, Costmap, StaticMap
+from move_base.costmap import Costmap
 from move_base.geometry import Pose
 from move_base.global_planner import PlanningError, make_plan, path_cost
+from move_base.grid import INSCRIBED
 from move_base.parameters import read_parameters
+from move_base.static_map import StaticMap
 
 CELLS = 240  # 12 m
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from move_base.costmap import LETHAL
 from move_base.geometry import Pose, Velocity, planar_matrix
+from move_base.grid import LETHAL
 from move_base.navigator import Outcome
 from move_base.oscillation import OscillationFlags
 

@@ -3,8 +3,8 @@
 import importlib
 
 import pytest
-from move_base.costmap import FREE, LETHAL
 from move_base.geometry import Pose
+from move_base.grid import FREE, LETHAL
 from move_base.parameters import ParameterError, read_parameters
 from move_base.reconfiguration import ServerDescription, changed, present_values, servers
 

@@ -23,11 +23,11 @@ from metacontrol_sim.simulation import Settings as SimulationSettings
 from metacontrol_sim.world import WorldError, rasterise
 from metacontrol_sim.world_file import read_world
 from move_base import geometry
-from move_base.costmap import StaticMap
 from move_base.navigator import Navigator
 from move_base.navigator import Outcome as GoalOutcome
 from move_base.parameters import MoveBaseParameters, read_parameters
 from move_base.sensors import cloud_observation, scan_observation
+from move_base.static_map import StaticMap
 from ros_model.reader import read_system
 
 from metacontrol_experiments import mission

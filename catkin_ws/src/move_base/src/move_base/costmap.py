@@ -1,7 +1,4 @@
-"""Layered costmaps: static map, obstacles seen by sensors, inflation.
-
-Cells are `grid[row, column]`; row grows with y, column with x. Costs are those of costmap_2d.
-"""
+"""Layered costmaps: static map, obstacles seen by sensors, inflation."""
 
 from __future__ import annotations
 
@@ -12,18 +9,19 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from move_base.geometry import Pose
+from move_base.geometry import Pose, inscribed_radius
+from move_base.grid import FREE, LETHAL, Geometry
+from move_base.inflation import Inflation
+from move_base.static_map import bounding_geometry, resample
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from move_base.parameters import CostmapParameters, Layer
+    from move_base.parameters import CostmapParameters
     from move_base.sensors import Observation
-
-FREE, INSCRIBED, LETHAL, UNKNOWN = 0, 253, 254, 255
-"""Costs: free, the robot's centre can't be here, an obstacle, not known."""
+    from move_base.static_map import StaticMap
 
 MAX_RAY_GAP = math.radians(3.0)
 """Neighbouring rays farther apart than this leave what lies between them as it was."""
@@ -31,68 +29,8 @@ MAX_RAY_GAP = math.radians(3.0)
 CLOUD_BIN = math.radians(1.0)
 """Width of the sectors in which a cloud's nearest return bounds what is cleared: over twice a depth camera's column."""
 
-MIN_RESOLUTION, MAX_RESOLUTION = 0.001, 10.0
-"""Sides of a map's cells that make sense, m."""
-
 SUBPIXEL_BITS = 4
 """Fixed-point digits of cv2's polygon corners: 1/16 cell."""
-
-
-class CostmapError(ValueError):
-    """A map can't be used; the message says why."""
-
-
-@dataclass(frozen=True)
-class Geometry:
-    """Where a grid lies in its frame.
-
-    Attributes:
-        resolution: side of a cell, m.
-        width: number of columns.
-        height: number of rows.
-        origin_x: x of the lower left corner, m.
-        origin_y: y of the lower left corner, m.
-    """
-
-    resolution: float
-    width: int
-    height: int
-    origin_x: float
-    origin_y: float
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
-        return self.height, self.width
-
-    def cells(self, points: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Returns rows and columns of points (..., 2); they may lie outside the grid."""
-        scale = 1.0 / self.resolution
-        columns = np.floor((points[..., 0] - self.origin_x) * scale).astype(np.intp)
-        rows = np.floor((points[..., 1] - self.origin_y) * scale).astype(np.intp)
-        return rows, columns
-
-    def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Returns row and column of a point; they may lie outside the grid."""
-        return (
-            math.floor((y - self.origin_y) / self.resolution),
-            math.floor((x - self.origin_x) / self.resolution),
-        )
-
-    def contains(self, x: float, y: float) -> bool:
-        """Whether a point is in the grid; one that is not finite is not."""
-        along_x, along_y = (x - self.origin_x) / self.resolution, (y - self.origin_y) / self.resolution
-        return 0.0 <= along_x < self.width and 0.0 <= along_y < self.height
-
-    def centres(self, rows: NDArray[np.integer], columns: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Returns the centres (N, 2) of cells in metres."""
-        return np.stack(
-            [
-                (columns + 0.5) * self.resolution + self.origin_x,
-                (rows + 0.5) * self.resolution + self.origin_y,
-            ],
-            axis=-1,
-        )
 
 
 @dataclass(frozen=True)
@@ -115,37 +53,6 @@ class Snapshot:
     inscribed_radius: float
 
 
-@dataclass(frozen=True)
-class StaticMap:
-    """An occupancy grid with its own origin.
-
-    Attributes:
-        geometry: the grid, before it is turned about its origin's corner.
-        yaw: turn of the grid about the origin, radians.
-        occupancy: -1 unknown, 0..100 (H, W), int8.
-    """
-
-    geometry: Geometry
-    yaw: float
-    occupancy: NDArray[np.int8]
-
-    @classmethod
-    def create(
-        cls, data: Sequence[int], width: int, height: int, resolution: float, origin: tuple[float, float, float]
-    ) -> StaticMap:
-        """Checks the fields of a nav_msgs/OccupancyGrid.
-
-        Raises:
-            CostmapError: sizes do not fit, or values are not finite.
-        """
-        if not all(math.isfinite(value) for value in origin) or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
-            raise CostmapError(f"the map's resolution ({resolution}) or origin ({origin}) makes no sense")
-        if width <= 0 or height <= 0 or len(data) != width * height:
-            raise CostmapError(f"the map announces {width} x {height} cells and holds {len(data)}")
-        occupancy = np.asarray(data, dtype=np.int8).reshape(height, width)
-        return cls(Geometry(resolution, width, height, origin[0], origin[1]), origin[2], occupancy)
-
-
 class Costmap:
     """One costmap, built up from the layers of its parameters."""
 
@@ -162,13 +69,12 @@ class Costmap:
     def reconfigure(self, parameters: CostmapParameters) -> None:
         """Takes another inflation, padding, rates; obstacles seen stay. Size, frame and other layers can't change."""
         self.parameters = parameters
-        self._inflation = next((layer for layer in parameters.layers if layer.kind == "inflation"), None)
         self._obstacle_layers = [layer for layer in parameters.layers if layer.kind == "obstacle"]
         padded = parameters.padded_footprint()
         self.inscribed_radius = inscribed_radius(padded)
         self.circumscribed_radius = float(np.hypot(*padded.T).max())
         self._footprint = np.array(parameters.footprint)
-        self._cost_table, self._table_scale = self._make_cost_table()
+        self._inflation = self._make_inflation()
 
     @property
     def needs_map(self) -> bool:
@@ -182,11 +88,11 @@ class Costmap:
         self._static = static
         self._static_costs = None
         if not self.parameters.rolling_window:
-            geometry = static.geometry if static.yaw == 0.0 else _bounding_geometry(static)
+            geometry = static.geometry if static.yaw == 0.0 else bounding_geometry(static)
             if geometry != self.geometry:
                 self.geometry = geometry
                 self._obstacles = np.zeros(geometry.shape, dtype=np.uint8)
-                self._cost_table, self._table_scale = self._make_cost_table()
+                self._inflation = self._make_inflation()
 
     def update(
         self,
@@ -234,6 +140,10 @@ class Costmap:
             p.origin_x,
             p.origin_y,
         )
+
+    def _make_inflation(self) -> Inflation:
+        layer = next((layer for layer in self.parameters.layers if layer.kind == "inflation"), None)
+        return Inflation(layer, self.geometry.resolution, self.inscribed_radius, self.circumscribed_radius)
 
     def _roll(self, robot: Pose) -> None:
         """Moves the window so that the robot is in its middle, by whole cells, keeping what overlaps."""
@@ -308,7 +218,8 @@ class Costmap:
         else:
             costs = self._static_costs.copy()
             costs[self._obstacles == LETHAL] = LETHAL
-        return self._inflate(costs)
+        costs, clearance = self._inflation.apply(costs)
+        return Snapshot(self.geometry, costs, clearance, self._inflation.limit, self.inscribed_radius)
 
     def _place_static(self, map_pose: Pose) -> None:
         """Resamples the static map into the grid, where grid or map moved since the last time."""
@@ -317,59 +228,8 @@ class Costmap:
         placement = (self.geometry, map_pose)
         if self._static_costs is not None and self._static_placed == placement:
             return
-        self._static_costs = _resample(self._static, self._static_layer, self.geometry, map_pose)
+        self._static_costs = resample(self._static, self._static_layer, self.geometry, map_pose)
         self._static_placed = placement
-
-    def _inflate(self, costs: NDArray[np.uint8]) -> Snapshot:
-        resolution = self.geometry.resolution
-        unknown = costs == UNKNOWN
-        cells = cv2.distanceTransform((costs != LETHAL).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        limit = (LETHAL - 1) / self._table_scale * resolution
-        if not cells.size or float(cells.max()) > 1e6:  # no obstacle at all
-            cells = np.full(costs.shape, limit / resolution, dtype=np.float32)
-        if self._inflation is not None:
-            steps = cv2.convertScaleAbs(cells, alpha=self._table_scale)
-            inflated = np.asarray(cv2.LUT(steps, self._cost_table), dtype=np.uint8)
-            if unknown.any():
-                inflated[unknown & (inflated < INSCRIBED)] = UNKNOWN
-            costs = inflated
-        clearance = np.minimum(cells * np.float32(resolution), np.float32(limit))
-        return Snapshot(self.geometry, costs, clearance, limit, self.inscribed_radius)
-
-    def _make_cost_table(self) -> tuple[NDArray[np.uint8], float]:
-        """Tabulates the published cost function over the distance, so that a look-up inflates the whole grid.
-
-        Returns:
-            256 costs, and the number of entries per cell of distance. The table reaches a cell beyond the larger of the
-            inflation and the circumscribed radius.
-        """
-        resolution = self.geometry.resolution  # a static map's own, where the costmap does not roll
-        radius = self._inflation.inflation_radius if self._inflation is not None else 0.0
-        reach = max(radius, self.circumscribed_radius, self.inscribed_radius) / resolution + 2.0
-        scale = 254.0 / reach
-        distances = np.arange(256) / scale * resolution
-        factor = self._inflation.cost_scaling_factor if self._inflation is not None else 0.0
-        costs = (INSCRIBED - 1) * np.exp(-factor * (distances - self.inscribed_radius))
-        costs = np.where(distances <= self.inscribed_radius, INSCRIBED, costs)
-        costs = np.where((distances > radius) & (distances > 0.0), FREE, costs)
-        costs[0] = LETHAL
-        return costs.astype(np.uint8), scale
-
-
-def inscribed_radius(corners: NDArray[np.float64]) -> float:
-    """Returns the distance from the origin to the nearest edge of a polygon (N, 2)."""
-    ends = np.roll(corners, -1, axis=0)
-    edges = ends - corners
-    along = np.clip(-(corners * edges).sum(1) / np.maximum((edges**2).sum(1), 1e-12), 0.0, 1.0)
-    return float(np.hypot(*(corners + along[:, None] * edges).T).min())
-
-
-def occupancy_values(costs: NDArray[np.uint8]) -> NDArray[np.int8]:
-    """Translates costs to the values of an OccupancyGrid as costmap_2d publishes them: 0, 1..98, 99, 100, -1."""
-    table = np.zeros(256, dtype=np.int8)
-    table[1:INSCRIBED] = 1 + 97 * (np.arange(1, INSCRIBED) - 1) // 251
-    table[INSCRIBED], table[LETHAL], table[UNKNOWN] = 99, 100, -1
-    return table[costs]
 
 
 def _overlap(shift: int, size: int) -> slice:
@@ -386,50 +246,3 @@ def _nearest_by_sector(
     kept, starts = np.unique(sectors[order], return_index=True)
     nearest = np.minimum.reduceat(ranges[order], starts)
     return (kept + 0.5) * CLOUD_BIN, nearest
-
-
-def _bounding_geometry(static: StaticMap) -> Geometry:
-    """The upright grid that holds a turned map."""
-    g = static.geometry
-    width, height = g.width * g.resolution, g.height * g.resolution
-    corners = Pose(g.origin_x, g.origin_y, static.yaw).apply(
-        np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
-    )
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    columns, rows = np.ceil((high - low) / g.resolution - 1e-9).astype(int)
-    return Geometry(g.resolution, int(columns), int(rows), float(low[0]), float(low[1]))
-
-
-def _resample(static: StaticMap, layer: Layer, target: Geometry, map_pose: Pose) -> NDArray[np.uint8]:
-    """Returns the static map's costs on another grid; what the map does not cover is unknown (if tracked) or FREE."""
-    outside = UNKNOWN if layer.track_unknown_space else FREE
-    costs = np.where(static.occupancy >= layer.lethal_cost_threshold, LETHAL, FREE).astype(np.uint8)
-    costs[static.occupancy < 0] = outside
-    source = static.geometry
-    identity = map_pose == Pose(0.0, 0.0, 0.0) and static.yaw == 0.0
-    if identity and source == target:
-        return costs
-    # cell index of the target -> metres -> map -> the map's own grid -> cell index
-    to_source = Pose(source.origin_x, source.origin_y, static.yaw).inverse().compose(map_pose.inverse())
-    cos, sin = math.cos(to_source.yaw), math.sin(to_source.yaw)
-    ratio = target.resolution / source.resolution
-    corner = to_source.apply(
-        np.array([[target.origin_x + 0.5 * target.resolution, target.origin_y + 0.5 * target.resolution]])
-    )[0]
-    warp = np.array(
-        [
-            [cos * ratio, -sin * ratio, corner[0] / source.resolution - 0.5],
-            [sin * ratio, cos * ratio, corner[1] / source.resolution - 0.5],
-        ]
-    )
-    return np.asarray(
-        cv2.warpAffine(
-            costs,
-            warp,
-            (target.width, target.height),
-            flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=outside,
-        ),
-        dtype=np.uint8,
-    )

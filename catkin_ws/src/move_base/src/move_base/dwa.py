@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from move_base.costmap import INSCRIBED, inscribed_radius
-from move_base.geometry import Pose, Velocity, wrap_angle
+from move_base.geometry import Pose, Velocity, inscribed_radius, wrap_angle
+from move_base.grid import INSCRIBED
 from move_base.oscillation import OscillationFlags
 
 if TYPE_CHECKING:

@@ -85,3 +85,11 @@ def planar_matrix(pose: Pose, z: float = 0.0) -> NDArray[np.float64]:
     """Returns the homogeneous 4 x 4 transform of a pose at height `z` (m)."""
     cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
     return np.array([[cos, -sin, 0.0, pose.x], [sin, cos, 0.0, pose.y], [0.0, 0.0, 1.0, z], [0.0, 0.0, 0.0, 1.0]])
+
+
+def inscribed_radius(corners: NDArray[np.float64]) -> float:
+    """Returns the distance from the origin to the nearest edge of a polygon (N, 2)."""
+    ends = np.roll(corners, -1, axis=0)
+    edges = ends - corners
+    along = np.clip(-(corners * edges).sum(1) / np.maximum((edges**2).sum(1), 1e-12), 0.0, 1.0)
+    return float(np.hypot(*(corners + along[:, None] * edges).T).min())

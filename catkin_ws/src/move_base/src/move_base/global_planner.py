@@ -13,11 +13,14 @@ import cv2
 import numpy as np
 import pyastar2d
 
-from move_base.costmap import INSCRIBED, LETHAL, UNKNOWN, Geometry, Snapshot
 from move_base.geometry import Pose
+from move_base.grid import INSCRIBED, LETHAL, UNKNOWN
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from move_base.costmap import Snapshot
+    from move_base.grid import Geometry
 
 COST_FACTOR = 0.8 / 50.0
 """Weight per unit of cost over a free cell's weight of 1: NavFn's COST_FACTOR over its COST_NEUTRAL."""

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from move_base.costmap import LETHAL
 from move_base.dwa import DwaController, Trajectory
 from move_base.followed_plan import FollowedPlan
 from move_base.geometry import STOP, Pose, Velocity, wrap_angle
 from move_base.global_planner import Plan, PlanningError, make_plan
+from move_base.grid import LETHAL
 from move_base.recovery import Recovery
 from move_base.surroundings import Surroundings
 
@@ -27,9 +27,10 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from move_base.costmap import Snapshot, StaticMap
+    from move_base.costmap import Snapshot
     from move_base.parameters import MoveBaseParameters, ObservationSource
     from move_base.sensors import Observation
+    from move_base.static_map import StaticMap
     from move_base.surroundings import Transformer
 
 ROTATE_SPEED = 1.0

@@ -25,14 +25,15 @@ from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_srvs.srv import Empty, EmptyResponse
 
-from move_base.costmap import CostmapError, StaticMap, occupancy_values
 from move_base.ending_node import end_in_time, end_without_master
 from move_base.geometry import STOP, Pose, Velocity
 from move_base.global_planner import PlanningError
+from move_base.grid import occupancy_values
 from move_base.navigator import Navigator, Outcome
 from move_base.parameters import ParameterError, read_parameters
 from move_base.reconfiguration import changed, present_values, servers
 from move_base.sensors import SensorError, cloud_observation, scan_observation
+from move_base.static_map import MapError, StaticMap
 from move_base.takeover import TakeoverError, decode_parameter
 
 if TYPE_CHECKING:
@@ -56,6 +57,9 @@ FRAME_PATIENCE = 2.0
 
 FEEDBACK_PERIOD = 0.2
 """s; the action's status has the same rate."""
+
+FARTHEST = 1e6
+"""Coordinates beyond this (m) are a mistake: it is farther than anything drives."""
 
 TF_CACHE = 10.0
 """Transforms kept, s: tf2's own default."""
@@ -92,7 +96,8 @@ class TfTransformer:
             transform = self.buffer.lookup_transform_core(target, source, when).transform
         except tf2_ros.TransformException:
             return None
-        return _matrix(transform.translation, transform.rotation)
+        matrix = _matrix(transform.translation, transform.rotation)
+        return matrix if (np.abs(matrix) <= FARTHEST).all() else None  # tf2 takes infinity for a number
 
     def newest(self, target: str, source: str) -> float | None:
         """Returns the time of the newest transform in s, or None. Frames that never move are current at any time."""
@@ -353,7 +358,7 @@ class MoveBaseNode:
         origin = (info.origin.position.x, info.origin.position.y, yaw)
         try:
             static = StaticMap.create(message.data, info.width, info.height, info.resolution, origin)
-        except CostmapError as error:
+        except MapError as error:
             rospy.logwarn_throttle_identical(WARN_PERIOD, f"Map ignored: {error}")
             return
         with self._lock:
@@ -370,7 +375,7 @@ class MoveBaseNode:
             rospy.logwarn("make_plan: start or goal is not a finite pose in a known frame")
             return response
         try:
-            plan = self._navigator.plan_between(start, goal, max(request.tolerance, 0.0))
+            plan = self._navigator.plan_between(start, goal, request.tolerance)
         except PlanningError as error:
             rospy.logwarn("make_plan: %s", error)
             return response
@@ -504,8 +509,8 @@ def _goal_problem(target: PoseStamped) -> str:
     """Returns why a pose can't be a goal, or an empty text."""
     position, orientation = target.pose.position, target.pose.orientation
     values = (position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
-    if not all(math.isfinite(value) for value in values):
-        return "the goal's pose is not finite"
+    if not all(abs(value) <= FARTHEST for value in values):
+        return f"the goal's pose is not finite, or over {FARTHEST / 1000:g} km away"
     length = math.sqrt(sum(value * value for value in values[3:]))
     if abs(length - 1.0) > 0.1:
         return f"the goal's quaternion has length {length:.2f}, must be 1"

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from move_base.costmap import StaticMap
     from move_base.parameters import CostmapParameters, MoveBaseParameters, ObservationSource
     from move_base.sensors import Observation
+    from move_base.static_map import StaticMap
 
 FUTURE_LIMIT = 0.5
 """A measurement whose stamp is this far ahead of the clock (s) is not believed."""
