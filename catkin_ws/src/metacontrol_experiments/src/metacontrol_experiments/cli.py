@@ -244,8 +244,10 @@ def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionR
     told = Timeline(settings.thresholds)
     display.start(outcome.state.started_s)
     record = outcome.record
-    reports: list[Report] = [*record.events, *record.components, *record.configurations]
-    reports += [*record.decisions, *record.observed]
+    closed = [decision for decision in record.decisions if decision.state != "DECIDED"]
+    decided = [decision for decision in record.decisions if decision.state == "DECIDED"]
+    reports: list[Report] = [*record.events, *record.components, *record.observed]  # as they follow in one moment
+    reports += [*decided, *record.configurations, *closed]
     for report in sorted(reports, key=lambda report: report.stamp):
         for entry in told.tell(report):
             display.entry(entry)

@@ -19,10 +19,10 @@ LASER_NOISE, DEPTH_NOISE = 0.01, 0.001
 
 
 class Drivers:
-    """The front laser's and the camera's driver; one that does not run is silent. Nobody reads the rear laser."""
+    """The front laser's and the camera's driver; one that does not run is silent."""
 
     TOPICS = {"front/scan": "front_laser", "camera/depth/points": "camera"}
-    COMPONENTS = ("front_laser", "rear_laser", "camera")
+    COMPONENTS = tuple(TOPICS.values())
 
     def __init__(self, simulation: Simulation, seed: int) -> None:
         """Start all, with the random numbers that the nodes have."""

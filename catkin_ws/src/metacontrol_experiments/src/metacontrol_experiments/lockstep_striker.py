@@ -77,4 +77,4 @@ def check(contingency: Contingency) -> None:
     """
     known = Drivers.COMPONENTS
     if contingency.kind.hits_component and contingency.target not in known:
-        raise StrikeError(f"{contingency}: in lockstep there are only the components {', '.join(known)}")
+        raise StrikeError(f"{contingency}: in lockstep there are only the components {' and '.join(known)}")
