@@ -1,7 +1,8 @@
 """Parameters: published names and defaults, one clear error per mistake."""
 
 import pytest
-from move_base.parameters import DEFAULT_UPDATE_PERIOD, ParameterError, read_parameters
+from move_base.parameter_tree import ParameterError
+from move_base.parameters import DEFAULT_UPDATE_PERIOD, read_parameters
 
 
 def test_base_file_of_d2_loads(tree):
@@ -19,6 +20,11 @@ def test_whole_numbers_are_taken_for_real_ones(tree):
 def test_several_sources_are_read(tree):
     parameters = read_parameters(tree(local_costmap__obstacles_layer__observation_sources="scan point_cloud"))
     assert [source.data_type for source in parameters.local_costmap.sources] == ["LaserScan", "PointCloud2"]
+
+
+def test_layer_that_is_not_enabled_is_not_used(tree):
+    off = read_parameters(tree(local_costmap__obstacles_layer__enabled=False)).local_costmap
+    assert off.sources == ()
 
 
 def test_footprint_may_be_a_text(tree):

@@ -5,7 +5,8 @@ import importlib
 import pytest
 from move_base.geometry import Pose
 from move_base.grid import FREE, LETHAL
-from move_base.parameters import ParameterError, read_parameters
+from move_base.parameter_tree import ParameterError
+from move_base.parameters import read_parameters
 from move_base.reconfiguration import ServerDescription, changed, present_values, servers
 
 
@@ -51,6 +52,17 @@ def test_every_parameter_of_every_server_can_be_set(tree):
             for part in filter(None, server.namespace.split("/")):
                 level = level[part]
             assert level[name] == value
+
+
+def test_layer_that_starts_switched_off_can_be_switched_on(tree):
+    given = tree(local_costmap__inflater_layer__enabled=False)
+    parameters = read_parameters(given)
+    server = ServerDescription("local_costmap/inflater_layer", "InflationPlugin")
+    assert server in servers(parameters)
+    assert parameters.local_costmap.layers_of("inflation") == ()
+    assert present_values(parameters, given, server, ["enabled"]) == {"enabled": False}
+    _, parameters = changed(given, server.namespace, {"enabled": True})
+    assert [layer.name for layer in parameters.local_costmap.layers_of("inflation")] == ["inflater_layer"]
 
 
 def test_change_reaches_its_parameter_and_leaves_the_tree_given(tree):

@@ -60,7 +60,7 @@ class Costmap:
         self.parameters = parameters
         self.geometry = self._initial_geometry()
         self.reconfigure(parameters)
-        self._static_layer = next((layer for layer in parameters.layers if layer.kind == "static"), None)
+        self._static_layer = next(iter(parameters.layers_of("static")), None)
         self._static: StaticMap | None = None
         self._static_costs: NDArray[np.uint8] | None = None
         self._static_placed: tuple[Geometry, Pose] | None = None
@@ -69,7 +69,7 @@ class Costmap:
     def reconfigure(self, parameters: CostmapParameters) -> None:
         """Takes another inflation, padding, rates; obstacles seen stay. Size, frame and other layers can't change."""
         self.parameters = parameters
-        self._obstacle_layers = [layer for layer in parameters.layers if layer.kind == "obstacle"]
+        self._clears_footprint = any(layer.footprint_clearing for layer in parameters.layers_of("obstacle"))
         padded = parameters.padded_footprint()
         self.inscribed_radius = inscribed_radius(padded)
         self.circumscribed_radius = float(np.hypot(*padded.T).max())
@@ -111,7 +111,7 @@ class Costmap:
             self._roll(robot)
         for observation, transform in observations:
             self._observe(observation, transform)
-        if any(layer.footprint_clearing for layer in self._obstacle_layers):
+        if self._clears_footprint:
             self._fill(robot.apply(self._footprint), FREE)
         return self._combine(map_pose or Pose(0.0, 0.0, 0.0))
 
@@ -142,7 +142,7 @@ class Costmap:
         )
 
     def _make_inflation(self) -> Inflation:
-        layer = next((layer for layer in self.parameters.layers if layer.kind == "inflation"), None)
+        layer = next(iter(self.parameters.layers_of("inflation")), None)
         return Inflation(layer, self.geometry.resolution, self.inscribed_radius, self.circumscribed_radius)
 
     def _roll(self, robot: Pose) -> None:

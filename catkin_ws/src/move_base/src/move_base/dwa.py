@@ -14,6 +14,7 @@ import numpy as np
 from move_base.geometry import Pose, Velocity, inscribed_radius, wrap_angle
 from move_base.grid import INSCRIBED
 from move_base.oscillation import OscillationFlags
+from move_base.rollout import Footprint, Rollout, Trajectory, roll_out
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
 MIN_STEPS, MAX_STEPS = 4, 20
 """Poses per trajectory: as many as sim_granularity asks for, within these. At 0.75 m/s and 2 s the most are 7.5 cm
 apart, under a tenth of the footprint."""
-
-EDGE_SPACING = 0.1
-"""Distance between the points that stand for the footprint's edge, m."""
 
 HARD_PADDING = (0.5, 0.25, 0.0)
 """Shares of the footprint's padding that a trajectory must keep free: the first, and what is tried where an obstacle is
@@ -58,37 +56,12 @@ ESCAPE_DISTANCE = 0.3
 
 
 @dataclass(frozen=True)
-class Trajectory:
-    """A velocity and where it leads.
-
-    Attributes:
-        velocity: the command.
-        poses: x, y, yaw over the horizon (S, 3).
-        cost: its score, m.
-    """
-
-    velocity: Velocity
-    poses: NDArray[np.float64]
-    cost: float
-
-
-@dataclass(frozen=True)
-class _Rollout:
-    """Sampled velocities (C, 3) and their poses x, y, yaw: three arrays (C, S)."""
-
-    velocities: NDArray[np.float64]
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    yaw: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
 class _Scene:
     """What trajectories are judged by: the path ahead (N, 2), the costmap, and the shape to keep free."""
 
     path: NDArray[np.float64]
     snapshot: Snapshot
-    shape: _Shape
+    shape: Footprint
 
 
 class DwaController:
@@ -104,7 +77,7 @@ class DwaController:
         self._period = 1.0 / parameters.controller_frequency
         footprint, padded = np.array(parameters.local_costmap.footprint), parameters.local_costmap.padded_footprint()
         padding = inscribed_radius(padded) - inscribed_radius(footprint)
-        self._shapes = [_Shape(footprint, share * padding) for share in HARD_PADDING]
+        self._shapes = [Footprint(footprint, share * padding) for share in HARD_PADDING]
 
     def reset(self) -> None:
         """Forgets the last command, for a new goal."""
@@ -152,11 +125,11 @@ class DwaController:
         p = self.parameters
         speed = min(p.max_vel_theta, max(p.min_in_place_vel_theta, abs(angle) / 0.5))
         command = np.array([[0.0, 0.0, np.copysign(speed, angle)]])
-        rollout = _roll_out(command, robot, min(abs(angle) / speed, 1.0), MAX_STEPS)
-        if not self._free(rollout, snapshot, self._shape_for(robot, snapshot))[0]:
+        rollout = roll_out(command, robot, min(abs(angle) / speed, 1.0), MAX_STEPS)
+        if not self._shape_for(robot, snapshot).is_free(rollout, snapshot)[0]:
             return None
         self._last = Velocity(0.0, 0.0, float(command[0, 2]))
-        return _trajectory(rollout, 0, 0.0)
+        return rollout.trajectory(0, 0.0)
 
     def _back_off(self, robot: Pose, scene: _Scene) -> Trajectory | None:
         """Goes on backing off, if it has begun and is not far enough or blocked."""
@@ -180,10 +153,10 @@ class DwaController:
         narrow = clearance < scene.shape.circumscribed + scene.shape.margin
         return NARROW_ALIGN_ANGLE if narrow else ALIGN_ANGLE
 
-    def _shape_for(self, robot: Pose, snapshot: Snapshot) -> _Shape:
+    def _shape_for(self, robot: Pose, snapshot: Snapshot) -> Footprint:
         """The footprint with its margin; a smaller margin where an obstacle is in it already, or nothing could move."""
-        here = _Rollout(np.zeros((1, 3)), *(np.array([[value]]) for value in (robot.x, robot.y, robot.yaw)))
-        return next((shape for shape in self._shapes if self._free(here, snapshot, shape)[0]), self._shapes[-1])
+        here = Rollout(np.zeros((1, 3)), *(np.array([[value]]) for value in (robot.x, robot.y, robot.yaw)))
+        return next((shape for shape in self._shapes if shape.is_free(here, snapshot)[0]), self._shapes[-1])
 
     def _arc_samples(self, velocity: Velocity) -> NDArray[np.float64]:
         p = self.parameters
@@ -229,47 +202,20 @@ class DwaController:
     ) -> Trajectory | None:
         if len(samples) == 0:
             return None
-        rollout = _roll_out(samples, robot, horizon, self._steps(horizon))
-        free = self._free(rollout, scene.snapshot, scene.shape)
+        rollout = roll_out(samples, robot, horizon, self._steps(horizon))
+        free = scene.shape.is_free(rollout, scene.snapshot)
         if not free.any():
             return None
-        kept = _Rollout(samples[free], rollout.x[free], rollout.y[free], rollout.yaw[free])
+        kept = rollout.only(free)
         costs = self._score(kept, scene.path, scene.snapshot)
         best = int(costs.argmin())
-        return _trajectory(kept, best, float(costs[best]))
+        return kept.trajectory(best, float(costs[best]))
 
     def _steps(self, horizon: float) -> int:
         p = self.parameters
         return int(np.clip(np.ceil(p.max_vel_x * horizon / p.sim_granularity), MIN_STEPS, MAX_STEPS))
 
-    def _free(self, rollout: _Rollout, snapshot: Snapshot, shape: _Shape) -> NDArray[np.bool_]:
-        """Whether each trajectory keeps the footprint off obstacles (C,); outside the costmap nothing is free.
-
-        The clearance of the robot's centre decides most poses; the edge is looked at only in between.
-        """
-        g = snapshot.geometry
-        rows, columns = g.cells(np.stack([rollout.x, rollout.y], axis=-1))
-        inside = (rows >= 0) & (rows < g.height) & (columns >= 0) & (columns < g.width)
-        clearance = np.where(
-            inside, snapshot.clearance[rows.clip(0, g.height - 1), columns.clip(0, g.width - 1)], np.float32(0.0)
-        )
-        margin = shape.margin + 0.5 * g.resolution  # clearances end at the middle of an obstacle's cell
-        blocked: NDArray[np.bool_] = np.any(clearance <= shape.inscribed + margin, axis=1)
-        unsure = (clearance <= shape.circumscribed + margin) & ~blocked[:, None]
-        if unsure.any():
-            which, step = np.nonzero(unsure)
-            cos, sin = np.cos(rollout.yaw[which, step]), np.sin(rollout.yaw[which, step])
-            edge_x = rollout.x[which, step, None] + cos[:, None] * shape.edge[:, 0] - sin[:, None] * shape.edge[:, 1]
-            edge_y = rollout.y[which, step, None] + sin[:, None] * shape.edge[:, 0] + cos[:, None] * shape.edge[:, 1]
-            columns = ((edge_x - g.origin_x) * (1.0 / g.resolution)).astype(np.intp)
-            rows = ((edge_y - g.origin_y) * (1.0 / g.resolution)).astype(np.intp)
-            np.clip(columns, 0, g.width - 1, out=columns)
-            np.clip(rows, 0, g.height - 1, out=rows)
-            touching = (snapshot.clearance[rows, columns] <= margin).any(axis=1)
-            blocked[which[touching]] = True
-        return ~blocked
-
-    def _score(self, rollout: _Rollout, path: NDArray[np.float64], snapshot: Snapshot) -> NDArray[np.float64]:
+    def _score(self, rollout: Rollout, path: NDArray[np.float64], snapshot: Snapshot) -> NDArray[np.float64]:
         """Returns the cost of each trajectory (C,) in metres: off the path, short of its end, near obstacles, jerky."""
         p = self.parameters
         lengths = np.hypot(*np.diff(path, axis=0).T)
@@ -293,41 +239,6 @@ class DwaController:
         jerk = changes @ (SPEED_CHANGE_COST, SPEED_CHANGE_COST, TURN_CHANGE_COST)
         path_cost = p.path_distance_bias * (off_path.mean(axis=1) + misaligned)
         return np.asarray(path_cost + p.goal_distance_bias * to_goal + p.occdist_scale * occupied + jerk)
-
-
-class _Shape:
-    """A footprint: points along its edge (N, 2), its two radii, and the margin kept around it, m."""
-
-    def __init__(self, corners: NDArray[np.float64], margin: float) -> None:
-        self.margin = margin
-        pieces = []
-        for corner, following in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-            count = max(1, int(np.ceil(np.hypot(*(following - corner)) / EDGE_SPACING)))
-            fractions = np.arange(count)[:, None] / count
-            pieces.append(corner + fractions * (following - corner))
-        self.edge = np.concatenate(pieces)
-        self.inscribed = inscribed_radius(corners)
-        self.circumscribed = float(np.hypot(*corners.T).max())
-
-
-def _roll_out(velocities: NDArray[np.float64], robot: Pose, horizon: float, steps: int) -> _Rollout:
-    """Integrates constant velocities (C, 3) in closed form over the horizon (s), to so many poses."""
-    times = np.linspace(horizon / steps, horizon, steps)
-    turned = velocities[:, 2:] * times
-    # sin(a)/a and (1 - cos(a))/a, whose limits at a = 0 are 1 and 0
-    sinc = np.sinc(turned / np.pi)
-    cosc = np.sinc(turned / (2.0 * np.pi)) * np.sin(turned / 2.0)
-    forward = (velocities[:, :1] * sinc - velocities[:, 1:2] * cosc) * times
-    left = (velocities[:, :1] * cosc + velocities[:, 1:2] * sinc) * times
-    cos, sin = np.cos(robot.yaw), np.sin(robot.yaw)
-    return _Rollout(
-        velocities, robot.x + cos * forward - sin * left, robot.y + sin * forward + cos * left, robot.yaw + turned
-    )
-
-
-def _trajectory(rollout: _Rollout, index: int, cost: float) -> Trajectory:
-    poses = np.stack([rollout.x[index], rollout.y[index], rollout.yaw[index]], axis=1)
-    return Trajectory(Velocity(*(float(value) for value in rollout.velocities[index])), poses, cost)
 
 
 def _direction_of(path: NDArray[np.float64], over: float = 0.5) -> float:

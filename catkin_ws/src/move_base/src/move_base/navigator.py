@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from move_base.dwa import DwaController, Trajectory
+from move_base.dwa import DwaController
 from move_base.followed_plan import FollowedPlan
 from move_base.geometry import STOP, Pose, Velocity, wrap_angle
 from move_base.global_planner import Plan, PlanningError, make_plan
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from move_base.costmap import Snapshot
     from move_base.parameters import MoveBaseParameters, ObservationSource
+    from move_base.rollout import Trajectory
     from move_base.sensors import Observation
     from move_base.static_map import StaticMap
     from move_base.surroundings import Transformer

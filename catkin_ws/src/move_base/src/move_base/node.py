@@ -30,7 +30,8 @@ from move_base.geometry import STOP, Pose, Velocity
 from move_base.global_planner import PlanningError
 from move_base.grid import occupancy_values
 from move_base.navigator import Navigator, Outcome
-from move_base.parameters import ParameterError, read_parameters
+from move_base.parameter_tree import ParameterError
+from move_base.parameters import read_parameters
 from move_base.reconfiguration import changed, present_values, servers
 from move_base.sensors import SensorError, cloud_observation, scan_observation
 from move_base.static_map import MapError, StaticMap
@@ -328,8 +329,8 @@ class MoveBaseNode:
             # buff_size: a cloud must fit in it, or rospy falls behind
             callback = functools.partial(self._on_sensor, source)
             rospy.Subscriber(source.topic, kind, callback, queue_size=2, buff_size=1 << 22)
-        layers = (*self._parameters.global_costmap.layers, *self._parameters.local_costmap.layers)
-        for topic in {layer.map_topic for layer in layers if layer.kind == "static"}:
+        costmaps = (self._parameters.global_costmap, self._parameters.local_costmap)
+        for topic in {layer.map_topic for costmap in costmaps for layer in costmap.layers_of("static")}:
             rospy.Subscriber(topic, numpy_msg(OccupancyGrid), self._on_map, queue_size=1)
 
     def _on_sensor(self, source: ObservationSource, message: Any) -> None:

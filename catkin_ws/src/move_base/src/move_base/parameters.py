@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from move_base.parameter_tree import ParameterError, ParameterTree
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -37,10 +39,6 @@ RECOVERY_TYPES = {
 }
 
 _ROTATION = "clearing_rotation_allowed"
-
-
-class ParameterError(ValueError):
-    """A parameter is missing, of the wrong type or out of its range; the message names it."""
 
 
 @dataclass(frozen=True)
@@ -78,11 +76,12 @@ class ObservationSource:
 
 @dataclass(frozen=True)
 class Layer:
-    """One entry of a costmap's `plugins` list; only the fields of its kind are used.
+    """One entry of a costmap's `plugins` list; only the fields of its kind are used, and none if it is not enabled.
 
     Attributes:
         name: the layer's name, under which its parameters are.
         kind: `static`, `obstacle` or `inflation`.
+        enabled: whether it is used.
         map_topic: topic of the occupancy grid (static).
         track_unknown_space: whether unknown cells stay unknown; else they are free (static).
         lethal_cost_threshold: occupancy from which a cell is an obstacle, 0..100 (static).
@@ -94,6 +93,7 @@ class Layer:
 
     name: str
     kind: str
+    enabled: bool = True
     map_topic: str = "map"
     track_unknown_space: bool = True
     lethal_cost_threshold: int = 100
@@ -122,10 +122,14 @@ class CostmapParameters:
     footprint_padding: float
     layers: tuple[Layer, ...]
 
+    def layers_of(self, kind: str) -> tuple[Layer, ...]:
+        """Returns the layers of a kind that are enabled."""
+        return tuple(layer for layer in self.layers if layer.kind == kind and layer.enabled)
+
     @property
     def sources(self) -> tuple[ObservationSource, ...]:
         """All observation sources of the costmap's layers."""
-        return tuple(source for layer in self.layers for source in layer.sources)
+        return tuple(source for layer in self.layers_of("obstacle") for source in layer.sources)
 
     def padded_footprint(self) -> NDArray[np.float64]:
         """Returns the padded footprint's corners (N, 2) in the base frame; each coordinate grows by the padding."""
@@ -212,7 +216,7 @@ def read_parameters(tree: Mapping[str, Any]) -> MoveBaseParameters:
     Raises:
         ParameterError: a value has the wrong type or is out of range.
     """
-    top = _Reader(tree, "")
+    top = ParameterTree(tree, "")
     local = _read_costmap(top.child("local_costmap"), rolling_default=True)
     parameters = MoveBaseParameters(
         controller_frequency=top.number("controller_frequency", 20.0, low=0.1, high=1000.0),
@@ -237,7 +241,7 @@ def read_parameters(tree: Mapping[str, Any]) -> MoveBaseParameters:
     return parameters
 
 
-def _read_controller(reader: _Reader) -> ControllerParameters:
+def _read_controller(reader: ParameterTree) -> ControllerParameters:
     max_vel_x = reader.number("max_vel_x", 0.5, low=0.0, above=True, high=10.0)
     min_vel_x = reader.number("min_vel_x", 0.1, low=0.0, high=10.0)
     if min_vel_x > max_vel_x:
@@ -274,7 +278,7 @@ def _read_controller(reader: _Reader) -> ControllerParameters:
     )
 
 
-def _read_recovery(reader: _Reader, local: CostmapParameters) -> tuple[RecoveryBehavior, ...]:
+def _read_recovery(reader: ParameterTree, local: CostmapParameters) -> tuple[RecoveryBehavior, ...]:
     """The behaviours that `recovery_behaviors` lists; without it the published default."""
     if not reader.has("recovery_behaviors"):
         radius = float(np.hypot(*np.array(local.footprint).T).max())
@@ -289,7 +293,7 @@ def _read_recovery(reader: _Reader, local: CostmapParameters) -> tuple[RecoveryB
     return tuple(found)
 
 
-def _read_lateral_samples(reader: _Reader) -> tuple[float, ...]:
+def _read_lateral_samples(reader: ParameterTree) -> tuple[float, ...]:
     """Lateral speeds in m/s: `y_vels`, clipped to max_vel_y and min_vel_y.
 
     A negative min_vel_y is the fastest speed to the right, one of zero or more the slowest sample's magnitude.
@@ -303,7 +307,7 @@ def _read_lateral_samples(reader: _Reader) -> tuple[float, ...]:
     return tuple(sorted(value for value in clipped if value and abs(value) >= least))
 
 
-def _read_costmap(reader: _Reader, *, rolling_default: bool) -> CostmapParameters:
+def _read_costmap(reader: ParameterTree, *, rolling_default: bool) -> CostmapParameters:
     parameters = CostmapParameters(
         global_frame=reader.frame("global_frame", "odom" if rolling_default else "map"),
         robot_base_frame=reader.frame("robot_base_frame", "base_link"),
@@ -325,23 +329,23 @@ def _read_costmap(reader: _Reader, *, rolling_default: bool) -> CostmapParameter
     return replace(parameters, layers=_read_layers(reader))
 
 
-def _read_layers(reader: _Reader) -> tuple[Layer, ...]:
+def _read_layers(reader: ParameterTree) -> tuple[Layer, ...]:
     layers = []
     for index, entry in enumerate(reader.sequence("plugins", ())):
         name, kind = reader.plugin(f"plugins[{index}]", entry, LAYER_TYPES)
         layers.append(_read_layer(reader.child(name), name, kind))
     if not layers:
         raise reader.error("plugins", "must list the layers (load the base navigation parameters first)", None)
-    return tuple(layer for layer in layers if layer is not None)
+    return tuple(layers)
 
 
-def _read_layer(reader: _Reader, name: str, kind: str) -> Layer | None:
-    if not reader.boolean("enabled", True):
-        return None
+def _read_layer(reader: ParameterTree, name: str, kind: str) -> Layer:
+    enabled = reader.boolean("enabled", True)
     if kind == "static":
         return Layer(
             name,
             kind,
+            enabled,
             map_topic=reader.text("map_topic", "map"),
             track_unknown_space=reader.boolean("track_unknown_space", True),
             lethal_cost_threshold=reader.integer("lethal_cost_threshold", 100, low=1, high=100),
@@ -350,21 +354,23 @@ def _read_layer(reader: _Reader, name: str, kind: str) -> Layer | None:
         return Layer(
             name,
             kind,
+            enabled,
             inflation_radius=reader.number("inflation_radius", 0.55, low=0.0, high=50.0),
             cost_scaling_factor=reader.number("cost_scaling_factor", 10.0, low=0.0),
         )
-    names = reader.text("observation_sources", "").split()
+    names = reader.text("observation_sources", "").split() if enabled else []
     if len(set(names)) != len(names):
         raise reader.error("observation_sources", "names a source twice", " ".join(names))
     return Layer(
         name,
         kind,
+        enabled,
         sources=tuple(_read_source(reader, source) for source in names),
         footprint_clearing=reader.boolean("footprint_clearing_enabled", True),
     )
 
 
-def _read_source(layer: _Reader, name: str) -> ObservationSource:
+def _read_source(layer: ParameterTree, name: str) -> ObservationSource:
     if not layer.has(name):
         raise layer.error("observation_sources", f"names {name!r}, but {layer.path(name)} has no parameters", name)
     reader = layer.child(name)
@@ -391,7 +397,7 @@ def _read_source(layer: _Reader, name: str) -> ObservationSource:
     return source
 
 
-def _read_footprint(reader: _Reader) -> tuple[tuple[float, float], ...]:
+def _read_footprint(reader: ParameterTree) -> tuple[tuple[float, float], ...]:
     value = reader.value("footprint", None)
     if value in (None, "", "[]", []):
         radius = reader.number("robot_radius", 0.46, low=0.0, above=True)
@@ -409,103 +415,3 @@ def _read_footprint(reader: _Reader) -> tuple[tuple[float, float], ...]:
     if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
         raise reader.error("footprint", "must be a list of at least three finite [x, y] corners", value)
     return tuple((float(x), float(y)) for x, y in corners)
-
-
-class _Reader:
-    """Checked access to one level of the parameter tree."""
-
-    def __init__(self, tree: Any, prefix: str) -> None:
-        if not hasattr(tree, "get"):
-            raise ParameterError(f"~{prefix or ''}: must be a group of parameters, is {tree!r}")
-        self._tree: Mapping[str, Any] = tree
-        self._prefix = prefix
-
-    def child(self, name: str) -> _Reader:
-        return _Reader(self._tree.get(name, {}), self.path(name))
-
-    def path(self, name: str) -> str:
-        return f"{self._prefix}/{name}" if self._prefix else name
-
-    def has(self, name: str) -> bool:
-        return name in self._tree
-
-    def error(self, name: str, rule: str, value: object) -> ParameterError:
-        return ParameterError(f"~{self.path(name)}: {rule}, is {value!r}; correct the launch or YAML file that sets it")
-
-    def value(self, name: str, default: object) -> Any:
-        return self._tree.get(name, default)
-
-    def number(
-        self,
-        name: str,
-        default: float,
-        *,
-        low: float = -math.inf,
-        high: float = math.inf,
-        above: bool = False,
-        formerly: str = "",
-    ) -> float:
-        """A number within bounds; `formerly` is the name that older files have for it."""
-        if formerly and not self.has(name) and self.has(formerly):
-            name = formerly
-        value = self.value(name, default)
-        if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
-            raise self.error(name, "must be a number", value)
-        if name in self._tree and math.isinf(value):
-            raise self.error(name, "must be finite", value)
-        if value < low or value > high or (above and value == low):
-            bounds = f"{'over' if above else 'at least'} {low:g}" if math.isfinite(low) else ""
-            upper = f"at most {high:g}" if math.isfinite(high) else ""
-            raise self.error(name, f"must be {' and '.join(part for part in (bounds, upper) if part)}", value)
-        return float(value)
-
-    def integer(self, name: str, default: int, *, low: int, high: int) -> int:
-        value = self.number(name, default, low=low, high=high)
-        if value != int(value):
-            raise self.error(name, "must be a whole number", value)
-        return int(value)
-
-    def boolean(self, name: str, default: bool) -> bool:
-        value = self.value(name, default)
-        if not isinstance(value, bool):
-            raise self.error(name, "must be true or false", value)
-        return value
-
-    def text(self, name: str, default: str) -> str:
-        value = self.value(name, default)
-        if not isinstance(value, str):
-            raise self.error(name, "must be a text", value)
-        return value
-
-    def frame(self, name: str, default: str) -> str:
-        """A frame's name; tf2 knows no leading slash, published files have some."""
-        return self.text(name, default).removeprefix("/")
-
-    def sequence(self, name: str, default: tuple[object, ...]) -> tuple[Any, ...]:
-        value = self.value(name, default)
-        if not isinstance(value, list | tuple):
-            raise self.error(name, "must be a list", value)
-        return tuple(value)
-
-    def plugin(self, where: str, entry: Any, types: Mapping[str, str]) -> tuple[str, str]:
-        """Name and kind of an entry `{name, type}` of a list of plug-ins."""
-        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
-            raise self.error(where, "must have a name and a type", entry)
-        kind = types.get(str(entry.get("type")))
-        if kind is None:
-            raise self.error(where, f"unknown type; known are {', '.join(types)}", entry.get("type"))
-        return entry["name"], kind
-
-    def numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
-        given = self.value(name, default)
-        if isinstance(given, str):  # base_local_planner's own form of a list
-            given = given.strip("[] ").replace(",", " ").split()
-        elif not isinstance(given, list | tuple) or any(isinstance(v, bool | str) for v in given):
-            raise self.error(name, "must be a list of numbers", given)
-        try:
-            values = tuple(float(value) for value in given)
-        except (TypeError, ValueError) as error:
-            raise self.error(name, "must be a list of numbers", given) from error
-        if not all(math.isfinite(value) for value in values):
-            raise self.error(name, "must be a list of finite numbers", given)
-        return values

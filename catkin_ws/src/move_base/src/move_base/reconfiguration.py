@@ -38,7 +38,7 @@ def servers(parameters: MoveBaseParameters) -> list[ServerDescription]:
         found.append(ServerDescription(name, "Costmap2D"))
         found += [
             ServerDescription(f"{name}/{layer.name}", "InflationPlugin")
-            for layer in costmap.layers
+            for layer in costmap.layers  # also those that are switched off: they can be switched on
             if layer.kind == "inflation"
         ]
     return found

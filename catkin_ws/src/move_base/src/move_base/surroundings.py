@@ -105,7 +105,7 @@ class Area:
 
     def map_topic(self) -> str:
         """Where its map comes from."""
-        return next((layer.map_topic for layer in self.parameters.layers if layer.kind == "static"), "map")
+        return next((layer.map_topic for layer in self.parameters.layers_of("static")), "map")
 
 
 class Surroundings:
