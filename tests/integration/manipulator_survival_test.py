@@ -161,7 +161,7 @@ class SurvivalTest(PairTest):
             master.wait(DEADLINE_S)
             for node, name in ((launcher, "rosgraph_launcher"), (manipulator, "rosgraph_manipulator")):
                 self.assertEqual(node.wait(), 0, node.said())
-                lines = [line for line in node.said().splitlines() if "master is lost" in line]
+                lines = [line for line in node.said().splitlines() if "is gone" in line]
                 self.assertEqual(len(lines), 1, node.said())
                 self.assertTrue(lines[0].startswith(name), lines)
                 self.assertNotIn("Traceback", node.said())

@@ -6,7 +6,6 @@ import contextlib
 import functools
 import math
 import queue
-import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -21,11 +20,11 @@ from geometry_msgs.msg import Point32, PolygonStamped, PoseStamped, Quaternion, 
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedback, MoveBaseResult
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from nav_msgs.srv import GetPlan, GetPlanResponse
+from node_lifetime.lifetime_node import Lifetime
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_srvs.srv import Empty, EmptyResponse
 
-from move_base.ending_node import end_in_time, end_without_master
 from move_base.geometry import STOP, Pose, Velocity
 from move_base.global_planner import PlanningError
 from move_base.grid import occupancy_values
@@ -468,27 +467,14 @@ class _CostmapDisplay:
 
 
 def main() -> None:
-    """Entry point of the node."""
-    try:
-        rospy.init_node("move_base")
-    except (rospy.ROSInitException, OSError) as error:
-        sys.stderr.write(f"move_base: no master: {error}\n")
-        sys.exit(2)
-    cv2.setNumThreads(1)  # the grids are small: threads cost more than they give
-    tree = rospy.get_param("~", {})
-    tree = tree if isinstance(tree, dict) else {}
-    try:
+    """Entry point of the node; exit status 2 when a parameter can't be used."""
+    with Lifetime("move_base", ParameterError) as life:
+        life.start()
+        cv2.setNumThreads(1)  # the grids are small: threads cost more than they give
+        tree = rospy.get_param("~", {})
+        tree = tree if isinstance(tree, dict) else {}
         parameters = read_parameters(tree)
-    except ParameterError as error:
-        rospy.logfatal("%s: %s", rospy.get_name(), error)
-        sys.exit(2)
-    end_in_time()
-    try:
-        node = MoveBaseNode(parameters, tree, _resumed_goal(tree.pop("resume_goal", None)))
-    except ConnectionError:
-        end_without_master()
-        return
-    node.run()
+        MoveBaseNode(parameters, tree, _resumed_goal(tree.pop("resume_goal", None))).run()
 
 
 def _resumed_goal(value: object) -> MoveBaseActionGoal | None:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import logging
 import math
-import sys
 import threading
 import time
-import traceback
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -18,13 +16,13 @@ import rospy
 from actionlib_msgs.msg import GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_msgs import msg as messages
+from node_lifetime.lifetime_node import Lifetime
 from ros_model.errors import ModelError
 from std_msgs.msg import Bool
 
 from mros1_reasoner import journal
 from mros1_reasoner.decision import DECIDED, EXECUTED, FAILED, Decision
 from mros1_reasoner.diagnostics import DiagnosticsReader, LevelFact, Reading, Remark, StaleFact
-from mros1_reasoner.ending_node import end, end_on_signals, end_without_master, start_node
 from mros1_reasoner.explain import line
 from mros1_reasoner.journal_node import JournalTopic
 from mros1_reasoner.knowledge_base import KnowledgeBase, KnowledgeBaseError
@@ -46,8 +44,6 @@ _LONGEST_WAIT = 1.0  # s, wall, until it is seen that somebody has asked the nod
 _WARM_UP = 4  # analyses before the node is ready: the JVM compiles what it has run
 _QUEUE = 1000  # diagnostics that wait at most
 _ANSWER_DEADLINE = 60.0  # s, wall, for a service; an analysis may have to start Pellet again
-
-_BAD_START = (ParameterError, KnowledgeBaseError, ReasonerError, ModelError, rospy.ROSInitException)
 
 _T = TypeVar("_T")
 
@@ -311,27 +307,14 @@ class ReasonerNode:
 
 def main() -> None:
     """Run the node; exit status 2 when it can't start."""
-    end_on_signals()
-    try:
+    with Lifetime("reasoner", ParameterError, KnowledgeBaseError, ReasonerError, ModelError) as life:
         reasoner = make_reasoner()  # its process gets ready while this one goes on
-        start_node("reasoner")
+        life.start()
         logger = logging.getLogger("mros1_reasoner")
         logger.setLevel(logging.INFO)
         logger.propagate = False
         logger.addHandler(_RosLog())
         ReasonerNode(reasoner).run()
-    except Exception as error:
-        if rospy.is_shutdown():
-            pass  # the end has cut a call short
-        elif isinstance(error, ConnectionError):
-            end_without_master()
-        elif isinstance(error, _BAD_START):
-            sys.stderr.write(f"reasoner: {' '.join(str(error).split())}\n")
-            end("it can't start", 2)
-        else:
-            traceback.print_exc()
-            end("it has failed", 1)
-    end("it was asked to end")
 
 
 class _RosLog(logging.Handler):

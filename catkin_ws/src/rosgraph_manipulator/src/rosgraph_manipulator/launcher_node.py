@@ -7,8 +7,6 @@ import math
 import os
 import queue
 import select
-import signal
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -19,10 +17,9 @@ import rosgraph
 import rospy
 from metacontrol_msgs.msg import LauncherState, Phase
 from metacontrol_msgs.srv import ChangeConfiguration, ChangeConfigurationRequest, ChangeConfigurationResponse
+from node_lifetime.lifetime_node import LONGEST_END, Lifetime
 
 from rosgraph_manipulator.launcher import Launcher, LauncherError, Options
-from rosgraph_manipulator.lifetime_node import LONGEST_END, cut_off, on_signal, tell_loss
-from rosgraph_manipulator.master import MasterWatch
 from rosgraph_manipulator.settings import SettingError, boolean, number
 from rosgraph_manipulator.supervision import RestartPolicy
 
@@ -42,36 +39,38 @@ class _Job:
 class LauncherNode:
     """Services and topic of the launcher; everything but the service callbacks runs in the main thread."""
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: Options, life: Lifetime) -> None:
         self._jobs: queue.Queue[_Job] = queue.Queue()
         self._wake_read, self._wake_write = os.pipe()
         os.set_blocking(self._wake_write, False)
         self._ends = ""
-        self._master_is_lost = False
+        self._closed = threading.Event()
         self._changed_at = time.monotonic()
+        self._life = life
+        life.consequence = "its nodes are stopped, and it ends"
         # Twice: a change that is under way ends first, then all.
-        self._cut_off = cut_off(LONGEST_END + 2 * (options.shutdown_timeout + options.sigint_timeout))
-        on_signal(self.end)  # the main thread stops the nodes first
-        rospy.on_shutdown(lambda: self.end("it was asked to end"))
+        self._longest_end = LONGEST_END + 2 * (options.shutdown_timeout + options.sigint_timeout)
         self._state = rospy.Publisher("~state", LauncherState, queue_size=10, latch=True)
         self._launcher = Launcher(options, self._publish, rospy.logwarn)
         self._publish()
-        self._watch = MasterWatch(self._on_master_loss)
         self._service = rospy.Service("~change", ChangeConfiguration, self._on_change)
 
     def end(self, reason: str) -> None:
-        """Have the main thread end the node."""
+        """Have the main thread stop the nodes, and then end this one."""
         self._ends = self._ends or reason
-        self._cut_off.set()
+        self._life.cut_off(self._longest_end)
         self._wake()
 
-    def _on_master_loss(self) -> None:
-        tell_loss("its nodes are stopped, and it ends")
-        self._master_is_lost = True
-        self.end("the master is lost")
+    def _end_on_request(self) -> None:
+        self.end("it was asked to end")
+        if threading.current_thread() is not threading.main_thread():
+            self._closed.wait()  # before the process ends
 
     def spin(self) -> None:
         """Serve requests and look after the nodes until the node is told to end; then stop what runs."""
+        # Not before: nothing is to be stopped yet, and rospy may hang in what it registers.
+        self._life.longest_end, self._life.on_end = self._longest_end, self.end
+        rospy.on_shutdown(self._end_on_request)
         while not self._ends:
             self._wait()
             with contextlib.suppress(queue.Empty):
@@ -82,10 +81,8 @@ class LauncherNode:
             self._launcher.look_after()
             if self._jobs.empty() and time.monotonic() - self._changed_at > STANDBY_DELAY:
                 self._launcher.stand_by()
-        self._watch.close()
-        self._launcher.close(gently=not self._master_is_lost)
-        cut_off(LONGEST_END).set()
-        rospy.signal_shutdown(self._ends)
+        self._launcher.close(gently=not self._life.watch.lost)
+        self._closed.set()
 
     def _wait(self) -> None:
         due = self._launcher.next_due()
@@ -160,14 +157,6 @@ def read_options() -> Options:
 
 def main() -> None:
     """Run the node; exit status 2 when it can't start."""
-    try:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # as with SIGTERM, nothing is to be ended yet
-        rospy.init_node("rosgraph_launcher", disable_signals=True)
-        node = LauncherNode(read_options())
-    except ConnectionError:
-        tell_loss("it ends")
-        sys.exit(2)
-    except (rospy.ROSInitException, SettingError, OSError) as error:
-        sys.stderr.write(f"rosgraph_launcher: {' '.join(str(error).split())}\n")
-        sys.exit(2)
-    node.spin()
+    with Lifetime("rosgraph_launcher", SettingError) as life:
+        life.start()
+        LauncherNode(read_options(), life).spin()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import queue
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -23,14 +22,15 @@ from metacontrol_msgs.msg import (
     MvpReconfigurationResult,
     Phase,
 )
+from node_lifetime.lifetime_node import Lifetime
+from node_lifetime.watch_node import MasterWatch
 
 from rosgraph_manipulator.configuration import Configuration, ConfigurationError, Settings, parse_settings
 from rosgraph_manipulator.deployment import CancelledError, DeploymentError, Outcome, Result, Stopwatch, deploy
 from rosgraph_manipulator.description import compare
 from rosgraph_manipulator.goal_node import PendingGoal
 from rosgraph_manipulator.journal import Journal, Resumption, parse_journal, resume
-from rosgraph_manipulator.lifetime_node import end_without_master, init_node
-from rosgraph_manipulator.master import MasterError, MasterWatch, set_parameters
+from rosgraph_manipulator.master import MasterError, set_parameters
 from rosgraph_manipulator.platform_node import RosPlatform
 from rosgraph_manipulator.request_queue import Policy, RequestQueue
 from rosgraph_manipulator.settings import SettingError, choice, number
@@ -111,14 +111,14 @@ class Manipulator:
 
     # -- life -----------------------------------------------------------------------------------------------------
 
-    def run(self) -> None:
-        """Take over what runs, else deploy; then serve requests until the node or the master ends."""
+    def run(self, watch: MasterWatch) -> None:
+        """Take over what runs, else deploy; then serve requests until the node ends, or the master that is watched."""
         known = self._settings.configurations
         running = known.get(self._resumption.running)
         wanted = known.get(self._resumption.deploy)
         self._last_good = known.get(self._resumption.last_good)
-        self._watch = MasterWatch(end_without_master, heartbeat=self._heartbeat)
-        rospy.on_shutdown(self._close)
+        watch.heartbeat = self._heartbeat
+        rospy.on_shutdown(lambda: self._note(ended=True))
         if running:
             self._running = self._last_good = running
             self._note()
@@ -134,10 +134,6 @@ class Manipulator:
                 continue
             work()
 
-    def _close(self) -> None:
-        self._watch.close()
-        self._note(ended=True)
-
     def _heartbeat(self) -> None:
         if time.time() - self._journal.alive > HEARTBEAT_PERIOD:
             self._note()
@@ -145,6 +141,8 @@ class Manipulator:
     def _note(self, wanted: str | None = None, ended: bool = False) -> None:
         """Write the journal."""
         with self._journal_lock:
+            if self._journal.ended:
+                return  # the last word
             self._journal = replace(
                 self._journal,
                 configuration=self._last_good.name if self._last_good else "",
@@ -388,18 +386,12 @@ def read_file(name: str) -> dict[str, Any]:
 
 def main() -> None:
     """Run the node; exit status 2 when its configuration cannot be used."""
-    try:
-        init_node("rosgraph_manipulator")
+    with Lifetime("rosgraph_manipulator", ConfigurationError, SettingError, TacticError) as life:
+        life.start()
         settings = parse_settings(read_parameters(rospy.myargv()[1:]))
         initial = str(rospy.get_param("~initial_configuration", ""))
         if initial and initial not in settings.configurations:
             known = ", ".join(sorted(settings.configurations))
             raise ConfigurationError(f"parameter '~initial_configuration' is '{initial}'; known are: {known}")
         manipulator = Manipulator(settings, load_tactics(), initial)
-    except ConnectionError:
-        end_without_master()
-        return
-    except (ConfigurationError, SettingError, TacticError, rospy.ROSInitException, OSError) as error:
-        sys.stderr.write(f"rosgraph_manipulator: {' '.join(str(error).split())}\n")
-        sys.exit(2)
-    manipulator.run()
+        manipulator.run(life.watch)

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 import http.client
-import os
 import socket
-import threading
-import time
 import xmlrpc.client
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import rosgraph
 
 CALL_TIMEOUT = 1.0  # s, wall
-WATCH_PERIOD = 0.4  # s, wall, between two calls that see whether the master is there
-LOST_AFTER = 1.2  # s, wall, without an answer, after which a master that nobody listens for is lost: noticed within 2 s
-SILENT_AFTER = 10.0  # s, wall, the same for one that may just be overloaded
 CALLER = "/rosgraph_manipulator"
 
 _TRANSPORT_ERRORS = (OSError, xmlrpc.client.Error, http.client.HTTPException)
@@ -180,42 +174,3 @@ def _multicall(calls: list[tuple[Any, ...]], caller: str = CALLER) -> list[tuple
     except (*_TRANSPORT_ERRORS, TypeError, OverflowError) as error:
         raise MasterError(f"the master does not answer: {error}") from error
     return [(int(answer[0][0]), answer[0][2]) if isinstance(answer, list) else (-1, None) for answer in answers]
-
-
-class MasterWatch:
-    """Notices the loss of the master: it does not come back, and nodes never register again."""
-
-    def __init__(self, on_loss: Callable[[], None], heartbeat: Callable[[], None] | None = None) -> None:
-        """Begin to watch.
-
-        Args:
-            on_loss: called once, in a thread of its own, when the master is lost.
-            heartbeat: called, in that thread, after each answer.
-        """
-        self._on_loss = on_loss
-        self._heartbeat = heartbeat
-        self._end = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="master watch", daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Stop watching."""
-        self._end.set()
-
-    def _run(self) -> None:
-        seen, master_pid = time.monotonic(), None
-        while not self._end.wait(WATCH_PERIOD):
-            try:
-                pid = int(_master().getPid(f"{CALLER}_{os.getpid()}")[2])
-            except (*_TRANSPORT_ERRORS, LookupError, TypeError, ValueError) as error:
-                patience = LOST_AFTER if isinstance(error, ConnectionRefusedError) else SILENT_AFTER
-                if time.monotonic() - seen > patience:
-                    break
-                continue
-            if master_pid not in (None, pid):
-                break  # another master at the same address knows nothing of us
-            seen, master_pid = time.monotonic(), pid
-            if self._heartbeat:
-                self._heartbeat()
-        if not self._end.is_set():
-            self._on_loss()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from typing import Any
 
@@ -10,10 +9,9 @@ import actionlib
 import roslib.message
 import rospy
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
+from node_lifetime.lifetime_node import Lifetime
 
 from rosgraph_manipulator.configuration import ConfigurationError, action_type
-from rosgraph_manipulator.lifetime_node import end_without_master, init_node
-from rosgraph_manipulator.master import MasterWatch
 from rosgraph_manipulator.relay import Ending, Link
 
 PERIOD = 0.05  # s, wall, between two looks at whether goals can be sent
@@ -106,8 +104,8 @@ class Relay:
 
 def main() -> None:
     """Run the node; exit status 2 where it is not told what to relay."""
-    try:
-        init_node("action_relay")
+    with Lifetime("action_relay", ConfigurationError) as life:
+        life.start()
         names = [rospy.get_param(f"~{key}", "") for key in ("action", "server")]
         if not all(isinstance(name, str) and name for name in names) or names[0] == names[1]:
             raise ConfigurationError("parameters '~action' and '~server' must be two different names of actions")
@@ -115,12 +113,4 @@ def main() -> None:
         message_class = roslib.message.get_message_class(kind)
         if message_class is None:
             raise ConfigurationError(f"parameter '~type': message type {kind} is not installed")
-        relay = Relay(names[0], names[1], message_class)
-    except ConnectionError:
-        end_without_master()
-        return
-    except (ConfigurationError, rospy.ROSInitException) as error:
-        sys.stderr.write(f"action_relay: {' '.join(str(error).split())}\n")
-        sys.exit(2)
-    MasterWatch(end_without_master)
-    relay.spin()
+        Relay(names[0], names[1], message_class).spin()

@@ -10,12 +10,12 @@ import time
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
+from node_lifetime.lifetime_node import BAD_START, LONGEST_END, Lifetime
 from rich.console import Console
 from rich.live import Live
 from ros_model.snapshot import GraphSnapshot, MasterClient, SnapshotError
 
 from rosgraph_monitor.board import Board
-from rosgraph_monitor.master_node import BAD_START, end_in_time, say
 
 _REFRESH = 0.5
 
@@ -26,12 +26,13 @@ def main() -> None:
     parser.add_argument("--once", type=float, metavar="S", help="listen for so many seconds, print once and end")
     options = parser.parse_args(rospy.myargv()[1:])
     client = MasterClient(rosgraph.get_master_uri(), "/watch")
+    life = Lifetime("watch")  # not begun: signals are the terminal's, which is put in order at the end
     try:
         graph = client.snapshot()
     except SnapshotError as error:
-        say("watch", f"{error}: start roscore or set ROS_MASTER_URI")
+        life.say(f"{error}: start roscore or set ROS_MASTER_URI")
         sys.exit(BAD_START)
-    rospy.on_shutdown(end_in_time)
+    rospy.on_shutdown(lambda: life.cut_off(LONGEST_END))
     rospy.init_node("rosgraph_watch", anonymous=True, disable_signals=True)
     board, lock = Board(), threading.Lock()
 
@@ -51,7 +52,7 @@ def main() -> None:
     except KeyboardInterrupt:
         return
     except SnapshotError as error:
-        say("watch", str(error))
+        life.say(str(error))
 
 
 def _show(console: Console, client: MasterClient, graph: GraphSnapshot, board: Board, lock: threading.Lock) -> None:

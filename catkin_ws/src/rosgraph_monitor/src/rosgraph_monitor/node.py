@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import resource
-import signal
-import sys
 import threading
 import time
 from typing import TYPE_CHECKING, Any
@@ -16,6 +14,8 @@ import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import ActiveConfiguration
+from node_lifetime.lifetime_node import Lifetime
+from node_lifetime.master import PATIENCE
 from ros_model.errors import ModelError
 from ros_model.files import resolve, safe_file_name
 from ros_model.reader import read_system
@@ -26,7 +26,6 @@ from rosgraph_monitor.desired import DesiredModel, Grounding
 from rosgraph_monitor.health import merged, model_topics
 from rosgraph_monitor.liveness import Life
 from rosgraph_monitor.look import Look, Looker
-from rosgraph_monitor.master_node import BAD_START, PATIENCE, MasterWatch, require_master
 from rosgraph_monitor.monitor import GraphMonitor
 from rosgraph_monitor.names import resolved
 from rosgraph_monitor.observer_node import ObserverHost
@@ -44,8 +43,6 @@ if TYPE_CHECKING:
 NAME = "rosgraph_monitor"
 _MASTER_TIMEOUT = 1.2
 """Wall seconds for one answer of the master."""
-_TIME_TO_NOTICE = 5.0
-"""Wall seconds to see, after a call has failed, whether that is because the master is lost."""
 _COALESCE = 0.02
 """Wall seconds between evaluations at least, for events that come in a bunch."""
 _FRESH = 0.15
@@ -118,30 +115,19 @@ class MonitorNode:
 
     def run(self) -> None:
         """Evaluate after every look, and whenever a node or topic fails or returns, until node or master end."""
-        try:
-            while not self._ending:
-                look = self._looker.latest
-                if look:
-                    begin = time.monotonic()
-                    self._publish(self._evaluate(look))
-                    self._evaluation = time.monotonic() - begin
-                    # Never more than half the time: hundreds of nodes may come or go together.
-                    time.sleep(max(_COALESCE, self._evaluation))
-                self._wait()
-        except rospy.ROSException:
-            if not self._ending:
-                raise
-        finally:
-            self.close()
+        while not self._ending:
+            look = self._looker.latest
+            if look:
+                begin = time.monotonic()
+                self._publish(self._evaluate(look))
+                self._evaluation = time.monotonic() - begin
+                # Never more than half the time: hundreds of nodes may come or go together.
+                time.sleep(max(_COALESCE, self._evaluation))
+            self._wait()
 
     def _end(self) -> None:
         self._ending = True
         self._events.set()
-
-    def close(self) -> None:
-        """Stop watching."""
-        self._looker.close()
-        self._watcher.close()
 
     def _on_life(self) -> None:
         """A node died or came back: look whether it has unregistered or has another address, then evaluate."""
@@ -251,24 +237,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="monitor", description="Compares the live ROS graph with the desired one.")
     parser.add_argument("--load", nargs="+", default=[], metavar="NAME", help="observers to start")
     options = parser.parse_args(rospy.myargv()[1:])
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # until rospy takes over, there is nothing to put in order
-    require_master(NAME)
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))  # a connection to each node
-    master = MasterWatch(NAME)
-    try:
-        rospy.init_node(NAME)
-        master.patience = parameters_node.number("~master_patience", PATIENCE)
-        node = MonitorNode(options.load)
-    except (parameters_node.ParameterError, ModelError) as error:
-        rospy.logfatal("%s", error)
-        sys.exit(BAD_START)
-    except (rospy.ROSException, OSError):
-        if not rospy.is_shutdown() and not master.lost.wait(_TIME_TO_NOTICE):
-            raise
-        return  # it was ended, or lost its master, while it started
-    node.run()
-    rospy.signal_shutdown("the monitor has ended")
+    with Lifetime(NAME, parameters_node.ParameterError, ModelError) as life:
+        life.start()
+        life.watch.patience = parameters_node.number("~master_patience", PATIENCE)
+        MonitorNode(options.load).run()
 
 
 def _message(status: Status) -> DiagnosticStatus:

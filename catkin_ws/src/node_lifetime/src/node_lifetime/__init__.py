@@ -1,0 +1,1 @@
+"""How our nodes start, watch the ROS master and end."""
