@@ -97,7 +97,7 @@ def _draw_map(axis: Axes, record: MissionRecord, summary: dict[str, Any]) -> Non
         handles.append(_mark(axis, goal, "*", "#2ca02c", "goal", size=20))
     for entry in summary["perturbations"]:
         place = _place(poses, start + entry["stamp_s"])
-        if place:
+        if place and "places" not in entry:  # clutter is drawn where it lies
             handles.append(_mark(axis, place, "X", _FAILURE, f"{entry['name']}\nstruck", size=15))
     for number, entry in enumerate(summary["reconfigurations"], start=1):
         place = _place(poses, start + entry["stamp_s"])
