@@ -1,5 +1,7 @@
 """Routes, commit, timeline, processes, the figure and the command's refusals."""
 
+import fcntl
+import os
 import signal
 import socket
 import struct
@@ -235,6 +237,19 @@ def test_port_in_use_is_refused_with_one_line(tmp_path):
     assert result.exit_code == 2
     assert f"port {port} is in use" in result.output
     assert len(result.output.strip().splitlines()) == 1
+
+
+def test_folder_in_which_another_run_is_at_work_is_refused_with_one_line(tmp_path):
+    bag = write(tmp_path / "mission.bag", "the other one's")
+    other = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(other, fcntl.LOCK_EX)
+    try:
+        result = CliRunner().invoke(cli.metacontrol, ["run", "--output", str(tmp_path)])
+    finally:
+        os.close(other)
+    assert result.exit_code == 2
+    assert result.output == f"metacontrol: --output: another run is at work in {tmp_path}: choose another folder\n"
+    assert bag.exists()
 
 
 def test_goal_counts_by_its_own_stamp_even_if_the_recorder_lags():

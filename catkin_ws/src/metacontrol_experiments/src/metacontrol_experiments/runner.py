@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import signal
@@ -51,6 +52,11 @@ def run_mission(settings: Settings, display: Display) -> State:
     bag = settings.output / BAG_NAME
     for folder in (settings.output, log):
         folder.mkdir(parents=True, exist_ok=True)
+    with _alone_in(settings.output):
+        return _run_alone(settings, display, log, bag)
+
+
+def _run_alone(settings: Settings, display: Display, log: Path, bag: Path) -> State:
     for old in (bag, bag.with_name(bag.name + ".active")):
         old.unlink(missing_ok=True)
     if settings.port is not None and not is_free(settings.port):
@@ -102,6 +108,24 @@ def _run(settings: Settings, display: Display, tree: ProcessTree, port: int, bag
     if not bag.exists():
         raise RunError(f"the recorder left no {bag}; see {settings.output / 'log' / 'recorder.log'}")
     return state
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Keeps other runs out of a folder.
+
+    Raises:
+        RunError: one is at work in it.
+    """
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise RunError(f"--output: another run is at work in {folder}: choose another folder") from error
+        yield
+    finally:
+        os.close(lock)
 
 
 def _record_command(bag: Path) -> list[str]:
