@@ -41,8 +41,6 @@ from metacontrol_experiments.mission import GoalStatus, Strike
 from metacontrol_experiments.record import ConfigurationReport, Event, GoalReport, MissionRecord, OccupancyMap
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from metacontrol_experiments import routes
     from metacontrol_experiments.contingency import Contingency
     from metacontrol_experiments.mission import State
@@ -318,20 +316,15 @@ def navigation_parameters(package: Path, configuration: str) -> MoveBaseParamete
     if component is None:
         raise LockstepError(f"{configuration} has no component move_base, which lockstep needs")
     tree = json.loads(json.dumps(tree))  # what the file's anchors share is no longer one object
-    for path, value in _values(component):
-        *folders, name = path.split("/")
+    for parameter in component.parameters:
+        if parameter.value is None:
+            continue
+        *folders, name = parameter.key.split("/")
         branch = tree
         for folder in folders:
             branch = branch.setdefault(folder, {})
-        branch[name] = value
+        branch[name] = parameter.value
     return read_parameters(tree)
-
-
-def _values(component: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the names in the node's namespace, and the values, of a component's parameters."""
-    for parameter in component.parameters:
-        if parameter.value is not None:
-            yield parameter.key, parameter.value
 
 
 def _pose(pose: routes.Pose) -> Pose:
