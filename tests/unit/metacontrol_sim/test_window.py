@@ -60,6 +60,12 @@ def test_path_becomes_close_points():
     assert path_points(np.empty((0, 2)), 0.1).shape == (0, 3)
 
 
+def test_path_of_any_length_and_with_broken_corners_is_drawn():
+    assert len(path_points(np.array([[0.0, 0.0], [1e12, 0.0]]), 0.1)) <= 4000
+    points = path_points(np.array([[0.0, 0.0], [math.nan, 1.0], [1.0, 0.0]]), 0.1)
+    assert np.isfinite(points).all() and points[-1] == pytest.approx([1.0, 0.0, 0.1])
+
+
 def test_only_cells_that_cost_something_are_drawn():
     costs = np.array([[0, 100, -1], [1, 0, 0]], dtype=np.int8)
     points, colours = cost_points(costs, 0.5, 0.0, LOCAL_HIGH)

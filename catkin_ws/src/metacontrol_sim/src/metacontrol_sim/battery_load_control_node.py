@@ -7,6 +7,7 @@ import threading
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
+from node_lifetime.lifetime_node import Lifetime
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float32
 
@@ -78,9 +79,9 @@ class BatteryLoadControlNode:
         return IncreaseConsumptionFactorResponse(success=True)
 
 
-def main() -> int:
-    """Run the node and return its exit status."""
-    rospy.init_node("battery_load_control")
-    BatteryLoadControlNode()
-    rospy.spin()
-    return 0
+def main() -> None:
+    """Run the node."""
+    with Lifetime("battery_load_control") as life:
+        life.start()
+        BatteryLoadControlNode()
+        rospy.spin()

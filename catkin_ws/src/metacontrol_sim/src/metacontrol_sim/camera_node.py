@@ -7,6 +7,7 @@ import threading
 
 import numpy as np
 import rospy
+from node_lifetime.lifetime_node import Lifetime
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Float32
 
@@ -73,13 +74,9 @@ class CameraNode(rospy.SubscribeListener):
         self._points.publish(self._outlet.pass_on(point_cloud(points, "camera_link", image.header.stamp)))
 
 
-def main() -> int:
-    """Run the node and return its exit status."""
-    rospy.init_node("camera")
-    try:
+def main() -> None:
+    """Run the node; exit status 2 when a parameter cannot be used."""
+    with Lifetime("camera", ParameterError) as life:
+        life.start()
         CameraNode()
-    except ParameterError as error:
-        rospy.logfatal(f"{rospy.get_name()}: {error}")
-        return 2
-    rospy.spin()
-    return 0
+        rospy.spin()

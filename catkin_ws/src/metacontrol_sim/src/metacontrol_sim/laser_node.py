@@ -6,6 +6,7 @@ import threading
 
 import numpy as np
 import rospy
+from node_lifetime.lifetime_node import Lifetime
 from sensor_msgs.msg import LaserScan
 
 from metacontrol_sim.faults import Outlet
@@ -62,13 +63,9 @@ class LaserNode(rospy.SubscribeListener):
         self._scan.publish(self._outlet.pass_on(rays))
 
 
-def main(side: str) -> int:
-    """Run the node of one side and return its exit status."""
-    rospy.init_node(f"{side}_laser")
-    try:
+def main(side: str) -> None:
+    """Run the node of one side; exit status 2 when a parameter cannot be used."""
+    with Lifetime(f"{side}_laser", ParameterError) as life:
+        life.start()
         LaserNode(side)
-    except ParameterError as error:
-        rospy.logfatal(f"{rospy.get_name()}: {error}")
-        return 2
-    rospy.spin()
-    return 0
+        rospy.spin()

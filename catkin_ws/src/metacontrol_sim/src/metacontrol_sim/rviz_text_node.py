@@ -7,6 +7,7 @@ import threading
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_msgs.msg import ActiveConfiguration
+from node_lifetime.lifetime_node import Lifetime
 from visualization_msgs.msg import Marker
 
 from metacontrol_sim.status_text import StatusText
@@ -56,9 +57,9 @@ class RvizTextNode:
         self._marker.publish(marker)
 
 
-def main() -> int:
-    """Run the node and return its exit status."""
-    rospy.init_node("rviz_text")
-    RvizTextNode()
-    rospy.spin()
-    return 0
+def main() -> None:
+    """Run the node."""
+    with Lifetime("rviz_text") as life:
+        life.start()
+        RvizTextNode()
+        rospy.spin()

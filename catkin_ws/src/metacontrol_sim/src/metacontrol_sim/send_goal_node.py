@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 
 import rospy
 import yaml
 from actionlib_msgs.msg import GoalStatusArray
 from geometry_msgs.msg import PoseStamped
+from node_lifetime.lifetime_node import Lifetime
 
 
 class GoalFileError(Exception):
@@ -45,17 +45,14 @@ def read_goal(path: Path) -> PoseStamped:
 
 def main() -> None:
     """Run the node; exit status 2 when the file cannot be used."""
-    rospy.init_node("send_goal")
-    arguments = rospy.myargv()[1:]
-    try:
+    with Lifetime("send_goal", GoalFileError) as life:
+        life.start()
+        arguments = rospy.myargv()[1:]
         if len(arguments) != 1:
             raise GoalFileError("give one argument: the YAML file of the goal")
         goal = read_goal(Path(arguments[0]))
-    except GoalFileError as error:
-        sys.stderr.write(f"send_goal: {error}\n")
-        sys.exit(2)
-    publisher = rospy.Publisher("move_base_simple/goal", PoseStamped, queue_size=1, latch=True)
-    rospy.wait_for_message("move_base/status", GoalStatusArray)
-    goal.header.stamp = rospy.Time.now()
-    publisher.publish(goal)
-    rospy.spin()
+        publisher = rospy.Publisher("move_base_simple/goal", PoseStamped, queue_size=1, latch=True)
+        rospy.wait_for_message("move_base/status", GoalStatusArray)
+        goal.header.stamp = rospy.Time.now()
+        publisher.publish(goal)
+        rospy.spin()

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import rospkg
 import rospy
 from geometry_msgs.msg import Twist
+from node_lifetime.lifetime_node import Lifetime
 from std_msgs.msg import Float32
 
 from metacontrol_sim.geometry import Pose
@@ -194,22 +195,14 @@ def _world_path(value: Any) -> Path:
     return file_path(value, "~world")
 
 
-def main() -> int:
-    """Run the node and return its exit status."""
+def main() -> None:
+    """Run the node; exit status 2 when a parameter or the world cannot be used."""
     # The loop computes without a pause at real-time factor 0: threads that talk to other nodes get their turn sooner.
     sys.setswitchinterval(0.001)
-    rospy.init_node("simulator")
-    try:
+    with Lifetime("simulator", ParameterError, WorldError, SimulationError) as life:
+        life.start()
         node = SimulatorNode()
-    except (ParameterError, WorldError, SimulationError) as error:
-        rospy.logfatal(f"{rospy.get_name()}: {error}")
-        return 2
-    try:
-        node.run()
-    except rospy.ROSException:
-        # Topics close while the loop may be about to publish on one; only then is it no error.
-        if not rospy.is_shutdown():
-            raise
-    finally:
-        node.close()
-    return 0
+        try:
+            node.run()
+        finally:
+            node.close()

@@ -105,11 +105,12 @@ def scan_points(ranges: NDArray[np.float64], angle_min: float, increment: float,
 
 def path_points(corners: NDArray[np.float64], height: float) -> NDArray[np.float64]:
     """Return points close to each other along a path of (n, 2) m, at a height: (m, 3)."""
+    corners = corners[np.isfinite(corners).all(axis=1)]
     if len(corners) < 2:
         return np.empty((0, 3))
     lengths = np.hypot(*np.diff(corners, axis=0).T)
     along = np.concatenate(([0.0], np.cumsum(lengths)))
-    places = np.arange(0.0, along[-1] + _CLOSE_POINT, _CLOSE_POINT)
+    places = np.linspace(0.0, along[-1], min(math.ceil(along[-1] / _CLOSE_POINT) + 1, _MAX_POINTS))
     x, y = (np.interp(places, along, corners[:, axis]) for axis in (0, 1))
     return np.column_stack((x, y, np.full(x.size, height)))
 

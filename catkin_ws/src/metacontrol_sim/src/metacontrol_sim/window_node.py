@@ -15,6 +15,7 @@ from nav_msgs.msg import OccupancyGrid, Path
 from sensor_msgs.msg import LaserScan, PointCloud2
 
 from metacontrol_sim.geometry import ORIGIN, Pose
+from metacontrol_sim.grid_messages import read_grid
 from metacontrol_sim.status_text import StatusText
 from metacontrol_sim.window import (
     BLUE,
@@ -84,7 +85,12 @@ class WindowView:
             latest, self._latest = self._latest, {}
             lines, alarm = self._text.lines(), self._text.alarm
         for topic, (convert, message) in latest.items():
-            self._window.draw(topic, convert(message))
+            try:
+                points = convert(message)
+            except ValueError as error:
+                rospy.logwarn_throttle(10.0, f"{topic} not shown: {error}")
+                continue
+            self._window.draw(topic, points)
             self._drawn[topic] = self._simulation.time
         for topic in SENSORS:
             if self._simulation.time - self._drawn.get(topic, math.inf) > STALE_S:
@@ -121,18 +127,17 @@ class WindowView:
 
     def _cloud(self, cloud: PointCloud2) -> Points:
         if cloud.point_step < 12 or len(cloud.data) % cloud.point_step:
-            return Points(np.empty((0, 3)), BLUE)
+            raise ValueError(f"{len(cloud.data)} bytes are no points of {cloud.point_step} bytes")
         rows = np.frombuffer(cloud.data, dtype=np.uint8).reshape(-1, cloud.point_step)[:, :12]
         points = np.ascontiguousarray(rows).view("<f4").astype(float)
         points[:, 2] += self._simulation.robot.camera.mount.z
         return Points(points[points[:, 2] > 0.05], BLUE, self._frame(cloud.header.frame_id), 2)
 
-    def _costmap(self, grid: OccupancyGrid, height: float, high: tuple[float, float, float]) -> Points:
-        costs = np.array(grid.data, dtype=np.int8).reshape(grid.info.height, grid.info.width)
-        points, colours = cost_points(costs, grid.info.resolution, height, high)
-        origin = grid.info.origin.position
-        corner = self._frame(grid.header.frame_id) @ Pose(origin.x, origin.y, 0.0)
-        return Points(points, colours, corner, 2)
+    def _costmap(self, message: OccupancyGrid, height: float, high: tuple[float, float, float]) -> Points:
+        grid = read_grid(message)
+        points, colours = cost_points(grid.cells, grid.resolution, height, high)
+        corner = Pose(grid.origin_x, grid.origin_y, grid.origin_yaw)
+        return Points(points, colours, self._frame(message.header.frame_id) @ corner, 2)
 
     def _path(self, path: Path, height: float, colour: tuple[float, float, float]) -> Points:
         corners = np.array([(stamped.pose.position.x, stamped.pose.position.y) for stamped in path.poses])
@@ -141,6 +146,4 @@ class WindowView:
 
     def _goal(self, goal: PoseStamped) -> Points:
         position = goal.pose.position
-        if not (math.isfinite(position.x) and math.isfinite(position.y)):
-            return Points(np.empty((0, 3)), PINK)
         return Points(cross_points(position.x, position.y), PINK, self._frame(goal.header.frame_id), 5)
