@@ -36,7 +36,10 @@ def refusing(*kinds: type[Exception]) -> Iterator[None]:
     try:
         yield
     except refused as error:
-        click.echo(f"metacontrol: {' '.join(str(error).split())}", err=True)
+        said = str(error)
+        if isinstance(error, OSError) and error.filename:
+            said = f"{error.filename}: {error.strerror}"
+        click.echo(f"metacontrol: {' '.join(said.split())}", err=True)
         raise click.exceptions.Exit(REFUSED) from error
     except KeyboardInterrupt as interrupt:
         click.echo("metacontrol: interrupted; every process was ended", err=True)
