@@ -19,12 +19,13 @@ import rospy
 import rostest
 import tf2_ros
 from actionlib_msgs.msg import GoalStatus
-from geometry_msgs.msg import PoseStamped, TransformStamped, Twist
+from geometry_msgs.msg import PolygonStamped, PoseStamped, TransformStamped, Twist
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseGoal
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from nav_msgs.srv import GetPlan
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan
+from std_srvs.srv import Empty
 
 DEADLINE_S = 20
 HALF_ROOM = 5.0
@@ -268,6 +269,62 @@ class MoveBaseTest(unittest.TestCase):
         plan = wait_for(lambda: make_plan(pose(0.0, 0.0), pose(3.0, 2.0), 0.0).plan.poses, "a plan")
         self.assertAlmostEqual(plan[-1].pose.position.x, 3.0)
         self.assertFalse(make_plan(pose(0.0, 0.0), pose(30.0, 2.0), 0.0).plan.poses)
+        self.assertFalse(make_plan(pose(0.0, 0.0), pose(3.0, 2.0), math.nan).plan.poses)
+
+    def test_clear_costmaps_forgets_what_was_seen(self):
+        costmaps = self.listen_to_costmap()
+        self.robot.silent = True
+        scan = LaserScan(angle_min=-0.05, angle_increment=0.01, range_min=0.05, range_max=10.0, ranges=[2.0] * 11)
+        scan.header.frame_id = "front_laser"
+
+        def is_seen():
+            scan.header.stamp = rospy.Time.now()
+            self.robot._scan.publish(scan)
+            return (self.cost(costmaps, 2.42, 0.0) or 0) >= 99
+
+        def is_forgotten():
+            rospy.ServiceProxy("move_base/clear_costmaps", Empty)()  # again, if the last scan came after it
+            return self.cost(costmaps, 2.42, 0.0) == 0
+
+        wait_for(is_seen, "the obstacle is in the costmap")
+        wait_for(is_forgotten, "it is forgotten")
+
+    def test_inflation_and_padding_change_what_is_published(self):
+        costmaps, polygons = self.listen_to_costmap(), []
+        rospy.Subscriber("move_base/local_costmap/footprint", PolygonStamped, polygons.append)
+        layer = "move_base/local_costmap/inflater_layer"
+        self.robot.x = 1.0  # the wall is in the rolling window
+        wait_for(lambda: costmaps and self.cost(costmaps, 4.2, 0.0) == 0, "the wall is far enough")
+        self.set_parameter(layer, "inflation_radius", 2.0)
+        self.addCleanup(self.set_parameter, layer, "inflation_radius", 0.65)
+        wait_for(lambda: 0 < self.cost(costmaps, 4.2, 0.0) < 99, "the wall reaches farther")
+        self.set_parameter("move_base/local_costmap", "footprint_padding", 0.4)
+        self.addCleanup(self.set_parameter, "move_base/local_costmap", "footprint_padding", 0.1)
+        wait_for(lambda: max(p.x for p in polygons[-1].polygon.points) > 0.87, "the footprint is larger")
+
+    def test_transform_that_is_not_finite_is_ignored(self):
+        self.send(1.0, 0.0)
+        self.moving()
+        for far in (math.inf, 1e300):
+            stamp = rospy.Time.now() + rospy.Duration.from_sec(0.1)
+            self.robot._tf.sendTransform(self.robot._transform("map", "odom", stamp, (far, 0.0, 0.0)))
+            wait_for(lambda: rospy.Time.now() > stamp + rospy.Duration.from_sec(0.1), "it is past")  # noqa: B023
+        self.assertEqual(self.finish(), (GoalStatus.SUCCEEDED, "Goal reached."))
+
+    def listen_to_costmap(self):
+        costmaps = []
+        subscriber = rospy.Subscriber("move_base/local_costmap/costmap", OccupancyGrid, costmaps.append)
+        self.addCleanup(subscriber.unregister)
+        return costmaps
+
+    @staticmethod
+    def cost(costmaps, x, y):
+        if not costmaps:
+            return None
+        grid = costmaps[-1]
+        column = int((x - grid.info.origin.position.x) / grid.info.resolution)
+        row = int((y - grid.info.origin.position.y) / grid.info.resolution)
+        return grid.data[row * grid.info.width + column]
 
     def test_parameters_change_on_the_way_without_a_stop(self):
         self.addCleanup(self.set_speed, 0.75)
@@ -290,14 +347,16 @@ class MoveBaseTest(unittest.TestCase):
         wait_for(lambda: any("Parameters refused" in line for line in self.log), "a warning")
         self.assertNotEqual(rospy.get_param("move_base/TrajectoryPlannerROS/max_vel_x"), 0.05)
 
+    def set_speed(self, speed):
+        self.set_parameter("move_base/TrajectoryPlannerROS", "max_vel_x", speed)
+
     @staticmethod
-    def set_speed(speed):
+    def set_parameter(server, name, value):
         """As an operator does it."""
-        server = "move_base/TrajectoryPlannerROS"
         wait_for(
-            lambda: any(name == f"/{server}/parameter_updates" for name, _ in rospy.get_published_topics()), server
+            lambda: any(topic == f"/{server}/parameter_updates" for topic, _ in rospy.get_published_topics()), server
         )
-        command = ["/usr/bin/rosrun", "dynamic_reconfigure", "dynparam", "set", server, "max_vel_x", str(speed)]
+        command = ["/usr/bin/rosrun", "dynamic_reconfigure", "dynparam", "set", server, name, str(value)]
         subprocess.run(command, check=True, timeout=DEADLINE_S)
 
     def test_bad_parameter_ends_the_node_with_its_name(self):
