@@ -163,7 +163,7 @@ class SurvivalTest(PairTest):
                 self.assertEqual(node.wait(), 0, node.said())
                 lines = [line for line in node.said().splitlines() if "is gone" in line]
                 self.assertEqual(len(lines), 1, node.said())
-                self.assertTrue(lines[0].startswith(name), lines)
+                self.assertTrue(lines[0].startswith(f"/{name}: "), lines)
                 self.assertNotIn("Traceback", node.said())
             wait_for(lambda: not any(map(is_alive, launched)), "the nodes have ended")
         finally:

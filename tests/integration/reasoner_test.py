@@ -188,7 +188,7 @@ class ReasonerTest(unittest.TestCase):
             }
             for name, process in processes.items():
                 _, error = process.communicate(timeout=DEADLINE_S)
-                lines = [line for line in error.splitlines() if line.startswith("reasoner")]
+                lines = [line for line in error.splitlines() if line.lstrip("/").startswith("reasoner")]
                 self.assertEqual(process.returncode, 2, f"{name}: {error}")
                 self.assertEqual(len(lines), 1, f"{name}: {error}")
                 self.assertIn(cases[name][2], lines[0])

@@ -29,14 +29,18 @@ NODES = {  # its package, and a service or topic that it offers, or listens to, 
     "rosgraph_manipulator/rosgraph_manipulator": "/rosgraph_manipulator_action_server/status",
     "rosgraph_manipulator/action_relay": "/a/status",
     "move_base/move_base": "/move_base/status",
+    "metacontrol_sim/simulator": "/simulator/set_light",
+    "metacontrol_sim/front_laser": "/front/scan",
+    "metacontrol_experiments/contingencies": "/mission/event",
 }
-NAMES = {"monitor": "rosgraph_monitor"}
+NAMES = {"monitor": "rosgraph_monitor", "contingencies": "mission_contingencies"}
 PARAMETERS = {
     "/configurations": {"slow": {"launch": SERVER}},
     "/rosgraph_manipulator": {"launcher_timeout": 0.1},
     "/action_relay": {"action": "a", "server": "b", "type": "actionlib/TestAction"},
     "/move_base": yaml.safe_load((PACKAGES / "metacontrol_sim" / "config" / "move_base.yaml").read_text()),
     "/reasoner": {"model_file": str(MODEL)},
+    "/simulator": {"initial_pose_x": -8.0, "initial_pose_y": -8.0},
 }
 every_node = pytest.mark.parametrize("node", NODES, ids=lambda node: node.rpartition("/")[2])
 
@@ -244,7 +248,7 @@ def test_master_that_dies_is_told_in_one_line(world, node):
     wait_for(lambda: all(map(has_ended, children)), "the end of its processes")
 
 
-@pytest.mark.parametrize("answers", [1, 3, 7, 12, 20])
+@pytest.mark.parametrize("answers", [1, 3, 8, 15])
 @every_node
 def test_master_that_dies_while_it_starts_is_told_in_one_line(world, node, answers):
     world.start_master()
@@ -269,7 +273,7 @@ def test_without_a_master_it_says_so_in_one_line_and_ends_with_2(world, node):
     said = world.expect_end(node, process, status=2)
     name = node.rpartition("/")[2]
     line = f"{NAMES.get(name, name)}: no ROS master answers at {world.uri}: start roscore or set ROS_MASTER_URI\n"
-    assert said == line
+    assert [said for said in said.splitlines(True) if not said.startswith("pybullet build")] == [line]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)

@@ -18,6 +18,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from metacontrol_msgs.msg import MissionEvent
 from metacontrol_sim.geometry import Pose
 from move_base_msgs.msg import MoveBaseActionGoal
+from node_lifetime.lifetime_node import Lifetime
 
 from metacontrol_experiments.components import ComponentError, node_of, read_components
 from metacontrol_experiments.contingency import (
@@ -128,13 +129,9 @@ def _timeline() -> tuple[Contingency, ...]:
     return (*listed, *(parse_contingency(str(text)) for text in texts))
 
 
-def main() -> int:
-    """Run the node and return its exit status."""
-    rospy.init_node("mission_contingencies")
-    try:
+def main() -> None:
+    """Run the node; exit status 2 when the timeline cannot be used."""
+    with Lifetime("mission_contingencies", ContingencyError, ComponentError) as life:
+        life.start()
         ContingencyNode()
-    except (ContingencyError, ComponentError) as error:
-        rospy.logfatal(str(error))
-        return 2
-    rospy.spin()
-    return 0
+        rospy.spin()

@@ -78,7 +78,7 @@ class Lifetime:
             rospy.init_node(self._name, disable_signals=True)
         except (OSError, rospy.ROSInitException) as error:
             raise _StartError(str(error)) from error
-        self._name = rospy.get_name().rpartition("/")[2]
+        self._name = rospy.get_name()
         rospy.core.add_shutdown_hook(self._after_goodbye)  # comes after rospy's own, in their order
 
     def __exit__(
