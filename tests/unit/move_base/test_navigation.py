@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from move_base.dwa import DwaController
 from move_base.geometry import Pose, Velocity, planar_matrix
 from move_base.grid import LETHAL
 from move_base.navigator import Outcome
 from move_base.oscillation import OscillationFlags
+from move_base.parameters import read_parameters
 
 RACK = (0.0, -1.5, 0.8, 6.0, 0.0)
 
@@ -213,6 +215,14 @@ def test_sideways_is_tried_before_backward(simulate, walls):
     controller, robot, path, snapshot = at_a_wall(simulate, walls)
     chosen = controller.follow(robot, Velocity(), path, 3.0, snapshot)
     assert chosen.velocity.x == 0.0 and chosen.velocity.y != 0.0
+
+
+@pytest.mark.parametrize("turning", [2.0, -2.0, 1e300])
+def test_base_that_is_measured_faster_than_it_may_be_is_sent_no_faster(tree, turning):
+    controller = DwaController(read_parameters(tree(TrajectoryPlannerROS__acc_lim_theta=3.0)))
+    samples = controller._arc_samples(Velocity(9.0, 0.0, turning))
+    assert np.abs(samples[:, 2]).max() <= 1.57
+    assert samples[:, 0].max() <= 0.5
 
 
 def test_base_that_gets_sideways_slowly_is_not_sent_fast(simulate, walls, tree):

@@ -165,9 +165,8 @@ class DwaController:
         slowest = min(max(p.min_vel_x, velocity.x - reach), fastest)
         forward = np.linspace(fastest, slowest, p.vx_samples)
         turn_reach = p.acc_lim_theta * self._period
-        low = max(p.min_vel_theta, velocity.yaw - turn_reach)
-        high = min(p.max_vel_theta, velocity.yaw + turn_reach)
-        turns = np.linspace(min(low, high), max(low, high), p.vtheta_samples)
+        low, high = np.clip([velocity.yaw - turn_reach, velocity.yaw + turn_reach], p.min_vel_theta, p.max_vel_theta)
+        turns = np.linspace(low, high, p.vtheta_samples)
         turns = np.unique(np.append(turns, [np.clip(0.0, turns[0], turns[-1])]))
         arcs = np.stack(np.meshgrid(forward, [0.0], turns, indexing="ij"), axis=-1).reshape(-1, 3)
         return np.vstack([arcs, self._turn_samples(velocity)])
