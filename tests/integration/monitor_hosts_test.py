@@ -42,8 +42,8 @@ class MonitorHostsTest(unittest.TestCase):
         seen.forget()
         near.kill()
         seen.wait_status("laser", "Component status", "FALSE")
-        link("up")
         seen.forget()
+        link("up")
         seen.wait_status("camera", "Component status", "RECOVERED")
 
 

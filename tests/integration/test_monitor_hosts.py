@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 FILE = Path(__file__).parent / "monitor_hosts" / "hosts.test"
-NETWORK = "10.213.77"
+NETWORK = f"10.213.{os.getpid() % 250}"
+"""One of many, since others may run this test on the same machine."""
 
 
 def ip(*arguments):
@@ -16,7 +17,7 @@ def ip(*arguments):
 
 @pytest.fixture
 def other_host():
-    """Make a namespace whose address 10.213.77.2 is reached through a link; yield its name."""
+    """Make a namespace whose address NETWORK.2 is reached through a link; yield its name."""
     if not Path("/usr/sbin/ip").exists():
         pytest.skip("no network namespace: iproute2 is not installed")
     name, link = f"mros_{os.getpid()}", f"mros{os.getpid() % 100000}"
