@@ -37,6 +37,11 @@ def metacontrol(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(["metacontrol", *arguments], capture_output=True, text=True, timeout=LIMIT_S, check=False)
 
 
+def account(result: subprocess.CompletedProcess[str], output: Path) -> str:
+    """All that a mission and its nodes have said."""
+    return f"{result.stdout}{result.stderr}\n{(output / 'log' / 'console.log').read_text(errors='replace')}"
+
+
 @pytest.fixture(scope="module")
 def adapted(tmp_path_factory):
     output = tmp_path_factory.mktemp("adapted")
@@ -52,7 +57,7 @@ def baseline(tmp_path_factory):
 
 def test_killed_laser_is_replaced_by_the_camera_and_the_robot_arrives(adapted):
     result, output = adapted
-    assert result.returncode == 0, result.stdout + result.stderr
+    assert result.returncode == 0, account(result, output)
     summary = json.loads((output / "summary.json").read_text())
     assert summary["goal_reached"] is True
     assert summary["collisions"] == 0
@@ -86,7 +91,7 @@ def test_summary_follows_from_the_bag_alone(adapted):
 
 def test_baseline_stops_for_want_of_a_sensor(baseline):
     result, output = baseline
-    assert result.returncode == 1, result.stdout + result.stderr
+    assert result.returncode == 1, account(result, output)
     summary = json.loads((output / "summary.json").read_text())
     assert summary["goal_reached"] is False and summary["metacontrol"] is False
     assert summary["reconfigurations"] == []
