@@ -18,7 +18,7 @@ import rosgraph
 import rospy
 import rostest
 import tf2_ros
-from actionlib_msgs.msg import GoalStatus
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import PolygonStamped, PoseStamped, TransformStamped, Twist
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseGoal
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
@@ -136,6 +136,7 @@ class MoveBaseTest(unittest.TestCase):
         cls.goals = []
         rospy.Subscriber("/rosout", Log, lambda message: cls.log.append(message.msg))
         rospy.Subscriber("move_base/goal", MoveBaseActionGoal, cls.goals.append)
+        rospy.Subscriber("move_base/status", GoalStatusArray, lambda message: setattr(cls, "status", message))
         cls.robot = Robot()
         cls.client = actionlib.SimpleActionClient("move_base", MoveBaseAction)
         cls.addClassCleanup(cls.stop)
@@ -168,6 +169,12 @@ class MoveBaseTest(unittest.TestCase):
     def finish(self):
         self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)), "the goal has no result")
         return self.client.get_state(), self.client.get_goal_status_text()
+
+    def cancel_all(self):
+        """Cancel what is at work, and wait for its end: a cancellation that comes late would hit the next goal."""
+        self.client.cancel_all_goals()
+        at_work = {GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING}
+        wait_for(lambda: not at_work & {goal.status for goal in self.status.status_list}, "no goal is at work")
 
     def moving(self):
         return wait_for(lambda: self.robot.command.linear.x > 0.2, "the robot moves")
@@ -261,7 +268,7 @@ class MoveBaseTest(unittest.TestCase):
         wait_for(lambda: plans, "a plan")
         self.assertEqual(plans[-1].header.frame_id, "map")
         self.assertTrue(self.goals[count].goal_id.id)
-        self.client.cancel_all_goals()
+        self.cancel_all()
 
     def test_make_plan_answers(self):
         rospy.wait_for_service("move_base/make_plan", DEADLINE_S)
@@ -340,7 +347,7 @@ class MoveBaseTest(unittest.TestCase):
         self.assertLessEqual(max(speeds[-10:]), 0.3)
         self.assertEqual(rospy.get_param("move_base/TrajectoryPlannerROS/max_vel_x"), 0.3)
         self.assertEqual(self.client.get_state(), GoalStatus.ACTIVE)
-        self.client.cancel_all_goals()
+        self.cancel_all()
 
     def test_parameters_that_do_not_fit_are_refused(self):
         self.set_speed(0.05)  # less than min_vel_x
