@@ -119,13 +119,14 @@ def _figures(summary: dict[str, Any]) -> Table:
     table.add_column("")
     table.add_column("", justify="right")
     above, mean, goal = summary["time_above_threshold"], summary["mean_qa"], summary["goal_reached"]
+    configurations = dict.fromkeys((summary["initial_configuration"], summary["final_configuration"]))
     rows: list[tuple[str, str]] = [
         ("goal reached", "yes" if goal else f"no ({summary['outcome']})"),
         ("success (paper's four conditions)", "yes" if summary["success"] else "no"),
         ("duration", _with_unit(summary["duration_s"], "s")),
         ("way driven", _with_unit(summary["path_length_m"], "m")),
         ("collisions", "-" if summary["collisions"] is None else str(summary["collisions"])),
-        ("configuration", f"{summary['initial_configuration']} -> {summary['final_configuration']}"),
+        ("configuration", " -> ".join(map(str, configurations))),
     ]
     rows += [(f"time above the {name} threshold", _percent(share)) for name, share in above.items()]
     rows += [(f"mean {name}", _with_unit(level, "")) for name, level in mean.items()]
