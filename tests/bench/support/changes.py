@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import math
 import os
 import statistics
 import tempfile
@@ -28,7 +29,8 @@ DEADLINE_S = 60.0
 PAPER_S = 4.3  # mean time of a reconfiguration in the paper
 PAPER = "published system (paper, another machine)"
 GOALS = (5.4, 6.0), (-8.0, -8.0)  # of a long way to and fro
-CHANGES_PER_GOAL = 6  # the goal is not reached meanwhile
+NEAR_M = 5.0  # so near to its goal a robot is sent to the other one: the goal is not reached meanwhile
+UNDER_WAY_M = 1.0  # so much nearer to its goal than at first a robot no longer turns round
 
 
 @dataclass
@@ -63,7 +65,9 @@ class System:
         self._slowest = 0.0
         rospy.Subscriber("move_base/status", GoalStatusArray, self._on_status)
         rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)
+        self._position = math.nan, math.nan
         rospy.Subscriber("odom", Odometry, self._on_odometry)
+        rospy.Subscriber("ground_truth/state", Odometry, self._on_state)
         self._stop = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         if not self._manipulator.wait_for_server(rospy.Duration(DEADLINE_S)):
             raise RuntimeError("the manipulator did not come up")
@@ -71,6 +75,8 @@ class System:
             raise RuntimeError("no configuration was deployed")
         if not self.navigation.wait_for_server(rospy.Duration(DEADLINE_S)):
             raise RuntimeError("navigation did not come up")
+        if not wait_until(lambda: not math.isnan(self._position[0]), DEADLINE_S):
+            raise RuntimeError("the robot's place did not come")
         self._goals = itertools.cycle(GOALS)
         self._handles: list[actionlib.ClientGoalHandle] = []  # actionlib forgets a goal whose handle is gone
         self.set_off()
@@ -104,19 +110,25 @@ class System:
         return Change(accepted - began, finished - began, tactic, phases, slowest)
 
     def drives(self) -> bool:
-        """Wait until the robot drives."""
-        return bool(wait_until(lambda: self._speed > 0.1, DEADLINE_S))
+        """Wait until the robot drives towards its goal: turning round, it stands for a moment whatever is changed."""
+        return bool(wait_until(lambda: self._speed > 0.1 and self.distance() < self._far - UNDER_WAY_M, DEADLINE_S))
+
+    def distance(self) -> float:
+        """Return the distance from the goal as the crow flies, m."""
+        return math.dist(self._position, self._goal)
 
     def set_off(self) -> None:
         """Send the next navigation goal, in place of the former one, and wait until it is at work."""
         goal = MoveBaseGoal()
         goal.target_pose.header.frame_id = "map"
-        goal.target_pose.pose.position.x, goal.target_pose.pose.position.y = next(self._goals)
+        self._goal = next(self._goals)
+        goal.target_pose.pose.position.x, goal.target_pose.pose.position.y = self._goal
         goal.target_pose.pose.orientation.w = 1.0
         self._handles.append(self.navigation.send_goal(goal))
         self.goal_id = str(self._handles[-1].comm_state_machine.action_goal.goal_id.id)
         if not wait_until(lambda: self._active[0] == self.goal_id, DEADLINE_S):
             raise RuntimeError("the navigation goal was not accepted")
+        self._far = self.distance()
 
     def _on_status(self, message: GoalStatusArray) -> None:
         connection = message._connection_header  # one object per connection, so another one is another server
@@ -137,6 +149,10 @@ class System:
         with self._condition:
             self._speed = abs(twist.linear.x) + abs(twist.linear.y)
             self._slowest = min(self._slowest, self._speed)
+
+    def _on_state(self, message: Odometry) -> None:
+        position = message.pose.pose.position
+        self._position = position.x, position.y
 
 
 @contextlib.contextmanager
@@ -183,7 +199,7 @@ def changes(
     found = []
     with running_system(configurations[0], parameters) as system:
         for number in range(count):
-            if number % CHANGES_PER_GOAL == CHANGES_PER_GOAL - 1:
+            if system.distance() < NEAR_M:
                 system.set_off()
             if not system.drives():
                 raise RuntimeError("the robot does not drive")
