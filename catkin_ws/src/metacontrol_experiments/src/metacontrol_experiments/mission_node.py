@@ -77,6 +77,7 @@ class MissionNode:
         self._failed: str | None = None
         self._server_seen = False
         self._observed: set[str] = set()  # quality attributes of which a level came in
+        self._graph_seen = False  # by the monitor
         self._goal: MoveBaseActionGoal | None = None
         self._began_wall = time.monotonic()
         self._startup = Startup(self._attend)
@@ -105,6 +106,7 @@ class MissionNode:
         wait(lambda: self._position is not None, "the robot's pose on amcl_pose")
         wait(lambda: self._stable, f"a STABLE configuration on {MANIPULATOR_TOPIC}")
         wait(lambda: self._server_seen and self._goals.get_num_connections() > 0, "the action server of move_base")
+        wait(lambda: self._graph_seen, "the monitor's first look at the graph, on /diagnostics")
         for quality in self._settings.thresholds:
             heard = partial(self._observed.__contains__, quality)
             wait(heard, f"a level of {quality} on /diagnostics, from its observer")
@@ -331,5 +333,6 @@ class MissionNode:
         for report in messages.diagnostics(message, rospy.get_time()):
             if isinstance(report, QualityReport) and report.level is not None:
                 self._observed.add(report.name)
+            self._graph_seen |= not isinstance(report, QualityReport)
             if not isinstance(report, CostReport):
                 self._tell(report)

@@ -45,6 +45,8 @@ _MASTER_TIMEOUT = 1.2
 """Wall seconds for one answer of the master."""
 _COALESCE = 0.02
 """Wall seconds between evaluations at least, for events that come in a bunch."""
+_LONGEST_REST = 0.2
+"""The same at most, after an evaluation that took long."""
 _FRESH = 0.15
 """Wall seconds to wait, after a node died, for a look that says whether it has unregistered."""
 _TOPIC_PERIOD = 0.05
@@ -103,8 +105,6 @@ class MonitorNode:
         self._updater.add("look at the graph", self._tell_look)
         self._observers = ObserverHost(self._diagnostics)
         self._observers.follow(self._model.current.system)
-        for name in observers:
-            self._observers.load(name)
         self._topics = TopicListener(patience.startup)
         self._topic_states: dict[str, str] = {}
         self._follow_topics()
@@ -112,6 +112,8 @@ class MonitorNode:
         self._subscriber = rospy.Subscriber(
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, self._follow, queue_size=5
         )
+        for name in observers:
+            self._observers.load(name)
 
     def run(self) -> None:
         """Evaluate after every look, and whenever a node or topic fails or returns, until node or master end."""
@@ -121,8 +123,8 @@ class MonitorNode:
                 begin = time.monotonic()
                 self._publish(self._evaluate(look))
                 self._evaluation = time.monotonic() - begin
-                # Never more than half the time: hundreds of nodes may come or go together.
-                time.sleep(max(_COALESCE, self._evaluation))
+                # Hardly more than half the time: hundreds of nodes may come or go together.
+                time.sleep(min(max(_COALESCE, self._evaluation), _LONGEST_REST))
             self._wait()
 
     def _end(self) -> None:
@@ -172,7 +174,7 @@ class MonitorNode:
             self._usage_due = now + _USAGE_PERIOD
             statuses.extend(self._meter.measure(self._metacontrol_pids(look), now))
             self._running_observers = self._observers.supervise()
-            self._updater.update()
+            self._updater.force_update()  # `update` would ask the master for its period, and wait for the answer
         return statuses
 
     def _tell_look(self, status: Any) -> Any:
