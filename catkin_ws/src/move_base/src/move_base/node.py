@@ -259,6 +259,7 @@ class MoveBaseNode:
 def main() -> None:
     """Entry point of the node; exit status 2 when a parameter can't be used."""
     with Lifetime("move_base", ParameterError) as life:
+        life.longest_end_without_master = life.longest_end  # the base is stopped after the step that is under way
         life.start()
         cv2.setNumThreads(1)  # the grids are small: threads cost more than they give
         tree = rospy.get_param("~", {})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import signal
@@ -25,7 +26,7 @@ BAD_START = 2
 LONGEST_END = 3.0
 """Wall s, after which a node that is to end is cut off: rospy asks the master without a deadline."""
 
-_LONGEST_END_WITHOUT_MASTER = 0.5
+LONGEST_END_WITHOUT_MASTER = 0.5
 """The same where nobody is left to say goodbye to."""
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -55,6 +56,8 @@ class Lifetime:
         """What the line about the loss of the master says of the node."""
         self.longest_end = LONGEST_END
         """Wall s after which the end is cut short."""
+        self.longest_end_without_master = LONGEST_END_WITHOUT_MASTER
+        """The same where the master is lost; more for a node that has something else to end."""
         self.watch = MasterWatch(self._tell, self._on_loss)
         self._name = name
         self._refusals = (*refusals, _StartError)
@@ -94,7 +97,8 @@ class Lifetime:
         if isinstance(error, self._refusals):
             self.say(" ".join(str(error).split()))
             self.end("it can't start", BAD_START)
-        traceback.print_exception(kind, error, trace)
+        with contextlib.suppress(OSError, ValueError):  # nobody reads any more
+            traceback.print_exception(kind, error, trace)
         self.end("it has failed", 1)
 
     @property
@@ -104,16 +108,17 @@ class Lifetime:
 
     def say(self, line: str) -> None:
         """Write a line on stderr: rospy's log asks the master for a parameter, and would wait for it."""
-        sys.stderr.write(f"{self._name}: {line}\n")
-        sys.stderr.flush()
+        with contextlib.suppress(OSError, ValueError):  # nobody reads any more
+            sys.stderr.write(f"{self._name}: {line}\n")
+            sys.stderr.flush()
 
     def end(self, reason: str, status: int = 0) -> NoReturn:
         """Say goodbye to the master and end the process, in time. Whoever calls it while it ends waits for the end."""
         if self._claim.acquire(blocking=False):
             self._status = status
-            self.cut_off(_LONGEST_END_WITHOUT_MASTER if self.watch.lost else self.longest_end)
+            self.cut_off(self.longest_end_without_master if self.watch.lost else self.longest_end)
             rospy.signal_shutdown(reason)
-            if self._shutting_down in (None, threading.get_ident()):
+            if self._shutting_down == threading.get_ident():
                 self._leave()
         while True:  # until another thread has said goodbye
             time.sleep(LONGEST_END)
@@ -152,10 +157,12 @@ class Lifetime:
 
     def _leave(self) -> NoReturn:
         """End the process: threads of rospy and actionlib would keep it, and the closed server of its API spins."""
-        logging.shutdown()
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(self._status)
+        try:
+            logging.shutdown()
+            sys.stdout.flush()
+            sys.stderr.flush()
+        finally:
+            os._exit(self._status)
 
 
 class _StartError(Exception):

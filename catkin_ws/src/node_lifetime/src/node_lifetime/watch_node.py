@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import logging
 import math
 import threading
 import time
@@ -12,6 +13,8 @@ from typing import Any
 from xml.parsers.expat import ExpatError
 
 from node_lifetime.master import PATIENCE, Answer, Refusal, Silence, Standing, View
+
+_log = logging.getLogger(__name__)
 
 
 class MasterWatch:
@@ -27,7 +30,7 @@ class MasterWatch:
         self.patience = PATIENCE
         """Wall s for which silence is borne."""
         self.heartbeat: Callable[[], None] | None = None
-        """Called after each answer."""
+        """Called after each answer; an error of it does not end the watch."""
         self.lost = False
         """Whether the master is lost."""
         self._tell, self._on_loss = tell, on_loss
@@ -70,8 +73,7 @@ class MasterWatch:
             before, view = view, view.after(came, asked, time.monotonic(), self.patience)
             if view.standing is Standing.THERE:
                 self._note(answered_at=asked)
-                if self.heartbeat:
-                    self.heartbeat()
+                self._beat()
                 self._hurry.wait(view.pause)
                 continue
             is_new_silence = view.silent_since is not None and before.silent_since is None
@@ -81,6 +83,13 @@ class MasterWatch:
                 time.sleep(view.pause)
         self._note(lost=True)
         self._on_loss(view)
+
+    def _beat(self) -> None:
+        if self.heartbeat:
+            try:
+                self.heartbeat()
+            except Exception:
+                _log.exception("the heartbeat has failed")
 
     def _note(self, answered_at: float | None = None, lost: bool = False) -> None:
         with self._news:
