@@ -122,19 +122,19 @@ class World:
             self.ask("setParam", name, value)
         return process
 
-    def start(self, node, uri=None):
+    def start(self, node, uri=None, stderr=None):
         """Start a node."""
         package, _, script = node.partition("/")
-        return self._start(node, [sys.executable, str(PACKAGES / package / "nodes" / script)], uri)
+        return self._start(node, [sys.executable, str(PACKAGES / package / "nodes" / script)], uri, stderr)
 
-    def _start(self, name, words, uri=None):
+    def _start(self, name, words, uri=None, stderr=None):
         own = {"ROS_MASTER_URI": uri or self.uri, "ROS_LOG_DIR": str(self._folder), "ROS_HOME": str(self._folder)}
         with open(self._path(name), "w") as output:
             process = subprocess.Popen(
                 words,
                 env={**os.environ, **own, "PYTHONUNBUFFERED": "1"},
                 stdout=subprocess.DEVNULL,  # what is said is said on stderr
-                stderr=output,
+                stderr=stderr or output,
             )
         self._stack.callback(process.wait)
         self._stack.callback(process.kill)
@@ -158,8 +158,8 @@ class World:
         groups = wait_for(lambda: self.ask("getSystemState"), "the master's answer")
         return {name for group in groups for name, owners in group if owner in owners}
 
-    def start_until_ready(self, node):
-        process = self.start(node)
+    def start_until_ready(self, node, **options):
+        process = self.start(node, **options)
         wait_for(lambda: NODES[node] in self.registrations(node), f"{node} is ready")
         return process
 
@@ -246,6 +246,16 @@ def test_master_that_dies_is_told_in_one_line(world, node):
     master.kill()
     assert world.expect_end(node, process).count(f"ROS master {world.uri} is gone") == 1
     wait_for(lambda: all(map(has_ended, children)), "the end of its processes")
+
+
+def test_master_that_dies_ends_it_though_nobody_reads_what_it_says(world):
+    master = world.start_master()
+    node = "rosgraph_manipulator/action_relay"
+    reader, writer = os.pipe()
+    with os.fdopen(reader), os.fdopen(writer, "w") as stderr:
+        process = world.start_until_ready(node, stderr=stderr)
+    master.kill()
+    world.expect_end(node, process)
 
 
 @pytest.mark.parametrize("answers", [1, 3, 8, 15])
