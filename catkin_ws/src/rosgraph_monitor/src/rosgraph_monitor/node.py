@@ -105,6 +105,8 @@ class MonitorNode:
         self._updater.add("look at the graph", self._tell_look)
         self._observers = ObserverHost(self._diagnostics)
         self._observers.follow(self._model.current.system)
+        for name in observers:
+            self._observers.load(name)
         self._topics = TopicListener(patience.startup)
         self._topic_states: dict[str, str] = {}
         self._follow_topics()
@@ -112,8 +114,6 @@ class MonitorNode:
         self._subscriber = rospy.Subscriber(
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, self._follow, queue_size=5
         )
-        for name in observers:
-            self._observers.load(name)
 
     def run(self) -> None:
         """Evaluate after every look, and whenever a node or topic fails or returns, until node or master end."""

@@ -20,6 +20,7 @@ from metacontrol_msgs.srv import (
 
 from rosgraph_monitor import plugins
 from rosgraph_monitor.observer import ServiceObserver
+from rosgraph_monitor.topics_node import unpacked
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -127,7 +128,7 @@ class _Runner:
         self._publishers = {
             topic: rospy.Publisher(topic, message_class, queue_size=1) for topic, message_class in observer.outputs
         }
-        self._inbox: deque[tuple[str, Any, float]] = deque(maxlen=_INBOX)
+        self._inbox: deque[tuple[str, type, Any, float]] = deque(maxlen=_INBOX)
         self._news: deque[RosSystem | None] = deque(maxlen=1)
         self._busy_since: float | None = None
         self._warned = "", 0.0
@@ -179,7 +180,7 @@ class _Runner:
         while self._news:
             self._guarded(self.observer.follow, self._news.popleft())
         while self._inbox:
-            self._guarded(self.observer.receive, *self._inbox.popleft())
+            self._guarded(self._take, *self._inbox.popleft())
         try:
             self._subscribe()
             statuses = self.observer.evaluate(now.to_sec())
@@ -221,14 +222,17 @@ class _Runner:
                     topic,
                     message_class,
                     self._receive,
-                    topic,
+                    (topic, message_class),
                     queue_size=1,
                     buff_size=_LARGEST_MESSAGE,
                     tcp_nodelay=True,
                 )
 
-    def _receive(self, msg: Any, topic: str) -> None:
-        self._inbox.append((topic, msg, rospy.get_time()))
+    def _receive(self, msg: Any, whence: tuple[str, type]) -> None:
+        self._inbox.append((*whence, msg, rospy.get_time()))
+
+    def _take(self, topic: str, message_class: type, msg: Any, received: float) -> None:
+        self.observer.receive(topic, unpacked(msg, message_class), received)
 
     def _warn(self, error: BaseException) -> None:
         """Log an error, one of the same kind only now and then.

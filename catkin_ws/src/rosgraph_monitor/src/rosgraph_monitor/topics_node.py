@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import threading
 import time
 import zlib
 from typing import TYPE_CHECKING, Any
 
+import genpy
 import roslib.message
 import rospy
 from sensor_msgs.msg import BatteryState
@@ -24,6 +26,33 @@ if TYPE_CHECKING:
 _LARGEST_MESSAGE = 1 << 24
 _SEQ_AND_STAMP = 12
 """Bytes of a serialised Header before its frame."""
+
+
+def packed(msg: Any) -> bytes:
+    """Return a message as it was sent.
+
+    rospy has one subscription to a topic for a whole process, and hands out messages of the class that came first.
+    """
+    if isinstance(msg, rospy.AnyMsg):
+        return bytes(msg._buff)
+    buffer = io.BytesIO()
+    msg.serialize(buffer)
+    return buffer.getvalue()
+
+
+def unpacked(msg: Any, message_class: type) -> Any:
+    """Return a message in its class, whoever subscribed first.
+
+    Raises:
+        TypeError: it is of another type.
+        genpy.DeserializationError: it is broken.
+    """
+    if not isinstance(msg, rospy.AnyMsg):
+        return msg
+    if msg._connection_header["md5sum"] != message_class._md5sum:  # type: ignore[attr-defined]
+        kind = msg._connection_header["type"]
+        raise TypeError(f"it is a {kind}, not a {message_class._type}")  # type: ignore[attr-defined]
+    return message_class().deserialize(msg._buff)
 
 
 class TopicListener:
@@ -67,7 +96,7 @@ class TopicListener:
 
     def _digest(self, msg: Any) -> int:
         """Return a checksum of the message without its header, which differs each time."""
-        data = msg._buff
+        data: bytes | memoryview = packed(msg)
         kind = msg._connection_header.get("type", "")
         if kind not in self._has_header:
             message_class = roslib.message.get_message_class(kind)
@@ -91,7 +120,12 @@ class BatteryListener:
             self.conditions[spec.component] = NodeCondition.UNKNOWN
             self._subscribers.append(rospy.Subscriber(spec.topic, BatteryState, self._receive, spec, queue_size=1))
 
-    def _receive(self, msg: BatteryState, spec: BatterySpec) -> None:
+    def _receive(self, msg: Any, spec: BatterySpec) -> None:
+        try:
+            msg = unpacked(msg, BatteryState)
+        except (TypeError, genpy.DeserializationError) as error:
+            rospy.logwarn_throttle(10.0, f"{spec.topic}: {error}: left out")
+            return
         charge = charge_of(msg.percentage, msg.charge, msg.capacity)
         if charge is None:
             rospy.logwarn_throttle(10.0, f"{spec.topic}: the message tells no charge of {spec.component}: left out")
