@@ -123,7 +123,7 @@ class MonitorNode:
                 begin = time.monotonic()
                 self._publish(self._evaluate(look))
                 self._evaluation = time.monotonic() - begin
-                # Hardly more than half the time: hundreds of nodes may come or go together.
+                # It rests as long again, up to a limit: hundreds of nodes may come or go together.
                 time.sleep(min(max(_COALESCE, self._evaluation), _LONGEST_REST))
             self._wait()
 
