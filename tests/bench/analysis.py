@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-from mros1_reasoner.knowledge_base import KnowledgeBase
-from mros1_reasoner.model import Facts, Objective
-from mros1_reasoner.owlready_reasoner import run_pellet
-from mros1_reasoner.pellet import PelletReasoner
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.knowledge.model import Facts, Objective
+from mros1_reasoner.pellet.owlready import run_pellet
+from mros1_reasoner.pellet.process import PelletReasoner
 from support.figures import LIMIT, entry, seconds
 
 SIZES = {30: 60, 300: 60, 1000: 60}  # number of FunctionDesigns -> samples

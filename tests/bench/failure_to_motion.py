@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from metacontrol_experiments.bag import read_record
+from metacontrol_bags.bag import read_record
 from support.figures import LIMIT, entry
 from support.missions import drive
 

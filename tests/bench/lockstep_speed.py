@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import rospkg
-from metacontrol_experiments.lockstep import SETTLE_S, Lockstep
-from metacontrol_experiments.routes import read_route
-from metacontrol_experiments.settings import Settings
+from metacontrol_experiments.lockstep.lockstep import SETTLE_S, Lockstep
+from metacontrol_experiments.mission.routes import read_route
+from metacontrol_experiments.mission.settings import Settings
 from support.figures import GAZEBO, entry
 
 _RUNS = 3

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any
 from unittest import mock
 
 import rospkg
-from metacontrol_experiments.lockstep import Lockstep
-from metacontrol_experiments.routes import read_route
-from metacontrol_experiments.settings import Settings
-from move_base.costmap import Costmap
-from move_base.dwa import DwaController
-from move_base.navigator import Navigator
+from metacontrol_experiments.lockstep.lockstep import Lockstep
+from metacontrol_experiments.mission.routes import read_route
+from metacontrol_experiments.mission.settings import Settings
+from move_base.control.dwa import DwaController
+from move_base.costmap.costmap import Costmap
+from move_base.navigation.navigator import Navigator
 from support.figures import LIMIT, entry
 
 if TYPE_CHECKING:

@@ -10,11 +10,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from metacontrol_experiments.processes import ProcessTree, free_port
+from metacontrol_experiments.io.processes import ProcessTree, free_port
 from support.figures import entry
 
 _REQUESTS = 200
-_INTEGRATION = Path(__file__).resolve().parents[1] / "integration"
+_TESTS = Path(__file__).resolve().parents[1]
 _TEST = "manipulator_changes_test.ChangesTest.test_many_random_requests_leave_nothing_behind_and_lose_no_goal"
 
 
@@ -26,11 +26,12 @@ def run() -> list[dict[str, Any]]:
         tree = ProcessTree(own)
         try:
             tree.start(["roscore", "-p", str(port)], Path(folder) / "master.log")
+            path = os.pathsep.join((str(_TESTS), os.environ["PYTHONPATH"]))
             began = time.monotonic()
             subprocess.run(
                 [sys.executable, "-m", "unittest", _TEST],
-                cwd=_INTEGRATION,
-                env={**os.environ, **own, "MROS_RANDOM_REQUESTS": str(_REQUESTS)},
+                cwd=_TESTS / "integration" / "rosgraph_manipulator",
+                env={**os.environ, **own, "MROS_RANDOM_REQUESTS": str(_REQUESTS), "PYTHONPATH": path},
                 check=True,
             )
             mean = (time.monotonic() - began) / _REQUESTS

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import rospkg
-from metacontrol_sim.geometry import Pose
-from metacontrol_sim.motion_sensors import REAL
-from metacontrol_sim.simulation import STEP, Settings, Simulation
-from metacontrol_sim.world_file import read_world
+from pybullet_simulator.physics.simulation import STEP, Settings, Simulation
+from pybullet_simulator.robot.motion_sensors import REAL
+from pybullet_simulator.world.world_file import read_world
+from robot_formulas.geometry import Pose
 from support.figures import entry
 
 _SECONDS = 60.0

@@ -10,9 +10,9 @@ from typing import Any
 
 import cv2
 import numpy as np
-from metacontrol_sim.geometry import Pose
-from metacontrol_sim.simulation import Settings, Simulation
-from metacontrol_sim.world_file import read_world
+from pybullet_simulator.physics.simulation import Settings, Simulation
+from pybullet_simulator.world.world_file import read_world
+from robot_formulas.geometry import Pose
 from support.figures import LIMIT, entry
 
 _CELLS = 1500

@@ -1,4 +1,4 @@
-"""Runs every .test file of this folder with rostest, each on a master of its own."""
+"""Runs every .test file of the folders here with rostest, each on a master of its own."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ HERE = Path(__file__).parent
 DEADLINE_S = 180
 
 
-@pytest.mark.parametrize("file", sorted(HERE.glob("*.test")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("file", sorted(HERE.glob("*/*.test")), ids=lambda path: path.stem)
 def test_rostest(file, tmp_path):
     environment = {**os.environ, "ROS_HOME": str(tmp_path), "ROS_LOG_DIR": str(tmp_path / "log")}
     environment.pop("ROS_MASTER_URI", None)

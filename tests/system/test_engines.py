@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import psutil
 import pytest
-from metacontrol_experiments.processes import wait_until
+from metacontrol_experiments.io.processes import wait_until
 
 if TYPE_CHECKING:
     from pathlib import Path

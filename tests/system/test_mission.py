@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import psutil
 import pytest
-from metacontrol_experiments.bag import read_record
+from metacontrol_bags.bag import read_record
 
 if TYPE_CHECKING:
     from pathlib import Path

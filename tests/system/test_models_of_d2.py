@@ -17,16 +17,16 @@ from pathlib import Path
 
 import pytest
 import rospkg
-from ros_model.extraction import plumbing
-from ros_model.extraction.catkin_package import find_packages
-from ros_model.extraction.graph import End, interfaces
-from ros_model.extraction.live import Details, look_at
-from ros_model.extraction.names import resolve
-from ros_model.extraction.package_source import ExtractedPackage, extract_package
-from ros_model.extraction.source import FoundPort
-from ros_model.metamodel import PortKind
-from ros_model.reader import read_system
-from ros_model.snapshot import GraphSnapshot, SnapshotError, take_snapshot
+from ros_model.io.snapshot import GraphSnapshot, SnapshotError, take_snapshot
+from ros_model.language.metamodel import PortKind
+from ros_model.language.reader import read_system
+from ros_model_extraction import ros_defaults as plumbing
+from ros_model_extraction.names import resolve
+from ros_model_extraction.packages.catkin_package import find_packages
+from ros_model_extraction.packages.package_source import ExtractedPackage, extract_package
+from ros_model_extraction.running.graph import End, interfaces
+from ros_model_extraction.running.live import Details, look_at
+from ros_model_extraction.source import FoundPort
 
 START_S = 120.0
 SETTLED_S = 3.0

@@ -11,12 +11,10 @@ from types import SimpleNamespace
 import psutil
 import pytest
 from click.testing import CliRunner
-from metacontrol_experiments import cli, messages
-from metacontrol_experiments.bag import read_record
-from metacontrol_experiments.commit import current_commit
-from metacontrol_experiments.figure import configuration_spans, draw
-from metacontrol_experiments.processes import ProcessTree, wait_until
-from metacontrol_experiments.record import (
+from metacontrol_bags import messages
+from metacontrol_bags.bag import read_record
+from metacontrol_bags.figure import configuration_spans, draw
+from metacontrol_bags.record import (
     ComponentReport,
     ConfigurationReport,
     DecisionReport,
@@ -24,9 +22,12 @@ from metacontrol_experiments.record import (
     MissionRecord,
     QualityReport,
 )
-from metacontrol_experiments.routes import Pose, RouteError, read_route
-from metacontrol_experiments.settings import Settings
-from metacontrol_experiments.timeline import Timeline
+from metacontrol_bags.timeline import Timeline
+from metacontrol_experiments.cli import main as cli
+from metacontrol_experiments.io.commit import current_commit
+from metacontrol_experiments.io.processes import ProcessTree, wait_until
+from metacontrol_experiments.mission.routes import Pose, RouteError, read_route
+from metacontrol_experiments.mission.settings import Settings
 
 HASH = "0123456789abcdef0123456789abcdef01234567"
 

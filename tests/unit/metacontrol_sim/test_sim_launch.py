@@ -33,6 +33,6 @@ def test_world_is_the_file_that_was_named(file, arguments, world):
 def test_monitor_expects_what_the_window_listens_to_only_where_there_is_one(file):
     assert "/rosgraph_monitor/ignore_ports" not in parameters(file)
     ignored = parameters(file, "gui:=true")["/rosgraph_monitor/ignore_ports"]
-    text = (PACKAGE / "src/metacontrol_sim/window_node.py").read_text()
+    text = (PACKAGE.parent / "pybullet_simulator/src/pybullet_simulator/ros/window.py").read_text()
     assert len(ignored) == 8
     assert [name for name in ignored if f'"{name.removeprefix("*/")}"' not in text] == []

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from move_base.costmap.grid import Geometry
+from move_base.costmap.sensors import Observation
+from move_base.costmap.static_map import StaticMap
 from move_base.geometry import Pose, Velocity, planar_matrix
-from move_base.grid import Geometry
-from move_base.navigator import Navigator
-from move_base.parameters import read_parameters
-from move_base.sensors import Observation
-from move_base.static_map import StaticMap
+from move_base.navigation.navigator import Navigator
+from move_base.parameters.parameters import read_parameters
 
 CONFIG = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim/config/move_base.yaml"
 RESOLUTION = 0.05

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import yaml
-from mros1_reasoner import journal
-from mros1_reasoner.journal import Entry, entry
-from mros1_reasoner.mape import Mape
-from mros1_reasoner.record import fill_message, record_of
+from mros1_reasoner.loop import journal
+from mros1_reasoner.loop.journal import Entry, entry
+from mros1_reasoner.loop.mape import Mape
+from mros1_reasoner.planning.record import fill_message, record_of
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 

@@ -7,9 +7,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from mros1_reasoner.knowledge_base import KnowledgeBase
-from mros1_reasoner.model import Direction
-from mros1_reasoner.pellet import PelletReasoner
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.knowledge.model import Direction
+from mros1_reasoner.pellet.process import PelletReasoner
 from reasoner_helpers import application
 
 DIRECTIONS = {"performance": Direction.HIGHER_IS_BETTER}

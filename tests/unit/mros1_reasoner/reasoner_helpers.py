@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from mros1_reasoner.model import Objective
+from mros1_reasoner.knowledge.model import Objective
 
 DECIMAL = "http://www.w3.org/2001/XMLSchema#decimal"
 HEAD = """<rdf:RDF xml:base="http://example.org/app" xmlns="http://example.org/app#"

@@ -1,8 +1,8 @@
 """What metacontrol.yaml may say of components and topics, and what the monitor takes, are the same."""
 
-from ros_model.schema_check import load_schema, part_of, violations
-from rosgraph_monitor.components import parse_mapping
-from rosgraph_monitor.health import parse_topics
+from ros_model.project.schema_check import load_schema, part_of, violations
+from rosgraph_monitor.health.components import parse_mapping
+from rosgraph_monitor.health.topics import parse_topics
 
 SETTINGS = {
     "components": {

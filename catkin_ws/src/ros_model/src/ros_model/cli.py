@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 _COMMANDS = {
     "check": "ros_model.commands.check:check",
     "diff": "ros_model.commands.diff:diff",
-    "extract": "ros_model.commands.extract:extract",
     "format": "ros_model.commands.format:format_",
     "generate": "ros_model.commands.generate:generate",
     "init": "ros_model.commands.init:init",
     "show": "ros_model.commands.show:show",
-    "snapshot": "ros_model.commands.snapshot:snapshot",
     "variants": "ros_model.commands.variants:variants",
 }
 """Command -> where it is. A command's module is imported when it is run, so that the others' imports cost nothing."""
+_PLUGINS = "ros_model"
+"""Packages add a command by `<export><ros_model command="NAME" function="MODULE:FUNCTION"/></export>`."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -53,14 +53,23 @@ class _Commands(click.Group):
     """A group that imports a command when it is asked for."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
-        return sorted(_COMMANDS)
+        return sorted({**_added_commands(), **_COMMANDS})
 
     def get_command(self, _context: click.Context, name: str) -> click.Command | None:
-        if name not in _COMMANDS:
+        where = _COMMANDS.get(name) or _added_commands().get(name)
+        if where is None:
             return None
-        module, function = _COMMANDS[name].split(":")
+        module, _, function = where.partition(":")
         found: click.Command = getattr(importlib.import_module(module), function)
         return found
+
+
+def _added_commands() -> dict[str, str]:
+    """Return the commands that other packages export: command -> where it is."""
+    from node_kit.plugins import exported  # slow to import
+
+    exports = (attributes for _, attributes in exported(_PLUGINS))
+    return {found["command"]: found["function"] for found in exports if {"command", "function"} <= found.keys()}
 
 
 def _version(context: click.Context, _option: click.Parameter, asked: bool) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from ros_model.metamodel import Position
+    from ros_model.language.metamodel import Position
 
 
 _TOLD = 20

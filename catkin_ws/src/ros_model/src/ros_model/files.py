@@ -10,7 +10,7 @@ from pathlib import Path
 import rospkg
 
 from ros_model.errors import ModelError
-from ros_model.metamodel import Position
+from ros_model.language.metamodel import Position
 
 MAX_SIZE = 16_000_000
 """Bytes of the largest file that is read; the largest published model has 432 thousand."""

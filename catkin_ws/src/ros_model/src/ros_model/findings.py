@@ -16,7 +16,7 @@ from ros_model.files import read_text
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
-    from ros_model.metamodel import Position
+    from ros_model.language.metamodel import Position
 
 ERROR = "error"
 WARNING = "warning"

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from rosgraph_monitor.status import QA_STALE, QA_STATUS
+from rosgraph_monitor.diagnostics.status import QA_STALE, QA_STATUS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from ros_model.metamodel import RosSystem
+    from ros_model.language.metamodel import RosSystem
 
 Topics = list[tuple[str, type]]
 _ARRIVALS = 20

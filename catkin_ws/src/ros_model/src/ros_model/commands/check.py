@@ -7,23 +7,23 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ros_model.checker import check_family, check_system, families
+from ros_model.checks.packages import check_packages
+from ros_model.checks.systems import check_family, check_system, families
 from ros_model.commands import BAD_INPUT
 from ros_model.errors import ModelError
 from ros_model.findings import ERROR, FORMATS, WARNING, Finding
-from ros_model.library import Library
-from ros_model.metamodel import compose
-from ros_model.model_files import PACKAGES, files_in, models_at, read_all
-from ros_model.packages import PackageSet
-from ros_model.packages_checker import check_packages
-from ros_model.packages_reader import read_packages
-from ros_model.settings import FILE_NAME
+from ros_model.language.library import Library
+from ros_model.language.metamodel import compose
+from ros_model.language.model_files import PACKAGES, files_in, models_at, read_all
+from ros_model.language.packages import PackageSet
+from ros_model.language.packages_reader import read_packages
+from ros_model.project.settings import FILE_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from ros_model.metamodel import RosSystem
-    from ros_model.project import Project
+    from ros_model.language.metamodel import RosSystem
+    from ros_model.project.project import Project
 
 
 _UNREADABLE = ("syntax", "unreadable")  # rules that a file breaks which can't be read
@@ -146,7 +146,7 @@ class _Check:
         return None
 
     def _load(self, folder: Path) -> Project:
-        from ros_model.project import load_project
+        from ros_model.project.project import load_project
 
         if folder not in self._loaded:
             self._loaded[folder] = load_project(folder)

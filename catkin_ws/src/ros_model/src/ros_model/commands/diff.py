@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from ros_model.difference import ADDITIONAL, CHANGED, MISSING, differences
 from ros_model.errors import ModelError
-from ros_model.model_files import read_all
+from ros_model.language.difference import ADDITIONAL, CHANGED, MISSING, differences
+from ros_model.language.model_files import read_all
 
 _COLOURS = {MISSING: "red", ADDITIONAL: "green", CHANGED: "yellow"}
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from ros_model.comments import with_comments
 from ros_model.errors import ModelError
 from ros_model.files import read_text
-from ros_model.model_files import models_at, parse_all
-from ros_model.packages import PackageSet
-from ros_model.packages_writer import write_packages
-from ros_model.writer import write_system
+from ros_model.language.comments import with_comments
+from ros_model.language.model_files import models_at, parse_all
+from ros_model.language.packages import PackageSet
+from ros_model.language.packages_writer import write_packages
+from ros_model.language.writer import write_system
 
 
 @click.command("format")

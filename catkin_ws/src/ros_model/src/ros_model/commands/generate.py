@@ -11,13 +11,13 @@ import click
 from ros_model.errors import ModelError
 from ros_model.files import safe_file_name
 from ros_model.generators import find_generators, write_file
-from ros_model.project import FILE_NAME, load_project
+from ros_model.project.project import FILE_NAME, load_project
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
     from ros_model.generators import Generator
-    from ros_model.project import Project
+    from ros_model.project.project import Project
 
 ALL = "all"
 _FIRST = ("variants", "launch", "deployment")  # the order of `generate all`; others follow by name
@@ -117,7 +117,7 @@ def _stale(written: list[Path]) -> list[Path]:
 
 def _tell_of_observers(project: Project, package: Path) -> None:
     from ros_model.generators.observer import missing_exports, outdated
-    from ros_model.observers import described_observers
+    from ros_model.project.observers import described_observers
 
     observers = described_observers(project)
     for line in outdated(observers, package):
@@ -128,9 +128,9 @@ def _tell_of_observers(project: Project, package: Path) -> None:
 
 def _generate_launch_file(path: Path, output: Path) -> None:
     from ros_model.generators.launch import launch_file
-    from ros_model.model_files import PACKAGES
-    from ros_model.project import read_library
-    from ros_model.reader import read_system
+    from ros_model.language.model_files import PACKAGES
+    from ros_model.language.reader import read_system
+    from ros_model.project.project import read_library
 
     system, library = read_system(path), read_library(sorted(path.parent.glob(f"*{PACKAGES}")))
     name = safe_file_name(system.name, f"{system.position}: system")

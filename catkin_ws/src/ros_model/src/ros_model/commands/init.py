@@ -9,9 +9,9 @@ import click
 from catkin_pkg.package import InvalidPackage, parse_package
 
 from ros_model.errors import ModelError
-from ros_model.first_project import Choices, first_project
 from ros_model.generators import write_files
-from ros_model.reader import read_system
+from ros_model.language.reader import read_system
+from ros_model.project.first_project import Choices, first_project
 
 _QUALITY = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")

@@ -13,18 +13,18 @@ from ros_model.errors import ModelError
 from ros_model.files import read_text
 from ros_model.generators import write_file
 from ros_model.generators.observer import missing_exports, outdated, plugin_path, write_observers
-from ros_model.observers import camel_case, described_observers, observer_model
-from ros_model.packages import SpecKind
-from ros_model.project import DIRECTIONS, load_project
-from ros_model.settings import FILE_NAME, problems_of
-from ros_model.signals import Signal, signals
-from ros_model.yaml_file import flow, with_entry
+from ros_model.generators.signals import Signal, signals
+from ros_model.language.packages import SpecKind
+from ros_model.project.observers import camel_case, described_observers, observer_model
+from ros_model.project.project import DIRECTIONS, load_project
+from ros_model.project.settings import FILE_NAME, problems_of
+from ros_model.project.yaml_file import flow, with_entry
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ros_model.library import Library
-    from ros_model.project import Project
+    from ros_model.language.library import Library
+    from ros_model.project.project import Project
 
 _QUALITY = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _TOPIC = re.compile(r"[/A-Za-z][A-Za-z0-9_/]*")

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ros_model.errors import ModelError
-from ros_model.model_files import read_all
-from ros_model.notation import type_text, value_text
-from ros_model.packages import PackageSet
+from ros_model.language.model_files import read_all
+from ros_model.language.notation import type_text, value_text
+from ros_model.language.packages import PackageSet
 
 if TYPE_CHECKING:
-    from ros_model.metamodel import Component, ParameterType, Position, RosSystem, Value
-    from ros_model.packages import Node, Package
+    from ros_model.language.metamodel import Component, ParameterType, Position, RosSystem, Value
+    from ros_model.language.packages import Node, Package
 
 _UNLIMITED = 100_000  # columns of what is no terminal
 
@@ -32,7 +32,7 @@ def show(file: str, graph: str | None) -> None:
     """Show a .rossystem or .ros file as a tree, or draw it."""
     model = read_all(Path(file))
     if graph is not None:
-        from ros_model.graph import draw
+        from ros_model.io.drawing import draw
 
         if isinstance(model, PackageSet):
             raise ModelError(f"{file}: packages have no connections to draw: give a .rossystem file")

@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ros_model.columns import Columns, parse_columns
 from ros_model.errors import ModelError
 from ros_model.generators import write_files
 from ros_model.generators.family import origin
-from ros_model.project import position_within
-from ros_model.reader import read_system
-from ros_model.schema_check import dotted, load_schema, violations
-from ros_model.settings import FILE_NAME, locate, read_settings
-from ros_model.tables import read_table
-from ros_model.variants import make_systems
-from ros_model.writer import write_system
+from ros_model.language.reader import read_system
+from ros_model.language.writer import write_system
+from ros_model.project.columns import Columns, parse_columns
+from ros_model.project.project import position_within
+from ros_model.project.schema_check import dotted, load_schema, violations
+from ros_model.project.settings import FILE_NAME, locate, read_settings
+from ros_model.project.tables import read_table
+from ros_model.project.variants import make_systems
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from ros_model.metamodel import RosSystem
+    from ros_model.language.metamodel import RosSystem
 
 _SYSTEM, _TABLE = ".rossystem", ".csv"
 _SET = re.compile(r"(?P<column>[^=]+)=(?:(?P<component>[^:*=]+):)?(?P<name>[^:*=]+)(?:\*(?P<factor>[-+0-9.eE]+))?")

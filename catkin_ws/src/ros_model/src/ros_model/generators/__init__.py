@@ -10,11 +10,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from node_kit.plugins import exported
+
 from ros_model.errors import ModelError
-from ros_model.plugins import exported
 
 if TYPE_CHECKING:
-    from ros_model.project import Project
+    from ros_model.project.project import Project
 
 Generator = Callable[["Project", Path], list[Path]]
 

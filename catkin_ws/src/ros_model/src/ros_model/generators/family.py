@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from ros_model.files import safe_file_name
 from ros_model.generators import write_files
-from ros_model.writer import write_system
+from ros_model.language.writer import write_system
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from ros_model.metamodel import RosSystem
-    from ros_model.project import Project
+    from ros_model.language.metamodel import RosSystem
+    from ros_model.project.project import Project
 
 
 def origin(base: str, tables: Iterable[str]) -> str:

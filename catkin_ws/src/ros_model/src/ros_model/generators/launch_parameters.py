@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from ros_model.errors import ModelError
-from ros_model.typed_values import bytes_of, element_types, fault, misfit
+from ros_model.language.typed_values import bytes_of, element_types, fault, misfit
 
 if TYPE_CHECKING:
-    from ros_model.metamodel import ParameterType, Position, RosParameter, SystemParameter, Value
+    from ros_model.language.metamodel import ParameterType, Position, RosParameter, SystemParameter, Value
 
 Sent = bool | int | float | str | bytes | list[Any] | dict[str, Any]
 """A value as the parameter server holds it."""

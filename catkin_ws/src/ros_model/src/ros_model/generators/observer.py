@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING
 from ros_model.errors import ModelError
 from ros_model.findings import ERROR
 from ros_model.generators import write_files
-from ros_model.observers import described_observers, observer_packages, variables
-from ros_model.packages import SpecKind
-from ros_model.packages_writer import write_packages
+from ros_model.language.packages import SpecKind
+from ros_model.language.packages_writer import write_packages
+from ros_model.project.observers import described_observers, observer_packages, variables
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from ros_model.observers import ObserverModel
-    from ros_model.project import Project
+    from ros_model.project.observers import ObserverModel
+    from ros_model.project.project import Project
 
 MODEL = Path("models") / "observers.ros"
 _TEMPLATES = Path(__file__).parent / "templates"

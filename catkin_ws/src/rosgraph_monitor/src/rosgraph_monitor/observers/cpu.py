@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import psutil
+from robot_formulas.quality import normalised
 
 from rosgraph_monitor.observer import Observer, StaleInputError
-from rosgraph_monitor.quality import normalised
 
 if TYPE_CHECKING:
     from diagnostic_msgs.msg import DiagnosticStatus

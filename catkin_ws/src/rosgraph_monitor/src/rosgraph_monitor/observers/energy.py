@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from robot_formulas.quality import energy_level
 from std_msgs.msg import Float32
 
 from rosgraph_monitor.observer import StaleInputError, TopicObserver
-from rosgraph_monitor.quality import energy_level
 
 if TYPE_CHECKING:
     from diagnostic_msgs.msg import DiagnosticStatus

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from robot_formulas.quality import normalised, position_uncertainty
 
 from rosgraph_monitor.observer import StaleInputError, TopicObserver, Topics
-from rosgraph_monitor.quality import normalised, position_uncertainty
 
 if TYPE_CHECKING:
     from diagnostic_msgs.msg import DiagnosticStatus

@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import LaserScan, PointCloud2, PointField
-from std_msgs.msg import Float32
-from tf2_msgs.msg import TFMessage
-
-from rosgraph_monitor.frames import StaticFrames
-from rosgraph_monitor.observer import StaleInputError, TopicObserver, Topics
-from rosgraph_monitor.quality import (
+from robot_formulas.quality import (
     BRAKING_GAIN,
     braking_distance,
     closest_in_direction,
     physical_braking_distance,
     safety_risk,
 )
+from sensor_msgs.msg import LaserScan, PointCloud2, PointField
+from std_msgs.msg import Float32
+from tf2_msgs.msg import TFMessage
+
+from rosgraph_monitor.observer import StaleInputError, TopicObserver, Topics
+from rosgraph_monitor.observers.frames import StaticFrames
 
 if TYPE_CHECKING:
     from diagnostic_msgs.msg import DiagnosticStatus
     from numpy.typing import NDArray
-    from ros_model.metamodel import RosSystem
+    from ros_model.language.metamodel import RosSystem
 
 ODOMETRY = "odometry/filtered"
 SCAN = "front/scan"

@@ -1,0 +1,1 @@
+"""Missions as plain data: read from bags without ROS, summarised, drawn."""

@@ -1,0 +1,204 @@
+"""The picture of a mission: the map with the path coloured by configuration, below it both quality series."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from metacontrol_bags.metrics import summarise
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+
+    from metacontrol_bags.record import MissionRecord
+
+_DPI = 160
+_SIZE_INCH = (10.0, 12.5)
+"""1600 x 2000 pixels."""
+
+_COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#9467bd", "#8c564b", "#e377c2", "#17becf", "#bcbd22")
+_FAILURE = "#d62728"
+_MARGIN_M = 0.6
+
+
+def draw(record: MissionRecord, path: Path) -> None:
+    """Draws a mission into a PNG file of 1600 x 2000 pixels.
+
+    Raises:
+        MetricsError: the record's events make no sense.
+        OSError: the file cannot be written.
+    """
+    summary = summarise(record)
+    figure = Figure(figsize=_SIZE_INCH, dpi=_DPI, layout="constrained")
+    axes = figure.subplots(3, 1, height_ratios=(3.6, 1.0, 1.0))
+    figure.suptitle(_title(summary), fontsize=13)
+    _draw_map(axes[0], record, summary)
+    for axis, name in zip(axes[1:], ("safety", "energy"), strict=True):
+        _draw_quality(axis, record, summary, name)
+    axes[1].tick_params(labelbottom=False)
+    axes[2].set_xlabel("simulated time since the start of the mission (s)")
+    figure.savefig(path, dpi=_DPI, format="png")
+
+
+def configuration_spans(record: MissionRecord) -> list[tuple[float, float, str]]:
+    """From when to when (stamps in s) each configuration was in force; a change counts from STABLE on."""
+    start, end = record.start_stamp, record.end_stamp
+    stable = [report for report in record.configurations if report.state == "STABLE" and report.stamp < end]
+    changes: list[tuple[float, str]] = []
+    for report in stable:
+        if not changes or changes[-1][1] != report.configuration:
+            changes.append((max(report.stamp, start), report.configuration))
+    if not changes:
+        began = record.event("MISSION_START")
+        changes = [(start, began.values.get("initial_configuration", "unknown") if began else "unknown")]
+    changes[0] = (start, changes[0][1])
+    ends = [stamp for stamp, _ in changes[1:]] + [end]
+    return [(begin, until, name) for (begin, name), until in zip(changes, ends, strict=True) if until > begin]
+
+
+def _title(summary: dict[str, Any]) -> str:
+    manager = "with metacontrol" if summary["metacontrol"] else "baseline without metacontrol"
+    result = "goal reached" if summary["goal_reached"] else f"goal not reached ({summary['outcome']})"
+    return (
+        f"Mission {summary['mission']}, route {summary['route']}, seed {summary['seed']}, {manager}\n"
+        f"{result} after {summary['duration_s']:.1f} s, {summary['path_length_m']:.1f} m, "
+        f"{len(summary['reconfigurations'])} reconfiguration(s)"
+    )
+
+
+def _draw_map(axis: Axes, record: MissionRecord, summary: dict[str, Any]) -> None:
+    start = record.start_stamp
+    _draw_obstacles(axis, record)
+    colours = _colours(record)
+    inside = (record.poses[:, 0] >= start) & (record.poses[:, 0] <= record.end_stamp)
+    poses = record.poses[inside]
+    for begin, until, name in configuration_spans(record):
+        first, last = np.searchsorted(poses[:, 0], (begin, until))
+        span = poses[first : last + 1, 1:]
+        axis.plot(span[:, 0], span[:, 1], color=colours[name], linewidth=3.5, solid_capstyle="round", zorder=3)
+    if record.obstacles:
+        axis.plot(*zip(*record.obstacles, strict=True), "s", color=_FAILURE, markersize=6, zorder=2)
+    handles = [Line2D([], [], color=colour, linewidth=3.5, label=name) for name, colour in colours.items()]
+    if record.obstacles:
+        handles.append(Line2D([], [], color=_FAILURE, marker="s", linestyle="", label="clutter"))
+    if len(poses):
+        handles.append(_mark(axis, (poses[0, 1], poses[0, 2]), "o", "black", "start"))
+    goal = _goal(record)
+    if goal:
+        handles.append(_mark(axis, goal, "*", "#2ca02c", "goal", size=20))
+    for entry in summary["perturbations"]:
+        place = _place(poses, start + entry["stamp_s"])
+        if place and "places" not in entry:  # clutter is drawn where it lies
+            handles.append(_mark(axis, place, "X", _FAILURE, f"{entry['name']}\nstruck", size=15))
+    for number, entry in enumerate(summary["reconfigurations"], start=1):
+        place = _place(poses, start + entry["stamp_s"])
+        if place:
+            label = f"{number}: {entry['from']}\n\N{RIGHTWARDS ARROW} {entry['to']}"
+            handles.append(_mark(axis, place, "D", "#ffd92f", label, size=7))
+            axis.annotate(
+                str(number), place, xytext=(14, -16), textcoords="offset points", fontsize=12, fontweight="bold"
+            )
+    axis.set_aspect("equal")
+    axis.set_xlabel("x (m)")
+    axis.set_ylabel("y (m)")
+    legend = axis.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9, frameon=False)
+    for handle in legend.get_lines():
+        handle.set_markersize(8)
+
+
+def _draw_obstacles(axis: Axes, record: MissionRecord) -> None:
+    grid = record.map
+    if grid is None:
+        axis.autoscale()
+        return
+    rows, columns = grid.occupied.shape
+    right, top = grid.origin_x + columns * grid.resolution, grid.origin_y + rows * grid.resolution
+    shades = np.where(grid.occupied, 0.35, 1.0)
+    extent = (grid.origin_x, right, grid.origin_y, top)
+    axis.imshow(shades, cmap="gray", vmin=0, vmax=1, origin="lower", extent=extent, interpolation="nearest")
+    if grid.occupied.any():
+        ys, xs = np.nonzero(grid.occupied)
+        axis.set_xlim(*_limits(grid.origin_x + xs * grid.resolution))
+        axis.set_ylim(*_limits(grid.origin_y + ys * grid.resolution))
+
+
+def _limits(values: np.ndarray) -> tuple[float, float]:
+    return float(values.min()) - _MARGIN_M, float(values.max()) + _MARGIN_M
+
+
+def _mark(axis: Axes, place: tuple[float, float], marker: str, colour: str, label: str, *, size: float = 11) -> Line2D:
+    (line,) = axis.plot(
+        *place,
+        marker=marker,
+        color=colour,
+        markeredgecolor="black",
+        markersize=size,
+        linestyle="",
+        label=label,
+        zorder=5,
+    )
+    return line
+
+
+def _draw_quality(axis: Axes, record: MissionRecord, summary: dict[str, Any], name: str) -> None:
+    start, end = record.start_stamp, record.end_stamp
+    limit = summary["thresholds"][name]
+    observed = [(r.stamp - start, np.nan if r.level is None else r.level) for r in record.observed if r.name == name]
+    truth = [(stamp - start, level) for stamp, level in record.true_quality.get(name, ())]
+    series = ((observed, "#888888", 0.9, "observed"), (truth, "#1f4e79", 1.4, "ground truth"))
+    for samples, colour, width, label in series:
+        if samples:
+            held = [*samples, (end - start, samples[-1][1])] if samples[-1][0] < end - start else samples
+            axis.step(*zip(*held, strict=True), where="post", color=colour, linewidth=width, label=label)
+    axis.axhline(limit, color=_FAILURE, linestyle="--", linewidth=1.2, label=f"threshold {limit:g}")
+    strikes = [entry["stamp_s"] for entry in summary["perturbations"]]
+    if strikes:
+        axis.axvspan(min(strikes), end - start, color=_FAILURE, alpha=0.10, linewidth=0, label="contingency")
+    for number, entry in enumerate(summary["reconfigurations"], start=1):
+        done = entry["stamp_s"] + (entry["execute_s"] or 0.0)
+        legend = "reconfiguration" if number == 1 else None
+        axis.axvspan(entry["stamp_s"], done, color="#ffb000", alpha=0.6, linewidth=1.5, zorder=0, label=legend)
+        axis.annotate(
+            f"{number}: {entry['to']}", (done, 1.0), xytext=(4, -2), textcoords="offset points", fontsize=9, va="top"
+        )
+    axis.set_xlim(0.0, max(end - start, 1.0))
+    axis.set_ylim(0.0, 1.08)
+    unit = "safety risk" if name == "safety" else name
+    share = summary["time_above_threshold"][name]
+    told = "" if share is None else f"\nabove: {share:.1%}"
+    axis.set_ylabel(f"{unit}{told}")
+    axis.grid(alpha=0.3)
+    axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9, frameon=False)
+
+
+def _colours(record: MissionRecord) -> dict[str, str]:
+    """One colour per configuration, in the order of appearance."""
+    names = dict.fromkeys(name for _, _, name in configuration_spans(record))
+    return {name: _COLOURS[number % len(_COLOURS)] for number, name in enumerate(names)}
+
+
+def _goal(record: MissionRecord) -> tuple[float, float] | None:
+    """The goal that MISSION_START tells, "x y yaw"."""
+    began = record.event("MISSION_START")
+    try:
+        x, y, *_ = map(float, (began.values.get("goal", "") if began else "").split())
+    except ValueError:
+        return None
+    return x, y
+
+
+def _place(poses: np.ndarray, stamp: float) -> tuple[float, float] | None:
+    """Where the robot was at a moment."""
+    if not len(poses):
+        return None
+    index = min(int(np.searchsorted(poses[:, 0], stamp)), len(poses) - 1)
+    return float(poses[index, 1]), float(poses[index, 2])

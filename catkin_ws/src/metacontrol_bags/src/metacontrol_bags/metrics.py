@@ -1,0 +1,373 @@
+"""The summary of a mission, from its record alone.
+
+Definitions
+- Mission time runs from the event MISSION_START to MISSION_END; `stamp_s` is simulated seconds since MISSION_START.
+- Shares and means of a QA are weighted by time: a sample holds until the next one. `time_above_threshold` and `mean_qa`
+  are those of the ground truth, `observed_qa` those of what the observers reported, over the time they were not stale.
+- `detect_s` of a component: from the perturbation that hit it to the stamp of the first diagnostic that reports it
+  FALSE. Of a QA: from the moment when the ground truth rose above the threshold (the rise that the observers' first
+  report falls into) to the first report above the threshold of that violation; null where the ground truth was not
+  above it then.
+- `decide_s`: from that diagnostic to the Decision DECIDED. `execute_s`: from DECIDED to EXECUTED.
+- `control` is of the initial configuration, until the first change: the rate that its controller was set to, and the
+  share of its periods in which no velocity command came. A command that is late within its period is none of them; a
+  controller that lags behind its schedule by a whole period, at once or little by little, has missed one.
+- `success` is the paper's: goal reached, mean safety risk < 0.4, risk below its threshold for more than 95 % of the
+  time, energy below its threshold for more than 90 % of the time; and not longer than 250 s.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from metacontrol_bags.goal_status import GoalStatus
+from metacontrol_bags.record import MissionRecord, Samples
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from metacontrol_bags.record import DecisionReport
+
+SCHEMA_VERSION = 1
+
+
+TIMEOUT_S = 250.0
+"""A run that lasts longer than this has failed (paper, section on D2)."""
+
+
+class MetricsError(ValueError):
+    """A mission's event says what cannot be."""
+
+
+DEFAULT_THRESHOLDS = {"safety": 0.6, "energy": 0.62}
+"""Thresholds of D2 (paper), where the bag does not tell any."""
+
+MAX_MEAN_SAFETY = 0.4
+MAX_SHARE = {"safety": 0.05, "energy": 0.10}
+"""The paper's definition of success: limits of the mean risk and of the shares of time above the thresholds."""
+
+_SAME_MOMENT_S = 0.05
+"""Stamps of different nodes may differ by a few periods of `/clock` (0.01 s) for what happened in the same moment."""
+
+_ROUNDING = 1e-6
+"""Periods by which times that are whole numbers of periods apart may seem less."""
+
+_CLOCK_LAG_S = 0.5
+"""So far the clock of a node may lag behind another's on a loaded machine; the mission ends by its own."""
+
+
+def summarise(record: MissionRecord) -> dict[str, Any]:
+    """The content of summary.json; figures that the bag does not hold are None."""
+    start, end = record.start_stamp, record.end_stamp
+    began, ended = record.event("MISSION_START"), record.event("MISSION_END")
+    told = began.values if began else {}
+    closing = ended.values if ended else {}
+    limits = thresholds(record)
+    above = {name: share_above(record.true_quality.get(name, ()), limit, start, end) for name, limit in limits.items()}
+    means = {name: mean(record.true_quality.get(name, ()), start, end) for name in limits}
+    goals = mission_goals(record)
+    reached = bool(goals) and all(status is GoalStatus.SUCCEEDED for status in goals.values())
+    duration = end - start
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "commit": told.get("commit", "unknown"),
+        "engine": told.get("engine", "ros"),
+        "mission": told.get("mission", "D2"),
+        "route": told.get("route", "unknown"),
+        "contingency": {
+            "clutter": int(_number(told, "clutter", 0)),
+            "power": _number(told, "power_factor", 1.0),
+            "component": None if told.get("failure", "none") == "none" else told["failure"],
+        },
+        "metacontrol": told.get("metacontrol", "true" if record.decisions else "false") == "true",
+        "seed": int(_number(told, "seed", 0)),
+        "goal_reached": reached,
+        "success": reached and duration <= TIMEOUT_S and _good_quality(means, above),
+        "duration_s": _rounded(duration),
+        "path_length_m": _rounded(path_length(record, start, end)),
+        "collisions": _collisions(record.contacts, start, end),
+        "initial_configuration": configuration_at(record, start) or told.get("initial_configuration"),
+        "final_configuration": configuration_at(record, end) or told.get("initial_configuration"),
+        "time_above_threshold": {name: _rounded(value) for name, value in above.items()},
+        "mean_qa": {name: _rounded(value) for name, value in means.items()},
+        "reconfigurations": reconfigurations(record, "EXECUTED"),
+        "reconfigurations_failed": reconfigurations(record, "FAILED"),
+        "perturbations": _perturbations(record),
+        "goals": {
+            "sent": len(goals),
+            "failed": sum(status is not GoalStatus.SUCCEEDED for status in goals.values()),
+        },
+        "control": _control(record, told, start, end),
+        "cost": _cost(record, start, end),
+        "real_time_factor": _real_time_factor(duration, closing),
+        "outcome": closing.get("outcome", "unknown"),
+        "reason": closing.get("reason", "the bag holds no end of the mission"),
+        "start_stamp_s": _rounded(start),
+        "thresholds": limits,
+        "observed_qa": {name: _observed(record, name, limit, start, end) for name, limit in limits.items()},
+    }
+
+
+def thresholds(record: MissionRecord) -> dict[str, float]:
+    """Threshold of each QA, as MISSION_START tells them (`nfr_<qa>`), else D2's."""
+    began = record.event("MISSION_START")
+    told = began.values if began else {}
+    return {name: _number(told, f"nfr_{name}", default) for name, default in DEFAULT_THRESHOLDS.items()}
+
+
+def mission_goals(record: MissionRecord) -> dict[str, GoalStatus | None]:
+    """Goals sent during the mission, by id, with how they ended: None where they did not.
+
+    The manipulator's re-sending keeps the id, so it does not count as another goal; a goal that a bad result was
+    reported for and that was reached later counts as reached.
+    """
+    start, end = record.start_stamp - _SAME_MOMENT_S, record.end_stamp + _SAME_MOMENT_S
+    goals: dict[str, GoalStatus | None] = {
+        goal.id: None for goal in record.goals if goal.id and start <= goal.stamp <= end
+    }
+    for result in record.results:
+        if result.id in goals and result.status is not None and result.stamp <= record.end_stamp + _CLOCK_LAG_S:
+            goals[result.id] = GoalStatus.of(result.status)
+    return goals
+
+
+def configuration_at(record: MissionRecord, stamp: float) -> str | None:
+    """The configuration in force at a moment: the last one reported, None before any was."""
+    reported = [report.configuration for report in record.configurations if report.stamp <= stamp + _SAME_MOMENT_S]
+    return reported[-1] if reported else None
+
+
+def held(samples: Samples, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+    """Levels and for how long each held within [start, end]: a sample holds until the next one.
+
+    Returns:
+        Two arrays of the same length: level, duration in s. The time before the first sample is left out.
+    """
+    if not samples or end <= start:
+        return np.empty(0), np.empty(0)
+    times, levels = np.array(samples, dtype=np.float64).T
+    begins = np.clip(times, start, end)
+    ends = np.clip(np.append(times[1:], end), start, end)
+    return levels, np.maximum(ends - begins, 0.0)
+
+
+def share_above(samples: Samples, limit: float, start: float, end: float) -> float | None:
+    """Share of time (0..1) for which the level was above the limit; None without any sample."""
+    levels, durations = held(samples, start, end)
+    total = float(durations.sum())
+    return float(durations[levels > limit].sum()) / total if total > 0 else None
+
+
+def mean(samples: Samples, start: float, end: float) -> float | None:
+    """Mean level weighted by time; None without any sample."""
+    levels, durations = held(samples, start, end)
+    total = float(durations.sum())
+    return float((levels * durations).sum()) / total if total > 0 else None
+
+
+def quantile(samples: Samples, share: float, start: float, end: float) -> float | None:
+    """Level that was not exceeded for a share of the time; None without any sample."""
+    levels, durations = held(samples, start, end)
+    total = float(durations.sum())
+    if total <= 0:
+        return None
+    order = np.argsort(levels, kind="stable")
+    reached = np.cumsum(durations[order]) >= share * total - 1e-9
+    return float(levels[order][int(reached.argmax())])
+
+
+def path_length(record: MissionRecord, start: float, end: float) -> float:
+    """Length of the way driven in m, from the ground truth."""
+    stamps = record.poses[:, 0]
+    way = record.poses[(stamps >= start) & (stamps <= end), 1:]
+    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+
+
+def reconfigurations(record: MissionRecord, state: str) -> list[dict[str, Any]]:
+    """Adaptations of the mission that ended in a state (EXECUTED or FAILED), in the order of time."""
+    decided = {d.id: d for d in record.decisions if d.state == "DECIDED" and d.stamp >= record.start_stamp}
+    closed = [d for d in record.decisions if d.state == state and d.id in decided and d.stamp <= record.end_stamp + 1.0]
+    return [_reconfiguration(record, decided[d.id], d) for d in closed]
+
+
+def _reconfiguration(record: MissionRecord, decided: DecisionReport, closed: DecisionReport) -> dict[str, Any]:
+    caused, reported = _cause(record, decided)
+    return {
+        "stamp_s": _rounded(decided.stamp - record.start_stamp),
+        "trigger": decided.trigger,
+        "from": decided.from_configuration,
+        "to": decided.to_configuration,
+        "detect_s": _span(caused, reported),
+        "decide_s": _span(reported, decided.stamp),
+        "execute_s": _span(decided.stamp, closed.stamp_executed or closed.stamp),
+        "degraded": decided.degraded,
+    }
+
+
+def _cause(record: MissionRecord, decided: DecisionReport) -> tuple[float | None, float | None]:
+    """When the cause of an adaptation set in, and when it was first reported; None where that is not known."""
+    kind, _, name = decided.trigger.partition(":")
+    if kind == "component":
+        return _component_cause(record, name, decided)
+    if kind == "qa":
+        return _quality_cause(record, name, decided)
+    return None, decided.stamp_monitored or None
+
+
+def _component_cause(record: MissionRecord, name: str, decided: DecisionReport) -> tuple[float | None, float | None]:
+    strikes = [
+        event.stamp
+        for event in record.events
+        if event.kind == "PERTURBATION" and event.name == decided.trigger and event.stamp <= decided.stamp
+    ]
+    struck = strikes[-1] if strikes else None
+    reports = [r for r in record.components if r.component == name and r.stamp <= decided.stamp + _SAME_MOMENT_S]
+    if struck is not None:
+        after = (r.stamp for r in reports if r.status == "FALSE" and r.stamp >= struck - _SAME_MOMENT_S)
+        return struck, next(after, None)
+    return None, _start_of_run([(r.stamp, r.status == "FALSE") for r in reports])
+
+
+def _quality_cause(record: MissionRecord, name: str, decided: DecisionReport) -> tuple[float | None, float | None]:
+    limit = thresholds(record).get(name)
+    if limit is None:
+        return None, decided.stamp_monitored or None
+    reports = [r for r in record.observed if r.name == name and r.stamp <= decided.stamp]
+    reported = _start_of_run([(r.stamp, r.level is not None and r.level > limit) for r in reports])
+    if reported is None:
+        return None, decided.stamp_monitored or None
+    truth = [(s, v > limit) for s, v in record.true_quality.get(name, ()) if s <= reported + _SAME_MOMENT_S]
+    return _start_of_run(truth), reported
+
+
+def _start_of_run(flags: Sequence[tuple[float, bool]]) -> float | None:
+    """Stamp at which the unbroken run of true flags began that the last entry belongs to; None where that is false."""
+    began = None
+    for stamp, flag in reversed(flags):
+        if not flag:
+            break
+        began = stamp
+    return began
+
+
+def _good_quality(means: dict[str, float | None], above: dict[str, float | None]) -> bool:
+    safety = means["safety"]
+    if safety is None or safety >= MAX_MEAN_SAFETY:
+        return False
+    return all((share := above[name]) is not None and share < limit for name, limit in MAX_SHARE.items())
+
+
+def _collisions(contacts: Samples, start: float, end: float) -> int | None:
+    """Contact episodes during the mission, None where nothing was recorded."""
+    if not contacts:
+        return None
+    before = [count for stamp, count in contacts if stamp <= start] or [contacts[0][1]]
+    until = [count for stamp, count in contacts if stamp <= end] or before
+    return int(until[-1] - before[-1])
+
+
+def _perturbations(record: MissionRecord) -> list[dict[str, Any]]:
+    found = []
+    for event in record.events:
+        if event.kind == "PERTURBATION":
+            entry: dict[str, Any] = {"stamp_s": _rounded(event.stamp - record.start_stamp), "name": event.name}
+            if "share" in event.values:
+                entry["share"] = _number(event.values, "share", 0.0)
+            if "pid" in event.values:
+                entry["pid"] = int(_number(event.values, "pid", 0))
+            if "places" in event.values:
+                entry["places"] = _places(event.values["places"])
+            found.append(entry)
+    return found
+
+
+def _places(text: str) -> list[list[float]]:
+    """Places x,y of clutter, m in the map frame.
+
+    Raises:
+        MetricsError: they are none.
+    """
+    try:
+        return [[float(number) for number in place.split(",")] for place in text.split()]
+    except ValueError as error:
+        raise MetricsError(f"mission/event: places is {text!r}; expected x,y in m, space between them") from error
+
+
+def _observed(record: MissionRecord, name: str, limit: float, start: float, end: float) -> dict[str, float | None]:
+    """What the observers saw of a QA: mean, share above the threshold, and for how many seconds it was stale."""
+    reports = tuple(report for report in record.observed if report.name == name)
+    levels = tuple((r.stamp, np.nan if r.level is None else r.level) for r in reports)
+    values, durations = held(levels, start, end)
+    stale = np.isnan(values)
+    fresh = float(durations[~stale].sum())
+    return {
+        "mean": _rounded(float((values[~stale] * durations[~stale]).sum()) / fresh) if fresh > 0 else None,
+        "time_above_threshold": _rounded(float(durations[values > limit].sum()) / fresh) if fresh > 0 else None,
+        "stale_s": _rounded(float(durations[stale].sum())),
+    }
+
+
+def periods_missed(stamps: Sequence[float], rate: float) -> float | None:
+    """Share of a controller's periods (rate in Hz) in which no command came; None with fewer than two commands."""
+    if len(stamps) < 2:
+        return None
+    lag, missed, periods = 0.0, 0.0, np.diff(np.asarray(stamps)) * rate
+    for period in periods:
+        lag = max(lag + float(period) - 1.0, 0.0)  # an early command gives no credit for later ones
+        missed += math.floor(lag + _ROUNDING)
+        lag -= math.floor(lag + _ROUNDING)
+    return missed / max(float(periods.sum()), 1.0)
+
+
+def _control(record: MissionRecord, told: dict[str, str], start: float, end: float) -> dict[str, float | None]:
+    """Rate of the initial configuration's controller, and the share of its periods that it missed."""
+    changes = [r.stamp for r in record.configurations if r.state != "STABLE" and start <= r.stamp <= end]
+    until = min(changes, default=end)
+    rate = _number(told, "controller_hz", 0.0)
+    stamps = [stamp for stamp in record.commands if start <= stamp <= until]
+    missed = periods_missed(stamps, rate) if rate > 0.0 else None
+    return {"rate_hz": rate or None, "periods_missed": _rounded(missed)}
+
+
+def _cost(record: MissionRecord, start: float, end: float) -> dict[str, dict[str, float | None]]:
+    """CPU (mean, per cent of a core) and memory (largest, MB) of each node that reported them during the mission."""
+    during = [report for report in record.costs if start <= report.stamp <= end]
+    costs = {}
+    for node in sorted({report.node for report in during}):
+        cpu = [report.value for report in during if report.node == node and report.figure == "cpu"]
+        memory = [report.value for report in during if report.node == node and report.figure == "memory"]
+        costs[node] = {
+            "cpu_percent_mean": _rounded(sum(cpu) / len(cpu)) if cpu else None,
+            "memory_mb_max": _rounded(max(memory)) if memory else None,
+        }
+    return costs
+
+
+def _real_time_factor(duration: float, closing: dict[str, str]) -> float | None:
+    """Simulated over wall duration of the mission."""
+    wall = _number(closing, "wall_duration_s", 0.0)
+    return _rounded(duration / wall) if wall > 0 else None
+
+
+def _number(values: dict[str, str], key: str, default: float) -> float:
+    """A number among an event's values.
+
+    Raises:
+        MetricsError: it is none.
+    """
+    try:
+        return float(values.get(key, default))
+    except ValueError as error:
+        raise MetricsError(f"mission/event: {key} is {values[key]!r}, which is no number") from error
+
+
+def _span(begin: float | None, end: float | None) -> float | None:
+    """Seconds from one moment to another, not below 0."""
+    return None if begin is None or end is None else _rounded(max(0.0, end - begin))
+
+
+def _rounded(value: float | None) -> Any:
+    return None if value is None else round(float(value), 4)

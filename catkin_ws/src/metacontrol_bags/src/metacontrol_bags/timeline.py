@@ -1,0 +1,121 @@
+"""What happens in a mission as lines for people: reports of the parts in, one entry per thing worth telling out.
+
+The components' and observers' reports repeat at every tick; the timeline tells only changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from metacontrol_bags.record import (
+    ComponentReport,
+    ConfigurationReport,
+    DecisionReport,
+    Event,
+    QualityReport,
+)
+
+CALM_S = 5.0
+"""A QA that was below its threshold for this long is told again when it rises above it."""
+
+Report = ComponentReport | QualityReport | DecisionReport | ConfigurationReport | Event
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A line of the timeline.
+
+    Attributes:
+        stamp: simulated seconds on the mission's clock.
+        step: "R1" monitor, "R2" analyse, "R3" plan, "R4" execute, "!" perturbation or "-" the mission itself.
+        text: what happened.
+        bad: whether it is bad news.
+    """
+
+    stamp: float
+    step: str
+    text: str
+    bad: bool = False
+
+
+class Timeline:
+    """Tells the changes; keeps what was told last."""
+
+    def __init__(self, thresholds: dict[str, float]) -> None:
+        """Takes the threshold of each QA."""
+        self._thresholds = thresholds
+        self._components: dict[str, str] = {}
+        self._violated: dict[str, float] = {}
+        self._stale: set[str] = set()
+        self._configurations: dict[str, ConfigurationReport] = {}
+
+    def tell(self, report: Report) -> tuple[Entry, ...]:
+        """The entries that a report makes, none where it brings nothing new."""
+        match report:
+            case ComponentReport():
+                return self._component(report)
+            case QualityReport():
+                return self._quality(report)
+            case DecisionReport():
+                return _decision(report)
+            case ConfigurationReport():
+                return self._configuration(report)
+            case Event():
+                return _event(report)
+
+    def _component(self, report: ComponentReport) -> tuple[Entry, ...]:
+        former = self._components.get(report.component, "TRUE")
+        self._components[report.component] = report.status
+        if report.status == former or (former, report.status) == ("RECOVERED", "TRUE"):
+            return ()
+        bad = report.status == "FALSE"
+        text = "has failed" if bad else "is back"
+        return (Entry(report.stamp, "R1", f"component {report.component} {text}", bad),)
+
+    def _quality(self, report: QualityReport) -> tuple[Entry, ...]:
+        if report.level is None:
+            if report.name in self._stale:
+                return ()
+            self._stale.add(report.name)
+            return (Entry(report.stamp, "R1", f"{report.name} cannot be observed: stale", True),)
+        self._stale.discard(report.name)
+        limit = self._thresholds.get(report.name)
+        if limit is None or report.level <= limit:
+            return ()
+        last = self._violated.get(report.name)
+        self._violated[report.name] = report.stamp
+        if last is not None and report.stamp - last < CALM_S:
+            return ()
+        return (Entry(report.stamp, "R1", f"{report.name} {report.level:.2f} is above {limit:g}", True),)
+
+    def _configuration(self, report: ConfigurationReport) -> tuple[Entry, ...]:
+        former = self._configurations.get(report.function)
+        self._configurations[report.function] = report
+        if former is None or (former.configuration, former.state) == (report.configuration, report.state):
+            return ()
+        bad = report.state in ("FAILED", "RECOVERING")
+        return (Entry(report.stamp, "R4", f"{report.function}: {report.configuration} {report.state}", bad),)
+
+
+def _decision(report: DecisionReport) -> tuple[Entry, ...]:
+    change = f"{report.from_configuration or 'nothing'} -> {report.to_configuration or 'nothing'}"
+    if report.state == "DECIDED":
+        how = ", degraded" if report.degraded else ""
+        return (
+            Entry(report.stamp, "R2", f"{report.objective} is violated by {report.trigger}", True),
+            Entry(report.stamp, "R3", f"{change}{how}", not report.to_configuration),
+        )
+    done = "done" if report.state == "EXECUTED" else report.state.lower()
+    return (Entry(report.stamp, "R4", f"{change} {done}", report.state != "EXECUTED"),)
+
+
+def _event(report: Event) -> tuple[Entry, ...]:
+    values = report.values
+    if report.kind == "PERTURBATION":
+        share = f" after {float(values['share']):.0%} of the way" if "share" in values else ""
+        pid = f", pid {values['pid']}: {values.get('how', 'kill')}" if "pid" in values else ""
+        return (Entry(report.stamp, "!", f"{report.name} struck{share}{pid}", True),)
+    if report.kind == "MISSION_START":
+        return (Entry(report.stamp, "-", f"goal sent, route {values.get('route', '?')}"),)
+    outcome = values.get("outcome", "?")
+    return (Entry(report.stamp, "-", f"mission over: {values.get('reason') or outcome}", outcome != "reached"),)

@@ -1,0 +1,1 @@
+"""Many missions: calibration of variants, comparison of engines, tables of them."""

@@ -1,0 +1,122 @@
+"""The commands `metacontrol calibrate` and `metacontrol variants`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from metacontrol_experiments.campaign.calibration import (
+    CalibrationError,
+    append_runs,
+    drive,
+    missing_runs,
+    plan,
+    read_runs,
+    write_levels,
+)
+from metacontrol_experiments.cli.display import CONSOLE, refusing, tell
+from metacontrol_experiments.io.commit import current_commit
+from metacontrol_experiments.io.package import simulation_package
+from metacontrol_experiments.mission.routes import RouteError, read_route, route_names
+from metacontrol_experiments.ros.runner import RunError
+
+if TYPE_CHECKING:
+    from metacontrol_experiments.campaign.calibration import Run
+
+RUNS = Path("results/calibration/runs.csv")
+
+_runs_option = click.option(
+    "--runs", type=click.Path(dir_okay=False, path_type=Path), default=RUNS, show_default=True, help="File of runs."
+)
+
+
+@click.command()
+@click.option("--seeds", type=click.IntRange(1), default=5, show_default=True, help="How many: 1, 2, ...")
+@click.option("--route", "routes", multiple=True, help="Only this one; any number of times.  [default: all]")
+@click.option("--variant", "variants", multiple=True, help="Only this one; any number of times.  [default: all]")
+@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Missions driven side by side.")
+@_runs_option
+@click.option(
+    "--levels",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Where the measured levels go, when all variants are measured.  [default: metacontrol_sim/models/qa.csv]",
+)
+def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tuple[str, ...]) -> None:
+    """Measure the expected quality levels: drive every variant over routes and seeds, in lockstep.
+
+    A line is added to the file of runs for each mission; what is in it already is not driven again. Then run
+    `rosmodel generate all` to take the levels into variants and ontology.
+    """
+    with refusing(CalibrationError, RouteError, RunError):
+        package = simulation_package()
+        known = sorted(path.stem for path in (package / "models" / "variants").glob("*.rossystem"))
+        file = package / "worlds" / "routes.yaml"
+        variants = _chosen("--variant", only["variants"], known)
+        routes = _chosen("--route", only["routes"], route_names(file))
+        for name in routes:
+            read_route(file, name)
+        done = read_runs(runs)
+        driven = {run.job for run in done}
+        missing = [job for job in plan(variants, routes, seeds) if job not in driven]
+        with _progress() as bar:
+            task = bar.add_task("missions", total=len(missing))
+            for run in append_runs(runs, drive(missing, file, current_commit(), jobs)):
+                done.append(run)
+                bar.update(task, advance=1, description=f"{run.variant} {run.route} seed {run.seed}: {run.outcome}")
+        _tell_runs(done, len(missing), runs)
+        lacking = missing_runs(done, known)
+        if lacking:
+            first = ", ".join(map(str, lacking[:3]))
+            tell(f"no levels written: {len(lacking)} missions are missing, {first} ...")
+            return
+        target = levels or package / "models" / "qa.csv"
+        write_levels(target, done)
+    tell(f"measured levels are in {target}; now: rosmodel generate all")
+
+
+@click.command()
+@_runs_option
+@click.option("--output", type=click.Path(dir_okay=False, path_type=Path), help="Write to a file instead.")
+def variants(runs: Path, output: Path | None) -> None:
+    """Print tables of a calibration's runs as Markdown, with 95 % confidence intervals over seeds."""
+    from metacontrol_experiments.campaign.variant_table import markdown  # scipy takes a while to import
+
+    with refusing(CalibrationError):
+        done = read_runs(runs)
+        if not done:
+            raise CalibrationError(f"{runs}: no runs; metacontrol calibrate makes some")
+        text = markdown(done)
+        if output:
+            text = f"# Variants\n\nMade by `metacontrol variants --output {output}`.\n\n{text}"
+            output.write_text(text, encoding="utf-8")
+            return
+    click.echo(text, nl=False)
+
+
+def _chosen(option: str, asked: tuple[str, ...], known: list[str]) -> list[str]:
+    """Return what was asked for, all without any.
+
+    Raises:
+        CalibrationError: something of it is not there.
+    """
+    for name in asked:
+        if name not in known:
+            raise CalibrationError(f"{option}: no {name!r}; there are {', '.join(known)}")
+    return list(asked) or known
+
+
+def _progress() -> Progress:
+    columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
+    return Progress(*columns, console=CONSOLE)
+
+
+def _tell_runs(done: list[Run], driven: int, path: Path) -> None:
+    bad = [run for run in done if not run.reached or run.collisions]
+    tell(f"{driven} missions driven, {len(done)} in {path}, {len(bad)} of them without success or with a collision")
+    for run in bad[:10]:
+        tell(f"  {run.job}: {run.outcome}, {run.collisions} collisions")
+    if len({run.commit for run in done}) > 1:
+        tell(f"{path} holds runs of different commits: delete it to measure one", "yellow")

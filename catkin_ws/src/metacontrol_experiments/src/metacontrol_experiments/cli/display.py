@@ -1,0 +1,156 @@
+"""What a person sees: notes and refusals of any command; of a mission the way, the timeline, a table at the end."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import TracebackType
+
+    from metacontrol_bags.timeline import Entry
+
+REFUSED, INTERRUPTED = 2, 130
+"""Exit status of a command."""
+
+CONSOLE = Console(highlight=False)
+_STYLES = {"R1": "yellow", "R2": "cyan", "R3": "cyan", "R4": "green", "!": "bold red", "-": "bold"}
+
+
+def tell(text: str, style: str = "") -> None:
+    """Shows a line."""
+    CONSOLE.print(Text(text, style), soft_wrap=True)
+
+
+@contextmanager
+def refusing(*kinds: type[Exception]) -> Iterator[None]:
+    """Ends a command with one line: where such an error, or one of the file system, comes up, or on Ctrl-C."""
+    refused: tuple[type[Exception], ...] = (*kinds, OSError)
+    try:
+        yield
+    except refused as error:
+        said = str(error)
+        if isinstance(error, OSError) and error.filename:
+            said = f"{error.filename}: {error.strerror}"
+        click.echo(f"metacontrol: {' '.join(said.split())}", err=True)
+        raise click.exceptions.Exit(REFUSED) from error
+    except KeyboardInterrupt as interrupt:
+        click.echo("metacontrol: interrupted; every process was ended", err=True)
+        raise click.exceptions.Exit(INTERRUPTED) from interrupt
+
+
+class Display:
+    """A mission: with a live bar on a terminal, else plain lines; silent if quiet."""
+
+    def __init__(self, quiet: bool = False) -> None:
+        """Shows nothing yet."""
+        self._quiet = quiet
+        self._bar: Progress | None = None
+        self._start = 0.0
+        self._tenth = 0
+        if CONSOLE.is_terminal and not quiet:
+            self._bar = Progress(
+                TextColumn("way"),
+                BarColumn(None),
+                TaskProgressColumn(),
+                TextColumn("{task.description}"),
+                console=CONSOLE,
+            )
+            self._task = self._bar.add_task("starting", total=1.0)
+
+    def __enter__(self) -> Display:
+        """Shows the bar."""
+        if self._bar:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Takes the bar away."""
+        if self._bar:
+            self._bar.stop()
+
+    def say(self, text: str) -> None:
+        """A line of its own."""
+        if not self._quiet:
+            tell(text)
+
+    def start(self, stamp: float) -> None:
+        """The mission starts: from here on, times count from this stamp."""
+        self._start = stamp
+
+    def entry(self, entry: Entry) -> None:
+        """A line of the timeline."""
+        line = Text(f"{entry.stamp - self._start:7.2f} s  ")
+        line.append(f"{entry.step:<2}", _STYLES.get(entry.step, ""))
+        line.append("  " + entry.text, "red" if entry.bad else "")
+        if not self._quiet:
+            CONSOLE.print(line, soft_wrap=True)
+
+    def progress(self, share: float, stamp: float, left_m: float) -> None:
+        """How much of the way is done (0..1), and how many metres are left as the crow flies."""
+        if self._bar:
+            text = f"{stamp - self._start:5.1f} s, {left_m:4.1f} m left"
+            self._bar.update(self._task, completed=share, description=text)
+        elif int(share * 10) > self._tenth:
+            self._tenth = int(share * 10)
+            self.say(f"{stamp - self._start:7.2f} s  ..  {self._tenth * 10} % of the way")
+
+    def summary(self, summary: dict[str, Any]) -> None:
+        """The closing tables."""
+        if not self._quiet:
+            CONSOLE.print(_figures(summary))
+            if summary["reconfigurations"]:
+                CONSOLE.print(_reconfigurations(summary["reconfigurations"]))
+
+
+def _figures(summary: dict[str, Any]) -> Table:
+    table = Table(
+        show_header=False, title=f"Mission {summary['mission']}, route {summary['route']}, seed {summary['seed']}"
+    )
+    table.add_column("")
+    table.add_column("", justify="right")
+    above, mean, goal = summary["time_above_threshold"], summary["mean_qa"], summary["goal_reached"]
+    configurations = dict.fromkeys((summary["initial_configuration"], summary["final_configuration"]))
+    rows: list[tuple[str, str]] = [
+        ("goal reached", "yes" if goal else f"no ({summary['outcome']})"),
+        ("success (paper's four conditions)", "yes" if summary["success"] else "no"),
+        ("duration", _with_unit(summary["duration_s"], "s")),
+        ("way driven", _with_unit(summary["path_length_m"], "m")),
+        ("collisions", "-" if summary["collisions"] is None else str(summary["collisions"])),
+        ("configuration", " -> ".join(map(str, configurations))),
+    ]
+    rows += [(f"time above the {name} threshold", _percent(share)) for name, share in above.items()]
+    rows += [(f"mean {name}", _with_unit(level, "")) for name, level in mean.items()]
+    rows.append(("control periods missed", _percent(summary["control"]["periods_missed"])))
+    rows.append(("simulated / wall time", _with_unit(summary["real_time_factor"], "")))
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _reconfigurations(entries: list[dict[str, Any]]) -> Table:
+    """Narrow enough for 80 columns."""
+    table = Table(title="Reconfigurations (s)", box=None, padding=(0, 1))
+    for title in ("at", "trigger", "from", "to", "detect", "decide", "execute"):
+        table.add_column(title, justify="left" if title in ("trigger", "from", "to") else "right", no_wrap=True)
+    for entry in entries:
+        spans = (_with_unit(entry[key], "") for key in ("detect_s", "decide_s", "execute_s"))
+        table.add_row(_with_unit(entry["stamp_s"], ""), entry["trigger"], entry["from"], entry["to"], *spans)
+    return table
+
+
+def _with_unit(value: float | None, unit: str) -> str:
+    return "-" if value is None else f"{value:.2f} {unit}".strip()
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{share:.2%}"

@@ -1,0 +1,1 @@
+"""What goes wrong in a mission, and when. Pure."""

@@ -1,0 +1,1 @@
+"""Missions without ROS: all parts stepped together in one process."""

@@ -1,0 +1,1 @@
+"""A mission: routes, settings, and its course. Pure."""

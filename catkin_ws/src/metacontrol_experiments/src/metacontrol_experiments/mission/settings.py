@@ -1,0 +1,113 @@
+"""What a mission is run with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S
+
+from metacontrol_experiments.contingency.contingency import Contingency, Kind, with_seed
+from metacontrol_experiments.mission.mission import Plan
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from metacontrol_experiments.mission.routes import Route
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One mission.
+
+    Attributes:
+        route: where it starts and goes.
+        output: folder for bag, summary, figure and logs.
+        metacontrol: with the reasoner; without it is the baseline.
+        seed: of everything random in the simulation.
+        initial_configuration: name of the variant deployed first.
+        contingencies: what goes wrong, and when.
+        components: name -> node, of what contingencies may hit.
+        world: file of the world or map; None for the factory.
+        real_time_factor: simulated per wall second, 0 for as fast as it can.
+        timeout_s: simulated seconds after which the mission has failed.
+        thresholds: QA name -> level that must not be exceeded.
+        gui: show the simulator's window.
+        rviz: start RViz.
+        port: of the master; None for a free one.
+        commit: of the code that runs.
+    """
+
+    route: Route
+    output: Path
+    metacontrol: bool = True
+    seed: int = 1
+    initial_configuration: str = "f2_v2_r2"
+    contingencies: tuple[Contingency, ...] = ()
+    components: dict[str, str] = field(default_factory=dict)
+    world: Path | None = None
+    real_time_factor: float = 1.0
+    timeout_s: float = TIMEOUT_S
+    thresholds: dict[str, float] = field(default_factory=lambda: dict(DEFAULT_THRESHOLDS))
+    gui: bool = False
+    rviz: bool = False
+    port: int | None = None
+    commit: str = "unknown"
+
+    @property
+    def plan(self) -> Plan:
+        """The mission's core."""
+        return Plan(
+            goal_x=self.route.goal.x,
+            goal_y=self.route.goal.y,
+            contingencies=with_seed(self.contingencies, self.seed),
+            timeout_s=self.timeout_s,
+        )
+
+    def launch_command(self, port: int) -> list[str]:
+        """The roslaunch command of the whole system, with a master on this port."""
+        file = "metacontrol_sim_reasoner.launch" if self.metacontrol else "MVP_metacontrol_world.launch"
+        start = self.route.start
+        arguments = {
+            "gui": _boolean(self.gui),
+            "rviz": _boolean(self.rviz),
+            "nav_profile": self.initial_configuration,
+            "initial_pose_x": repr(start.x),
+            "initial_pose_y": repr(start.y),
+            "initial_pose_a": repr(start.yaw),
+            "seed": str(self.seed),
+            "real_time_factor": repr(self.real_time_factor),
+        }
+        if self.world is not None:
+            arguments["world"] = str(self.world.resolve())
+        if self.metacontrol:
+            arguments |= {f"nfr_{name}": repr(level) for name, level in self.thresholds.items()}
+        pairs = [f"{name}:={value}" for name, value in arguments.items()]
+        return ["roslaunch", "-p", str(port), "metacontrol_sim", file, *pairs]
+
+    def describe(self) -> dict[str, str]:
+        """The values of the event MISSION_START, from which the bag alone tells what was run."""
+        goal = self.route.goal
+        broken = [entry for entry in self.contingencies if entry.kind.breaks_component]
+        power = [entry.value for entry in self.contingencies if entry.kind is Kind.POWER]
+        return {
+            "mission": "D2",
+            "route": self.route.name,
+            "goal": f"{goal.x:g} {goal.y:g} {goal.yaw:g}",
+            "metacontrol": _boolean(self.metacontrol),
+            "seed": str(self.seed),
+            "initial_configuration": self.initial_configuration,
+            "world": str(self.world) if self.world else "factory",
+            "clutter": str(sum(entry.obstacles for entry in self.contingencies)),
+            "failure": broken[0].target if broken else "none",
+            "power_factor": repr(power[-1] if power else 1.0),
+            "contingencies": " ".join(map(str, self.contingencies)),
+            "real_time_factor": repr(self.real_time_factor),
+            "timeout_s": repr(self.timeout_s),
+            **{f"nfr_{name}": repr(level) for name, level in self.thresholds.items()},
+            "commit": self.commit,
+        }
+
+
+def _boolean(value: bool) -> str:
+    return "true" if value else "false"

@@ -1,0 +1,1 @@
+"""Missions on ROS: the runner and its nodes."""

@@ -1,0 +1,176 @@
+"""Runs one mission from nothing to nothing: an own master, the system, the recorder, and all of it ended again."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import signal
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from metacontrol_bags.bag import TOPICS
+from roslib.packages import find_node
+from rospkg import ResourceNotFound
+
+from metacontrol_experiments.io.processes import ProcessTree, free_port, is_free
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from metacontrol_experiments.cli.display import Display
+    from metacontrol_experiments.mission.mission import State
+    from metacontrol_experiments.mission.settings import Settings
+
+RECORDER = "/mission_recorder"
+BAG_NAME = "mission.bag"
+
+_RECORDER_GRACE_S = 15.0
+_LAUNCH_GRACE_S = 12.0
+"""Wall seconds after which a process that was asked to end is made to."""
+
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_POINTER = ("The traceback for the exception", "log file:")
+_COMPLAINT = re.compile(r"error|exception|fatal|has died|unused args|invalid|no such", re.IGNORECASE)
+
+
+class RunError(RuntimeError):
+    """The mission could not be started; the message names the log."""
+
+
+def run_mission(settings: Settings, display: Display) -> State:
+    """Runs a mission and records it to OUTPUT/mission.bag.
+
+    Whatever happens, no process of the run is left behind.
+
+    Raises:
+        RunError: the system did not come up, or the mission cannot be run as asked for.
+        KeyboardInterrupt: it was interrupted; the bag is complete up to then.
+    """
+    log = settings.output / "log"
+    bag = settings.output / BAG_NAME
+    for folder in (settings.output, log):
+        folder.mkdir(parents=True, exist_ok=True)
+    with _alone_in(settings.output):
+        return _run_alone(settings, display, log, bag)
+
+
+def _run_alone(settings: Settings, display: Display, log: Path, bag: Path) -> State:
+    for old in (bag, bag.with_name(bag.name + ".active")):
+        old.unlink(missing_ok=True)
+    if settings.port is not None and not is_free(settings.port):
+        raise RunError(
+            f"--port: port {settings.port} is in use or not allowed: choose another, or leave the option out"
+        )
+    port = settings.port or free_port()
+    environment = {
+        "ROS_MASTER_URI": f"http://localhost:{port}",
+        "ROS_HOSTNAME": "localhost",
+        "ROS_HOME": str(log.resolve()),
+        "ROS_LOG_DIR": str(log.resolve()),
+    }
+    os.environ.pop("ROS_IP", None)
+    os.environ.update(environment)
+    tree = ProcessTree(environment)
+    with signals_as_interrupts(), _closing(tree):
+        return _run(settings, display, tree, port, bag)
+
+
+def _run(settings: Settings, display: Display, tree: ProcessTree, port: int, bag: Path) -> State:
+    from metacontrol_experiments.mission.mission import MissionError
+    from metacontrol_experiments.ros.mission import MissionNode  # rospy reads the environment when imported
+    from metacontrol_experiments.ros.startup import StartError
+
+    console = settings.output / "log" / "console.log"
+    display.say(f"starting the system on port {port}, its console is {console}")
+    launch = tree.start(settings.launch_command(port), console)
+
+    def check() -> None:
+        if launch.poll() is not None:
+            raise StartError(f"roslaunch has ended: {_last_complaint(console)}")
+
+    node = None
+    try:
+        node = MissionNode(settings, tree, display, check)
+        node.wait_ready()
+        recorder = tree.start(_record_command(bag), settings.output / "log" / "recorder.log")
+        node.wait_recorded(RECORDER)
+        state = node.drive()
+    except (StartError, MissionError) as error:
+        raise RunError(f"{error}; see {console}") from error
+    finally:
+        if node is not None:
+            node.close()
+    display.say("mission over, ending the system")
+    tree.stop(recorder, _RECORDER_GRACE_S)
+    tree.stop(launch, _LAUNCH_GRACE_S)
+    if not bag.exists():
+        raise RunError(f"the recorder left no {bag}; see {settings.output / 'log' / 'recorder.log'}")
+    return state
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Keeps other runs out of a folder.
+
+    Raises:
+        RunError: one is at work in it.
+    """
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise RunError(f"--output: another run is at work in {folder}: choose another folder") from error
+        yield
+    finally:
+        os.close(lock)
+
+
+def _record_command(bag: Path) -> list[str]:
+    """The recorder itself: its Python front end would not pass signals on.
+
+    Raises:
+        RunError: rosbag is not installed.
+    """
+    try:
+        found = find_node("rosbag", "record")
+    except ResourceNotFound:
+        found = []
+    if not found:
+        raise RunError("rosbag's recorder is not installed; on Debian it is in the package rosbag")
+    return [found[0], "-O", str(bag), "--min-space", "64M", *TOPICS, f"__name:={RECORDER.lstrip('/')}"]
+
+
+def _last_complaint(console: Path) -> str:
+    """The last line of a log that tells of an error, else the last line."""
+    text = _COLOUR.sub("", console.read_text(encoding="utf-8", errors="replace"))
+    lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith(_POINTER)]
+    return ([line for line in lines if _COMPLAINT.search(line)] or lines or ["it said nothing"])[-1]
+
+
+@contextmanager
+def _closing(tree: ProcessTree) -> Iterator[None]:
+    """Ends the processes at the end, and lets nobody disturb it."""
+    try:
+        yield
+    finally:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_IGN)
+        tree.close()
+
+
+@contextmanager
+def signals_as_interrupts() -> Iterator[None]:
+    """SIGTERM and SIGHUP end a run as Ctrl-C does."""
+
+    def interrupt(_number: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    former = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)

@@ -1,0 +1,177 @@
+"""Lets contingencies happen in a running system: signals to nodes, and services of simulator and power meter."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import signal
+import xmlrpc.client
+from typing import TYPE_CHECKING, Any
+
+import rosgraph
+import rospy
+from metacontrol_sim.srv import (
+    Contingency as ContingencyService,
+)
+from metacontrol_sim.srv import (
+    ContingencyRequest,
+    ContingencyResponse,
+    IncreaseConsumptionFactor,
+)
+from nav_msgs.msg import OccupancyGrid
+from pybullet_simulator.robot.faults import SIGNALS, Fault
+from pybullet_simulator.ros.grid_messages import GridMessageError, read_grid
+from pybullet_simulator.world.clutter import ClutterError, scatter
+from robot_formulas.geometry import Pose
+from simulator_msgs.srv import SetLight, SpawnObstacle
+
+from metacontrol_experiments.contingency.components import ComponentError, node_of
+from metacontrol_experiments.contingency.contingency import AT_START, ContingencyError, Kind, StrikeError, make
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from metacontrol_experiments.contingency.contingency import Contingency
+
+SERVICE = "contingency/strike"
+_SIGNALS = {
+    Kind.KILL: signal.SIGKILL,
+    Kind.STOP: signal.SIGINT,
+    Kind.FREEZE: signal.SIGSTOP,
+    Kind.THAW: signal.SIGCONT,
+    Kind.REPEAT: SIGNALS[Fault.REPEAT],
+    Kind.JUMP: SIGNALS[Fault.JUMP],
+}
+_WAIT_S = 10.0
+_CALL_S = 2.0
+"""Wall seconds for a service or the map to be there, and for a call to a node's own API."""
+
+
+class ImpatientTransport(xmlrpc.client.Transport):
+    """Calls that end after a time, since a hung node would never answer."""
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        """Return a connection with a time-out."""
+        connection = super().make_connection(host)
+        connection.timeout = _CALL_S
+        return connection
+
+
+class Striker:
+    """Knows which node is behind a component, and how each kind of contingency is made."""
+
+    def __init__(self, components: Mapping[str, str], owns: Callable[[int], bool]) -> None:
+        """Keep what it needs.
+
+        Args:
+            components: name -> node.
+            owns: tells whether a process may be struck.
+        """
+        self._components = components
+        self._owns = owns
+        self._pids: dict[str, int] = {}  # of frozen nodes, which no longer tell theirs
+
+    def strike(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> dict[str, str]:
+        """Let a contingency happen now; return what is worth telling of it.
+
+        Args:
+            contingency: what is to happen.
+            way: where the robot starts and where it goes; clutter at random places follows from it and the seed.
+
+        Raises:
+            StrikeError: it could not.
+        """
+        try:
+            if contingency.kind.hits_component:
+                return self._signal(contingency)
+            if contingency.kind is Kind.POWER:
+                return self._call(
+                    "increase_power_consumption", IncreaseConsumptionFactor, factor=f"{contingency.value:g}"
+                )(contingency.value)
+            if contingency.kind is Kind.LIGHT:
+                return self._call("simulator/set_light", SetLight, light=f"{contingency.value:g}")(contingency.value)
+            return self._clutter(contingency, way)
+        except (OSError, xmlrpc.client.Error, rosgraph.MasterException, rospy.ROSException) as error:
+            raise StrikeError(f"{contingency}: {' '.join(str(error).split())}") from error
+        except (rospy.ServiceException, ComponentError, ClutterError, GridMessageError) as error:
+            raise StrikeError(f"{contingency}: {error}") from error
+
+    def _signal(self, contingency: Contingency) -> dict[str, str]:
+        """Send a component's node the signal of a kind."""
+        node = rospy.resolve_name(node_of(contingency.target, self._components))
+        pid = self._pids.get(node) or self._pid_of(node)
+        if not self._owns(pid):
+            raise StrikeError(f"{node} (pid {pid}) is not a process that may be struck from here")
+        number = _SIGNALS[contingency.kind]
+        if contingency.kind.spoils_data and not _handles(pid, number):
+            raise StrikeError(f"{node} (pid {pid}) is no driver whose data can be spoilt")
+        os.kill(pid, number)
+        if contingency.kind is Kind.FREEZE:
+            self._pids[node] = pid
+        else:
+            self._pids.pop(node, None)
+        return {"node": node, "pid": str(pid), "how": contingency.kind.value}
+
+    def _pid_of(self, node: str) -> int:
+        """Return the process of a node, as its own API tells."""
+        uri = rosgraph.Master(rospy.get_name()).lookupNode(node)
+        with xmlrpc.client.ServerProxy(uri, transport=ImpatientTransport()) as proxy:
+            answer: Any = proxy.getPid(rospy.get_name())
+        return int(answer[2])
+
+    def _clutter(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> dict[str, str]:
+        """Put obstacles on the floor: the listed ones, or random ones off the ends of the way."""
+        places = tuple(Pose(x, y, 0.0) for x, y in contingency.places)
+        if not places and contingency.count:
+            if way is None:
+                raise StrikeError(f"{contingency}: random places need a pose on amcl_pose; list the places instead")
+            grid = read_grid(rospy.wait_for_message("map", OccupancyGrid, _WAIT_S))
+            places = scatter(grid, *way, contingency.count, contingency.seed or 0)
+        spawn = self._call("simulator/spawn_obstacle", SpawnObstacle)
+        for place in places:
+            spawn(x=place.x, y=place.y, yaw=place.yaw)
+        return {"places": " ".join(f"{place.x:.3f},{place.y:.3f}" for place in places)}
+
+    def _call(self, service: str, kind: type, **told: str) -> Callable[..., dict[str, str]]:
+        """Return a call of a service that raises where it is refused, and returns what is told."""
+        rospy.wait_for_service(service, _WAIT_S)
+        proxy = rospy.ServiceProxy(service, kind)
+
+        def call(*arguments: float, **fields: float) -> dict[str, str]:
+            answer = proxy(*arguments, **fields)
+            if not answer.success:
+                raise StrikeError(f"{service} refused: {getattr(answer, 'message', '') or arguments}")
+            return told
+
+        return call
+
+
+def _handles(pid: int, number: int) -> bool:
+    """Whether a process takes a signal that would end it otherwise."""
+    with open(f"/proc/{pid}/status", encoding="ascii", errors="replace") as status:
+        caught = next((line.split()[1] for line in status if line.startswith("SigCgt:")), "0")
+    return bool(int(caught, 16) >> (number - 1) & 1)
+
+
+def serve(strike: Callable[[Contingency], None], seed: int) -> rospy.Service:
+    """Offer the service `contingency/strike`, by which anybody lets a contingency happen now.
+
+    Args:
+        strike: lets it happen; called in a thread of rospy; raises StrikeError.
+        seed: of random places where the request has none.
+    """
+
+    def answer(request: ContingencyRequest) -> ContingencyResponse:
+        kind = request.kind
+        what: object = request.target if request.target else request.value
+        if kind == Kind.CLUTTER.value:
+            what = {"count": request.value, "seed": request.seed or seed}
+        try:
+            contingency = make(kind, what, AT_START, SERVICE)
+            strike(contingency)
+        except (ContingencyError, StrikeError) as error:
+            rospy.logwarn(f"contingency refused: {error}")
+            return ContingencyResponse(False, str(error))
+        return ContingencyResponse(True, contingency.event)
+
+    return rospy.Service(SERVICE, ContingencyService, answer)

@@ -1,0 +1,1 @@
+"""ROS shells of the demonstrator: power meter, goal, text for RViz."""

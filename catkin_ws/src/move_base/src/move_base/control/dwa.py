@@ -1,0 +1,248 @@
+"""Dynamic-window controller: samples velocities, rolls them out, checks the footprint, scores, takes the cheapest.
+
+As in base_local_planner the robot drives arcs and turns on the spot; sideways and backward samples are tried only where
+none of these is free, because the sensors look ahead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from move_base.control.oscillation import OscillationFlags
+from move_base.control.rollout import Footprint, Rollout, Trajectory, roll_out
+from move_base.costmap.grid import INSCRIBED
+from move_base.geometry import Pose, Velocity, inscribed_radius, wrap_angle
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from move_base.costmap.costmap import Snapshot
+    from move_base.parameters.parameters import MoveBaseParameters
+
+MIN_STEPS, MAX_STEPS = 4, 20
+"""Poses per trajectory: as many as sim_granularity asks for, within these. At 0.75 m/s and 2 s the most are 7.5 cm
+apart, under a tenth of the footprint."""
+
+HARD_PADDING = (0.5, 0.25, 0.0)
+"""Shares of the footprint's padding that a trajectory must keep free: the first, and what is tried where an obstacle is
+in it already. The planner keeps the whole padding, so its paths leave the controller some room to follow them."""
+
+SCORED_EVERY = 4
+"""Every so many poses of a trajectory count for its distance to the path."""
+
+MIN_HORIZON = 0.8
+"""Shortest roll-out near the goal, s."""
+
+TURN_CHANGE_COST = 0.03
+"""Cost in metres per rad/s of change to the turning speed: keeps neighbouring samples from alternating."""
+
+SPEED_CHANGE_COST = 0.05
+"""Cost in metres per m/s of change to the forward speed, for the same reason; accelerating costs energy, too."""
+
+ALIGN_ANGLE = 1.05
+"""Off the path's direction by more than this (rad) the robot turns on the spot before it drives, if it can."""
+
+NARROW_ALIGN_ANGLE = 0.35
+"""The same for a robot that hardly moves in front of a narrow passage, which it can't enter aslant, rad."""
+
+NARROW_AHEAD = 1.0
+"""How far ahead a passage counts as in front, m: the robot's length."""
+
+ESCAPE_DISTANCE = 0.3
+"""Once it has to back off, the robot does so for this distance, m: with less it would come back to where it stuck."""
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What trajectories are judged by: the path ahead (N, 2), the costmap, and the shape to keep free."""
+
+    path: NDArray[np.float64]
+    snapshot: Snapshot
+    shape: Footprint
+
+
+class DwaController:
+    """The controller; from one step to the next it keeps the last command, and where it began to back off."""
+
+    def __init__(self, parameters: MoveBaseParameters) -> None:
+        self.reconfigure(parameters)
+        self.reset()
+
+    def reconfigure(self, parameters: MoveBaseParameters) -> None:
+        """Takes other parameters on the way."""
+        self.parameters = parameters.controller
+        self._period = 1.0 / parameters.controller_frequency
+        footprint, padded = np.array(parameters.local_costmap.footprint), parameters.local_costmap.padded_footprint()
+        padding = inscribed_radius(padded) - inscribed_radius(footprint)
+        self._shapes = [Footprint(footprint, share * padding) for share in HARD_PADDING]
+
+    def reset(self) -> None:
+        """Forgets the last command, for a new goal."""
+        self._last = Velocity()
+        self._backing_from: Pose | None = None
+        self._oscillation = OscillationFlags()
+
+    def follow(
+        self, robot: Pose, velocity: Velocity, path: NDArray[np.float64], to_goal: float, snapshot: Snapshot
+    ) -> Trajectory | None:
+        """Returns the best trajectory along a path, or None where every sample collides.
+
+        Args:
+            robot: in the local costmap's frame.
+            velocity: measured, in the base's frame.
+            path: the part of the plan ahead, in the local costmap's frame (N, 2), N >= 2.
+            to_goal: length of the plan ahead, m.
+            snapshot: the local costmap.
+        """
+        p = self.parameters
+        self._oscillation.follow(robot, p.oscillation_reset_dist)
+        horizon = min(p.sim_time, max(MIN_HORIZON, 2.0 * to_goal / p.max_vel_x))
+        scene = _Scene(path, snapshot, self._shape_for(robot, snapshot))
+        best = self._back_off(robot, scene)
+        error = abs(wrap_angle(_direction_of(path) - robot.yaw))
+        if best is None and error > self._align_angle(velocity, scene):
+            best = self._best(self._turn_samples(velocity), robot, horizon, scene)
+        if best is None:
+            best = self._best(self._arc_samples(velocity), robot, horizon, scene)
+        if best is None:
+            best = self._best(self._sideways_samples(velocity), robot, MIN_HORIZON, scene)
+        if best is None:
+            best = self._best(self._backward_samples(), robot, MIN_HORIZON, scene)
+            self._backing_from = None if best is None else robot
+        if best is not None:
+            self._last = best.velocity
+            self._oscillation.take(robot, best.velocity)
+        return best
+
+    def turn(self, robot: Pose, angle: float, snapshot: Snapshot) -> Trajectory | None:
+        """Returns a turn on the spot by up to `angle` (rad, signed), or None where it is not free.
+
+        The speed falls with the angle left, so that the turn ends without overshoot.
+        """
+        p = self.parameters
+        speed = min(p.max_vel_theta, max(p.min_in_place_vel_theta, abs(angle) / 0.5))
+        command = np.array([[0.0, 0.0, np.copysign(speed, angle)]])
+        rollout = roll_out(command, robot, min(abs(angle) / speed, 1.0), MAX_STEPS)
+        if not self._shape_for(robot, snapshot).is_free(rollout, snapshot)[0]:
+            return None
+        self._last = Velocity(0.0, 0.0, float(command[0, 2]))
+        return rollout.trajectory(0, 0.0)
+
+    def _back_off(self, robot: Pose, scene: _Scene) -> Trajectory | None:
+        """Goes on backing off, if it has begun and is not far enough or blocked."""
+        if self._backing_from is None:
+            return None
+        if robot.distance(self._backing_from) < ESCAPE_DISTANCE:
+            backward = self._best(self._backward_samples(), robot, MIN_HORIZON, scene)
+            if backward is not None:
+                return backward
+        self._backing_from = None
+        return None
+
+    def _align_angle(self, velocity: Velocity, scene: _Scene) -> float:
+        """How far off the path's direction the robot may drive, rad."""
+        if velocity.x > 1.5 * self.parameters.min_vel_x:
+            return ALIGN_ANGLE
+        near = scene.path[np.hypot(*(scene.path - scene.path[0]).T) <= NARROW_AHEAD]
+        g = scene.snapshot.geometry
+        rows, columns = g.cells(near)
+        clearance = scene.snapshot.clearance[rows.clip(0, g.height - 1), columns.clip(0, g.width - 1)].min()
+        narrow = clearance < scene.shape.circumscribed + scene.shape.margin
+        return NARROW_ALIGN_ANGLE if narrow else ALIGN_ANGLE
+
+    def _shape_for(self, robot: Pose, snapshot: Snapshot) -> Footprint:
+        """The footprint with its margin; a smaller margin where an obstacle is in it already, or nothing could move."""
+        here = Rollout(np.zeros((1, 3)), *(np.array([[value]]) for value in (robot.x, robot.y, robot.yaw)))
+        return next((shape for shape in self._shapes if shape.is_free(here, snapshot)[0]), self._shapes[-1])
+
+    def _arc_samples(self, velocity: Velocity) -> NDArray[np.float64]:
+        p = self.parameters
+        reach = p.acc_lim_x * self._period
+        fastest = min(p.max_vel_x, max(velocity.x + reach, p.min_vel_x))
+        slowest = min(max(p.min_vel_x, velocity.x - reach), fastest)
+        forward = np.linspace(fastest, slowest, p.vx_samples)
+        turn_reach = p.acc_lim_theta * self._period
+        low, high = np.clip([velocity.yaw - turn_reach, velocity.yaw + turn_reach], p.min_vel_theta, p.max_vel_theta)
+        turns = np.linspace(low, high, p.vtheta_samples)
+        turns = np.unique(np.append(turns, [np.clip(0.0, turns[0], turns[-1])]))
+        arcs = np.stack(np.meshgrid(forward, [0.0], turns, indexing="ij"), axis=-1).reshape(-1, 3)
+        return np.vstack([arcs, self._turn_samples(velocity)])
+
+    def _turn_samples(self, velocity: Velocity) -> NDArray[np.float64]:
+        p = self.parameters
+        turn_reach = p.acc_lim_theta * self._period
+        rates = np.linspace(p.min_in_place_vel_theta, p.max_vel_theta, max(2, p.vtheta_samples // 2))
+        rates = np.concatenate([-rates, rates])
+        near = rates[np.abs(rates - velocity.yaw) <= max(turn_reach, p.min_in_place_vel_theta * 1.01)]
+        samples = np.zeros((len(near), 3))
+        samples[:, 2] = near
+        return self._oscillation.allowed(samples)
+
+    def _sideways_samples(self, velocity: Velocity) -> NDArray[np.float64]:
+        p = self.parameters
+        reach = p.acc_lim_y * MIN_HORIZON  # what the base gets to while it drives such a sample
+        laterals = sorted({min(max(lateral, velocity.y - reach), velocity.y + reach) for lateral in p.y_vels})
+        samples = [(forward, lateral, 0.0) for lateral in laterals for forward in (0.0, p.min_vel_x)]
+        return self._oscillation.allowed(np.array(samples).reshape(-1, 3))
+
+    def _backward_samples(self) -> NDArray[np.float64]:
+        escape = self.parameters.escape_vel
+        return np.array([[escape, 0.0, 0.0]] if escape else []).reshape(-1, 3)
+
+    def _best(
+        self,
+        samples: NDArray[np.float64],
+        robot: Pose,
+        horizon: float,
+        scene: _Scene,
+    ) -> Trajectory | None:
+        if len(samples) == 0:
+            return None
+        rollout = roll_out(samples, robot, horizon, self._steps(horizon))
+        free = scene.shape.is_free(rollout, scene.snapshot)
+        if not free.any():
+            return None
+        kept = rollout.only(free)
+        costs = self._score(kept, scene.path, scene.snapshot)
+        best = int(costs.argmin())
+        return kept.trajectory(best, float(costs[best]))
+
+    def _steps(self, horizon: float) -> int:
+        p = self.parameters
+        return int(np.clip(np.ceil(p.max_vel_x * horizon / p.sim_granularity), MIN_STEPS, MAX_STEPS))
+
+    def _score(self, rollout: Rollout, path: NDArray[np.float64], snapshot: Snapshot) -> NDArray[np.float64]:
+        """Returns the cost of each trajectory (C,) in metres: off the path, short of its end, near obstacles, jerky."""
+        p = self.parameters
+        lengths = np.hypot(*np.diff(path, axis=0).T)
+        remaining = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
+        steps = slice(rollout.x.shape[1] - 1, None, -SCORED_EVERY)
+        dx = rollout.x[:, steps, None] - path[:, 0]
+        dy = rollout.y[:, steps, None] - path[:, 1]
+        squared = dx * dx + dy * dy
+        nearest = squared[:, 0].argmin(axis=1)
+        off_path = np.sqrt(squared.min(axis=2))
+        to_goal = remaining[nearest] + off_path[:, 0]
+        steps_along = np.diff(path, axis=0)
+        directions = np.arctan2(steps_along[:, 1], steps_along[:, 0])
+        turned = rollout.yaw[:, -1] - directions[np.minimum(nearest, len(directions) - 1)]
+        misaligned = p.heading_lookahead * (1.0 - np.cos(turned))
+        g = snapshot.geometry
+        rows, columns = g.cells(np.stack([rollout.x[:, steps], rollout.y[:, steps]], axis=-1))
+        cell_costs = snapshot.costs[rows, columns].astype(np.float32)
+        occupied = np.minimum(cell_costs, INSCRIBED).mean(axis=1) * g.resolution
+        changes = np.abs(rollout.velocities - (self._last.x, self._last.y, self._last.yaw))
+        jerk = changes @ (SPEED_CHANGE_COST, SPEED_CHANGE_COST, TURN_CHANGE_COST)
+        path_cost = p.path_distance_bias * (off_path.mean(axis=1) + misaligned)
+        return np.asarray(path_cost + p.goal_distance_bias * to_goal + p.occdist_scale * occupied + jerk)
+
+
+def _direction_of(path: NDArray[np.float64], over: float = 0.5) -> float:
+    """Returns the direction of a path's first `over` metres, rad."""
+    away = np.hypot(*(path - path[0]).T)
+    beyond = np.flatnonzero(away >= over)
+    step = path[beyond[0] if len(beyond) else -1] - path[0]
+    return float(np.arctan2(step[1], step[0]))

@@ -1,0 +1,109 @@
+"""Velocities rolled out: where the base gets to over a horizon, and whether its footprint keeps off obstacles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from move_base.geometry import Pose, Velocity, inscribed_radius
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from move_base.costmap.costmap import Snapshot
+
+EDGE_SPACING = 0.1
+"""Distance between the points that stand for the footprint's edge, m."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A velocity and where it leads.
+
+    Attributes:
+        velocity: the command.
+        poses: x, y, yaw over the horizon (S, 3).
+        cost: its score, m.
+    """
+
+    velocity: Velocity
+    poses: NDArray[np.float64]
+    cost: float
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """Sampled velocities (C, 3) and their poses x, y, yaw: three arrays (C, S)."""
+
+    velocities: NDArray[np.float64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    yaw: NDArray[np.float64]
+
+    def only(self, kept: NDArray[np.bool_]) -> Rollout:
+        """Returns those that are marked (C,)."""
+        return Rollout(self.velocities[kept], self.x[kept], self.y[kept], self.yaw[kept])
+
+    def trajectory(self, index: int, cost: float) -> Trajectory:
+        """Returns one of them with its cost."""
+        poses = np.stack([self.x[index], self.y[index], self.yaw[index]], axis=1)
+        return Trajectory(Velocity(*(float(value) for value in self.velocities[index])), poses, cost)
+
+
+def roll_out(velocities: NDArray[np.float64], robot: Pose, horizon: float, steps: int) -> Rollout:
+    """Integrates constant velocities (C, 3) in closed form over the horizon (s), to so many poses."""
+    times = np.linspace(horizon / steps, horizon, steps)
+    turned = velocities[:, 2:] * times
+    # sin(a)/a and (1 - cos(a))/a, whose limits at a = 0 are 1 and 0
+    sinc = np.sinc(turned / np.pi)
+    cosc = np.sinc(turned / (2.0 * np.pi)) * np.sin(turned / 2.0)
+    forward = (velocities[:, :1] * sinc - velocities[:, 1:2] * cosc) * times
+    left = (velocities[:, :1] * cosc + velocities[:, 1:2] * sinc) * times
+    cos, sin = np.cos(robot.yaw), np.sin(robot.yaw)
+    return Rollout(
+        velocities, robot.x + cos * forward - sin * left, robot.y + sin * forward + cos * left, robot.yaw + turned
+    )
+
+
+class Footprint:
+    """A footprint: points along its edge (N, 2), its two radii, and the margin kept around it, m."""
+
+    def __init__(self, corners: NDArray[np.float64], margin: float) -> None:
+        self.margin = margin
+        pieces = []
+        for corner, following in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            count = max(1, int(np.ceil(np.hypot(*(following - corner)) / EDGE_SPACING)))
+            fractions = np.arange(count)[:, None] / count
+            pieces.append(corner + fractions * (following - corner))
+        self.edge = np.concatenate(pieces)
+        self.inscribed = inscribed_radius(corners)
+        self.circumscribed = float(np.hypot(*corners.T).max())
+
+    def is_free(self, rollout: Rollout, snapshot: Snapshot) -> NDArray[np.bool_]:
+        """Whether each trajectory keeps the footprint off obstacles (C,); outside the costmap nothing is free.
+
+        The clearance of the robot's centre decides most poses; the edge is looked at only in between.
+        """
+        g = snapshot.geometry
+        rows, columns = g.cells(np.stack([rollout.x, rollout.y], axis=-1))
+        inside = (rows >= 0) & (rows < g.height) & (columns >= 0) & (columns < g.width)
+        clearance = np.where(
+            inside, snapshot.clearance[rows.clip(0, g.height - 1), columns.clip(0, g.width - 1)], np.float32(0.0)
+        )
+        margin = self.margin + 0.5 * g.resolution  # clearances end at the middle of an obstacle's cell
+        blocked: NDArray[np.bool_] = np.any(clearance <= self.inscribed + margin, axis=1)
+        unsure = (clearance <= self.circumscribed + margin) & ~blocked[:, None]
+        if unsure.any():
+            which, step = np.nonzero(unsure)
+            cos, sin = np.cos(rollout.yaw[which, step]), np.sin(rollout.yaw[which, step])
+            edge_x = rollout.x[which, step, None] + cos[:, None] * self.edge[:, 0] - sin[:, None] * self.edge[:, 1]
+            edge_y = rollout.y[which, step, None] + sin[:, None] * self.edge[:, 0] + cos[:, None] * self.edge[:, 1]
+            columns = ((edge_x - g.origin_x) * (1.0 / g.resolution)).astype(np.intp)
+            rows = ((edge_y - g.origin_y) * (1.0 / g.resolution)).astype(np.intp)
+            np.clip(columns, 0, g.width - 1, out=columns)
+            np.clip(rows, 0, g.height - 1, out=rows)
+            touching = (snapshot.clearance[rows, columns] <= margin).any(axis=1)
+            blocked[which[touching]] = True
+        return ~blocked

@@ -1,0 +1,1 @@
+"""Costmaps and what fills them. Pure."""

@@ -1,0 +1,63 @@
+"""Inflation by the published cost function, and the distance to the nearest obstacle that comes with it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from move_base.costmap.grid import FREE, INSCRIBED, LETHAL, UNKNOWN
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from move_base.parameters.parameters import Layer
+
+
+class Inflation:
+    """Costs around obstacles, for one footprint on a grid of one resolution; without a layer only distances.
+
+    Attributes:
+        limit: larger distances are not told apart, m.
+    """
+
+    def __init__(self, layer: Layer | None, resolution: float, inscribed: float, circumscribed: float) -> None:
+        """Tabulates the cost function over the distance, so that a look-up inflates the whole grid.
+
+        The table of 256 costs reaches a cell beyond the larger of the inflation and the circumscribed radius.
+
+        Args:
+            layer: the inflation layer, if there is one.
+            resolution: of the grid, m.
+            inscribed: radius of the padded footprint, m.
+            circumscribed: the same, m.
+        """
+        self._resolution = resolution
+        self._costs = layer is not None
+        radius = layer.inflation_radius if layer is not None else 0.0
+        factor = layer.cost_scaling_factor if layer is not None else 0.0
+        reach = max(radius, circumscribed, inscribed) / resolution + 2.0
+        self._scale = 254.0 / reach  # entries per cell of distance
+        self.limit = (LETHAL - 1) / self._scale * resolution
+        distances = np.arange(256) / self._scale * resolution
+        costs = (INSCRIBED - 1) * np.exp(-factor * (distances - inscribed))
+        costs = np.where(distances <= inscribed, INSCRIBED, costs)
+        costs = np.where((distances > radius) & (distances > 0.0), FREE, costs)
+        costs[0] = LETHAL
+        self._table = costs.astype(np.uint8)
+
+    def apply(self, costs: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Returns the inflated costs (H, W), and each cell's distance to the nearest obstacle (H, W), m."""
+        cells = cv2.distanceTransform((costs != LETHAL).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        if not cells.size or float(cells.max()) > 1e6:  # no obstacle at all
+            cells = np.full(costs.shape, self.limit / self._resolution, dtype=np.float32)
+        clearance = np.minimum(cells * np.float32(self._resolution), np.float32(self.limit))
+        if not self._costs:
+            return costs, clearance
+        unknown = costs == UNKNOWN
+        steps = cv2.convertScaleAbs(cells, alpha=self._scale)
+        inflated = np.asarray(cv2.LUT(steps, self._table), dtype=np.uint8)
+        if unknown.any():
+            inflated[unknown & (inflated < INSCRIBED)] = UNKNOWN
+        return inflated, clearance

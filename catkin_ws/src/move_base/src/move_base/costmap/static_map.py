@@ -1,0 +1,105 @@
+"""The static map: checked when it comes, and placed in a costmap's grid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from move_base.costmap.grid import FREE, LETHAL, UNKNOWN, Geometry
+from move_base.geometry import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from move_base.parameters.parameters import Layer
+
+MIN_RESOLUTION, MAX_RESOLUTION = 0.001, 10.0
+"""Sides of a map's cells that make sense, m."""
+
+
+class MapError(ValueError):
+    """A map can't be used; the message says why."""
+
+
+@dataclass(frozen=True)
+class StaticMap:
+    """An occupancy grid with its own origin.
+
+    Attributes:
+        geometry: the grid, before it is turned about its origin's corner.
+        yaw: turn of the grid about the origin, radians.
+        occupancy: -1 unknown, 0..100 (H, W), int8.
+    """
+
+    geometry: Geometry
+    yaw: float
+    occupancy: NDArray[np.int8]
+
+    @classmethod
+    def create(
+        cls, data: Sequence[int], width: int, height: int, resolution: float, origin: tuple[float, float, float]
+    ) -> StaticMap:
+        """Checks the fields of a nav_msgs/OccupancyGrid.
+
+        Raises:
+            MapError: sizes do not fit, or values are not finite.
+        """
+        if not all(math.isfinite(value) for value in origin) or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
+            raise MapError(f"the map's resolution ({resolution}) or origin ({origin}) makes no sense")
+        if width <= 0 or height <= 0 or len(data) != width * height:
+            raise MapError(f"the map announces {width} x {height} cells and holds {len(data)}")
+        occupancy = np.asarray(data, dtype=np.int8).reshape(height, width)
+        return cls(Geometry(resolution, width, height, origin[0], origin[1]), origin[2], occupancy)
+
+
+def bounding_geometry(static: StaticMap) -> Geometry:
+    """The upright grid that holds a turned map."""
+    g = static.geometry
+    width, height = g.width * g.resolution, g.height * g.resolution
+    corners = Pose(g.origin_x, g.origin_y, static.yaw).apply(
+        np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
+    )
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    columns, rows = np.ceil((high - low) / g.resolution - 1e-9).astype(int)
+    return Geometry(g.resolution, int(columns), int(rows), float(low[0]), float(low[1]))
+
+
+def resample(static: StaticMap, layer: Layer, target: Geometry, map_pose: Pose) -> NDArray[np.uint8]:
+    """Returns the static map's costs on another grid; what the map does not cover is unknown (if tracked) or FREE."""
+    outside = UNKNOWN if layer.track_unknown_space else FREE
+    costs = np.where(static.occupancy >= layer.lethal_cost_threshold, LETHAL, FREE).astype(np.uint8)
+    costs[static.occupancy < 0] = outside
+    source = static.geometry
+    identity = map_pose == Pose(0.0, 0.0, 0.0) and static.yaw == 0.0
+    if identity and source == target:
+        return costs
+    # cell index of the target -> metres -> map -> the map's own grid -> cell index
+    to_source = Pose(source.origin_x, source.origin_y, static.yaw).inverse().compose(map_pose.inverse())
+    cos, sin = math.cos(to_source.yaw), math.sin(to_source.yaw)
+    ratio = target.resolution / source.resolution
+    corner = to_source.apply(
+        np.array([[target.origin_x + 0.5 * target.resolution, target.origin_y + 0.5 * target.resolution]])
+    )[0]
+    warp = np.array(
+        [
+            [cos * ratio, -sin * ratio, corner[0] / source.resolution - 0.5],
+            [sin * ratio, cos * ratio, corner[1] / source.resolution - 0.5],
+        ]
+    )
+    return np.asarray(
+        cv2.warpAffine(
+            costs,
+            warp,
+            (target.width, target.height),
+            flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=outside,
+        ),
+        dtype=np.uint8,
+    )

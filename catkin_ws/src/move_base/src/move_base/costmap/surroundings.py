@@ -1,0 +1,209 @@
+"""What the robot knows of its surroundings: both costmaps, filled at their rates from the map and the sensors.
+
+It also tells what keeps them from being current: a missing map or transform, a sensor that is silent.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
+
+from move_base.costmap.costmap import Costmap, Snapshot
+from move_base.geometry import Pose
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from move_base.costmap.sensors import Observation
+    from move_base.costmap.static_map import StaticMap
+    from move_base.parameters.parameters import CostmapParameters, MoveBaseParameters, ObservationSource
+
+FUTURE_LIMIT = 0.5
+"""A measurement whose stamp is this far ahead of the clock (s) is not believed."""
+
+KEPT_OBSERVATIONS = 5
+"""Per source: as many as can be waiting for their transform at any usual rate."""
+
+
+class Transformer(Protocol):
+    """Access to the tree of frames."""
+
+    def lookup(self, target: str, source: str, stamp: float | None) -> NDArray[np.float64] | None:
+        """Returns the 4 x 4 transform from `source` to `target` at a time (None: newest), or None if there is none."""
+
+    def newest(self, target: str, source: str) -> float | None:
+        """Returns the time of the newest transform between two frames, s; None where they are not connected."""
+
+
+@dataclass
+class _Sensor:
+    """What is known of one source."""
+
+    source: ObservationSource
+    recent: list[Observation] = field(default_factory=list)
+    used: float = -math.inf  # stamp of the newest observation in a costmap
+
+    def newest(self, after: float, target: str, frames: Transformer) -> tuple[Observation, NDArray[np.float64]] | None:
+        """Returns the newest observation later than `after` that can be transformed."""
+        for observation in reversed(self.recent):
+            if observation.stamp <= after:
+                return None
+            transform = frames.lookup(target, observation.frame, observation.stamp)
+            if transform is not None:
+                return observation, transform
+        return None
+
+    def trouble(self, now: float) -> str:
+        """Why nothing current of it is in a costmap, or an empty text.
+
+        The age that counts is that of the newest measurement in a costmap, not of one that can't be transformed.
+        """
+        period = self.source.expected_update_rate
+        if now - self.used <= period:
+            return ""
+        if self.recent and now - self.recent[-1].stamp <= period:
+            return f"no transform for {self.source.topic} from its frame {self.recent[-1].frame!r}"
+        return f"no current data from {self.source.topic}"
+
+
+class Area:
+    """A costmap with its rate and the stamps of what it has used."""
+
+    def __init__(self, parameters: CostmapParameters) -> None:
+        self.parameters = parameters
+        self.costmap = Costmap(parameters)
+        self.snapshot: Snapshot | None = None
+        self.updated = -math.inf
+        self.used: dict[tuple[str, str], float] = {}
+
+    def reconfigure(self, parameters: CostmapParameters) -> None:
+        """Takes other parameters, which count from the next update on: at once."""
+        if parameters != self.parameters:
+            self.parameters = parameters
+            self.costmap.reconfigure(parameters)
+            self.updated = -math.inf
+
+    def due(self, now: float) -> bool:
+        """Whether it is time for an update."""
+        return self.snapshot is None or now - self.updated >= 1.0 / self.parameters.update_frequency - 1e-3
+
+    def updated_at(self, now: float) -> None:
+        """Rates are kept on average even if steps and updates do not divide evenly."""
+        period = 1.0 / self.parameters.update_frequency
+        self.updated = max(self.updated + period, now - period) if math.isfinite(self.updated) else now
+
+    def robot_pose(self, now: float, frames: Transformer) -> Pose | None:
+        """Returns the robot's pose in the costmap's frame; None where there is none, or it is too old."""
+        p = self.parameters
+        matrix = frames.lookup(p.global_frame, p.robot_base_frame, None)
+        stamp = frames.newest(p.global_frame, p.robot_base_frame)
+        if matrix is None or stamp is None or now - stamp > p.transform_tolerance:
+            return None
+        return Pose.from_matrix(matrix)
+
+    def map_topic(self) -> str:
+        """Where its map comes from."""
+        return next((layer.map_topic for layer in self.parameters.layers_of("static")), "map")
+
+
+class Surroundings:
+    """The global and the local costmap, and the sensors of both."""
+
+    def __init__(self, parameters: MoveBaseParameters) -> None:
+        self.global_area = Area(parameters.global_costmap)
+        self.local_area = Area(parameters.local_costmap)
+        sources = [*parameters.global_costmap.sources, *parameters.local_costmap.sources]
+        self._sensors = {(source.topic, source.data_type): _Sensor(source) for source in sources}
+        self._map_frame = ""
+
+    def reconfigure(self, parameters: MoveBaseParameters) -> None:
+        """Takes other parameters on the way: obstacles stay."""
+        self.global_area.reconfigure(parameters.global_costmap)
+        self.local_area.reconfigure(parameters.local_costmap)
+
+    @property
+    def sources(self) -> list[ObservationSource]:
+        """The sources to listen to, each topic once."""
+        return [sensor.source for sensor in self._sensors.values()]
+
+    def set_map(self, static: StaticMap, frame: str) -> None:
+        """Takes the static map."""
+        self._map_frame = frame.removeprefix("/")
+        for area in (self.global_area, self.local_area):
+            area.costmap.set_map(static)
+            area.snapshot = None
+
+    def observe(self, observation: Observation, now: float) -> str:
+        """Takes a measurement, and returns why it was ignored, or an empty text."""
+        sensor = self._sensors[(observation.source.topic, observation.source.data_type)]
+        if observation.stamp > now + FUTURE_LIMIT:
+            return f"{observation.source.topic}: the stamp is more than {FUTURE_LIMIT:g} s ahead of the clock"
+        if sensor.recent and observation.stamp <= sensor.recent[-1].stamp:
+            return f"{observation.source.topic}: the stamp is not newer than the last message's"
+        sensor.recent = [*sensor.recent[1 - KEPT_OBSERVATIONS :], observation]
+        return ""
+
+    def clear(self) -> None:
+        """Forgets all obstacles but those of the static map."""
+        self.global_area.costmap.clear()
+        self.local_area.costmap.clear()
+
+    def reset_time(self) -> None:
+        """Forgets all stamps, after the clock was set back."""
+        for sensor in self._sensors.values():
+            sensor.recent, sensor.used = [], -math.inf
+        for area in (self.global_area, self.local_area):
+            area.updated, area.used = -math.inf, {}
+
+    def update(self, now: float, frames: Transformer, robot: Pose | None, local_robot: Pose | None) -> str:
+        """Updates the costmaps that are due.
+
+        Args:
+            now: time in s.
+            frames: the transforms.
+            robot: pose in the global costmap's frame, if known.
+            local_robot: the same in the local costmap's.
+
+        Returns:
+            What is missing for it: map or transform.
+        """
+        for area, pose in ((self.local_area, local_robot), (self.global_area, robot)):
+            if area.costmap.needs_map:
+                return f"no map received on {area.map_topic()}"
+            if pose is None or not area.due(now):
+                continue
+            map_pose = self._map_pose(area, frames)
+            if map_pose is None:
+                return f"no transform from {self._map_frame!r} to {area.parameters.global_frame!r}"
+            area.snapshot = area.costmap.update(pose, self._observations_for(area, frames), map_pose)
+            area.updated_at(now)
+        for area, pose in ((self.global_area, robot), (self.local_area, local_robot)):
+            if pose is None:
+                p = area.parameters
+                return f"no current transform from {p.robot_base_frame!r} to {p.global_frame!r}"
+        return ""
+
+    def stale_reason(self, now: float) -> str:
+        """Names the first source whose data are too old, or returns an empty text."""
+        return next(filter(None, (sensor.trouble(now) for sensor in self._sensors.values())), "")
+
+    def _observations_for(self, area: Area, frames: Transformer) -> list[tuple[Observation, NDArray[np.float64]]]:
+        """What an area has not used yet, the newest of each source, with its transform."""
+        observations = []
+        for source in area.parameters.sources:
+            key = (source.topic, source.data_type)
+            found = self._sensors[key].newest(area.used.get(key, -math.inf), area.parameters.global_frame, frames)
+            if found is not None:
+                observations.append(found)
+                area.used[key] = found[0].stamp
+                self._sensors[key].used = max(self._sensors[key].used, found[0].stamp)
+        return observations
+
+    def _map_pose(self, area: Area, frames: Transformer) -> Pose | None:
+        """Pose of the map's frame in the area's frame."""
+        if not self._map_frame or self._map_frame == area.parameters.global_frame:
+            return Pose(0.0, 0.0, 0.0)
+        matrix = frames.lookup(area.parameters.global_frame, self._map_frame, None)
+        return None if matrix is None else Pose.from_matrix(matrix)

@@ -1,0 +1,1 @@
+"""From a goal to velocities: the state machine. Pure."""

@@ -1,0 +1,61 @@
+"""The recovery sequence of one goal: which behaviour is next, and how far a turn has come."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from move_base.geometry import Pose, wrap_angle
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from move_base.parameters.parameters import RecoveryBehavior
+
+PATIENCE = 15.0
+"""The turn is given up after this time, s: over twice what it takes."""
+
+TURN_TOLERANCE = 0.1
+"""A turn is complete within this angle, rad."""
+
+AFRESH_DISTANCE = 1.0
+"""Having come this far from where it last recovered (m), the robot may try all behaviours again."""
+
+
+@dataclass
+class Recovery:
+    """The sequence's state.
+
+    Attributes:
+        behaviour: the present one.
+    """
+
+    behaviour: RecoveryBehavior | None = None
+    _tried: int = 0
+    _since: float = 0.0
+    _where: Pose | None = None
+    _turned: float = 0.0
+    _yaw: float = 0.0
+
+    def begin(self, behaviours: Sequence[RecoveryBehavior], now: float, robot: Pose) -> RecoveryBehavior | None:
+        """Goes on to the next behaviour and returns it; None when all were tried."""
+        if self._tried >= len(behaviours):
+            return None
+        self.behaviour = behaviours[self._tried]
+        self._tried += 1
+        self._since, self._where = now, robot
+        self._turned, self._yaw = 0.0, robot.yaw
+        return self.behaviour
+
+    def follow(self, robot: Pose) -> None:
+        """Starts the sequence afresh where the robot got away."""
+        if self._where is not None and robot.distance(self._where) > AFRESH_DISTANCE:
+            self._tried, self._where = 0, None
+
+    def left_to_turn(self, now: float, robot: Pose) -> float:
+        """Returns what is left of a full turn, rad; 0 when it is complete or took too long."""
+        self._turned += wrap_angle(robot.yaw - self._yaw)
+        self._yaw = robot.yaw
+        left = 2.0 * math.pi - self._turned
+        return left if left > TURN_TOLERANCE and now - self._since < PATIENCE else 0.0

@@ -1,0 +1,1 @@
+"""Parameters: read, checked, changed while it runs. Pure."""

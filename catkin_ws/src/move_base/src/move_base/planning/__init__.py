@@ -1,0 +1,1 @@
+"""The global plan. Pure."""

@@ -1,0 +1,71 @@
+"""The plan that the robot is on, and how far along it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from move_base.planning.global_planner import PATH_SPACING, Plan, path_cost
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from move_base.costmap.costmap import Snapshot
+    from move_base.geometry import Pose
+
+LOOKAHEAD = 3.0
+"""Length of the plan that the controller is given, m: twice what 0.75 m/s covers in a sim_time of 2 s."""
+
+PATH_STEP = 2
+"""The controller is given every second point of the plan (0.1 m)."""
+
+SEARCHED_POINTS = 60
+"""The robot is looked for along so many points from where it was: 3 m."""
+
+KEEP_RATIO = 0.9
+"""A new plan replaces a free one only if it costs less than this share of it: equal ways must not alternate."""
+
+KEEP_DISTANCE = 0.3
+"""Farther than this from its plan (m) the robot takes the new one in any case."""
+
+
+@dataclass
+class FollowedPlan:
+    """A plan with the index of its point nearest to the robot."""
+
+    plan: Plan
+    progress: int = 0
+
+    def cost_left(self, robot: Pose, snapshot: Snapshot, *, allow_unknown: bool) -> float:
+        """Returns the cost of what remains, in weighted metres; infinite where it is blocked or far away."""
+        points = self._rest(robot)
+        if math.hypot(points[0, 0] - robot.x, points[0, 1] - robot.y) > KEEP_DISTANCE:
+            return math.inf
+        return path_cost(points, snapshot, allow_unknown=allow_unknown)
+
+    def is_better_than(self, new: Plan, robot: Pose, snapshot: Snapshot, *, allow_unknown: bool) -> bool:
+        """Whether the robot stays on this plan although there is a new one."""
+        if self.plan.goal != new.goal:
+            return False
+        kept = self.cost_left(robot, snapshot, allow_unknown=allow_unknown)
+        cost = path_cost(new.points, snapshot, allow_unknown=allow_unknown)
+        return kept < math.inf and cost > KEEP_RATIO * kept
+
+    def ahead(self, robot: Pose) -> tuple[NDArray[np.float64], float]:
+        """Returns the next metres of the plan, at least two points (N, 2), and the length left to its end (m)."""
+        points = self._rest(robot)
+        count = round(LOOKAHEAD / PATH_SPACING)
+        ahead = points[: count + 1 : PATH_STEP]
+        if len(points) <= count or len(ahead) < 2:
+            ahead = np.vstack([ahead, points[-1:]])
+        return ahead, float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+    def _rest(self, robot: Pose) -> NDArray[np.float64]:
+        """Moves on to the nearest point within the next few metres, and returns what is left from there."""
+        window = self.plan.points[self.progress : self.progress + SEARCHED_POINTS]
+        squared = (window[:, 0] - robot.x) ** 2 + (window[:, 1] - robot.y) ** 2
+        self.progress += int(squared.argmin())
+        return self.plan.points[self.progress :]

@@ -1,0 +1,48 @@
+"""The tree of frames, as the core asks for it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rospy
+import tf2_ros
+
+from move_base.ros.messages import FARTHEST, matrix_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+TF_CACHE = 10.0
+"""Transforms kept, s: tf2's own default."""
+
+
+class TfTransformer:
+    """The navigator's access to /tf."""
+
+    def __init__(self) -> None:
+        self.buffer = tf2_ros.Buffer(cache_time=rospy.Duration.from_sec(TF_CACHE), debug=False)
+        self._listener = tf2_ros.TransformListener(self.buffer)
+
+    def lookup(self, target: str, source: str, stamp: float | None) -> NDArray[np.float64] | None:
+        """Returns the 4 x 4 transform at a time (s), the newest for None, or None."""
+        when = rospy.Time() if stamp is None else rospy.Time.from_sec(stamp)
+        try:
+            transform = self.buffer.lookup_transform_core(target, source, when).transform
+        except tf2_ros.TransformException:
+            return None
+        matrix = matrix_of(transform.translation, transform.rotation)
+        return matrix if (np.abs(matrix) <= FARTHEST).all() else None  # tf2 takes infinity for a number
+
+    def newest(self, target: str, source: str) -> float | None:
+        """Returns the time of the newest transform in s, or None. Frames that never move are current at any time."""
+        try:
+            stamp: float = self.buffer.get_latest_common_time(target, source).to_sec()
+        except tf2_ros.TransformException:
+            return None
+        return stamp or math.inf
+
+    def clear(self) -> None:
+        """Forgets everything, after the clock was set back."""
+        self.buffer.clear()

@@ -1,0 +1,209 @@
+"""The action server: one goal at a time, from its arrival to the answer that its client gets."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import queue
+from typing import TYPE_CHECKING, Any
+
+import actionlib
+import genpy
+import rospy
+from actionlib.goal_id_generator import GoalIDGenerator
+from geometry_msgs.msg import PoseStamped
+from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedback, MoveBaseResult
+
+from move_base.geometry import Pose
+from move_base.navigation.navigator import Outcome
+from move_base.navigation.takeover import TakeoverError, decode_parameter
+from move_base.ros.messages import goal_problem, matrix_of, pose_stamped
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from actionlib.server_goal_handle import ServerGoalHandle
+
+    from move_base.ros.frames import TfTransformer
+
+ACTION = "move_base"
+
+FRAME_PATIENCE = 2.0
+"""How long a goal waits for its frame to become known, s."""
+
+FEEDBACK_PERIOD = 0.2
+"""s; the action's status has the same rate."""
+
+
+class _TakingOverActionServer(actionlib.ActionServer):
+    """An action server that may start with a goal already at work."""
+
+    def __init__(self, *arguments: Any, resumed: MoveBaseActionGoal | None = None, **options: Any) -> None:
+        super().__init__(*arguments, auto_start=False, **options)
+        self._resumed = resumed
+
+    def start(self) -> None:
+        """Starts like the base class, but the first status message already holds the resumed goal."""
+        with self.lock:
+            self.initialize()
+            self.started = True
+            if self._resumed is not None:
+                self.internal_goal_callback(self._resumed)
+            self.publish_status()
+
+
+class GoalServer:
+    """Goals of the action and of RViz; all but their arrival happens in the control loop."""
+
+    def __init__(
+        self,
+        frames: TfTransformer,
+        global_frame: str,
+        begin: Callable[[Pose, float], None],
+        cancel: Callable[[bool], None],
+        resumed: MoveBaseActionGoal | None,
+    ) -> None:
+        """Prepares the server.
+
+        Args:
+            frames: the transforms.
+            global_frame: that of the goals that are begun.
+            begin: starts on a goal, at a time in s.
+            cancel: drops the present goal, and stops the base if it is told to.
+            resumed: a goal that was at work before this start.
+        """
+        self._frames = frames
+        self._global_frame = global_frame
+        self._begin = begin
+        self._cancel = cancel
+        self._requests: queue.SimpleQueue[tuple[str, ServerGoalHandle]] = queue.SimpleQueue()
+        self._active: ServerGoalHandle | None = None
+        self._waiting: tuple[ServerGoalHandle, float] | None = None
+        self._fed_back = -math.inf
+        self._sent_on = rospy.Publisher(f"{ACTION}/goal", MoveBaseActionGoal, queue_size=5)
+        self._current_goal = rospy.Publisher("~current_goal", PoseStamped, queue_size=1)
+        self._server = _TakingOverActionServer(
+            ACTION, MoveBaseAction, goal_cb=self._on_goal, cancel_cb=self._on_cancel, resumed=resumed
+        )
+        rospy.Subscriber(f"{ACTION}_simple/goal", PoseStamped, self._on_simple_goal, queue_size=5)
+
+    def start(self) -> None:
+        """Begins to take goals."""
+        self._server.start()
+
+    def take_requests(self, now: float) -> None:
+        """Deals with the goals and cancellations that have come; `now` in s."""
+        while not self._requests.empty():
+            kind, handle = self._requests.get()
+            if kind == "goal":
+                self._take_goal(handle, now)
+            elif _is_same(handle, self._current()):
+                self._drop_goal("cancelled by the client")
+        if self._waiting is not None:
+            self._resolve_waiting(now)
+
+    def feed_back(self, now: float, robot: Pose) -> None:
+        """Tells the active goal's client where the robot is, if it is time."""
+        if self._active is not None and now - self._fed_back >= FEEDBACK_PERIOD:
+            self._fed_back = now
+            pose = pose_stamped(robot, self._global_frame, rospy.Time.now())
+            self._active.publish_feedback(MoveBaseFeedback(base_position=pose))
+
+    def finish(self, outcome: Outcome, text: str) -> None:
+        """Tells the active goal's client how it ended."""
+        handle, self._active = self._active, None
+        if handle is None:
+            return
+        if outcome is Outcome.SUCCEEDED:
+            rospy.loginfo("%s", text)
+            handle.set_succeeded(MoveBaseResult(), text)
+        else:
+            rospy.logwarn("Goal aborted: %s", text)
+            handle.set_aborted(MoveBaseResult(), text)
+
+    def reset_time(self) -> None:
+        """Forgets times, after the clock was set back."""
+        self._fed_back = -math.inf
+
+    def _on_goal(self, handle: ServerGoalHandle) -> None:
+        problem = goal_problem(handle.get_goal().target_pose)
+        if problem:
+            rospy.logwarn("Goal rejected: %s", problem)
+            handle.set_rejected(MoveBaseResult(), problem)
+            return
+        handle.set_accepted("This goal has been accepted.")
+        self._requests.put(("goal", handle))
+
+    def _on_cancel(self, handle: ServerGoalHandle) -> None:
+        self._requests.put(("cancel", handle))
+
+    def _on_simple_goal(self, message: PoseStamped) -> None:
+        """Sends the pose as an action goal on the action's topic, where others can see it, too."""
+        goal = MoveBaseActionGoal()
+        goal.header.stamp = rospy.Time.now()
+        goal.goal_id = GoalIDGenerator().generate_ID()
+        goal.goal.target_pose = message
+        self._sent_on.publish(goal)
+
+    def _current(self) -> ServerGoalHandle | None:
+        """The goal at work, or the one that waits for its frame."""
+        return self._active or (self._waiting[0] if self._waiting is not None else None)
+
+    def _take_goal(self, handle: ServerGoalHandle, now: float) -> None:
+        current = self._current()
+        if current is not None and handle.get_goal_id().stamp < current.get_goal_id().stamp:
+            handle.set_canceled(MoveBaseResult(), "a newer goal is active")
+            return
+        if current is not None:
+            self._drop_goal("preempted by a newer goal", stop=False)
+        self._waiting = (handle, now)
+
+    def _resolve_waiting(self, now: float) -> None:
+        """Starts the waiting goal as soon as its frame is known."""
+        assert self._waiting is not None  # noqa: S101
+        handle, since = self._waiting
+        target = handle.get_goal().target_pose
+        frame = target.header.frame_id.removeprefix("/")
+        goal = Pose.from_matrix(matrix_of(target.pose.position, target.pose.orientation))
+        if frame != self._global_frame:
+            matrix = self._frames.lookup(self._global_frame, frame, None)
+            if matrix is None:
+                if now - since > FRAME_PATIENCE:
+                    self._waiting = None
+                    reason = f"the goal's frame {frame!r} has no transform to {self._global_frame!r}"
+                    rospy.logwarn("Goal aborted: %s", reason)
+                    self._cancel(True)
+                    handle.set_aborted(MoveBaseResult(), reason)
+                return
+            goal = Pose.from_matrix(matrix).compose(goal)
+        self._waiting, self._active = None, handle
+        self._begin(goal, now)
+        self._current_goal.publish(pose_stamped(goal, self._global_frame, rospy.Time.now()))
+        rospy.loginfo("Goal (%.2f, %.2f, %.2f) accepted", goal.x, goal.y, goal.yaw)
+
+    def _drop_goal(self, reason: str, stop: bool = True) -> None:
+        handle = self._current()
+        self._active = self._waiting = None
+        self._cancel(stop)
+        if handle is not None:
+            rospy.loginfo("Goal %s", reason)
+            handle.set_canceled(MoveBaseResult(), reason)
+
+
+def resumed_goal(value: object) -> MoveBaseActionGoal | None:
+    """Returns the goal to take over, and deletes the parameter `~resume_goal`: it is meant for this start only."""
+    if value is None:
+        return None
+    with contextlib.suppress(KeyError):
+        rospy.delete_param("~resume_goal")
+    try:
+        goal = MoveBaseActionGoal().deserialize(decode_parameter(value))
+    except (TakeoverError, genpy.DeserializationError) as error:
+        rospy.logwarn("%s ignored: %s", rospy.resolve_name("~resume_goal"), error)
+        return None
+    rospy.loginfo("Taking over goal %s", goal.goal_id.id)
+    return goal
+
+
+def _is_same(one: ServerGoalHandle, other: ServerGoalHandle | None) -> bool:
+    return other is not None and one.get_goal_id().id == other.get_goal_id().id

@@ -1,0 +1,100 @@
+"""Messages of ROS made from what the core holds, and the other way round; no node is needed for it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from geometry_msgs.msg import Point32, PolygonStamped, PoseStamped, Quaternion, Twist
+from nav_msgs.msg import OccupancyGrid, Path
+
+from move_base.costmap.grid import occupancy_values
+
+if TYPE_CHECKING:
+    import genpy
+    from numpy.typing import NDArray
+
+    from move_base.costmap.costmap import Snapshot
+    from move_base.geometry import Pose, Velocity
+
+FARTHEST = 1e6
+"""Coordinates beyond this (m) are a mistake: it is farther than anything drives."""
+
+
+def goal_problem(target: PoseStamped) -> str:
+    """Returns why a pose can't be a goal, or an empty text."""
+    position, orientation = target.pose.position, target.pose.orientation
+    values = (position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
+    if not all(abs(value) <= FARTHEST for value in values):
+        return f"the goal's pose is not finite, or over {FARTHEST / 1000:g} km away"
+    length = math.sqrt(sum(value * value for value in values[3:]))
+    if abs(length - 1.0) > 0.1:
+        return f"the goal's quaternion has length {length:.2f}, must be 1"
+    if not target.header.frame_id.strip("/"):
+        return "the goal has no frame_id"
+    return ""
+
+
+def matrix_of(position: Any, q: Quaternion) -> NDArray[np.float64]:
+    """Returns the homogeneous 4 x 4 transform of a position and a unit quaternion."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = (
+        (1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y - q.z * q.w), 2 * (q.x * q.z + q.y * q.w)),
+        (2 * (q.x * q.y + q.z * q.w), 1 - 2 * (q.x * q.x + q.z * q.z), 2 * (q.y * q.z - q.x * q.w)),
+        (2 * (q.x * q.z - q.y * q.w), 2 * (q.y * q.z + q.x * q.w), 1 - 2 * (q.x * q.x + q.y * q.y)),
+    )
+    matrix[:3, 3] = position.x, position.y, position.z
+    return matrix
+
+
+def twist_of(velocity: Velocity) -> Twist:
+    """Returns a velocity as the command for it."""
+    twist = Twist()
+    twist.linear.x, twist.linear.y, twist.angular.z = velocity.x, velocity.y, velocity.yaw
+    return twist
+
+
+def pose_stamped(pose: Pose, frame: str, stamp: genpy.Time) -> PoseStamped:
+    """Returns a pose in a frame."""
+    stamped = PoseStamped()
+    stamped.header.stamp = stamp
+    stamped.header.frame_id = frame
+    stamped.pose.position.x, stamped.pose.position.y = pose.x, pose.y
+    stamped.pose.orientation = Quaternion(0.0, 0.0, math.sin(0.5 * pose.yaw), math.cos(0.5 * pose.yaw))
+    return stamped
+
+
+def path_of(points: NDArray[np.float64], headings: NDArray[np.float64], frame: str, stamp: genpy.Time) -> Path:
+    """Returns points (N, 2) with headings (N,) as a path."""
+    path = Path()
+    path.header.stamp = stamp
+    path.header.frame_id = frame
+    for (x, y), yaw in zip(points.tolist(), headings.tolist(), strict=True):
+        stamped = PoseStamped(header=path.header)
+        stamped.pose.position.x, stamped.pose.position.y = x, y
+        stamped.pose.orientation = Quaternion(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
+        path.poses.append(stamped)
+    return path
+
+
+def polygon_of(corners: NDArray[np.float64], frame: str, stamp: genpy.Time) -> PolygonStamped:
+    """Returns corners (N, 2) as a polygon."""
+    polygon = PolygonStamped()
+    polygon.header.stamp = stamp
+    polygon.header.frame_id = frame
+    polygon.polygon.points = [Point32(x, y, 0.0) for x, y in corners.tolist()]
+    return polygon
+
+
+def occupancy_grid(snapshot: Snapshot, frame: str, stamp: genpy.Time) -> OccupancyGrid:
+    """Returns a costmap with the values that costmap_2d publishes."""
+    grid = OccupancyGrid()
+    g = snapshot.geometry
+    grid.header.stamp = stamp
+    grid.header.frame_id = frame
+    grid.info.resolution, grid.info.width, grid.info.height = g.resolution, g.width, g.height
+    grid.info.origin.position.x, grid.info.origin.position.y = g.origin_x, g.origin_y
+    grid.info.origin.orientation.w = 1.0
+    grid.data = occupancy_values(snapshot.costs).ravel().tolist()
+    return grid

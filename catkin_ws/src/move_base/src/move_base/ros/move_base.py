@@ -1,0 +1,268 @@
+"""ROS shell of move_base: parameters in; action, topics and services out. All decisions are in `navigator`."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import math
+import threading
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import rospy
+from geometry_msgs.msg import PoseStamped, Twist
+from nav_msgs.msg import OccupancyGrid, Odometry
+from nav_msgs.srv import GetPlan, GetPlanResponse
+from node_kit.ros.lifetime import Lifetime
+from rospy.numpy_msg import numpy_msg
+from sensor_msgs.msg import LaserScan, PointCloud2
+from std_srvs.srv import Empty, EmptyResponse
+
+from move_base.costmap.sensors import SensorError, cloud_observation, scan_observation
+from move_base.costmap.static_map import MapError, StaticMap
+from move_base.geometry import STOP, Pose, Velocity
+from move_base.navigation.navigator import Navigator
+from move_base.parameters.parameters import read_parameters
+from move_base.parameters.reconfiguration import changed, present_values, servers
+from move_base.parameters.tree import ParameterError
+from move_base.planning.global_planner import PlanningError
+from move_base.ros.display import CostmapDisplay, PathDisplay
+from move_base.ros.frames import TfTransformer
+from move_base.ros.goals import GoalServer, resumed_goal
+from move_base.ros.messages import goal_problem, matrix_of, path_of, twist_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from move_base_msgs.msg import MoveBaseActionGoal
+
+    from move_base.parameters.parameters import MoveBaseParameters, ObservationSource
+    from move_base.parameters.reconfiguration import ServerDescription
+
+WARN_PERIOD = 5.0
+"""The same warning is repeated no sooner than this, s."""
+
+
+class MoveBaseNode:
+    """The node: callbacks fill the navigator, `run` steps it at controller_frequency."""
+
+    def __init__(
+        self, parameters: MoveBaseParameters, tree: dict[str, Any], resumed: MoveBaseActionGoal | None
+    ) -> None:
+        self._parameters = parameters
+        self._tree = tree  # what they were read from
+        self._reconfigured: MoveBaseParameters | None = None  # to be taken on at the next tick
+        self._tree_lock = threading.Lock()
+        self._navigator = Navigator(parameters)
+        self._lock = threading.RLock()  # the navigator, and the last word on cmd_vel
+        self._closing = False
+        self._velocity: Velocity = STOP
+        self._frames = TfTransformer()
+        self._cmd_vel = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+        self._goals = GoalServer(
+            self._frames, parameters.global_costmap.global_frame, self._begin_goal, self._cancel_goal, resumed
+        )
+        self._path_display = PathDisplay(parameters.global_costmap.global_frame, parameters.local_costmap.global_frame)
+        self._displays = [
+            CostmapDisplay("global_costmap", parameters.global_costmap),
+            CostmapDisplay("local_costmap", parameters.local_costmap),
+        ]
+        rospy.on_shutdown(self._stop_base)
+        self._subscribe()
+        self._goals.start()
+        rospy.Service("~make_plan", GetPlan, self._on_make_plan)
+        rospy.Service("~clear_costmaps", Empty, self._on_clear_costmaps)
+        # Beside the control loop: the first command must not wait for a score of registrations.
+        threading.Thread(target=self._offer_reconfiguration, daemon=True).start()
+
+    def run(self) -> None:
+        """Steps until shutdown."""
+        period = 1.0 / self._parameters.controller_frequency
+        rate = rospy.Rate(self._parameters.controller_frequency)
+        last = 0.0
+        while not rospy.is_shutdown():
+            if self._take_parameters():
+                period = 1.0 / self._parameters.controller_frequency
+                rate = rospy.Rate(self._parameters.controller_frequency)
+            now = rospy.get_time()
+            if now < last:
+                self._clock_set_back(now)
+            elif now > 0.0:
+                if last and now - last > 2.5 * period:
+                    rospy.logwarn_throttle(WARN_PERIOD, "The control loop missed its rate")
+                self._tick(now)
+            last = now
+            with contextlib.suppress(rospy.ROSInterruptException, rospy.ROSTimeMovedBackwardsException):
+                rate.sleep()
+
+    def _tick(self, now: float) -> None:
+        self._goals.take_requests(now)
+        with self._lock:
+            result = self._navigator.step(now, self._frames, self._velocity)
+            if result.velocity is not None and not self._closing:
+                self._cmd_vel.publish(twist_of(result.velocity))
+        if result.warning:
+            rospy.logwarn_throttle_identical(WARN_PERIOD, result.warning)
+        self._path_display.publish(result)
+        if result.outcome is not None:
+            self._goals.finish(result.outcome, result.text)
+        elif result.robot is not None:
+            self._goals.feed_back(now, result.robot)
+        for display, snapshot in zip(
+            self._displays, (self._navigator.global_snapshot, self._navigator.local_snapshot), strict=True
+        ):
+            display.publish(now, snapshot, self._frames)
+
+    # -- parameters that change on the way -------------------------------------------------------------------------
+
+    def _offer_reconfiguration(self) -> None:
+        from move_base.ros.reconfigure import offer  # not needed for the first command
+
+        with contextlib.suppress(rospy.ROSException, OSError):  # the node ends while it starts
+            offer(servers(self._parameters), self._present_values, self._reconfigure)
+
+    def _present_values(self, server: ServerDescription, names: Iterable[str]) -> dict[str, Any]:
+        with self._tree_lock:
+            return present_values(self._reconfigured or self._parameters, self._tree, server, names)
+
+    def _reconfigure(self, namespace: str, values: dict[str, Any]) -> str:
+        """Takes values at the next tick; returns why they do not fit, or an empty text."""
+        with self._tree_lock:
+            try:
+                self._tree, self._reconfigured = changed(self._tree, namespace, values)
+            except ParameterError as error:
+                return str(error)
+        return ""
+
+    def _take_parameters(self) -> bool:
+        with self._tree_lock:
+            parameters, self._reconfigured = self._reconfigured, None
+        if parameters is None:
+            return False
+        self._parameters = parameters
+        with self._lock:
+            self._navigator.reconfigure(parameters)
+        for display, costmap in zip(self._displays, (parameters.global_costmap, parameters.local_costmap), strict=True):
+            display.reconfigure(costmap)
+        return True
+
+    # -- sensors and services --------------------------------------------------------------------------------------
+
+    def _subscribe(self) -> None:
+        controller = self._parameters.controller
+        rospy.Subscriber(controller.odom_topic, Odometry, self._on_odometry, queue_size=1)
+        for source in self._navigator.sources:
+            kind = numpy_msg(LaserScan) if source.data_type == "LaserScan" else PointCloud2
+            # buff_size: a cloud must fit in it, or rospy falls behind
+            callback = functools.partial(self._on_sensor, source)
+            rospy.Subscriber(source.topic, kind, callback, queue_size=2, buff_size=1 << 22)
+        costmaps = (self._parameters.global_costmap, self._parameters.local_costmap)
+        for topic in {layer.map_topic for costmap in costmaps for layer in costmap.layers_of("static")}:
+            rospy.Subscriber(topic, numpy_msg(OccupancyGrid), self._on_map, queue_size=1)
+
+    def _on_sensor(self, source: ObservationSource, message: Any) -> None:
+        convert = scan_observation if source.data_type == "LaserScan" else cloud_observation
+        try:
+            observation = convert(message, source)
+        except SensorError as error:
+            rospy.logwarn_throttle_identical(WARN_PERIOD, f"{source.topic}: message ignored: {error}")
+            return
+        with self._lock:
+            ignored = self._navigator.observe(observation, rospy.get_time())
+        if ignored:
+            rospy.logwarn_throttle_identical(WARN_PERIOD, f"Message ignored: {ignored}")
+
+    def _on_odometry(self, message: Odometry) -> None:
+        twist = message.twist.twist
+        values = (twist.linear.x, twist.linear.y, twist.angular.z)
+        if all(math.isfinite(value) for value in values):
+            self._velocity = Velocity(*values)
+        else:
+            rospy.logwarn_throttle(WARN_PERIOD, "Odometry ignored: its velocity is not finite")
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        info = message.info
+        yaw = Pose.from_matrix(matrix_of(info.origin.position, info.origin.orientation)).yaw
+        origin = (info.origin.position.x, info.origin.position.y, yaw)
+        try:
+            static = StaticMap.create(message.data, info.width, info.height, info.resolution, origin)
+        except MapError as error:
+            rospy.logwarn_throttle_identical(WARN_PERIOD, f"Map ignored: {error}")
+            return
+        with self._lock:
+            self._navigator.set_map(static, message.header.frame_id)
+
+    def _on_make_plan(self, request: Any) -> GetPlanResponse:
+        response = GetPlanResponse()
+        frame = self._parameters.global_costmap.global_frame
+        response.plan.header.frame_id = frame
+        response.plan.header.stamp = rospy.Time.now()
+        start = self._in_global(request.start) if request.start.header.frame_id else self._robot()
+        goal = self._in_global(request.goal)
+        if start is None or goal is None:
+            rospy.logwarn("make_plan: start or goal is not a finite pose in a known frame")
+            return response
+        try:
+            plan = self._navigator.plan_between(start, goal, request.tolerance)
+        except PlanningError as error:
+            rospy.logwarn("make_plan: %s", error)
+            return response
+        response.plan.poses = path_of(plan.points, plan.headings(), frame, response.plan.header.stamp).poses
+        return response
+
+    def _on_clear_costmaps(self, _request: Any) -> EmptyResponse:
+        with self._lock:
+            self._navigator.clear_costmaps()
+        return EmptyResponse()
+
+    def _in_global(self, stamped: PoseStamped) -> Pose | None:
+        if goal_problem(stamped):
+            return None
+        frame = self._parameters.global_costmap.global_frame
+        matrix = self._frames.lookup(frame, stamped.header.frame_id.removeprefix("/"), None)
+        if matrix is None:
+            return None
+        return Pose.from_matrix(matrix @ matrix_of(stamped.pose.position, stamped.pose.orientation))
+
+    def _robot(self) -> Pose | None:
+        p = self._parameters.global_costmap
+        matrix = self._frames.lookup(p.global_frame, p.robot_base_frame, None)
+        return None if matrix is None else Pose.from_matrix(matrix)
+
+    # -- what moves the base ---------------------------------------------------------------------------------------
+
+    def _begin_goal(self, goal: Pose, now: float) -> None:
+        with self._lock:
+            self._navigator.set_goal(goal, now)
+
+    def _cancel_goal(self, stop: bool) -> None:
+        with self._lock:
+            self._navigator.cancel()
+            if stop and not self._closing:
+                self._cmd_vel.publish(Twist())
+
+    def _stop_base(self) -> None:
+        """The last command of a node that ends is to stand still."""
+        with self._lock:
+            self._closing = True
+            with contextlib.suppress(rospy.ROSException):
+                self._cmd_vel.publish(Twist())
+
+    def _clock_set_back(self, now: float) -> None:
+        rospy.logwarn("The clock was set back; sensor data and transforms are forgotten")
+        self._frames.clear()
+        self._goals.reset_time()
+        with self._lock:
+            self._navigator.reset_time(now)
+
+
+def main() -> None:
+    """Entry point of the node; exit status 2 when a parameter can't be used."""
+    with Lifetime("move_base", ParameterError) as life:
+        life.longest_end_without_master = life.longest_end  # the base is stopped after the step that is under way
+        life.start()
+        cv2.setNumThreads(1)  # the grids are small: threads cost more than they give
+        tree = rospy.get_param("~", {})
+        tree = tree if isinstance(tree, dict) else {}
+        parameters = read_parameters(tree)
+        MoveBaseNode(parameters, tree, resumed_goal(tree.pop("resume_goal", None))).run()

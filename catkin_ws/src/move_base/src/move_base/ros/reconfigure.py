@@ -1,0 +1,66 @@
+"""dynamic_reconfigure servers of move_base: part of the ROS shell, started beside `node`."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import rospy
+from dynamic_reconfigure.server import Server
+
+from move_base.parameters.reconfiguration import ServerDescription
+
+WARN_PERIOD = 1.0
+"""The same warning is repeated no sooner than this, s."""
+
+Present = Callable[[ServerDescription, Iterable[str]], dict[str, Any]]
+Take = Callable[[str, dict[str, Any]], str]
+
+
+def offer(descriptions: Sequence[ServerDescription], present: Present, take: Take) -> list[Server]:
+    """Starts the servers.
+
+    Args:
+        descriptions: of the servers.
+        present: returns what parameters have as values now.
+        take: takes new values in a namespace, and returns why not, or an empty text.
+    """
+    return [_Server(description, present, take) for description in descriptions]
+
+
+class _Server(Server):
+    """A server that starts from what the node has, and writes to the parameter server only what is changed.
+
+    The base class reads and writes every parameter in a call of its own: a second's work for six servers.
+    """
+
+    def __init__(self, description: ServerDescription, present: Present, take: Take) -> None:
+        self._description = description
+        self._present = present
+        self._take = take
+        self._written: dict[str, Any] = {}
+        definition = importlib.import_module(f"move_base.cfg.{description.definition}Config")
+        self._names = [str(name) for name in definition.defaults]
+        super().__init__(definition, self._on_change, description.namespace)
+
+    def _copy_from_parameter_server(self) -> None:
+        present = self._present(self._description, self._names)
+        self.config.update({name: type(self.config[name])(value) for name, value in present.items()})
+
+    def _copy_to_parameter_server(self) -> None:
+        for name in self._names:
+            if self.config[name] != self._written.get(name):
+                rospy.set_param(self.ns + name, self.config[name])
+        self._written = {name: self.config[name] for name in self._names}
+
+    def _on_change(self, config: Any, level: int) -> Any:
+        if level == -1:  # the first call tells what there is
+            self._written = {name: config[name] for name in self._names}
+            return config
+        values = {name: config[name] for name in self._names if config[name] != self._written.get(name)}
+        problem = self._take(self._description.namespace, values) if values else ""
+        if problem:
+            rospy.logwarn_throttle_identical(WARN_PERIOD, f"Parameters refused: {problem}")
+            config.update(self._written)
+        return config

@@ -1,0 +1,1 @@
+"""The TOMASys knowledge base and its vocabulary."""

@@ -1,0 +1,179 @@
+"""What the knowledge base says, as plain frozen data."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from mros1_reasoner.knowledge.vocabulary import IN_ERROR_COMPONENT, IN_ERROR_NFR
+
+
+class Direction(enum.Enum):
+    """Which levels of a quality attribute are the better ones."""
+
+    LOWER_IS_BETTER = "lower_is_better"
+    HIGHER_IS_BETTER = "higher_is_better"
+
+    @property
+    def sign(self) -> int:
+        """1 or -1: a level times it is worse the greater it is (`qa_sign` in the vocabulary)."""
+        return 1 if self is Direction.LOWER_IS_BETTER else -1
+
+    def excess(self, level: float, limit: float) -> float:
+        """Return by how much a level passes a limit; zero or less where it keeps it."""
+        return self.sign * (level - limit)
+
+    def better(self, first: float, second: float) -> float:
+        """Return the better one of two levels."""
+        return min(first, second) if self is Direction.LOWER_IS_BETTER else max(first, second)
+
+    @property
+    def passes(self) -> str:
+        """The comparison that holds between a level and the limit that it does not keep."""
+        return ">" if self is Direction.LOWER_IS_BETTER else "<"
+
+
+@dataclass(frozen=True)
+class Quality:
+    """A quality attribute: how its levels compare.
+
+    Attributes:
+        direction: which levels are the better ones.
+        reaching_violates: a level that equals the limit does not keep it.
+        low: no level is below; None where that is not known.
+        high: no level is above; None where that is not known.
+    """
+
+    direction: Direction = Direction.LOWER_IS_BETTER
+    reaching_violates: bool = False
+    low: float | None = None
+    high: float | None = None
+
+    @classmethod
+    def compared_by(cls, operator: str, low: float | None = None, high: float | None = None) -> Quality:
+        """Return the quality whose observed level is in error while the operator holds between it and the limit.
+
+        Raises:
+            ValueError: it is none of `>`, `>=`, `<`, `<=`.
+        """
+        if operator not in (">", ">=", "<", "<="):
+            raise ValueError(f"{operator!r} is no comparison: expected >, >=, < or <=")
+        direction = Direction.LOWER_IS_BETTER if operator[0] == ">" else Direction.HIGHER_IS_BETTER
+        return cls(direction, operator.endswith("="), low, high)
+
+    @property
+    def operator(self) -> str:
+        """The comparison that holds between a level and a limit that it does not keep."""
+        return self.direction.passes + ("=" if self.reaching_violates else "")
+
+    def excess(self, level: float, limit: float) -> float:
+        """Return by how much a level passes a limit; less than zero where it keeps it with room to spare."""
+        return self.direction.excess(level, limit)
+
+    def violates(self, level: float, limit: float) -> bool:
+        """Return whether a level does not keep a limit."""
+        excess = self.excess(level, limit)
+        return excess > 0 or (self.reaching_violates and excess == 0)
+
+    def holds(self, level: float) -> bool:
+        """Return whether there can be such a level."""
+        above = self.low is None or level >= self.low
+        return math.isfinite(level) and above and (self.high is None or level <= self.high)
+
+
+@dataclass(frozen=True)
+class Design:
+    """A FunctionDesign: its name is that of the configuration which deploys it.
+
+    Attributes:
+        name: local name of the individual.
+        function: the function that it solves.
+        expected: expected level of each quality attribute.
+        components: components that it cannot be deployed without.
+        requires: functions that must be provided for it to work.
+    """
+
+    name: str
+    function: str
+    expected: Mapping[str, float] = field(default_factory=dict)
+    components: frozenset[str] = frozenset()
+    requires: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Objective:
+    """A function that is needed.
+
+    Attributes:
+        name: local name of the individual.
+        function: the function.
+        limits: the limit that each quality attribute must keep.
+        always_improve: adapt also when a clearly better design has become available; None: as the settings say.
+    """
+
+    name: str
+    function: str
+    limits: Mapping[str, float] = field(default_factory=dict)
+    always_improve: bool | None = None
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Everything that is known at one moment, as an analysis takes it.
+
+    Attributes:
+        objectives: what is needed now.
+        groundings: design that is deployed for an objective, by the objective's name.
+        levels: observed level, by objective and quality attribute.
+        components: status of components, one of TRUE, FALSE, RECOVERED.
+        broken: objectives whose grounding is known to be out of order as a whole.
+        failed: objectives whose task has failed, though nothing else is known to be wrong.
+        requires: objectives that the grounding of an objective requires, by the objective's name.
+    """
+
+    objectives: tuple[Objective, ...] = ()
+    groundings: Mapping[str, str] = field(default_factory=dict)
+    levels: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    components: Mapping[str, str] = field(default_factory=dict)
+    broken: frozenset[str] = frozenset()
+    failed: frozenset[str] = frozenset()
+    requires: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ObjectiveAnalysis:
+    """What reasoning says of an objective.
+
+    Attributes:
+        status: its o_status, derived from the causes.
+        causes: every o_cause that holds.
+        violated: quality attributes whose limit is not kept, sorted.
+        grounding_status: fg_status of its grounding, empty without an error.
+    """
+
+    status: str
+    causes: frozenset[str] = frozenset()
+    violated: tuple[str, ...] = ()
+    grounding_status: str = ""
+
+    @property
+    def in_error(self) -> bool:
+        """Whether it is not fulfilled as it should be."""
+        return bool(self.causes & {IN_ERROR_NFR, IN_ERROR_COMPONENT})
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """The statuses that follow from facts.
+
+    Attributes:
+        objectives: by name.
+        unrealisable: components that keep a design from being deployed, by the design's name; others can be.
+        tried: designs that do not keep their objective's limits while deployed, as (design, objective).
+    """
+
+    objectives: Mapping[str, ObjectiveAnalysis] = field(default_factory=dict)
+    unrealisable: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    tried: frozenset[tuple[str, str]] = frozenset()

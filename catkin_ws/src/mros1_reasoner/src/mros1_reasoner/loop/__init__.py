@@ -1,0 +1,1 @@
+"""The loop from facts to decisions. Pure."""

@@ -1,0 +1,342 @@
+"""R3 for objectives that may require others: causes, the objective to find another design for, explained decisions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.knowledge.model import Design, Direction, Objective
+from mros1_reasoner.loop.state import Running, State
+from mros1_reasoner.planning.decision import ADVISED, DECIDED, FAILED, OPERATOR, RECOVERY, Cause, Decision
+from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When and for how long the present step has analysed."""
+
+    now: float
+    analysed: float
+    analyse_wall: float
+
+
+class Deliberation:
+    """Decides for one objective at a time, by what the state says."""
+
+    def __init__(
+        self,
+        state: State,
+        utility: Utility,
+        distance: Distance,
+        wall: Callable[[], float],
+        stamp: Callable[[float], float],
+        name: str,
+    ) -> None:
+        """Decide by a state, which is changed only where it keeps what was decided.
+
+        Args:
+            state: what is known.
+            utility: of a design.
+            distance: how big a change it is from one design to another.
+            wall: wall clock that measures durations, s.
+            stamp: ROS time, given that of the step.
+            name: beginning of the decisions' ids.
+        """
+        self._state = state
+        self._utility, self._distance = utility, distance
+        self._wall, self._stamp, self._name = wall, stamp, name
+        self._count = 0
+
+    def decide(self, name: str, timing: Timing) -> Decision | None:
+        """Decide for an objective: another design of its own, else of one that requires it; else tell why not."""
+        running = self._state.running[name]
+        causes = self._causes(name, timing.now)
+        if not causes:
+            running.refusal = ()
+            self._state.wanted.pop(name, None)
+            return None
+        if self._state.waits(name, timing.now):
+            return None
+        improves_only = all(cause.is_chance for cause in causes)
+        self._note_failure(name, timing.now)
+        began = self._wall()
+        level, outcome = self._choose(name, timing.now, climbs=not improves_only)
+        if self._state.waits(level, timing.now):
+            return None
+        stays = not self._is_change(level, outcome)
+        if improves_only and (stays or not self._improves(running, outcome)):
+            return None
+        if not stays:
+            return self._adapt(name, level, outcome, causes, timing, began)
+        return self._refuse(name, outcome, causes, timing, self._wall() - began)
+
+    def _choose(self, name: str, now: float, *, climbs: bool) -> tuple[str, Plan]:
+        """Return the objective to find another design for, and what to do for it.
+
+        It is the given one where a design of its own helps, else the nearest one above where one helps in full, else
+        the nearest one where a design helps in part.
+        """
+        outcomes: dict[str, Plan] = {}
+        queue = [name]
+        while queue:
+            objective = queue.pop(0)
+            outcomes[objective] = outcome = self._plan(objective, now)
+            if self._is_change(objective, outcome) and not outcome.degraded:
+                return objective, outcome
+            if climbs:
+                queue += [o for o in self._state.requirers(objective) if o not in outcomes and o not in queue]
+        partly = (o for o, outcome in outcomes.items() if self._is_change(o, outcome))
+        best = next(partly, name)
+        return best, outcomes[best]
+
+    def _is_change(self, name: str, outcome: Plan) -> bool:
+        running = self._state.running[name]
+        return outcome.choice is not None and (outcome.choice != running.design or running.is_broken)
+
+    def _adapt(
+        self, name: str, level: str, outcome: Plan, causes: list[Cause], timing: Timing, began: float
+    ) -> Decision | None:
+        """Return the decision for the first thing to be done towards an outcome: the deepest requirement first."""
+        if level != name:
+            climbed = {"component": "S6b"}
+            causes = [replace(c, rules=f"{c.rules}, {climbed.get(c.trigger.split(':')[0], 'S6a')}") for c in causes]
+        steps = self._missing(level, outcome, timing.now)
+        objective, first = steps[0]
+        if self._state.locked & {name, *(o for o, _ in steps)}:
+            reason = f"locked by the operator; {outcome.choice} would be taken: {outcome.reason}"
+            return self._refuse(name, replace(outcome, reason=reason), causes, timing, self._wall() - began)
+        self._state.wanted.update({o: plan.choice for o, plan in steps if plan.choice})
+        if any(self._state.waits(o, timing.now) for o, _ in steps if o in self._state.running):
+            return None
+        running = self._state.running.get(objective)
+        if self._state.settings.dry_run and not self._is_news(self._state.running[name], causes, outcome):
+            return None
+        design = running.design if running else None
+        words = f"{name}: {'; '.join(cause.text for cause in causes)}: "
+        if objective != name:
+            words += f"{objective}: "
+        words += f"{design or 'nothing'} -> {first.choice}"
+        if objective != level:
+            words += f", which {outcome.choice} of {level} requires: {first.reason}"
+        words += f": {outcome.reason}"
+        self._state.match_requirements()
+        releases = set(self._state.objectives) - set(
+            self._state.needed({**self._state.deployments(), **self._state.wanted})
+        )
+        decision = self._decision(objective, causes, first, timing, words, self._wall() - began)
+        return replace(
+            decision,
+            state=ADVISED if self._state.settings.dry_run else DECIDED,
+            to_configuration=first.choice or "",
+            releases=tuple(sorted(releases)) if objective == level else (),
+        )
+
+    def _refuse(
+        self, name: str, outcome: Plan, causes: list[Cause], timing: Timing, plan_wall: float
+    ) -> Decision | None:
+        """Return the decision to leave things as they are; it is told once."""
+        running = self._state.running[name]
+        self._state.wanted.pop(name, None)
+        if not self._is_news(running, causes, outcome):
+            return None
+        running.degraded = True
+        text = "; ".join(cause.text for cause in causes)
+        words = f"{name}: {text}: stays with {running.design or 'nothing'}: {outcome.reason}"
+        return self._decision(name, causes, outcome, timing, words, plan_wall)
+
+    def _is_news(self, running: Running, causes: list[Cause], outcome: Plan) -> bool:
+        errors = tuple(cause.trigger for cause in causes if not cause.is_chance)
+        refusal = (errors, outcome.choice, outcome.degraded)
+        is_news, running.refusal = refusal != running.refusal, refusal
+        return is_news
+
+    def _decision(
+        self, objective: str, causes: list[Cause], outcome: Plan, timing: Timing, words: str, plan_wall: float
+    ) -> Decision:
+        """Return a refusal with everything that explains it."""
+        self._count += 1
+        running = self._state.running.get(objective)
+        corrections = self._corrections(objective, timing.now)
+        return Decision(
+            id=f"{self._name}-{self._count}",
+            state=FAILED,
+            objective=objective,
+            trigger=causes[0].trigger,
+            causes=tuple(cause.text for cause in causes),
+            from_configuration=(running.design if running else None) or "",
+            to_configuration="",
+            degraded=outcome.degraded,
+            candidates=outcome.candidates,
+            explanation="; ".join((words, *corrections)),
+            stamp_monitored=causes[0].stamp,
+            stamp_analysed=timing.analysed,
+            stamp_planned=self._stamp(timing.now),
+            analyse_wall_s=timing.analyse_wall,
+            plan_wall_s=plan_wall,
+            reasons=tuple(causes),
+            corrections=corrections,
+            wall_began=self._wall(),
+        )
+
+    def _missing(self, name: str, outcome: Plan, now: float) -> list[tuple[str, Plan]]:
+        """Return what is to be deployed for an outcome, the deepest requirement first, the objective itself last."""
+        steps: list[tuple[str, Plan]] = []
+        for function in self._state.kb.designs[outcome.choice or ""].requires:
+            provider = self._state.provider(function)
+            if not self._state.is_fine(provider):
+                found = self._plan(provider, now, function)
+                if found.choice:
+                    steps += [s for s in self._missing(provider, found, now) if s[0] not in {o for o, _ in steps}]
+            else:
+                below = self._state.running[provider].design
+                fine = Plan(below, False, (), "")
+                steps += [s for s in self._missing(provider, fine, now)[:-1] if s[0] not in {o for o, _ in steps}]
+        return [*steps, (name, outcome)]
+
+    def _note_failure(self, name: str, now: float) -> None:
+        """Put the running design into the error log where it is known not to do."""
+        running = self._state.running[name]
+        if (running.design or "", name) in self._state.analysis.tried:
+            reason = "did not keep a limit while deployed"
+            if running.task_failure:
+                reason = f"its task failed while it was deployed ({running.task_failure[1] or 'no reason given'})"
+            self._state.note_in_vain(now, running.design or "", name, reason)
+        if running.is_broken and running.design:
+            self._state.note_in_vain(now, running.design, name, "did not run")
+
+    def _causes(self, name: str, now: float) -> list[Cause]:
+        """Return everything that asks for an adaptation of an objective itself, the earliest first."""
+        running, result = self._state.running[name], self._state.analysis.objectives.get(name)
+        if running.design is None:
+            requirers = self._state.requirers(name)
+            if not self._state.has_waited(now) or (name not in self._state.roots and not requirers):
+                return []
+            words = f"no configuration runs{f', which {requirers[0]} requires' if requirers else ''}"
+            return [Cause(now, "initial", words)]
+        errors: list[Cause] = []
+        if result and v.IN_ERROR_COMPONENT in result.causes:
+            errors += self._component_causes(name, now)
+        if result and v.IN_ERROR_NFR in result.causes:
+            errors += [self._violation(self._state.objectives[name], quality, now) for quality in result.violated]
+        if running.task_failure:
+            stamp, why = running.task_failure
+            errors.append(Cause(stamp, f"task:{name}", f"the task failed{f': {why}' if why else ''}", "S9"))
+        elif result and v.IN_ERROR_NFR in result.causes and not result.violated and not self._inherits(running):
+            errors.append(Cause(now, f"qa:{name}", f"a rule of the model finds an error of quality in {name}"))
+        return [*sorted(errors, key=_by_time), *self._chances(name, now, has_errors=bool(errors))]
+
+    def _chances(self, name: str, now: float, *, has_errors: bool) -> list[Cause]:
+        """Return why a better design may have become available, where it would be taken or is planned for anyway."""
+        running, always = self._state.running[name], self._state.objectives[name].always_improve
+        heeds = running.degraded or (self._state.settings.always_improve if always is None else always)
+        if heeds and not has_errors and now < running.calm_until:
+            return []
+        found = [
+            Cause(min(stamp, now), trigger, words, "" if trigger == OPERATOR else RECOVERY)
+            for trigger, (stamp, words) in running.updatable.items()
+        ]
+        running.updatable.clear()
+        return sorted(found, key=_by_time) if heeds or has_errors else []
+
+    def _inherits(self, running: Running) -> bool:
+        """Return whether something that the running design requires is in error."""
+        results = [self._state.analysis.objectives.get(o) for o in self._state.required(running.design)]
+        return any(result and result.in_error for result in results)
+
+    def _component_causes(self, name: str, now: float) -> list[Cause]:
+        running = self._state.running[name]
+        causes = []
+        for component in self._state.analysis.unrealisable.get(running.design or "", ()):
+            known = self._state.components.get(component)
+            words = f"component {component}, which {running.design} requires, does not work"
+            stamp = known.stamp if known else now
+            causes.append(Cause(stamp, f"component:{component}", words, "compError, compErrFG, S1a"))
+        if running.is_broken or not (causes or self._inherits(running)):
+            words = f"configuration {running.design} does not run"
+            causes.append(Cause(running.failed_stamp or now, f"component:{running.design}", words, "S1a"))
+        return causes
+
+    def _violation(self, objective: Objective, quality: str, now: float) -> Cause:
+        level, limit = self._state.levels[objective.name, quality], objective.limits[quality]
+        since = level.passed_since if level.passed_since is not None else now
+        kind = self._state.kb.qualities[quality]
+        return Cause(
+            stamp=since,
+            trigger=f"qa:{quality}",
+            text=f"{quality} {level.value:.3g} {kind.operator} {limit:g} for {now - since:.1f} s",
+            rules="QA, S9",
+            quality=quality,
+            level=level.value,
+            limit=limit,
+            excess=kind.excess(level.value, limit) / (abs(limit) or 1.0),
+        )
+
+    def _improves(self, running: Running, outcome: Plan) -> bool:
+        if running.degraded and not outcome.degraded:
+            return True
+        now = self._utility(self._state.kb.designs[running.design]) if running.design else -math.inf
+        return not running.degraded and outcome.candidates[0].utility >= now + self._state.settings.improvement
+
+    def _plan(self, name: str, now: float, function: str = "") -> Plan:
+        """Return what to deploy for an objective, or for a function that none asks for yet."""
+        objective = self._state.objectives.get(name) or Objective(name, function)
+        running = self._state.running.get(name) or Running()
+        designs: tuple[Design, ...] = self._state.kb.solving(objective.function)
+        unfulfilled: dict[str, list[str]] = {}
+        strained: dict[str, list[str]] = {}
+        for design in designs:
+            for required in design.requires:
+                provider = self._state.provider(required)
+                outcome = None if self._state.is_fine(provider) else self._plan(provider, now, required)
+                if outcome and (outcome.choice is None or outcome.degraded):
+                    kind = unfulfilled if outcome.choice is None else strained
+                    kind.setdefault(design.name, []).append(required)
+        situation = Situation(
+            qualities=self._state.kb.qualities,
+            unrealisable=self._state.analysis.unrealisable,
+            unfulfilled=unfulfilled,
+            strained=strained,
+            tried={
+                design: f"{reason}, not again for {expiry - now:.0f} s"
+                for (design, tried_for), (expiry, reason) in self._state.error_log.items()
+                if tried_for == name
+            },
+            current=None if running.is_broken else running.design,
+            observed=self._state.levels.latest(name),
+            factors=self.factors(name, now),
+            worth=self._state.settings.worth,
+        )
+        desired = self._state.settings.desired
+        is_possible = situation.can_deploy(desired) and desired not in strained and desired not in situation.tried
+        if running.design is None and is_possible:
+            designs = tuple(design for design in designs if design.name == desired) or designs
+        return plan(objective, designs, situation, self._utility, self._distance)
+
+    def factors(self, name: str, now: float) -> dict[str, float]:
+        """Return by how much the expected levels of qualities are to be multiplied: never towards the better."""
+        objective = self._state.objectives.get(name)
+        if not self._state.settings.correct_expected or objective is None:
+            return {}
+        most = max(1.0, self._state.settings.correction_limit)
+        found = {}
+        for quality in objective.limits:
+            ratio = self._state.levels.ratio(now, (name, quality))
+            if ratio is not None and quality in self._state.kb.qualities:
+                lower_is_better = self._state.kb.qualities[quality].direction is Direction.LOWER_IS_BETTER
+                found[quality] = min(max(1.0, ratio), most) if lower_is_better else max(min(1.0, ratio), 1.0 / most)
+        return found
+
+    def _corrections(self, name: str, now: float) -> tuple[str, ...]:
+        limit = self._state.settings.correction_limit
+        return tuple(
+            f"{quality} was {self._state.levels.ratio(now, (name, quality)) or 1.0:.3g} times what was expected of "
+            f"{self._state.running[name].design}: {factor:.3g} times (at most {limit:g}) is expected of the others"
+            for quality, factor in self.factors(name, now).items()
+            if round(factor, 2) != 1.0
+        )
+
+
+def _by_time(cause: Cause) -> tuple[float, str]:
+    return cause.stamp, cause.trigger

@@ -1,0 +1,234 @@
+"""What the statuses of a DiagnosticArray say, pure: levels of qualities, statuses of components, failures of tasks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mros1_reasoner.knowledge import vocabulary as v
+
+ERROR_LEVEL = 2  # diagnostic_msgs/DiagnosticStatus
+TASK_KEYS = ("objetive_error", "objective_error")
+"""Keys with which a "QA status" says that a task failed; the published observer of /obj_error writes the first."""
+_SHOWN = 60  # characters of foreign text in a warning
+_OPEN = ("level", "binding", "task")  # facts with a foreign name
+_TRUE, _FALSE = ("true", "1"), ("false", "0")
+
+
+@dataclass(frozen=True)
+class LevelFact:
+    """A quality has a level; `grounding` may be empty; `text` is the level as it was written."""
+
+    quality: str
+    level: float
+    grounding: str = ""
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class StaleFact:
+    """A quality can't be observed at present."""
+
+    quality: str
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class ComponentFact:
+    """A component has a status."""
+
+    component: str
+    status: str
+
+
+@dataclass(frozen=True)
+class BindingFact:
+    """A binding of a grounding is in error, or no longer is."""
+
+    grounding: str
+    in_error: bool
+
+
+@dataclass(frozen=True)
+class TaskFact:
+    """The task of an objective has failed, or no longer has; where no objective is called so, that of every one."""
+
+    name: str
+    failed: bool
+
+
+Fact = LevelFact | StaleFact | ComponentFact | BindingFact | TaskFact
+
+
+@dataclass(frozen=True)
+class Remark:
+    """Something about a status that makes no sense, or concerns nobody.
+
+    Attributes:
+        kind: statuses of one kind are told of together, however many they are.
+        text: one line, free of foreign control characters.
+        is_warning: False where it may well be meant for somebody else.
+    """
+
+    kind: str
+    text: str
+    is_warning: bool = True
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What statuses hold: facts, at most one of each thing, and remarks."""
+
+    facts: tuple[Fact, ...] = ()
+    remarks: tuple[Remark, ...] = ()
+
+
+class DiagnosticsReader:
+    """Reads statuses; what is not meant for the reasoner is left out.
+
+    However many statuses come, the facts are bounded by what the model knows: a later one of the same thing replaces an
+    earlier one, of foreign names there are at most `MAX_NAMES`, and what is not in the model yields a remark only, of
+    which there are at most `MAX_REMARKS`.
+    """
+
+    MAX_REMARKS = 20
+    MAX_NAMES = 200  # of groundings and tasks, which the reader can't check
+
+    def __init__(
+        self, qualities: Collection[str], components: Collection[str], nodes: Mapping[str, str] | None = None
+    ) -> None:
+        """Take what the model knows.
+
+        Args:
+            qualities: names of the quality attributes.
+            components: names of the components.
+            nodes: name of the component that a node is, by the node's name without a leading slash.
+        """
+        self._qualities = frozenset(qualities)
+        self._components = frozenset(components)
+        self._nodes = dict(nodes or {})
+        self._readers: dict[str, Callable[[Any], Fact | Remark | None]] = {
+            "QA status": self._quality,
+            "QA stale": self._stale,
+            "Component status": self._component,
+            "Missing node": self._missing,
+            "binding error": self._binding,
+        }
+
+    def read(self, statuses: Iterable[Any]) -> Reading:
+        """Return what statuses, objects with the fields of diagnostic_msgs/DiagnosticStatus, say."""
+        facts: dict[tuple[str, ...], Fact] = {}
+        remarks: dict[Remark, None] = {}
+        names = 0
+        for status in statuses:
+            reader = self._readers.get(status.message)
+            found = reader(status) if reader else None
+            match found:
+                case None:
+                    pass
+                case Remark():
+                    if len(remarks) < self.MAX_REMARKS:
+                        remarks[found] = None
+                case _:
+                    key = _key(found)
+                    if facts.pop(key, None) is None and key[0] in _OPEN:
+                        names += 1
+                    if names <= self.MAX_NAMES or key[0] not in _OPEN:
+                        facts[key] = found
+        return Reading(tuple(facts.values()), tuple(remarks))
+
+    def _quality(self, status: Any) -> Fact | Remark:
+        key, value = _first(status)
+        if not key:
+            return Remark("QA status", f"QA status of {shown(status.name)} has no value: left out")
+        if key in TASK_KEYS:
+            return _task(status.name, key, value)
+        if key not in self._qualities:
+            return Remark("Unsupported QA", f"Unsupported QA TYPE received: {_plain(key)}")
+        try:
+            level = float(value)
+        except ValueError:
+            say = f"QA status {shown(key)} has the level {shown(value)}, which is no number: left out"
+            return Remark("QA status", say)
+        if not math.isfinite(level):
+            say = f"QA status {shown(key)} has the level {shown(value)}, which is not finite: left out"
+            return Remark("QA status", say)
+        return LevelFact(key, level, status.name, _plain(value.strip()))
+
+    def _stale(self, status: Any) -> Fact | Remark:
+        key, value = _first(status)
+        if not key:
+            return Remark("QA stale", f"QA stale of {shown(status.name)} has no value: left out")
+        if key not in self._qualities:
+            return Remark("Unsupported QA", f"Unsupported QA TYPE received: {_plain(key)}")
+        return StaleFact(key, _plain(value))
+
+    def _component(self, status: Any) -> Fact | Remark:
+        key, value = _first(status)
+        text = value[:_SHOWN].strip().upper()
+        if not key or text not in v.COMPONENT_STATUSES:
+            say = f"Component status ({shown(key)}, {shown(value)}) is left out: expected (component, "
+            return Remark("Component status", say + "TRUE|FALSE|RECOVERED)")
+        return self._known(key, text)
+
+    def _missing(self, status: Any) -> Fact | Remark | None:
+        if _level(status) < ERROR_LEVEL:
+            return None
+        node = status.name.strip("/")
+        return self._known(self._nodes.get(node, node), v.FAILED)
+
+    def _known(self, name: str, status: str) -> Fact | Remark:
+        component = name if name in self._components else name.strip("/")
+        if component not in self._components:  # nothing in the model requires it
+            say = f"component {_plain(name)} is not in the model: its status is left out"
+            return Remark("unknown component", say, is_warning=False)
+        return ComponentFact(component, status)
+
+    @staticmethod
+    def _binding(status: Any) -> Fact | Remark:
+        if not status.name:
+            return Remark("binding error", "binding error without the name of a grounding: left out")
+        return BindingFact(status.name, _level(status) >= ERROR_LEVEL)
+
+
+def shown(text: str) -> str:
+    """Return foreign text in quotes, cut, on one line."""
+    return repr(text if len(text) <= _SHOWN else text[:_SHOWN] + "...")
+
+
+def _plain(text: str) -> str:
+    """Return foreign text as it is where it is short and printable, else as `shown`."""
+    return text if len(text) <= _SHOWN and text.isprintable() else shown(text)
+
+
+def _task(name: str, key: str, value: str) -> Fact | Remark:
+    text = value[:_SHOWN].strip().lower()
+    if text not in (*_TRUE, *_FALSE):
+        return Remark("QA status", f"QA status {key} has the value {shown(value)}: expected True or False: left out")
+    return TaskFact(name, text in _TRUE)
+
+
+def _key(fact: Fact) -> tuple[str, ...]:
+    """Return what a fact is about: a later fact of the same thing replaces it."""
+    match fact:
+        case LevelFact():
+            return ("level", fact.quality, fact.grounding)
+        case StaleFact():
+            return ("stale", fact.quality)
+        case ComponentFact():
+            return ("component", fact.component)
+        case BindingFact():
+            return ("binding", fact.grounding)
+        case TaskFact():
+            return ("task", fact.name)
+
+
+def _first(status: Any) -> tuple[str, str]:
+    return (status.values[0].key, status.values[0].value) if status.values else ("", "")
+
+
+def _level(status: Any) -> int:
+    level = status.level
+    return level[0] if isinstance(level, bytes) and level else int(level or 0)

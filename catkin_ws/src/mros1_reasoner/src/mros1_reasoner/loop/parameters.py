@@ -1,0 +1,190 @@
+"""The node's parameters, pure: from a mapping, as the parameter server or a bag holds it, to what the loop needs."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import rospkg
+from ros_model.files import resolve
+
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.knowledge.model import Direction, Objective
+from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.planning.utility import UtilityError, make_utility
+
+_log = logging.getLogger(__name__)
+
+DEFAULT_ACTION = "rosgraph_manipulator_action_server"
+_NFR = "nfr_"
+_NAMED_OTHERWISE = ("desired", "start_grace", "utility")  # settings whose parameter needs more than its default's type
+_TRUE, _FALSE = (True, 1, "true", "True"), (False, 0, "false", "False")
+
+
+class ParameterError(Exception):
+    """A parameter can't be used; one line with its name, its value and what to do."""
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The private parameters of the node reasoner; the package's README tells what they mean.
+
+    Every property and method raises ParameterError where a value can't be used.
+    """
+
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def period(self) -> float:
+        """Period of reasoning while only levels change, s."""
+        value = self._number("reasoning_rate", 2.0)
+        if value <= 0:
+            raise ParameterError(f"parameter ~reasoning_rate is {value:g}: expected more than 0")
+        return value
+
+    @property
+    def execution_deadline(self) -> float:
+        """A request without a result has failed after so long, s of wall time."""
+        return self._not_negative("execution_deadline", 60.0)
+
+    @property
+    def asks(self) -> bool:
+        """Whether a manipulator is asked; else what is decided is taken for done."""
+        return self._flag("use_reconfigure_srv", True)
+
+    @property
+    def action(self) -> str:
+        """Name of the manipulator's action."""
+        return str(self.values.get("reconfigure_srv_name") or DEFAULT_ACTION)
+
+    @property
+    def save_folder(self) -> Path:
+        """The folder in which knowledge bases are saved."""
+        given = str(self.values.get("save_folder") or "")
+        return Path(given or rospkg.get_ros_home()).expanduser().resolve()
+
+    @property
+    def nodes(self) -> dict[str, str]:
+        """Component by node, from `~components`: {component: {node: name}}."""
+        return {
+            str(entry["node"]).strip("/"): str(component)
+            for component, entry in self._mapping("components", "component -> {node: name}").items()
+            if isinstance(entry, dict) and entry.get("node")
+        }
+
+    @property
+    def task_actions(self) -> dict[str, str]:
+        """Action that pursues the task of an objective, by the objective's name."""
+        given = self._mapping("task_actions", "objective -> action")
+        return {str(objective): str(action) for objective, action in given.items() if action}
+
+    @property
+    def model_files(self) -> list[Path]:
+        """The application's ontologies."""
+        files = self._files("model_file")
+        if not files:
+            raise ParameterError("parameter ~model_file is not set: give the application's OWL file")
+        return files
+
+    @property
+    def vocabulary_files(self) -> list[Path]:
+        """Ontologies to load beside the package's own."""
+        return self._files("tomasys_file")
+
+    def knowledge_base(
+        self, models: Sequence[Path] | None = None, vocabularies: Sequence[Path] | None = None
+    ) -> KnowledgeBase:
+        """Return the knowledge base of the parameters' files, or of those given.
+
+        Raises:
+            KnowledgeBaseError, ModelError: a file can't be used.
+        """
+        directions = {}
+        for quality, direction in self._mapping("qa_direction", "QA -> direction").items():
+            try:
+                directions[str(quality)] = Direction(direction)
+            except ValueError as error:
+                known = " or ".join(d.value for d in Direction)
+                raise ParameterError(f"parameter ~qa_direction/{quality} is {direction!r}: expected {known}") from error
+        models = self.model_files if models is None else models
+        return KnowledgeBase(models, self.vocabulary_files if vocabularies is None else vocabularies, directions)
+
+    def objectives(self, knowledge_base: KnowledgeBase) -> tuple[Objective, ...]:
+        """Return the model's objectives, else one for each function that no design requires, with the NFRs given."""
+        objectives = knowledge_base.objectives
+        if not objectives:
+            required = {function for design in knowledge_base.designs.values() for function in design.requires}
+            objectives = tuple(
+                Objective(f"o_{function.removeprefix('f_')}A", function)
+                for function in knowledge_base.functions
+                if function not in required
+            )
+        limits = {}
+        for name in sorted(self.values):
+            quality = name.removeprefix(_NFR)
+            if quality == name:
+                continue
+            if quality not in knowledge_base.qualities:
+                _log.warning("parameter ~%s: Unsupported QA TYPE received: %s: left out", name, quality)
+                continue
+            limits[quality] = self._number(name, 0.0)
+        return tuple(replace(o, limits={**o.limits, **limits}) for o in objectives)
+
+    def settings(self, knowledge_base: KnowledgeBase) -> Settings:
+        """Return the loop's settings: each has a parameter of its name, `desired` is `~desired_configuration`."""
+        defaults = Settings()
+        desired = str(self.values.get("desired_configuration") or "")
+        if desired and desired not in knowledge_base.designs:
+            raise ParameterError(f"parameter ~desired_configuration is {desired!r}: no FunctionDesign of the model")
+        utility = self.values.get("utility", defaults.utility)
+        try:
+            make_utility(utility, knowledge_base.qualities)
+        except UtilityError as error:
+            raise ParameterError(f"parameter ~utility: {error}") from error
+        others: dict[str, Any] = {}
+        for item in fields(Settings):
+            default = getattr(defaults, item.name)
+            if item.name in _NAMED_OTHERWISE:
+                continue
+            if isinstance(default, bool):
+                others[item.name] = self._flag(item.name, default)
+            elif isinstance(default, float):
+                others[item.name] = self._not_negative(item.name, default)
+        grace = self._not_negative("start_grace", defaults.start_grace)
+        return Settings(**others, start_grace=grace if self.asks else 0.0, utility=utility, desired=desired)
+
+    def _files(self, name: str) -> list[Path]:
+        """Return the files that a parameter names: one, several separated by commas, or a list."""
+        value = self.values.get(name, "")
+        names = value if isinstance(value, list) else str(value).split(",")
+        return [resolve(str(name).strip()) for name in names if str(name).strip()]
+
+    def _mapping(self, name: str, expected: str) -> Mapping[str, Any]:
+        value = self.values.get(name) or {}
+        if not isinstance(value, Mapping):
+            raise ParameterError(f"parameter ~{name} is {value!r}: expected a mapping {expected}")
+        return value
+
+    def _flag(self, name: str, default: bool) -> bool:
+        value = self.values.get(name, default)
+        if value in _TRUE:
+            return True
+        if value in _FALSE:
+            return False
+        raise ParameterError(f"parameter ~{name} is {value!r}: expected true or false")
+
+    def _number(self, name: str, default: float) -> float:
+        value = self.values.get(name, default)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise ParameterError(f"parameter ~{name} is {value!r}: expected a finite number")
+        return float(value)
+
+    def _not_negative(self, name: str, default: float) -> float:
+        value = self._number(name, default)
+        if value < 0:
+            raise ParameterError(f"parameter ~{name} is {value:g}: expected 0 or more")
+        return value

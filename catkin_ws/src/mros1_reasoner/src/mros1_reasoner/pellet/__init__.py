@@ -1,0 +1,1 @@
+"""Pellet in a process of its own, and what makes its analyses quick."""

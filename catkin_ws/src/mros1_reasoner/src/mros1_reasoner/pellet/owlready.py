@@ -1,0 +1,76 @@
+"""The slow way: owlready2's own call of Pellet, a new JVM for every analysis (1.1 to 3 s)."""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections.abc import Sequence
+
+import owlready2
+
+from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, ReasonerError
+from mros1_reasoner.knowledge.triples import assertion_triple, iri_of, literal_of, parse_ntriples
+from mros1_reasoner.knowledge.vocabulary import XSD
+
+_log = logging.getLogger(__name__)
+
+
+class OwlreadyReasoner:
+    """A Reasoner by `owlready2.sync_reasoner_pellet`: the fallback, and the reference in tests and benchmarks."""
+
+    def __init__(self) -> None:
+        self._ontology = ""
+
+    def load(self, ontology: str) -> None:
+        """See Reasoner.load."""
+        self._ontology = ontology
+
+    def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
+        """See Reasoner.infer."""
+        world = owlready2.World()
+        try:
+            return self._infer(world, facts, properties)
+        finally:
+            world.close()
+
+    def close(self) -> None:
+        """See Reasoner.close."""
+
+    def _infer(self, world: owlready2.World, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
+        text = self._ontology + "".join(f"{' '.join(assertion_triple(fact))} .\n" for fact in facts)
+        ontology = world.get_ontology("http://metacontrol.org/analysis#")
+        ontology.load(fileobj=io.BytesIO(text.encode()), format="ntriples")
+        run_pellet(world)
+        saved = io.BytesIO()
+        world.save(saved, format="ntriples")
+        wanted = set(properties)
+        found: set[Assertion] = set()
+        for subject, predicate, value in parse_ntriples(saved.getvalue().decode()):
+            name = iri_of(predicate)
+            if name in wanted:
+                literal = literal_of(value)
+                if literal is None:
+                    found.add(Assertion(iri_of(subject), name, iri_of(value)))
+                else:
+                    found.add(Assertion(iri_of(subject), name, literal[0], _datatype(literal[1])))
+        return sorted(found)
+
+
+def _datatype(iri: str) -> str:
+    """Plain text and xsd:string are one."""
+    return XSD + "string" if not iri or iri.endswith("#PlainLiteral") else iri
+
+
+def run_pellet(world: owlready2.World) -> None:
+    """Run owlready2's call of Pellet over a world, which takes the inferences in.
+
+    Raises:
+        InconsistentError: the ontology contradicts itself.
+        ReasonerError: Java or Pellet failed.
+    """
+    try:
+        owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
+    except owlready2.OwlReadyInconsistentOntologyError as error:
+        raise InconsistentError(" ".join(str(error).split())) from error
+    except (owlready2.OwlReadyJavaError, OSError) as error:
+        raise ReasonerError(f"owlready2 could not run Pellet: {' '.join(str(error).split())}") from error

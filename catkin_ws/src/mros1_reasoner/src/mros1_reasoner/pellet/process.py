@@ -1,0 +1,280 @@
+"""Pellet in a child process that stays warm: started once, watched, and restarted when it dies or hangs."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import logging
+import math
+import os
+import select
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, Reasoner, ReasonerError
+from mros1_reasoner.knowledge.triples import TripleError, parse_ntriples, write_ntriples
+from mros1_reasoner.pellet.equivalence import Twins
+from mros1_reasoner.pellet.owlready import OwlreadyReasoner
+
+_log = logging.getLogger(__name__)
+
+_Answer = TypeVar("_Answer")
+
+START_DEADLINE = 20.0  # s, wall: a JVM and its jars, on a loaded machine
+HEAP_MB = 256  # of the JVM; with it, node and child stay below 500 MB
+RETRY_AFTER = 300.0  # s, wall: so long the slow way is taken after the child could not be kept running
+NO_JAVA = "no Java runtime found: install openjdk-17-jre-headless"
+
+
+class NoJavaError(ReasonerError):
+    """There is no Java runtime."""
+
+
+class ChildLostError(ReasonerError):
+    """The child could not be kept running, though it was started again."""
+
+
+def find_jvm() -> Path:
+    """Return the path of libjvm.so: of JAVA_HOME, else of the `java` on PATH.
+
+    Raises:
+        NoJavaError: there is none.
+    """
+    homes = [Path(os.environ["JAVA_HOME"])] if os.environ.get("JAVA_HOME") else []
+    java = shutil.which("java")
+    if java:
+        homes.append(Path(java).resolve().parents[1])
+    for home in homes:
+        for library in (home / "lib/server/libjvm.so", home / "jre/lib/server/libjvm.so"):
+            if library.is_file():
+                return library
+    raise NoJavaError(NO_JAVA)
+
+
+class PelletReasoner:
+    """A Reasoner by Pellet in a warm child process.
+
+    Not safe for use by several threads, and the thread that calls it first must live as long as it does:
+    the kernel ends the child with the thread that started it.
+    """
+
+    def __init__(self, deadline: float = 20.0, heap_mb: int = HEAP_MB) -> None:
+        """Start the child; it gets ready while the caller goes on.
+
+        Args:
+            deadline: s, wall, for an answer; a child that takes longer is replaced.
+            heap_mb: memory of the JVM; a child that needs more ends, and is replaced.
+
+        Raises:
+            NoJavaError: there is no Java runtime.
+            ReasonerError: JPype1 or owlready2's jars are missing.
+        """
+        self._deadline, self._heap_mb = deadline, heap_mb
+        self._jvm = find_jvm()
+        if importlib.util.find_spec("jpype") is None:
+            raise ReasonerError("the Python package JPype1 is missing: install requirements/python.txt")
+        self._jars = _jar_folder()
+        self._ontology: str | None = None
+        self._twins = Twins(())
+        self._process: subprocess.Popen[bytes] | None = None
+        self._buffer = bytearray()
+        self._greeted = False
+        self._start()
+
+    @property
+    def pid(self) -> int | None:
+        """Process id of the child, None while there is none."""
+        return self._process.pid if self._process else None
+
+    def load(self, ontology: str) -> None:
+        """See Reasoner.load."""
+        self._ontology = None
+        try:
+            twins = Twins(list(parse_ntriples(ontology)))
+        except TripleError as error:
+            raise ReasonerError(f"the ontology is no N-Triples: {error}") from error
+        reduced = write_ntriples(twins.reduced)
+        self._ask_twice({"op": "load", "ontology": ontology})  # the whole of it must be free of contradiction
+        self._ask_twice({"op": "load", "ontology": reduced})
+        self._ontology, self._twins = reduced, twins
+
+    def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
+        """See Reasoner.infer."""
+        added, expand = self._twins.split(facts)
+        answer = self._ask_twice({"op": "infer", "facts": [list(f) for f in added], "properties": list(properties)})
+        return sorted(expand(Assertion(*row) for row in answer["values"]))
+
+    def close(self) -> None:
+        """End the child."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        process.kill()
+        for stream in (process.stdin, process.stdout):
+            if stream:
+                stream.close()
+        process.wait()
+
+    def _start(self) -> None:
+        child = Path(__file__).with_name("child.py")
+        self._buffer.clear()
+        self._greeted = False
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", str(child), str(os.getpid()), str(self._jvm), str(self._jars), str(self._heap_mb)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL if not _log.isEnabledFor(logging.DEBUG) else None,
+            bufsize=0,
+        )
+        os.set_blocking(self._process.stdin.fileno(), False)  # type: ignore[union-attr]
+
+    def _ask_twice(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Ask; when the child dies or hangs, ask a new one once more."""
+        try:
+            return self._ask(request)
+        except _ChildError as error:
+            _log.warning("Pellet's process %s: starting it again", error)
+        self.close()
+        self._start()
+        try:
+            if request["op"] != "load" and self._ontology is not None:
+                self._ask({"op": "load", "ontology": self._ontology})
+            return self._ask(request)
+        except _ChildError as error:
+            self.close()
+            raise ChildLostError(f"Pellet's process {error}, twice in a row") from error
+
+    def _ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        if self._process is None:
+            raise _ChildError("is not running")
+        if not self._greeted:
+            greeting = self._receive(time.monotonic() + START_DEADLINE)
+            if not greeting["ok"]:
+                raise _ChildError(f"does not start ({greeting['message']})")
+            self._greeted = True
+        until = time.monotonic() + self._deadline
+        data = json.dumps(request, separators=(",", ":")).encode("ascii")
+        self._send(b"%d\n" % len(data) + data, until)
+        answer = self._receive(until)
+        self._check(answer)
+        return answer
+
+    @staticmethod
+    def _check(answer: dict[str, Any]) -> None:
+        if answer["ok"]:
+            return
+        if answer["inconsistent"]:
+            raise InconsistentError(f"the ontology contradicts itself: {answer['message']}")
+        raise ReasonerError(f"Pellet refuses: {answer['message']}")
+
+    def _send(self, data: bytes, until: float) -> None:
+        stream = self._process.stdin.fileno()  # type: ignore[union-attr]
+        view = memoryview(data)
+        while view:
+            _, ready, _ = select.select([], [stream], [], max(0.0, until - time.monotonic()))
+            if not ready:
+                raise _ChildError("takes no request")
+            try:
+                view = view[os.write(stream, view) :]
+            except OSError as error:
+                raise _ChildError("has died") from error
+
+    def _receive(self, until: float) -> dict[str, Any]:
+        stream = self._process.stdout.fileno()  # type: ignore[union-attr]
+        while True:
+            header, newline, rest = self._buffer.partition(b"\n")
+            if newline and len(rest) >= int(header):
+                size = int(header)
+                del self._buffer[: len(header) + 1 + size]
+                return json.loads(rest[:size])
+            ready, _, _ = select.select([stream], [], [], max(0.0, until - time.monotonic()))
+            if not ready:
+                raise _ChildError("does not answer in time")
+            data = os.read(stream, 1 << 20)
+            if not data:
+                raise _ChildError("has died")
+            self._buffer += data
+
+
+class SteadyReasoner:
+    """Pellet in its child process; the slow way while that can't be kept running."""
+
+    def __init__(
+        self,
+        child: PelletReasoner,
+        slow: Callable[[], Reasoner] = OwlreadyReasoner,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Go by the child.
+
+        Args:
+            child: the fast way; it is closed with this.
+            slow: makes the other way.
+            clock: wall clock, s.
+        """
+        self._child, self._slow, self._clock = child, slow, clock
+        self._ontology = ""
+        self._retry_at = -math.inf
+
+    def load(self, ontology: str) -> None:
+        """See Reasoner.load."""
+        self._ontology = ontology
+        self._by_child(lambda: self._child.load(ontology), lambda _: None)
+
+    def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
+        """See Reasoner.infer."""
+        return self._by_child(lambda: self._child.infer(facts, properties), lambda slow: slow.infer(facts, properties))
+
+    def close(self) -> None:
+        """See Reasoner.close."""
+        self._child.close()
+
+    def _by_child(self, fast: Callable[[], _Answer], otherwise: Callable[[Reasoner], _Answer]) -> _Answer:
+        if self._clock() >= self._retry_at:
+            try:
+                if self._retry_at > -math.inf:  # the child has gone since it has loaded the ontology
+                    self._child.load(self._ontology)
+                    self._retry_at = -math.inf
+                return fast()
+            except ChildLostError as error:
+                self._retry_at = self._clock() + RETRY_AFTER
+                _log.warning(
+                    "%s; going on with a new JVM for every analysis, more than a second each; next try in %g s",
+                    error,
+                    RETRY_AFTER,
+                )
+        slow = self._slow()
+        slow.load(self._ontology)
+        return otherwise(slow)
+
+
+def make_reasoner(deadline: float = 20.0) -> Reasoner:
+    """Return Pellet kept warm; where its child process can't run, owlready2's slow call of it, with a warning.
+
+    Raises:
+        NoJavaError: there is no Java runtime, without which neither runs.
+    """
+    try:
+        return SteadyReasoner(PelletReasoner(deadline))
+    except NoJavaError:
+        raise
+    except (ReasonerError, OSError) as error:
+        _log.warning("%s; going on with a new JVM for every analysis, which takes more than a second each", error)
+        return OwlreadyReasoner()
+
+
+class _ChildError(Exception):
+    """The child does not do its part; the text goes on from "Pellet's process"."""
+
+
+def _jar_folder() -> Path:
+    spec = importlib.util.find_spec("owlready2")
+    folder = Path(spec.origin).parent / "pellet" if spec and spec.origin else Path()
+    if not any(folder.glob("pellet-*.jar")):
+        raise ReasonerError(f"owlready2's jars of Pellet are not in {folder}: install owlready2 0.49")
+    return folder

@@ -1,0 +1,199 @@
+"""R3, pure: which design to deploy for an objective, and why each other one was not taken."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+
+from mros1_reasoner.knowledge.model import Design, Objective, Quality
+
+Utility = Callable[[Design], float]
+Distance = Callable[[Design, Design], float]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A design that was considered.
+
+    Attributes:
+        design: what was considered.
+        utility: how useful it is expected to be.
+        violation: by how much its levels pass the objective's limits, as a sum of shares of the limits.
+        chosen: whether it was taken.
+        refused_because: why it can't be taken; empty for the chosen one and those that merely are less useful.
+        lost_because: why it was not taken; empty for the chosen one only.
+        levels: the levels that were compared with the limits: observed ones of the deployed design, expected and
+            corrected ones of the others.
+    """
+
+    design: Design
+    utility: float
+    violation: float
+    chosen: bool = False
+    refused_because: str = ""
+    lost_because: str = ""
+    levels: Mapping[str, float] = field(default_factory=dict, compare=False)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to deploy.
+
+    Attributes:
+        choice: name of the design, None when no design can be deployed.
+        degraded: no design keeps every limit; the choice is the least violating one.
+        candidates: all that were considered, best first.
+        reason: why the choice was made, in words.
+    """
+
+    choice: str | None
+    degraded: bool
+    candidates: tuple[Candidate, ...]
+    reason: str
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What planning has to heed beside the designs.
+
+    Attributes:
+        qualities: how the levels of each quality attribute compare.
+        unrealisable: components that are missing, by the name of the design that requires them.
+        unfulfilled: functions that a design requires and that no design can be deployed for, by the design's name.
+        strained: the same for functions that are provided, but not as they should be.
+        tried: why a design was tried in vain, by its name.
+        current: name of the deployed design.
+        observed: levels that were observed with it; they count in place of the expected ones.
+        factors: by how much the expected levels of a quality are to be multiplied.
+        worth: by how much less, as a share of a limit, another design must violate limits where none keeps them all.
+    """
+
+    qualities: Mapping[str, Quality] = field(default_factory=dict)
+    unrealisable: Mapping[str, Collection[str]] = field(default_factory=dict)
+    unfulfilled: Mapping[str, Collection[str]] = field(default_factory=dict)
+    strained: Mapping[str, Collection[str]] = field(default_factory=dict)
+    tried: Mapping[str, str] = field(default_factory=dict)
+    current: str | None = None
+    observed: Mapping[str, float] = field(default_factory=dict)
+    factors: Mapping[str, float] = field(default_factory=dict)
+    worth: float = 0.0
+
+    def can_deploy(self, design: str) -> bool:
+        """Return whether a design can be deployed, however well it does."""
+        return not self.unrealisable.get(design) and not self.unfulfilled.get(design)
+
+
+def plan(
+    objective: Objective,
+    designs: Collection[Design],
+    situation: Situation,
+    utility: Utility,
+    distance: Distance,
+) -> Plan:
+    """Choose a design that can be deployed, was not just tried in vain and keeps every limit.
+
+    The highest utility wins, a tie goes to the smaller change. Where none keeps every limit, the least violating
+    one is taken, the current one included, which goes only when another one is worth the change; where all were
+    tried in vain, they are tried again.
+    """
+    running = next((design for design in designs if design.name == situation.current), None)
+    candidates = [_judge(objective, design, situation, utility) for design in designs]
+
+    def change(candidate: Candidate) -> float:
+        return distance(running, candidate.design) if running else 0.0
+
+    def by_use(candidate: Candidate) -> tuple[float, float, str]:
+        return -candidate.utility, change(candidate), candidate.design.name
+
+    def by_violation(candidate: Candidate) -> tuple[float, float, float, str]:
+        return candidate.violation, *by_use(candidate)
+
+    fit = sorted((c for c in candidates if not c.refused_because), key=by_use)
+    deployable = [c for c in candidates if situation.can_deploy(c.design.name)]
+    fresh = [c for c in deployable if c.design.name not in situation.tried or c.design.name == situation.current]
+    if fit:
+        degraded, best = False, fit[0]
+        reason = f"{best.design.name} has the highest utility ({best.utility:g}) of the {len(fit)} (out of "
+        reason += f"{len(candidates)}) designs that can be deployed and keep every limit"
+        if len(fit) > 1 and fit[1].utility == best.utility and running:
+            reason += f", and is a smaller change than {fit[1].design.name}, which is as useful"
+    elif deployable:
+        degraded, best = True, min(fresh or deployable, key=by_violation)
+        now = next((c for c in fresh if c.design.name == situation.current), None)
+        stays = now is not None and (best is now or now.violation - best.violation < situation.worth)
+        reason = f"degraded: no design keeps every limit; {(now if now and stays else best).design.name} "
+        if now and stays and best is not now:
+            reason += f"stays: {best.design.name} would violate them hardly less"
+            best = now
+        else:
+            reason += f"{'stays' if stays else 'is taken'}: it is the least violating"
+        if not fresh:
+            reason += ", and all were tried before"
+    else:
+        ranked = (replace(c, lost_because=c.refused_because) for c in sorted(candidates, key=by_violation))
+        return Plan(None, False, tuple(ranked), _nothing(situation))
+    others = sorted((c for c in candidates if c is not best), key=lambda c: (bool(c.refused_because), *by_use(c)))
+    chosen = replace(best, chosen=True, refused_because="")
+    lost = (replace(c, lost_because=_loss(c, best, degraded)) for c in others)
+    return Plan(best.design.name, degraded, (chosen, *lost), reason)
+
+
+def difference(first: Design, second: Design) -> float:
+    """Return how big a change it is from one design to the other: components first, then expected levels."""
+    components = len(first.components ^ second.components)
+    shared = sorted(set(first.expected) & set(second.expected))
+    return components + math.dist([first.expected[q] for q in shared], [second.expected[q] for q in shared])
+
+
+def _judge(objective: Objective, design: Design, situation: Situation, utility: Utility) -> Candidate:
+    name = design.name
+    expected = {q: level * situation.factors.get(q, 1.0) for q, level in design.expected.items()}
+    is_current = name == situation.current
+    levels = {**expected, **situation.observed} if is_current else expected
+    reasons, violation = [], 0.0
+    for parts, words in (
+        (situation.unrealisable, "which does not work"),
+        (situation.unfulfilled, "which no design can provide now"),
+        (situation.strained, "which no design provides as it should now"),
+    ):
+        if parts.get(name):
+            reasons.append(f"requires {', '.join(sorted(parts[name]))}, {words}")
+    violation += len(situation.strained.get(name, ()))
+    if name in situation.tried:
+        reasons.append(situation.tried[name])
+    for quality, limit in sorted(objective.limits.items()):
+        kind = situation.qualities.get(quality, Quality())
+        level = levels.get(quality)
+        if level is None:
+            reasons.append(f"no {quality} is expected of it")
+            violation = math.inf
+            continue
+        if kind.violates(level, limit):
+            factor = "" if is_current else _factor(situation.factors.get(quality, 1.0))
+            reasons.append(f"{quality} {level:.4g}{factor} {kind.operator} {limit:g}")
+        # A lucky or unlucky moment of the deployed design must not weigh more than what is expected of the others.
+        lasting = kind.direction.better(level, expected.get(quality, level)) if quality in situation.factors else level
+        violation += max(0.0, kind.excess(lasting, limit)) / (abs(limit) or 1.0)
+    return Candidate(design, utility(design), violation, refused_because="; ".join(reasons), levels=levels)
+
+
+def _factor(factor: float) -> str:
+    return "" if factor == 1.0 else f" (expected, times {factor:.3g})"
+
+
+def _loss(candidate: Candidate, best: Candidate, degraded: bool) -> str:
+    """Return why a candidate was not taken."""
+    if candidate.refused_because:
+        worse = f"; violates limits by {candidate.violation:.2g}, the choice by {best.violation:.2g}"
+        return candidate.refused_because + (worse if degraded and math.isfinite(candidate.violation) else "")
+    if candidate.utility < best.utility:
+        return f"utility {candidate.utility:.4g} is less than {best.utility:.4g}"
+    return "as useful as the choice, but a bigger change"
+
+
+def _nothing(situation: Situation) -> str:
+    missing = sorted({c for components in situation.unrealisable.values() for c in components})
+    functions = sorted({f for names in situation.unfulfilled.values() for f in names})
+    without = " or ".join(", ".join(names) for names in (missing, functions) if names)
+    return f"no design can be deployed without {without}" if without else "no design is known"

@@ -1,0 +1,1 @@
+"""Recorded runs: what was decided, and what would have been. Without ROS."""

@@ -1,0 +1,176 @@
+"""What a bag holds of a reasoner: its journal and decisions, or at least what it could hear. Read without ROS."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+from metacontrol_bags.typestore import typestore
+from rosbags.rosbag1 import Reader, ReaderError
+from rosbags.typesys import TypesysError
+
+from mros1_reasoner.loop.journal import Entry
+from mros1_reasoner.planning.record import DecisionRecord, read_message, seconds
+
+_JOURNAL = "mros1_reasoner/journal"
+_DECISION = "mros1_reasoner/decision"
+_ACTIVE = "rosgraph_manipulator/active_configuration"
+_DIAGNOSTICS = "/diagnostics"
+_UNREADABLE = (ReaderError, TypesysError, AttributeError, IndexError, UnicodeDecodeError)
+
+
+class RecordingError(Exception):
+    """A bag can't be used; one line that names it and says what to do."""
+
+
+@dataclass
+class Run:
+    """One life of a reasoner, from its journal.
+
+    Attributes:
+        name: beginning of its decisions' ids.
+        parameters: of the node.
+        files: text of the ontologies that it loaded, by path.
+        first: number of the first entry; more than 0 where the reasoner had forgotten older ones.
+        entries: of its journal, from its start where the bag has the beginning.
+    """
+
+    name: str
+    parameters: dict[str, Any] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
+    first: int = 0
+    entries: list[Entry] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Statuses:
+    """A DiagnosticArray: when it was recorded, its own stamp, and its statuses."""
+
+    now: float
+    stamp: float
+    statuses: tuple[Any, ...]
+
+
+@dataclass
+class Recording:
+    """What a bag holds of one reasoner; times are s of ROS time.
+
+    Attributes:
+        start: of the bag.
+        runs: by the journal; empty where the bag has none.
+        decisions: every message, with when it was recorded.
+        diagnostics: everything on /diagnostics, and `active`, what ran: read only where there is no journal.
+    """
+
+    start: float = 0.0
+    runs: list[Run] = field(default_factory=list)
+    decisions: list[tuple[float, DecisionRecord]] = field(default_factory=list)
+    diagnostics: list[Statuses] = field(default_factory=list)
+    active: list[Entry] = field(default_factory=list)
+
+
+def read_decisions(path: Path, namespace: str | None = None) -> list[DecisionRecord]:
+    """Return the decisions in a bag, each as its last message tells it.
+
+    Raises:
+        RecordingError: the bag can't be read, or holds several reasoners and no namespace is given.
+    """
+    last: dict[str, DecisionRecord] = {}
+    with _open(path) as reader:
+        topic = _topic(path, reader, _DECISION, namespace)
+        for _, _, message in _messages(path, reader, [topic] if topic else []):
+            record = read_message(message)
+            last[record.id] = record
+    return list(last.values())
+
+
+def read_recording(path: Path, namespace: str | None = None) -> Recording:
+    """Return what a bag holds of a reasoner.
+
+    Raises:
+        RecordingError: the bag can't be read, or holds several reasoners and no namespace is given.
+    """
+    recording = Recording()
+    with _open(path) as reader:
+        journal = _topic(path, reader, _JOURNAL, namespace)
+        decision = _topic(path, reader, _DECISION, namespace)
+        active = _topic(path, reader, _ACTIVE, namespace)
+        raw = [] if journal else [active, _DIAGNOSTICS]
+        recording.start = reader.start_time * 1e-9
+        wanted = [topic for topic in (journal, decision, *raw) if topic]
+        for topic, now, message in _messages(path, reader, wanted):
+            if topic == journal:
+                _add_journal(path, recording, message)
+            elif topic == decision:
+                recording.decisions.append((now, read_message(message)))
+            elif topic == active:
+                recording.active += [
+                    Entry(now, "active", (f.function, f.configuration, f.state)) for f in message.functions
+                ]
+            else:
+                statuses = Statuses(now, seconds(message.header.stamp), tuple(message.status))
+                recording.diagnostics.append(statuses)
+    return recording
+
+
+def _add_journal(path: Path, recording: Recording, message: Any) -> None:
+    runs = [run for run in recording.runs if run.name == message.name]
+    if not runs:
+        runs = [Run(str(message.name), first=int(message.first))]
+        recording.runs += runs
+    run = runs[-1]
+    if message.parameters and not run.parameters:
+        try:
+            parameters = yaml.safe_load(message.parameters)
+        except yaml.YAMLError as error:
+            raise RecordingError(f"{path}: the reasoner's parameters are no YAML: {error}") from error
+        run.parameters = parameters if isinstance(parameters, dict) else {}
+        run.files = dict(zip(message.files, message.contents, strict=False))
+    held = run.first + len(run.entries)
+    if int(message.first) > held:
+        raise RecordingError(f"{path}: a part of the reasoner's journal is missing: it can't be replayed")
+    fresh = message.entries[held - int(message.first) :]
+    run.entries += [Entry(float(item.now), str(item.kind), tuple(map(str, item.values))) for item in fresh]
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[Reader]:
+    """Open a bag; whatever is wrong with it becomes a RecordingError."""
+    if not path.is_file():
+        raise RecordingError(f"{path}: no such bag")
+    try:
+        with Reader(path) as reader:
+            yield reader
+    except _UNREADABLE as error:
+        hint = "; it was not closed: run `rosbag reindex`" if path.suffix == ".active" else ""
+        raise RecordingError(f"{path}: not a readable bag ({error}){hint}") from error
+
+
+def _topic(path: Path, reader: Reader, name: str, namespace: str | None) -> str:
+    """Return the topic of that name in the namespace, or in the only one; empty where there is none."""
+    if namespace is not None:
+        return f"/{namespace.strip('/')}/{name}".replace("//", "/")
+    found = sorted({c.topic for c in reader.connections if c.topic == f"/{name}" or c.topic.endswith(f"/{name}")})
+    if len(found) > 1:
+        spaces = ", ".join(topic.removesuffix(name) for topic in found)
+        raise RecordingError(f"{path}: holds several reasoners: choose one with --namespace: {spaces}")
+    return found[0] if found else ""
+
+
+def _messages(path: Path, reader: Reader, topics: Collection[str]) -> Iterator[tuple[str, float, Any]]:
+    """Yield topic, time of recording and message, in the order of recording."""
+    connections = [connection for connection in reader.connections if connection.topic in topics]
+    if not connections:
+        return
+    store = typestore(connections)
+    for connection, nanoseconds, data in reader.messages(connections=connections):
+        try:
+            message = store.deserialize_ros1(data, connection.msgtype)
+        except (ValueError, struct.error, AssertionError) as error:
+            raise RecordingError(f"{path}: a message on {connection.topic} does not fit its definition") from error
+        yield connection.topic, nanoseconds * 1e-9, message

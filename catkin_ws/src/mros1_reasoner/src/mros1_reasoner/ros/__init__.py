@@ -1,0 +1,1 @@
+"""ROS shells: the node reasoner and its parts."""

@@ -1,0 +1,70 @@
+"""The journal on a topic, so that a bag holds what a replay needs."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+import rospy
+import yaml
+from metacontrol_msgs.msg import JournalEntry, ReasonerJournal
+
+from mros1_reasoner.loop.journal import Entry, Journal
+from mros1_reasoner.loop.parameters import Parameters
+
+
+class JournalTopic:
+    """Publishes what the loop takes in; a new subscriber gets what was before.
+
+    The loop's thread appends and flushes; subscribers come in rospy's threads.
+    """
+
+    def __init__(self, name: str, parameters: Parameters, files: Sequence[Path]) -> None:
+        """Offer the topic.
+
+        Args:
+            name: beginning of the decisions' ids.
+            parameters: of the node.
+            files: the ontologies that it has loaded.
+        """
+        self._name = name
+        self._parameters = yaml.safe_dump(dict(parameters.values))
+        self._files = [str(path) for path in files]
+        self._contents = [path.read_text(encoding="utf-8", errors="replace") for path in files]
+        self._journal = Journal()
+        self._lock = threading.Lock()
+        self._fresh: list[Entry] = []
+        self._first = 0
+        listener = rospy.SubscribeListener()
+        listener.peer_subscribe = lambda _topic, _publish, publish_to_peer: publish_to_peer(self._beginning())
+        self._publisher = rospy.Publisher(
+            "mros1_reasoner/journal", ReasonerJournal, subscriber_listener=listener, queue_size=1000
+        )
+
+    def append(self, item: Entry) -> None:
+        """Add an entry."""
+        with self._lock:
+            number = self._journal.append(item)
+        if not self._fresh:
+            self._first = number
+        self._fresh.append(item)
+
+    def flush(self) -> None:
+        """Publish the entries since the last flush."""
+        fresh, self._fresh = self._fresh, []
+        if fresh and self._publisher.get_num_connections():
+            self._publisher.publish(self._message(self._first, fresh))
+
+    def _beginning(self) -> ReasonerJournal:
+        with self._lock:
+            first, entries = self._journal.snapshot()
+        message = self._message(first, entries)
+        message.parameters, message.files, message.contents = self._parameters, self._files, self._contents
+        return message
+
+    def _message(self, first: int, entries: Sequence[Entry]) -> ReasonerJournal:
+        message = ReasonerJournal(name=self._name, first=first)
+        message.header.stamp = rospy.Time.now()
+        message.entries = [JournalEntry(item.now, item.kind, list(item.values)) for item in entries]
+        return message

@@ -1,0 +1,28 @@
+"""The last decision of a running reasoner, for the command `explain`."""
+
+from __future__ import annotations
+
+import rospy
+from metacontrol_msgs.msg import Decision
+
+from mros1_reasoner.planning.record import DecisionRecord, read_message
+from mros1_reasoner.replay.recording import RecordingError
+
+
+def last_decision(topic: str, wait: float) -> DecisionRecord:
+    """Return the last decision that was published on a latched topic.
+
+    Args:
+        topic: its name.
+        wait: for so long, s.
+
+    Raises:
+        RecordingError: there is no master, or none has come.
+    """
+    try:
+        rospy.init_node("explain", anonymous=True, disable_signals=True, disable_rosout=True)
+        return read_message(rospy.wait_for_message(topic, Decision, wait))
+    except (OSError, rospy.ROSException, rospy.exceptions.ROSInitException) as error:
+        name = rospy.resolve_name(topic)
+        say = f"no decision on {name} within {wait:g} s: no reasoner runs, or it has decided nothing yet"
+        raise RecordingError(f"{say} ({error})") from error

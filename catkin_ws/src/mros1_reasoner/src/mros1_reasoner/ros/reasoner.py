@@ -1,0 +1,338 @@
+"""Node reasoner: R2 and R3 of the loop around the pure core, and the request for R4."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
+from typing import TypeVar
+
+import rospy
+from actionlib_msgs.msg import GoalStatusArray
+from diagnostic_msgs.msg import DiagnosticArray
+from metacontrol_msgs import msg as messages
+from node_kit.ros.lifetime import Lifetime
+from ros_model.errors import ModelError
+from std_msgs.msg import Bool
+
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase, KnowledgeBaseError
+from mros1_reasoner.knowledge.model import Facts, Objective
+from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
+from mros1_reasoner.loop import journal
+from mros1_reasoner.loop.diagnostics import DiagnosticsReader, LevelFact, Reading, Remark, StaleFact
+from mros1_reasoner.loop.mape import Mape, MapeError
+from mros1_reasoner.loop.parameters import ParameterError, Parameters
+from mros1_reasoner.loop.tasks import newest_goal
+from mros1_reasoner.loop.throttle import Throttle
+from mros1_reasoner.pellet.process import make_reasoner
+from mros1_reasoner.planning.decision import DECIDED, EXECUTED, FAILED, Decision
+from mros1_reasoner.planning.record import fill_message, record_of
+from mros1_reasoner.replay.explain import line
+from mros1_reasoner.ros.journal import JournalTopic
+from mros1_reasoner.ros.requests import Requests
+from mros1_reasoner.ros.services import Services
+
+_LOG = "[RosReasoner] -- %s"
+_TIMER_PERIOD = 0.02  # s, wall, the shortest between two looks at ROS time while the core waits for a moment
+_FASTEST = 10.0  # ROS time may run so much faster than wall time
+_LONGEST_WAIT = 1.0  # s, wall, until it is seen that somebody has asked the node to end
+_WARM_UP = 4  # analyses before the node is ready: the JVM compiles what it has run
+_QUEUE = 1000  # diagnostics that wait at most
+_ANSWER_DEADLINE = 60.0  # s, wall, for a service; an analysis may have to start Pellet again
+
+_T = TypeVar("_T")
+
+
+class ReasonerNode:
+    """Takes facts in from topics, lets the core decide, publishes decisions and has them carried out.
+
+    Callbacks only queue what they get; everything else happens in the thread that calls `run`.
+    """
+
+    def __init__(self, reasoner: Reasoner) -> None:
+        """Read parameters and models, warm the reasoner up, offer and listen to all topics and services.
+
+        Raises:
+            ParameterError, KnowledgeBaseError, ModelError, ReasonerError: the node can't work.
+        """
+        parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
+        self._period = parameters.period
+        knowledge_base = parameters.knowledge_base()
+        objectives = parameters.objectives(knowledge_base)
+        settings = parameters.settings(knowledge_base)
+        reasoner.load(knowledge_base.ontology)
+        for path in knowledge_base.files:
+            rospy.loginfo(f"Loaded ontology: {path}")
+        _warm_up(knowledge_base, reasoner, objectives)
+        name = f"{rospy.get_name().strip('/')}-{int(time.time())}"
+        self.core = Mape(knowledge_base, reasoner, objectives, settings, clock=rospy.get_time, name=name)
+        self._waiting: deque[Callable[[], object]] = deque()
+        self._wake = threading.Condition()
+        self._reader = DiagnosticsReader(knowledge_base.qualities, knowledge_base.components, parameters.nodes)
+        self._throttle, self._levels_told = Throttle(), Throttle(self._period, burst=1)
+        self._told: set[str] = set()
+        self._taken_over: set[str] = set()
+        self._goals: dict[str, tuple[str, bool]] = {}  # newest goal of an objective's task, and whether it failed
+        self._journal = JournalTopic(name, parameters, knowledge_base.files)
+        self._decisions = rospy.Publisher("mros1_reasoner/decision", messages.Decision, queue_size=10, latch=True)
+        self._requests = None
+        if parameters.asks and not settings.dry_run:
+            self._requests = Requests(parameters.action, parameters.execution_deadline, self._queue, self._report)
+        self._listen(parameters.task_actions)
+        self._services = Services(self, parameters.save_folder)
+        for objective in objectives:
+            self._tell_objective(objective)
+        rospy.loginfo(_LOG, "Reasoner Initialization Ok")
+
+    def _listen(self, task_actions: dict[str, str]) -> None:
+        active = "rosgraph_manipulator/active_configuration"
+        rospy.Subscriber(active, messages.ActiveConfiguration, self._on_active)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=100)
+        rospy.Subscriber("obj_error", Bool, self._on_obj_error)
+        for objective, action in task_actions.items():
+            listen = partial(self._on_task_status, objective, action)
+            rospy.Subscriber(f"{action}/status", GoalStatusArray, listen)
+
+    def run(self) -> None:
+        """Work until the node is shut down."""
+        heartbeat = time.monotonic()
+        while not rospy.is_shutdown():
+            now = time.monotonic()
+            is_heartbeat = now >= heartbeat
+            if is_heartbeat:
+                heartbeat = now + self._period
+            self._drain()
+            if self._requests:
+                self._requests.look()
+                if is_heartbeat:
+                    self._requests.tell_trouble()
+            self._take("step", is_heartbeat)
+            self._journal.flush()
+            until = min(heartbeat, now + _LONGEST_WAIT, self._next_look())
+            with self._wake:
+                if not self._waiting:
+                    self._wake.wait(max(0.0, until - time.monotonic()))
+
+    def _next_look(self) -> float:
+        """Return the wall time at which to look whether the moment has come for which the core or a request waits."""
+        ros_now, request = rospy.get_time(), self._requests.next_look if self._requests else math.inf
+        due = self.core.due(ros_now)
+        if due is None:
+            return request
+        return min(request, time.monotonic() + max(_TIMER_PERIOD, (due - ros_now) / _FASTEST))
+
+    # What comes in
+
+    def ask(self, work: Callable[[], _T]) -> _T:
+        """Have the loop's thread do something; wait for what it returns.
+
+        Raises:
+            MapeError, KnowledgeBaseError, ReasonerError, ValueError: as `work` does.
+            TimeoutError: the loop is busy for too long.
+        """
+        answer: Future[_T] = Future()
+
+        def run() -> None:
+            if not answer.set_running_or_notify_cancel():
+                return  # nobody waits any more
+            try:
+                answer.set_result(work())
+            except (MapeError, KnowledgeBaseError, ReasonerError, ValueError) as error:
+                answer.set_exception(error)
+
+        self._queue(run)
+        try:
+            return answer.result(_ANSWER_DEADLINE)
+        except TimeoutError:
+            answer.cancel()
+            raise
+
+    def command(self, kind: str, *values: object) -> None:
+        """Take in what an operator asks for, in the loop's thread; kinds and values: journal.py.
+
+        Raises:
+            MapeError, ReasonerError: it does not fit.
+        """
+        self._announce(self._applied(kind, *values))
+        shown = " ".join(str(value) for value in values)
+        rospy.loginfo(_LOG, f"operator: {kind} {shown}".strip())
+        if kind == "add_objective":
+            self._tell_objective(self.core.objectives[str(values[0])])
+
+    def _on_diagnostics(self, array: DiagnosticArray) -> None:
+        reading = self._reader.read(array.status)
+        if not reading.facts and not reading.remarks:
+            return
+        if len(self._waiting) > _QUEUE:
+            reading = Reading(
+                remarks=(Remark("queue", "diagnostics come faster than they can be read: some are lost"),)
+            )
+            self._queue(lambda: self._take_reading(reading, 0.0), at_most=_QUEUE + 1)
+            return
+        stamp = array.header.stamp.to_sec()
+        self._queue(lambda: self._take_reading(reading, stamp))
+
+    def _on_active(self, active: messages.ActiveConfiguration) -> None:
+        self._queue(lambda: self._take_active(active))
+
+    def _on_obj_error(self, message: Bool) -> None:
+        self._queue(lambda: self._take("task", "", message.data, 0.0, "reported on obj_error"))
+
+    def _on_task_status(self, objective: str, action: str, statuses: GoalStatusArray) -> None:
+        """Take in how the newest goal of an objective's action fares, where that is new."""
+        newest = newest_goal(statuses)
+        if newest is None or self._goals.get(objective) == newest:
+            return
+        self._goals[objective] = newest
+        self._queue(lambda: self._take("task", objective, newest[1], 0.0, f"a goal of {action} was aborted"))
+
+    def _queue(self, work: Callable[[], object], at_most: float = math.inf) -> None:
+        with self._wake:
+            if len(self._waiting) <= at_most:
+                self._waiting.append(work)
+            self._wake.notify()
+
+    def _drain(self) -> None:
+        with self._wake:
+            works, self._waiting = self._waiting, deque()
+        for work in works:
+            work()
+
+    def _take(self, kind: str, *values: object) -> bool:
+        """Take something in and announce what follows; say what is wrong where it does not fit."""
+        try:
+            self._announce(self._applied(kind, *values))
+        except (MapeError, KnowledgeBaseError) as error:
+            self._warn(kind, str(error))
+        except ReasonerError as error:
+            self._warn("analysis", f"analysis failed: {error}")
+        else:
+            return True
+        return False
+
+    def _applied(self, kind: str, *values: object) -> list[Decision]:
+        item = journal.entry(rospy.get_time(), kind, *values)
+        decisions = journal.apply(self.core, item)
+        self._journal.append(item)
+        for brought in journal.decided(item.now, decisions):
+            self._journal.append(brought)
+        return decisions
+
+    def _take_reading(self, reading: Reading, stamp: float) -> None:
+        for remark in reading.remarks:
+            self._tell_remark(remark)
+        for fact in reading.facts:
+            taken = self._take(*journal.of_fact(fact, stamp))
+            if isinstance(fact, LevelFact) and taken:
+                self._tell_level(fact)
+            elif isinstance(fact, StaleFact):
+                self._warn("stale", f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
+
+    def _take_active(self, active: messages.ActiveConfiguration) -> None:
+        for function in active.functions:
+            if not function.configuration:
+                continue
+            taken = self._take("active", function.function, function.configuration, function.state)
+            if taken and function.function not in self._taken_over:
+                self._taken_over.add(function.function)
+                say = f"{function.function} runs {function.configuration} ({function.state}): taken over as it is"
+                rospy.loginfo(_LOG, say)
+
+    # What goes out
+
+    def _announce(self, decisions: list[Decision]) -> None:
+        """Tell of decisions and have those carried out that are to be."""
+        for decision in decisions:
+            self._publish(decision)
+            self._tell_decision(decision)
+            if decision.state != DECIDED:
+                continue
+            if self._requests:
+                self._requests.ask(decision.id, decision.to_configuration)
+            else:
+                self._report(decision.id, True)
+
+    def _report(self, decision: str, ok: bool, message: str = "", *, blame: bool = True) -> None:
+        """Take in how a decision went."""
+        self._take("result", decision, ok, message, blame)
+        self._queue(lambda: None)  # look at once at what happened meanwhile
+
+    def _tell_decision(self, decision: Decision) -> None:
+        if decision.state == EXECUTED:
+            rospy.loginfo("Exited timer_cb after successful reconfiguration")
+            took = f"{decision.objective} has {decision.to_configuration} after {decision.execute_wall_s:.2f} s"
+            rospy.loginfo(_LOG, f"executed: {took} ({decision.id})")
+        elif decision.state == FAILED and decision.to_configuration:
+            rospy.logwarn(_LOG, f"failed: {decision.explanation} ({decision.id})")
+        else:
+            (rospy.loginfo if decision.to_configuration else rospy.logwarn)(_LOG, line(record_of(decision)))
+
+    def _publish(self, decision: Decision) -> None:
+        record = record_of(decision)
+        message = fill_message(messages.Decision(), record, rospy.Time.from_sec, messages)
+        message.header.stamp = rospy.Time.now()
+        self._decisions.publish(message)
+
+    # What is logged
+
+    def _tell_objective(self, objective: Objective) -> None:
+        rospy.loginfo("Objective created and set to ungrounded")
+        limits = ", ".join(f"{quality} {limit:g}" for quality, limit in sorted(objective.limits.items()))
+        rospy.loginfo(_LOG, f"{objective.name} needs {objective.function} with {limits or 'no limits'}")
+
+    def _tell_level(self, fact: LevelFact) -> None:
+        """Log a level as published tools expect it, but at most once in a period for each quality."""
+        text = f"QA value received!\tTYPE: {fact.quality}\tVALUE: {fact.text}"
+        if self._levels_told.admit(time.monotonic(), fact.quality, text):
+            rospy.loginfo(text)
+
+    def _tell_remark(self, remark: Remark) -> None:
+        if remark.is_warning:
+            self._warn(remark.kind, remark.text)
+        elif remark.text not in self._told and len(self._told) < _QUEUE:
+            self._told.add(remark.text)
+            rospy.loginfo(_LOG, remark.text)
+
+    def _warn(self, kind: str, text: str) -> None:
+        said = self._throttle.admit(time.monotonic(), kind, text)
+        if said:
+            is_published = text.startswith("Unsupported QA TYPE received: ")  # tools wait for that line as it is
+            rospy.logwarn(said) if is_published else rospy.logwarn(_LOG, said)
+
+
+def main() -> None:
+    """Run the node; exit status 2 when it can't start."""
+    with Lifetime("reasoner", ParameterError, KnowledgeBaseError, ReasonerError, ModelError) as life:
+        reasoner = make_reasoner()  # its process gets ready while this one goes on
+        life.start()
+        logger = logging.getLogger("mros1_reasoner")
+        logger.setLevel(logging.INFO)
+        logger.propagate = False
+        logger.addHandler(_RosLog())
+        ReasonerNode(reasoner).run()
+
+
+class _RosLog(logging.Handler):
+    """Takes what the core logs to rosout."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Log a record as the node's own."""
+        log = rospy.logwarn if record.levelno >= logging.WARNING else rospy.loginfo
+        log(_LOG, record.getMessage())
+
+
+def _warm_up(knowledge_base: KnowledgeBase, reasoner: Reasoner, objectives: tuple[Objective, ...]) -> None:
+    """Let the JVM compile what an analysis runs, with every kind of fact."""
+    facts = Facts(
+        objectives=objectives,
+        groundings={o.name: d.name for o in objectives for d in knowledge_base.solving(o.function)[:1]},
+        levels={(o.name, quality): limit for o in objectives for quality, limit in o.limits.items()},
+        components=dict.fromkeys(knowledge_base.components, "FALSE"),
+    )
+    for _ in range(_WARM_UP):
+        knowledge_base.analyse(facts, reasoner)

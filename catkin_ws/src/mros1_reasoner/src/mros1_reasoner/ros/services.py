@@ -1,0 +1,118 @@
+"""The services of the node reasoner: what an operator or mission logic asks of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import rospy
+from metacontrol_msgs import srv as services
+from metacontrol_msgs.msg import FunctionFeasibility
+from std_srvs.srv import Trigger, TriggerResponse
+
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBaseError
+from mros1_reasoner.knowledge.reasoner import ReasonerError
+from mros1_reasoner.loop.mape import MapeError
+
+if TYPE_CHECKING:
+    from mros1_reasoner.ros.reasoner import ReasonerNode
+
+_ERRORS = (MapeError, KnowledgeBaseError, ReasonerError, ValueError)
+_SAVED = "knowledge_base.owl"
+
+
+class Services:
+    """Offers the services; each does its work in the loop's thread and answers with why it could not."""
+
+    def __init__(self, node: ReasonerNode, save_folder: Path) -> None:
+        """Offer them from now on.
+
+        Args:
+            node: does the work.
+            save_folder: knowledge bases are saved in it.
+        """
+        self._node = node
+        self._save_folder = save_folder
+        for name in ("pause", "resume", "lock", "unlock"):
+            rospy.Service(f"~{name}", Trigger, lambda _, kind=name: self._trigger(kind))
+        for name in ("approve", "reject"):
+            rospy.Service(
+                f"~{name}", services.ApproveDecision, lambda request, kind=name: self._settle(kind, request.id)
+            )
+        rospy.Service("~add_objective", services.AddObjective, self._add_objective)
+        rospy.Service("~remove_objective", services.RemoveObjective, self._remove_objective)
+        rospy.Service("~set_nfr", services.SetNfr, self._set_nfr)
+        rospy.Service("~feasible", services.Feasible, self._feasible)
+        rospy.Service("~save_knowledge_base", services.SaveKnowledgeBase, self._save)
+
+    def _trigger(self, kind: str) -> TriggerResponse:
+        ok, message = self._answer(lambda: self._node.command(kind))
+        return TriggerResponse(ok, message)
+
+    def _settle(self, kind: str, decision_id: str) -> services.ApproveDecisionResponse:
+        def work() -> None:
+            waits = self._node.core.proposal
+            if waits is None:
+                raise MapeError("no decision waits for approval")
+            self._node.command(kind, decision_id or waits.id)
+
+        return services.ApproveDecisionResponse(*self._answer(work))
+
+    def _add_objective(self, request: Any) -> services.AddObjectiveResponse:
+        def work() -> None:
+            if not request.name or not request.name.replace("_", "a").isalnum():
+                raise MapeError(f"objective {request.name!r}: use letters, digits and '_' for its name")
+            limits = [value for nfr in request.nfrs for value in (nfr.name, nfr.value)]
+            self._node.command("add_objective", request.name, request.function, *limits)
+
+        return services.AddObjectiveResponse(*self._answer(work))
+
+    def _remove_objective(self, request: Any) -> services.RemoveObjectiveResponse:
+        work = lambda: self._node.command("remove_objective", request.name)  # noqa: E731
+        return services.RemoveObjectiveResponse(*self._answer(work))
+
+    def _set_nfr(self, request: Any) -> services.SetNfrResponse:
+        work = lambda: self._node.command("set_nfr", request.objective, request.quality, request.value)  # noqa: E731
+        return services.SetNfrResponse(*self._answer(work))
+
+    def _feasible(self, request: Any) -> services.FeasibleResponse:
+        found: list[FunctionFeasibility] = []
+
+        def work() -> None:
+            designs = self._node.core.feasible()
+            if request.function and request.function not in designs:
+                raise MapeError(f"no Function is called {request.function!r}: known: {', '.join(designs)}")
+            for function in [request.function] if request.function else sorted(designs):
+                names = list(designs[function])
+                why_not = "" if names else "each function design needs a component or a function that does not work"
+                found.append(FunctionFeasibility(function, bool(names), names, why_not))
+
+        ok, message = self._answer(work)
+        return services.FeasibleResponse(ok, message, found)
+
+    def _save(self, request: Any) -> services.SaveKnowledgeBaseResponse:
+        saved = []
+
+        def work() -> None:
+            path = (self._save_folder / (request.path or _SAVED)).resolve()
+            if not path.is_relative_to(self._save_folder) or path == self._save_folder:
+                say = f"{request.path!r} is not in {self._save_folder}: give a file in it, or set ~save_folder"
+                raise MapeError(say)
+            if not path.parent.is_dir():
+                raise MapeError(f"{path.parent}: no such folder: make it first")
+            self._node.core.save(path)
+            saved.append(str(path))
+
+        ok, message = self._answer(work)
+        return services.SaveKnowledgeBaseResponse(ok, saved[0] if ok else message)
+
+    def _answer(self, work: Callable[[], None]) -> tuple[bool, str]:
+        """Have the loop's thread work; return whether it went well, and why not."""
+        try:
+            self._node.ask(work)
+        except _ERRORS as error:
+            return False, str(error)
+        except TimeoutError:
+            return False, "the reasoner is busy: try again"
+        return True, ""

@@ -1,0 +1,1 @@
+"""PyBullet: bodies, the simulation that steps them, its window."""

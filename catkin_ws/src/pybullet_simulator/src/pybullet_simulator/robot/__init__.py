@@ -1,0 +1,1 @@
+"""The robot: shape, drive, sensors, their noise and faults."""

@@ -1,0 +1,88 @@
+"""The robot's URDF, as robot_state_publisher takes it, made into one that PyBullet can slide over a floor."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import rospkg
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ROOT = "base_link"
+JOINTS = ("slide_x", "slide_y", "turn")
+"""Joints from the map to the robot's root, in the order in which they follow each other."""
+
+_FAR = "1e9"
+_SLIDE_MASS = "1"
+_LOOKS_MASS = "0.001"  # kg; to a link without inertia PyBullet gives 1 kg
+
+
+class RobotFileError(ValueError):
+    """A URDF that cannot be used; the message names the file."""
+
+
+def robot_file() -> Path:
+    """Return the path of the robot's URDF.
+
+    Raises:
+        RobotFileError: the package is not found.
+    """
+    try:
+        return Path(rospkg.RosPack().get_path("pybullet_simulator")) / "urdf" / "ridgeback.urdf"
+    except rospkg.ResourceNotFound as error:
+        raise RobotFileError("package pybullet_simulator not found; source the workspace's devel/setup.bash") from error
+
+
+def planar_urdf(path: Path) -> str:
+    """Return a URDF with two sliding joints and a turning one between the map and the robot's root.
+
+    Raises:
+        RobotFileError: the file cannot be read, is no URDF with the link base_link, or declares entities.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        if "<!DOCTYPE" in text:
+            raise RobotFileError(f"{path}: declares a document type; a URDF needs none")
+        robot = ET.fromstring(text)  # noqa: S314 (entities are refused above)
+    except OSError as error:
+        raise RobotFileError(f"{path}: cannot be read ({error.strerror})") from error
+    except ET.ParseError as error:
+        raise RobotFileError(f"{path}: is not XML: {error}") from error
+    if ROOT not in {link.get("name") for link in robot.iter("link")}:
+        raise RobotFileError(f"{path}: has no link {ROOT}")
+    for link in robot.findall("link"):
+        if link.find("inertial") is None:
+            link.append(_inertial(_LOOKS_MASS, "1e-6"))
+    robot.extend(_slides())
+    return ET.tostring(robot, encoding="unicode")
+
+
+def _slides() -> Iterator[ET.Element]:
+    """Yield the links and joints that let the root move in the plane."""
+    slide_x, slide_y, turn = JOINTS
+    joints = (
+        (slide_x, "prismatic", "1 0 0", "plane", slide_x),
+        (slide_y, "prismatic", "0 1 0", slide_x, slide_y),
+        (turn, "continuous", "0 0 1", slide_y, ROOT),
+    )
+    for link in ("plane", slide_x, slide_y):
+        element = ET.Element("link", name=link)
+        element.append(_inertial(_SLIDE_MASS, "1"))
+        yield element
+    for name, kind, axis, parent, child in joints:
+        joint = ET.Element("joint", name=name, type=kind)
+        ET.SubElement(joint, "parent", link=parent)
+        ET.SubElement(joint, "child", link=child)
+        ET.SubElement(joint, "axis", xyz=axis)
+        ET.SubElement(joint, "limit", lower="-" + _FAR, upper=_FAR, effort=_FAR, velocity=_FAR)
+        yield joint
+
+
+def _inertial(mass: str, moment: str) -> ET.Element:
+    inertial = ET.Element("inertial")
+    ET.SubElement(inertial, "mass", value=mass)
+    ET.SubElement(inertial, "inertia", ixx=moment, iyy=moment, izz=moment, ixy="0", ixz="0", iyz="0")
+    return inertial

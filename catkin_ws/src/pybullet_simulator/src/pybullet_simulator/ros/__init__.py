@@ -1,0 +1,1 @@
+"""ROS shells: the node simulator and the drivers of the sensors."""

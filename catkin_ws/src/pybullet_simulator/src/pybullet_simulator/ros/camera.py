@@ -1,0 +1,82 @@
+"""Node camera: the driver of the depth camera. Depth images in, a point cloud out."""
+
+from __future__ import annotations
+
+import math
+import threading
+
+import numpy as np
+import rospy
+from node_kit.ros.lifetime import Lifetime
+from sensor_msgs.msg import Image, PointCloud2
+from std_msgs.msg import Float32
+
+from pybullet_simulator.robot.faults import Outlet
+from pybullet_simulator.robot.sensors import DepthProjector, SensorError, measure_depth
+from pybullet_simulator.ros.parameters import ParameterError, number, seed
+from pybullet_simulator.ros.sensor_messages import point_cloud, read_depth
+
+
+class CameraNode(rospy.SubscribeListener):
+    """Publishes camera/depth/points; takes simulator/depth, which is costly to render, only while somebody listens."""
+
+    def __init__(self) -> None:
+        """Read the parameters and connect.
+
+        Raises:
+            ParameterError: a parameter cannot be used.
+        """
+        super().__init__()
+        degrees = number(rospy.get_param("~field_of_view", 60.0), "~field_of_view", 1.0, 170.0)
+        self._field_of_view = math.radians(degrees)
+        self._range_min = number(rospy.get_param("~range_min", 0.05), "~range_min", 0.0, 99.0)
+        self._range_max = number(rospy.get_param("~range_max", 8.0), "~range_max", self._range_min + 0.1, 100.0)
+        self._noise = number(rospy.get_param("~noise", 0.001), "~noise", 0.0, 1.0)
+        self._rng = np.random.default_rng([seed(rospy.get_param("~seed", 0)), 8])
+        self._light = 1.0
+        self._projector: DepthProjector | None = None
+        self._depth: rospy.Subscriber | None = None
+        self._outlet = Outlet()
+        self._outlet.listen()
+        self._lock = threading.Lock()
+        self._points = rospy.Publisher("camera/depth/points", PointCloud2, subscriber_listener=self, queue_size=1)
+        self._lamp = rospy.Subscriber("simulator/light", Float32, self._on_light, queue_size=1)
+
+    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
+        """Start to take images: somebody wants points (called by rospy)."""
+        with self._lock:
+            if self._depth is None:
+                self._depth = rospy.Subscriber(
+                    "simulator/depth", Image, self._on_depth, queue_size=1, buff_size=1 << 20, tcp_nodelay=True
+                )
+
+    def peer_unsubscribe(self, _topic: str, num_peers: int) -> None:
+        """Stop to take images when the last listener is gone (called by rospy)."""
+        with self._lock:
+            if num_peers == 0 and self._depth is not None:
+                self._depth.unregister()
+                self._depth = None
+
+    def _on_light(self, light: Float32) -> None:
+        if math.isfinite(light.data):
+            self._light = light.data
+
+    def _on_depth(self, image: Image) -> None:
+        try:
+            depth = read_depth(image)
+            if self._projector is None or self._projector.shape != depth.shape:
+                self._projector = DepthProjector(image.width, image.height, self._field_of_view)
+            depth = measure_depth(depth, self._light, self._noise, self._rng)
+            points = self._projector.points(depth, self._range_min, self._range_max)
+        except SensorError as error:
+            rospy.logwarn_throttle(10.0, f"simulator/depth refused: {error}")
+            return
+        self._points.publish(self._outlet.pass_on(point_cloud(points, "camera_link", image.header.stamp)))
+
+
+def main() -> None:
+    """Run the node; exit status 2 when a parameter cannot be used."""
+    with Lifetime("camera", ParameterError) as life:
+        life.start()
+        CameraNode()
+        rospy.spin()

@@ -1,0 +1,71 @@
+"""Nodes front_laser and rear_laser: drivers of the lasers. True ranges in, a noisy scan out."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import rospy
+from node_kit.ros.lifetime import Lifetime
+from sensor_msgs.msg import LaserScan
+
+from pybullet_simulator.robot.faults import Outlet
+from pybullet_simulator.robot.sensors import SensorError, measure_ranges
+from pybullet_simulator.ros.parameters import ParameterError, number, seed
+
+SIDES = {"front": 3, "rear": 7}
+"""Sides of the robot with a laser, and the stream of random numbers of each."""
+
+
+class LaserNode(rospy.SubscribeListener):
+    """Publishes SIDE/scan from simulator/SIDE_rays, which are cast only while somebody listens."""
+
+    def __init__(self, side: str) -> None:
+        """Read the parameters and connect.
+
+        Raises:
+            ParameterError: a parameter cannot be used.
+        """
+        super().__init__()
+        self._frame = f"{side}_laser"
+        self._raw = f"simulator/{side}_rays"
+        self._noise = number(rospy.get_param("~noise", 0.01), "~noise", 0.0, 1.0)
+        self._rng = np.random.default_rng([seed(rospy.get_param("~seed", 0)), SIDES[side]])
+        self._rays: rospy.Subscriber | None = None
+        self._outlet = Outlet()
+        self._outlet.listen()
+        self._lock = threading.Lock()
+        self._scan = rospy.Publisher(
+            f"{side}/scan", LaserScan, subscriber_listener=self, queue_size=1, tcp_nodelay=True
+        )
+
+    def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
+        """Start to take rays: somebody wants scans (called by rospy)."""
+        with self._lock:
+            if self._rays is None:
+                self._rays = rospy.Subscriber(self._raw, LaserScan, self._on_rays, queue_size=1, tcp_nodelay=True)
+
+    def peer_unsubscribe(self, _topic: str, num_peers: int) -> None:
+        """Stop to take rays when the last listener is gone (called by rospy)."""
+        with self._lock:
+            if num_peers == 0 and self._rays is not None:
+                self._rays.unregister()
+                self._rays = None
+
+    def _on_rays(self, rays: LaserScan) -> None:
+        try:
+            ranges = measure_ranges(rays.ranges, rays.range_min, rays.range_max, self._noise, self._rng)
+        except SensorError as error:
+            rospy.logwarn_throttle(10.0, f"{self._raw} refused: {error}")
+            return
+        rays.header.frame_id = self._frame
+        rays.ranges = ranges.tolist()
+        self._scan.publish(self._outlet.pass_on(rays))
+
+
+def main(side: str) -> None:
+    """Run the node of one side; exit status 2 when a parameter cannot be used."""
+    with Lifetime(f"{side}_laser", ParameterError) as life:
+        life.start()
+        LaserNode(side)
+        rospy.spin()

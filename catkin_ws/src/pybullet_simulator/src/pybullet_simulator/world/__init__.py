@@ -1,0 +1,1 @@
+"""What stands, lies and walks on the floor. Pure."""

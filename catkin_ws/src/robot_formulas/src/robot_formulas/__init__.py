@@ -1,0 +1,1 @@
+"""Pure functions of numbers that simulator, observers and navigation share."""

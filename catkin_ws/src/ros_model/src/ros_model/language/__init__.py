@@ -1,0 +1,1 @@
+"""The languages .ros and .rossystem: metamodel, grammars, reading, writing."""

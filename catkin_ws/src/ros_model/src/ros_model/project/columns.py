@@ -1,0 +1,210 @@
+"""What the columns of a table of variants set: parameters, connections, the presence of components, expected levels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from ros_model.errors import ModelError
+from ros_model.language.metamodel import ENDS, PortPath, Position
+
+if TYPE_CHECKING:
+    from ros_model.language.metamodel import Component, PortKind, RosSystem
+    from ros_model.project.tables import Table
+
+Where = Callable[..., Position | None]
+
+TARGET_OF = {source: (kind, target) for kind, (source, target) in ENDS.items()}
+"""For each port that a connection may come from: the kind of the connection, and of the port at its other end."""
+
+_EXPECTED = "qa_"
+
+
+def _nowhere(*_keys: str | int) -> None:
+    return None
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A parameter of a component that a column sets, times a factor where there is one."""
+
+    component: str
+    name: str
+    factor: float | None = None
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A connection that a value of a column makes. Without a port, the target's is named as the connection."""
+
+    source: PortPath
+    component: str
+    port: str | None = None
+
+    def leads_to(self, source: PortPath, target: PortPath) -> bool:
+        """Return whether this is the wire between two ports."""
+        return self.source == source and self.component == target.component and self.port in {None, target.port}
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What each column of a table sets.
+
+    Attributes:
+        component: the component that varies, where a column doesn't say another.
+        parameters: column -> parameters.
+        wires: column -> its value -> connections.
+        presence: column -> components that are there where it is true.
+        expected: column -> quality attribute whose expected level it holds.
+        ignored: columns that set nothing.
+        where: from the keys of the section to a position in its file.
+    """
+
+    component: str | None = None
+    parameters: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
+    wires: Mapping[str, Mapping[str, tuple[Wire, ...]]] = field(default_factory=dict)
+    presence: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    expected: Mapping[str, str] = field(default_factory=dict)
+    ignored: frozenset[str] = frozenset()
+    where: Where = _nowhere
+
+    @property
+    def names(self) -> frozenset[str]:
+        """All columns that are spoken of."""
+        return self.ignored.union(self.parameters, self.wires, self.presence, self.expected)
+
+    @property
+    def optional(self) -> frozenset[str]:
+        """Components that some variants lack."""
+        return frozenset(name for names in self.presence.values() for name in names)
+
+    @property
+    def varied(self) -> frozenset[str]:
+        """Components that a variant brings."""
+        named = {setting.component for settings in self.parameters.values() for setting in settings}
+        named |= {wire.component for wire in self.all_wires()}
+        return self.optional | named | ({self.component} if self.component else set())
+
+    def all_wires(self) -> Iterator[Wire]:
+        """Yield the connections that any value of any column makes."""
+        for choices in self.wires.values():
+            for wires in choices.values():
+                yield from wires
+
+
+def parse_columns(section: Mapping[str, Any], where: Where = _nowhere) -> Columns:
+    """Return what a family of metacontrol.yaml (which its schema has accepted) says of columns.
+
+    Raises:
+        ModelError: it leaves open which component varies.
+    """
+    component = section.get("component")
+
+    def default(*keys: str | int) -> str:
+        if not component:
+            raise ModelError("says no component: give the family one, or name it here", where(*keys))
+        return str(component)
+
+    def setting(column: str, number: int, entry: str | dict[str, Any]) -> Setting:
+        entry = {"name": entry} if isinstance(entry, str) else entry
+        owner = entry.get("component") or default("parameters", column, number)
+        return Setting(owner, entry["name"], entry.get("factor"))
+
+    def wire(column: str, value: str, number: int, entry: str | dict[str, str]) -> Wire:
+        if isinstance(entry, str):
+            return Wire(PortPath.parse(entry), default("connections", column, value, number))
+        target = PortPath.parse(entry["to"])
+        return Wire(PortPath.parse(entry["from"]), target.component, target.port)
+
+    return Columns(
+        component,
+        {
+            column: tuple(setting(column, number, entry) for number, entry in enumerate(entries))
+            for column, entries in section.get("parameters", {}).items()
+        },
+        {
+            column: {
+                value: tuple(wire(column, value, number, entry) for number, entry in enumerate(entries))
+                for value, entries in choices.items()
+            }
+            for column, choices in section.get("connections", {}).items()
+        },
+        {column: tuple(names) for column, names in section.get("components", {}).items()},
+        section.get("expected", {}),
+        frozenset(section.get("ignore", ())),
+        where,
+    )
+
+
+def with_implied(columns: Columns, table: Table, base: RosSystem) -> Columns:
+    """Return the columns with those that speak for themselves: `COMPONENT.PARAMETER`, and `qa_NAME`.
+
+    Raises:
+        ModelError: a column is neither spoken of nor such a one, or one that is spoken of is missing.
+    """
+    parameters, expected = dict(columns.parameters), dict(columns.expected)
+    first_line = Position(str(table.path), 1, 1)
+    for column in table.columns:
+        component, dot, parameter = column.partition(".")
+        if column in columns.names:
+            continue
+        if dot and parameter and base.component(component):
+            parameters[column] = (Setting(component, parameter),)
+        elif column.startswith(_EXPECTED):
+            expected[column] = column.removeprefix(_EXPECTED)
+        else:
+            raise ModelError(
+                f"nothing says what column {column!r} sets: map it, or name it COMPONENT.PARAMETER", first_line
+            )
+    if absent := sorted(columns.names - columns.ignored - set(table.columns)):
+        raise ModelError(f"column {absent[0]!r} is missing, which is mapped: add it, or don't map it", first_line)
+    return replace(columns, parameters=parameters, expected=expected)
+
+
+def check_columns(columns: Columns, base: RosSystem) -> None:
+    """Check that what the columns speak of is there in the base.
+
+    Raises:
+        ModelError: a component is not there or names no node, or a connection does not begin at a publisher or server.
+    """
+
+    def named(name: str, *keys: str | int) -> Component:
+        component = base.component(name)
+        if component is None or component.executable is None:
+            raise ModelError(
+                f"{name!r} is no component with a FromRosNode in {base.position.file}", columns.where(*keys)
+            )
+        return component
+
+    if columns.component:
+        named(columns.component, "component")
+    seen: dict[tuple[str, str], str] = {}
+    for column, settings in columns.parameters.items():
+        for number, setting in enumerate(settings):
+            named(setting.component, "parameters", column, number)
+            other = seen.setdefault((setting.component, setting.name), column)
+            if other != column:
+                raise ModelError(
+                    f"columns {other!r} and {column!r} both set {setting.name} of {setting.component}: take one out",
+                    columns.where("parameters", column, number),
+                )
+    for column, names in columns.presence.items():
+        for number, name in enumerate(names):
+            named(name, "components", column, number)
+    for column, choices in columns.wires.items():
+        for value, wires in choices.items():
+            for number, wire in enumerate(wires):
+                keys = ("connections", column, value, number)
+                named(wire.component, *keys)
+                if outlet(base, wire.source) is None:
+                    raise ModelError(
+                        f"{wire.source} is no publisher or server in {base.position.file}", columns.where(*keys)
+                    )
+
+
+def outlet(system: RosSystem, source: PortPath) -> PortKind | None:
+    """Return the kind of the port that a connection may come from, or None."""
+    component = system.component(source.component)
+    kinds = (port.kind for port in component.ports if port.name == source.port) if component else ()
+    return next((kind for kind in kinds if kind in TARGET_OF), None)

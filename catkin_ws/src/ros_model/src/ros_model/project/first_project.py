@@ -1,0 +1,207 @@
+"""A first metacontrol.yaml, with its tables, for a base system: it checks clean, and comments say what may go where."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ros_model.errors import ModelError
+from ros_model.language.metamodel import PortKind
+from ros_model.project.schema_check import load_schema
+from ros_model.project.settings import FILE_NAME
+from ros_model.project.tables import NAME, typed_cell
+from ros_model.project.yaml_file import flow
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ros_model.language.metamodel import Component, RosParameter, RosSystem
+
+TABLE = "variants.csv"
+LEVELS = "qa.csv"
+UTILITY = "performance"
+_GRAPH_NAME = re.compile(load_schema("metacontrol")["$defs"]["graph_name"]["pattern"])
+
+_TEMPLATE = """\
+# What can't be read off the models of {system}. CHANGE marks guesses and examples; all of it may be changed.
+# Then: rosmodel check {folder}     rosmodel generate all {folder} -o PACKAGE
+
+# The catkin package whose folder models/ holds this file, and into which the rest is generated.
+package: {package}
+# The system as it runs before a variant is chosen.
+base: {base}
+
+variants:
+  # CHANGE: the component that the variants bring, in place of the base's.
+  component: {component}
+  # One row for each variant; its name is that of its launch file and of its function design.
+  table: {table}
+  # Its expected level of each quality attribute, measured or estimated.
+  qa: {levels}
+  # Column of the table -> parameters that it sets. {{name: PARAMETER, factor: 0.5}} scales the column, and
+  # {{name: PARAMETER, component: NAME}} sets it on another component.
+  parameters:{parameters}
+  # Column -> its value -> publishers (COMPONENT.PORT) that the component is connected to.
+  # connections:
+  #   sensor:
+  #     laser: [{example_port}]
+  #     none: []
+  # Column of true and false -> components that are there or not.
+  # components:
+  #   has_filter: [scan_filter]
+
+# What the robot can do, and which variants (all, or a list of names) do it. CHANGE the name.
+# requires: [FUNCTION] names functions that must be provided too.
+functions:
+  {function}: {{designs: all}}
+
+# What is measured. The direction says which end is better; levels run over the range.
+quality_attributes:
+{qualities}
+# Among variants that meet all requirements, the best in this one is taken.
+utility: {utility}
+
+# What is asked of the robot: a function, with required levels. CHANGE: e.g. nfrs: {{safety: 0.6}}
+objectives:
+  {objective}: {{function: {function}, nfrs: {{}}}}
+
+# Components, and the node that each is in the running graph.
+components:{components}
+
+# Observers that the monitor starts. `rosmodel generate observer` asks for one, and adds it here.
+observers: []
+
+manipulator:
+  # CHANGE: an action whose pending goal is kept while the configuration changes, and its type.
+{action}
+  # Nodes that a change may have to stop although it did not start them.
+  kill_nodes: [{kill}]
+
+# Only for models without connections: parameter -> value -> the component that it needs.
+# requires:
+#   observation_sources: {{scan: front_laser}}
+"""
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What a first project needs to know beside the base; None: it is guessed."""
+
+    package: str
+    component: str | None = None
+    qualities: tuple[str, ...] = ()
+
+
+def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> dict[str, str]:
+    """Return the texts of metacontrol.yaml and its two tables, by the names of the files.
+
+    Args:
+        base: the system.
+        file: name of its file.
+        folder: name of the folder, for the comments.
+        choices: what the user said.
+
+    Raises:
+        ModelError: the base has no component that could vary, or not the one chosen.
+    """
+    component = _varying(base, choices.component)
+    columns = _columns(component)
+    variant = re.sub(r"[^A-Za-z0-9_]+", "_", base.name).strip("_").lower() or "base"
+    what = re.sub(r"\W+", "_", component.name, flags=re.ASCII).strip("_")
+    qualities = dict.fromkeys((*choices.qualities, UTILITY))
+    others = (other.graph_name for other in base.components if other.name != component.name)
+    names = [name for name in others if _GRAPH_NAME.search(name) and "\n" not in name]
+    action = next((p.name for p in component.ports if p.kind is PortKind.ACTION_SERVER), None)
+    text = _TEMPLATE.format(
+        system=base.name.replace("\n", " "),
+        folder=folder,
+        package=flow(choices.package),
+        base=flow(file),
+        component=flow(component.name),
+        table=TABLE,
+        levels=LEVELS,
+        parameters=_lines({column: [parameter.key] for column, parameter in columns.items()}),
+        example_port=_example_port(base, component),
+        function=f"f_{what}",
+        objective=f"o_{what}",
+        qualities="".join(f"  {name}: {_quality(name)}\n" for name in qualities),
+        utility=UTILITY,
+        components=_lines({name.rpartition("/")[2]: {"node": name} for name in names}, indent=2),
+        action=f"  # save_action: {action or 'ACTION'}\n  # goal_msg_type: PACKAGE.msg.TYPEAction",
+        kill=flow(component.graph_name),
+    )
+    values = [_cell(parameter) for parameter in columns.values()]
+    return {
+        FILE_NAME: text,
+        TABLE: _csv([NAME, *columns], [f"{variant}_default", *values]),
+        LEVELS: _csv([NAME, *qualities, "source"], [f"{variant}_default", *["0.5"] * len(qualities), "estimated"]),
+    }
+
+
+def _varying(base: RosSystem, name: str | None) -> Component:
+    """Return the component that was chosen, else the one that most looks like it: by actions, parameters, inputs."""
+    candidates = [component for component in base.components if component.executable and component.executable.node]
+    if name is not None:
+        chosen = next((component for component in candidates if component.name == name), None)
+        if chosen is None:
+            known = ", ".join(component.name for component in candidates)
+            raise ModelError(f"{name!r} is no component with a FromRosNode; there are {known}", base.position)
+        return chosen
+    if not candidates:
+        raise ModelError("has no component with a FromRosNode that could vary: add one", base.position)
+
+    def likeness(component: Component) -> tuple[bool, int, int]:
+        acts = any(port.kind is PortKind.ACTION_SERVER for port in component.ports)
+        inputs = sum(end.component == component.name for c in base.connections for end in c.targets)
+        return acts, len(component.parameters), inputs
+
+    return max(candidates, key=likeness)
+
+
+def _columns(component: Component) -> dict[str, RosParameter]:
+    """Return a column for each parameter whose value a cell can hold, named by the last part of its name."""
+    found: dict[str, RosParameter] = {}
+    for parameter in component.parameters:
+        text = _cell(parameter)
+        again = typed_cell(text)
+        if parameter.value is None or again != parameter.value or type(again) is not type(parameter.value):
+            continue
+        column = parameter.key.rpartition("/")[2]
+        if column in found or column in {NAME, ""}:
+            column = parameter.key
+        found.setdefault(column, parameter)
+    return found
+
+
+def _cell(parameter: RosParameter) -> str:
+    return str(parameter.value).lower() if isinstance(parameter.value, bool) else str(parameter.value)
+
+
+def _example_port(base: RosSystem, component: Component) -> str:
+    ports = (
+        f"{other.name}.{port.name}"
+        for other in base.components
+        for port in other.ports
+        if other.name != component.name and port.kind is PortKind.PUBLISHER
+    )
+    return next(ports, "front_laser.scan").replace("\n", " ")
+
+
+def _quality(name: str) -> str:
+    direction = "higher_is_better" if name == UTILITY else "lower_is_better"
+    return f"{{direction: {direction}, range: [0.0, 1.0]}}"
+
+
+def _lines(entries: dict[str, object], indent: int = 4) -> str:
+    if not entries:
+        return " {}"
+    return "".join(f"\n{' ' * indent}{flow(name)}: {flow(value)}" for name, value in entries.items())
+
+
+def _csv(*rows: Sequence[str]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

@@ -1,0 +1,185 @@
+"""`metacontrol.yaml` as checked data that knows where each value stands in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ros_model.errors import ModelError, first_of
+from ros_model.language.metamodel import Position
+from ros_model.project.schema_check import Keys, dotted, load_schema, part_of, violations
+from ros_model.project.yaml_file import read_yaml
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+FILE_NAME = "metacontrol.yaml"
+_SCHEMA = "metacontrol"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The content of a metacontrol.yaml.
+
+    Attributes:
+        path: the file.
+        content: what it says; the sections `components`, `observers` and `requires` are there even if empty.
+    """
+
+    path: Path
+    content: dict[str, Any]
+    _places: Mapping[Keys, Position] = field(repr=False, compare=False)
+
+    def at(self, *keys: str | int) -> Position:
+        """Return where the value stands to which the keys lead, or the nearest thing around it that there is."""
+        while keys not in self._places and keys:
+            keys = keys[:-1]
+        return self._places.get(keys, Position(str(self.path), 1, 1))
+
+    def error(self, message: str, *keys: str | int) -> ModelError:
+        """Return an error about the value to which the keys lead."""
+        return ModelError(f"{dotted(keys) or 'the file'}: {message}", self.at(*keys), rule="settings")
+
+    def inside(self, *keys: str | int) -> Path:
+        """Return the file that a value names, relative to this one.
+
+        Raises:
+            ModelError: it leaves the folder.
+        """
+        name: Any = self.content
+        for key in keys:
+            name = name[key]
+        folder = self.path.parent.resolve()
+        try:
+            found = (folder / name).resolve()
+        except ValueError:  # a character that no path has
+            raise self.error(f"{name!r} is no name of a file", *keys) from None
+        if not found.is_relative_to(folder):
+            raise self.error(f"{name} leaves the folder of the models: move the file into it", *keys)
+        return found
+
+    @property
+    def families(self) -> tuple[tuple[Keys, dict[str, Any]], ...]:
+        """The families of variants, each with the keys that lead to it."""
+        section = self.content["variants"]
+        if isinstance(section, list):
+            return tuple((("variants", number), family) for number, family in enumerate(section))
+        return ((("variants",), section),)
+
+
+def locate(folder: str | Path) -> Path:
+    """Return the path of the metacontrol.yaml of a folder, or of that file itself.
+
+    Raises:
+        ModelError: the file is no YAML by its name.
+    """
+    path = Path(folder)
+    if path.is_file() and path.suffix not in {".yaml", ".yml"}:
+        raise ModelError(f"{path}: is no project: give the folder of {FILE_NAME}, or that file")
+    return path / FILE_NAME if path.is_dir() else path
+
+
+def read_settings(path: Path, sections: Sequence[str] = ()) -> Settings:
+    """Read and check a metacontrol.yaml.
+
+    Args:
+        path: the file.
+        sections: check only these, and let the others be absent; all of them if empty.
+
+    Raises:
+        ModelError: it can't be read, or everything that is wrong in it.
+    """
+    settings, problems = examine(path, sections)
+    if problems:
+        raise first_of(problems)
+    return settings
+
+
+def problems_of(path: Path) -> tuple[ModelError, ...]:
+    """Return everything that is wrong in a metacontrol.yaml by itself, in the order of the file.
+
+    Raises:
+        ModelError: it can't be read.
+    """
+    return examine(path)[1]
+
+
+def examine(path: Path, sections: Sequence[str] = ()) -> tuple[Settings, tuple[ModelError, ...]]:
+    """Return the settings of a file, and what is wrong in them.
+
+    Raises:
+        ModelError: the file can't be read.
+    """
+    value, places = read_yaml(path)
+    schema = load_schema(_SCHEMA)
+    if sections:
+        schema = part_of(schema, *sections)
+    content = value if isinstance(value, dict) else {}
+    settings = Settings(path, {"components": {}, "observers": [], "requires": {}, **content}, places)
+    found = [settings.error(violation.message, *violation.keys) for violation in violations(value, schema)]
+    if not found and not sections:
+        found = list(_broken_links(settings))
+    return settings, tuple(sorted(found, key=_place))
+
+
+def _place(error: ModelError) -> tuple[int, int]:
+    return (error.position.line, error.position.column) if error.position else (0, 0)
+
+
+def _broken_links(settings: Settings) -> Iterator[ModelError]:
+    """Yield names in one section that do not stand in the other that they refer to."""
+    content = settings.content
+    yield from _unknown_qas(settings)
+    for name, function in content["functions"].items():
+        requires = function.get("requires", [])
+        for design, required in requires.items() if isinstance(requires, dict) else [(None, requires)]:
+            for number, other in enumerate(required):
+                keys = ("functions", name, "requires", *([] if design is None else [design]), number)
+                if other not in content["functions"]:
+                    yield _no_such(settings, other, "functions", *keys)
+                elif other == name:
+                    yield settings.error("a function can't require itself: take it out", *keys)
+    for name, objective in content["objectives"].items():
+        if objective["function"] not in content["functions"]:
+            yield _no_such(settings, objective["function"], "functions", "objectives", name, "function")
+    for name, entry in content["quality_attributes"].items():
+        yield from _ascending(settings, entry.get("range"), "quality_attributes", name, "range")
+    seen: set[str] = set()
+    for number, entry in enumerate(content["observers"]):
+        name = entry["name"] if isinstance(entry, dict) else entry
+        if name in seen:
+            yield settings.error(f"{name!r} stands twice: take one out", "observers", number)
+        seen.add(name)
+        if isinstance(entry, dict):
+            yield from _ascending(settings, entry["range"], "observers", number, "range")
+            if "outputs" in entry and "plugin" not in entry:
+                yield settings.error(
+                    "is for an observer that exists: name it as plugin", "observers", number, "outputs"
+                )
+
+
+def _unknown_qas(settings: Settings) -> Iterator[ModelError]:
+    content = settings.content
+    used: list[tuple[str, Keys]] = [(content["utility"], ("utility",))]
+    for name, objective in content["objectives"].items():
+        used += [(qa, ("objectives", name, "nfrs", qa)) for qa in objective.get("nfrs", {})]
+    for number, entry in enumerate(content["observers"]):
+        if isinstance(entry, dict):
+            used.append((entry["quality_attribute"], ("observers", number, "quality_attribute")))
+    for keys, family in settings.families:
+        used += [(qa, (*keys, "expected", column)) for column, qa in family.get("expected", {}).items()]
+    for qa, keys in used:
+        if qa not in content["quality_attributes"]:
+            yield _no_such(settings, qa, "quality_attributes", *keys)
+
+
+def _ascending(settings: Settings, limits: list[float] | None, *keys: str | int) -> Iterator[ModelError]:
+    if limits and not limits[0] < limits[1]:
+        yield settings.error(f"is '{limits}', must be a list of two numbers, the lower one first", *keys)
+
+
+def _no_such(settings: Settings, name: str, section: str, *keys: str | int) -> ModelError:
+    known = ", ".join(sorted(settings.content[section]))
+    return settings.error(f"{name!r} is none of {section}: {known}", *keys)

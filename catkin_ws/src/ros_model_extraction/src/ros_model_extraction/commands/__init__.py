@@ -1,0 +1,1 @@
+"""The commands `rosmodel extract` and `rosmodel snapshot`."""

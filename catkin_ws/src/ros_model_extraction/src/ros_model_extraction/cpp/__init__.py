@@ -1,0 +1,1 @@
+"""roscpp nodes from their source."""

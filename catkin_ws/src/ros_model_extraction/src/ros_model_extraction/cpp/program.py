@@ -1,0 +1,429 @@
+"""The C++ sources of a program: what they declare and call, and what texts in them are worth, as far as that shows."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tree_sitter_cpp
+from ros_model.language.metamodel import Position
+from tree_sitter import Language, Node, Parser
+
+from ros_model_extraction.cpp.syntax import (
+    arguments_of,
+    child_of,
+    function_name,
+    last_name,
+    literal_text,
+    parameters,
+    text,
+    type_text,
+    walk,
+)
+from ros_model_extraction.python.values import Const, Hole, Text, joined
+from ros_model_extraction.source import Remark, SourceError, read_source
+
+MAX_DEPTH = 16
+MAX_VALUES = 16
+
+_LANGUAGE = Language(tree_sitter_cpp.language())
+_KNOWN_TEXTS = {"ros::this_node::getName": "~", "ros::this_node::getNamespace": ""}
+_SAME_TEXT = ("std::string", "string", "ros::names::resolve", "ros::names::remap")
+_HEADERS = (".h", ".hpp", ".hh", ".hxx")
+
+
+@dataclass(frozen=True)
+class File:
+    """A source file: its path for people, its tree."""
+
+    shown: str
+    root: Node
+
+    def position(self, node: Node) -> Position:
+        """Return where a node stands."""
+        return Position(self.shown, node.start_point[0] + 1, node.start_point[1] + 1)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an expression stands: file, function (its definition, None outside), class ("" outside)."""
+
+    file: File
+    function: Node | None = None
+    owner: str = ""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A variable: its type, what it is made with (one value, or the arguments of a constructor), and where.
+
+    `is_indirect`: it is declared as a pointer (not a smart one) or a reference.
+    """
+
+    type: str
+    values: tuple[Node, ...]
+    place: Place
+    is_indirect: bool = False
+
+
+@dataclass
+class _Index:
+    functions: dict[str, list[tuple[Node, Place]]] = field(default_factory=lambda: defaultdict(list))
+    calls: dict[str, list[tuple[tuple[Node, ...], Place]]] = field(default_factory=lambda: defaultdict(list))
+    globals: dict[str, list[Declared]] = field(default_factory=lambda: defaultdict(list))
+    members: dict[tuple[str, str], list[Declared]] = field(default_factory=lambda: defaultdict(list))
+    given: list[tuple[str, tuple[Node, ...], Place]] = field(default_factory=list)
+    macros: dict[str, str] = field(default_factory=dict)
+    aliases: dict[str, str] = field(default_factory=dict)
+
+
+class Program:
+    """The sources of an executable, with the headers of its package that they include."""
+
+    def __init__(self, sources: Sequence[Path], package_folder: Path) -> None:
+        """Read and index them.
+
+        Raises:
+            SourceError: none of the sources can be read. Others are remarks.
+        """
+        self.files: list[File] = []
+        self.remarks: list[Remark] = []
+        self._folder = package_folder
+        self._index = _Index()
+        self._locals: dict[int, dict[str, list[Declared]]] = {}
+        self._fills: dict[tuple[str, str], list[tuple[Node | str | None, Place, str]]] = defaultdict(list)
+        parser = Parser(_LANGUAGE)
+        todo, seen = list(sources), set()
+        while todo:
+            path = todo.pop(0)
+            if path.resolve() in seen:
+                continue
+            seen.add(path.resolve())
+            try:
+                self.files.append(self._read(path, parser))
+            except SourceError as error:
+                self.remarks.append(error.remark)
+                continue
+            todo += self._included(self.files[-1], path)
+        if not self.files and self.remarks:
+            raise SourceError(self.remarks[0])
+        for file in reversed(self.files):  # headers, which declare, before the sources that include them
+            self._index_file(file)
+        for name, values, place in self._index.given:  # only now all declarations are known, wherever they stand
+            self._give(name, values, place)
+
+    def expressions(self) -> Iterator[tuple[Node, Place]]:
+        """Yield every node with its place."""
+        for file in self.files:
+            yield from self._walk(file.root, Place(file))
+
+    def alias(self, type_name: str) -> str:
+        """Return a type with the names that `typedef` and `using` gave replaced by what they stand for."""
+        for _ in range(MAX_DEPTH):
+            base, bracket, rest = type_name.partition("<")
+            if base not in self._index.aliases:
+                return type_name
+            type_name = self._index.aliases[base] + bracket + rest
+        return type_name
+
+    def function(self, name: str, owner: str = "") -> tuple[Node, Place] | None:
+        """Return the definition of a function; the one in a class, where several have the name."""
+        found = self._index.functions.get(name.rpartition("::")[2], [])
+        wanted = name.rpartition("::")[0].rpartition("::")[2] or owner
+        of_class = [entry for entry in found if entry[1].owner == wanted] or found
+        defined = [entry for entry in of_class if entry[0].type == "function_definition"]
+        return next(iter(defined or of_class), None)
+
+    def note_fill(self, variable: Node, value: Node | str | None, place: Place, note: str) -> None:
+        """Note that a call like `param(name, variable, value)` fills a variable."""
+        owner = "" if self._is_local(text(variable), place) else place.owner
+        self._fills[owner or _key(place), text(variable)].append((value, place, note))
+
+    def declared(self, name: str, place: Place) -> list[Declared]:
+        """Return what a name may have been declared as: a local variable, a member, a global one."""
+        plain = name.removeprefix("this->")
+        if place.function is not None and (found := self._local(place).get(plain)):
+            return found
+        if place.owner and (found := self._index.members.get((place.owner, plain), [])):
+            return found
+        return self._index.globals.get(plain.rpartition("::")[2], [])
+
+    def texts(self, node: Node, place: Place, depth: int = 0) -> list[tuple[Const | Text, str]]:
+        """Return the texts that an expression may be, each with a note ("" for none); unknown parts are holes."""
+        unknown: list[tuple[Const | Text, str]] = [(Text((Hole(text(node)),)), "")]
+        if depth > MAX_DEPTH:
+            return unknown
+        found = self._texts(node, place, depth)
+        return found[:MAX_VALUES] if found else unknown
+
+    def passed(self, name: str, place: Place) -> list[tuple[Node, Place]]:
+        """Return what the calls of a function pass for one of its parameters."""
+        if place.function is None or name not in (known := parameters(place.function)):
+            return []
+        index, _, default = known[name]
+        called = function_name(place.function).rpartition("::")[2]
+        found = []
+        for arguments, at in self._index.calls.get(called, ()):
+            if index < len(arguments):
+                found.append((arguments[index], at))
+            elif default is not None:
+                found.append((default, place))
+        return found
+
+    # --- texts
+
+    def _texts(self, node: Node, place: Place, depth: int) -> list[tuple[Const | Text, str]]:
+        children = node.named_children
+        found: list[tuple[Const | Text, str]] = []
+        match node.type:
+            case "string_literal":
+                found = [(Const(literal_text(text(node))), "")]
+            case "concatenated_string":
+                found = [(Const("".join(literal_text(text(child)) for child in children)), "")]
+            case "raw_string_literal":
+                found = [(Const("".join(text(n) for n in children if n.type == "raw_string_content")), "")]
+            case "number_literal" | "true" | "false":
+                found = [(Const(text(node)), "")]
+            case "parenthesized_expression" | "initializer_list" if len(children) == 1:
+                found = self.texts(children[0], place, depth + 1)
+            case "binary_expression" if text(node.child_by_field_name("operator")) == "+":
+                left, right = (self.texts(child_of(node, side), place, depth + 1) for side in ("left", "right"))
+                found = [
+                    (joined([as_text(one), as_text(two)]), note or other) for one, note in left for two, other in right
+                ]
+            case "call_expression":
+                found = self._called_text(node, place, depth)
+            case "identifier" | "field_expression" | "qualified_identifier" | "field_identifier":
+                found = self._variable_texts(node, place, depth)
+        return found
+
+    def _called_text(self, node: Node, place: Place, depth: int) -> list[tuple[Const | Text, str]]:
+        function, arguments = child_of(node, "function"), arguments_of(node)
+        name = text(function)
+        if name in _KNOWN_TEXTS:
+            return [(Const(_KNOWN_TEXTS[name]), "")]
+        if name in _SAME_TEXT and len(arguments) == 1:
+            return self.texts(arguments[0], place, depth + 1)
+        if function.type == "field_expression" and (found := self._method_text(function, arguments, place, depth)):
+            return found
+        if definition := self.function(name, place.owner):
+            body = definition[0].child_by_field_name("body")
+            returned = [n for n in walk(body) if n.type == "return_statement" and n.named_child_count] if body else []
+            if len(returned) == 1:
+                return self.texts(returned[0].named_children[0], definition[1], depth + 1)
+        return []
+
+    def _method_text(
+        self, function: Node, arguments: Sequence[Node], place: Place, depth: int
+    ) -> list[tuple[Const | Text, str]]:
+        method = text(child_of(function, "field")).partition("<")[0]
+        if method in ("c_str", "str") and not arguments:
+            return self.texts(child_of(function, "argument"), place, depth + 1)
+        if method == "resolveName" and arguments:
+            return self.texts(arguments[0], place, depth + 1)
+        if method == "param" and len(arguments) == 2:
+            note = f"the default of the parameter {text(arguments[0])}"
+            return [(value, note) for value, _ in self.texts(arguments[1], place, depth + 1)]
+        return []
+
+    def _variable_texts(self, node: Node, place: Place, depth: int) -> list[tuple[Const | Text, str]]:
+        name = text(node).removeprefix("this->")
+        last = name.rpartition("::")[2]
+        found: list[tuple[Const | Text, str]] = []
+        if last in self._index.macros:
+            return [(Const(self._index.macros[last]), "")]
+        for value, at, note in self._filled(name, place):
+            if isinstance(value, str):
+                found.append((Const(value), ""))
+            elif value is not None:
+                found += [(known, note) for known, _ in self.texts(value, at, depth + 1)]
+            else:
+                found.append((Text((Hole(name),)), ""))
+        if found:
+            return found
+        for declared in self.declared(name, place):
+            if len(declared.values) == 1:
+                found += self.texts(declared.values[0], declared.place, depth + 1)
+        if not found:
+            for argument, at in self.passed(name, place):
+                found += self.texts(argument, at, depth + 1)
+        return found
+
+    def _filled(self, name: str, place: Place) -> list[tuple[Node | str | None, Place, str]]:
+        keys = (_key(place), place.owner)
+        return next((self._fills[key, name] for key in keys if key and (key, name) in self._fills), [])
+
+    # --- the index
+
+    def _read(self, path: Path, parser: Parser) -> File:
+        shown = str(path.relative_to(self._folder)) if path.is_relative_to(self._folder) else str(path)
+        root = parser.parse(read_source(path, shown)).root_node
+        if root.has_error:
+            bad = next((node for node in walk(root) if node.is_error or node.is_missing), root)
+            position = Position(shown, bad.start_point[0] + 1, bad.start_point[1] + 1)
+            self.remarks.append(
+                Remark(position, "not read: this is no C++ that can be parsed; the rest of the file is")
+            )
+        return File(shown, root)
+
+    def _included(self, file: File, path: Path) -> Iterator[Path]:
+        for node in walk(file.root):
+            if node.type == "preproc_include":
+                name = text(child_of(node, "path")).strip('<>"')
+                for folder in (path.parent, self._folder / "include", self._folder / "src"):
+                    header = folder / name
+                    if (
+                        name.endswith(_HEADERS)
+                        and os.path.isfile(header)
+                        and header.resolve().is_relative_to(self._folder)
+                    ):
+                        yield header
+                        break
+
+    def _index_file(self, file: File) -> None:
+        for node, place in self._walk(file.root, Place(file)):
+            match node.type:
+                case "function_definition":
+                    self._index.functions[function_name(node).rpartition("::")[2]].append((node, place))
+                    self._initialised(node, place)
+                case "preproc_def":
+                    value = text(node.child_by_field_name("value")).strip()
+                    if value.startswith('"') and value.endswith('"') and len(value) > 1:
+                        self._index.macros[text(child_of(node, "name"))] = literal_text(value)
+                case "type_definition" | "alias_declaration":
+                    declarator = node.child_by_field_name("declarator") or node.child_by_field_name("name")
+                    self._index.aliases[text(declarator)] = type_text(child_of(node, "type"))
+                case "declaration" | "field_declaration":
+                    self._index_declaration(node, place)
+                case "call_expression" | "new_expression":
+                    if reset := _reset(node):
+                        self._index.given.append((*reset, place))
+                    name = text(node.child_by_field_name("function") or node.child_by_field_name("type"))
+                    made = re.match(r"(?:\w+::)*make_(?:shared|unique)<(.*)>$", name)
+                    arguments = tuple(arguments_of(node))
+                    self._index.calls[last_name(made[1] if made else name)].append((arguments, place))
+                case "assignment_expression":
+                    self._index.given.append((text(child_of(node, "left")), (child_of(node, "right"),), place))
+
+    def _index_declaration(self, node: Node, place: Place) -> None:
+        if name := function_name(node):
+            self._index.functions[name.rpartition("::")[2]].append((node, place))
+        for name, declared in _declarations(node, place):
+            if place.function is None and place.owner:
+                self._index.members[place.owner, name].append(declared)
+            elif place.function is None:
+                self._index.globals[name].append(declared)
+            self._index.calls[last_name(declared.type)].append((declared.values, place))
+
+    def _initialised(self, function: Node, place: Place) -> None:
+        """Note what a constructor's initialisers give the members."""
+        for node in function.named_children:
+            if node.type != "field_initializer_list":
+                continue
+            for initialiser in node.named_children:
+                if initialiser.type != "field_initializer" or not initialiser.named_children:
+                    continue
+                name = f"this->{text(initialiser.named_children[0])}"
+                values = tuple(initialiser.named_children[-1].named_children)
+                self._index.given.append((name, values, Place(place.file, function, place.owner)))
+
+    def _give(self, name: str, values: tuple[Node, ...], place: Place) -> None:
+        """Note what a member or a global variable is given outside its declaration."""
+        plain = name.removeprefix("this->")
+        if plain == name and self._is_local(name, place):
+            return
+        if place.owner and ((place.owner, plain) in self._index.members or plain not in self._index.globals):
+            known = self._index.members[place.owner, plain]
+        elif plain in self._index.globals:
+            known = self._index.globals[plain]
+        else:
+            return
+        kind = known[0].type if known else ""
+        known[:] = [*(declared for declared in known if declared.values), Declared(kind, values, place)]
+
+    def _walk(self, root: Node, start: Place) -> Iterator[tuple[Node, Place]]:
+        todo = [(root, start)]
+        while todo:
+            node, place = todo.pop()
+            inner = place
+            if node.type == "function_definition":
+                name = function_name(node)
+                owner = name.rpartition("::")[0].rpartition("::")[2] or place.owner
+                inner = Place(place.file, node, owner)
+                place = Place(place.file, place.function, owner)
+            elif node.type in ("class_specifier", "struct_specifier") and node.child_by_field_name("body"):
+                inner = Place(place.file, None, text(node.child_by_field_name("name")))
+            yield node, inner if node.type == "function_definition" else place
+            todo += [(child, inner) for child in reversed(node.named_children)]
+
+    def _local(self, place: Place) -> dict[str, list[Declared]]:
+        function = place.function
+        if function is None:
+            return {}
+        if function.id not in self._locals:
+            found: dict[str, list[Declared]] = defaultdict(list)
+            for node in walk(function):
+                if node.type == "declaration":
+                    for name, declared in _declarations(node, place):
+                        found[name].append(declared)
+                    continue
+                given = _reset(node)
+                if node.type == "assignment_expression":
+                    given = text(child_of(node, "left")), (child_of(node, "right"),)
+                if given and given[0] in found:
+                    kept = [declared for declared in found[given[0]] if declared.values]
+                    found[given[0]] = [*kept, Declared(found[given[0]][0].type, given[1], place)]
+            self._locals[function.id] = dict(found)
+        return self._locals[function.id]
+
+    def _is_local(self, name: str, place: Place) -> bool:
+        return place.function is not None and (name in self._local(place) or name in parameters(place.function))
+
+
+def _declarations(node: Node, place: Place) -> Iterator[tuple[str, Declared]]:
+    """Yield the variables that a declaration declares."""
+    kind = type_text(node.child_by_field_name("type"))
+    for declarator in node.children_by_field_name("declarator"):
+        value: tuple[Node, ...] = ()
+        name_node = declarator
+        if declarator.type == "init_declarator":
+            given = declarator.child_by_field_name("value")
+            name_node = child_of(declarator, "declarator")
+            if given is not None:
+                is_list = given.type in ("argument_list", "initializer_list")
+                value = tuple(given.named_children) if is_list else (given,)
+        elif declarator.type == "function_declarator":
+            # `Type name(a, b);` may look like a function: its parameters are then the names of variables.
+            listed = declarator.child_by_field_name("parameters")
+            children = listed.named_children if listed else []
+            value = tuple(child.named_children[0] for child in children if child.named_children)
+            name_node = child_of(declarator, "declarator")
+        default = node.child_by_field_name("default_value")
+        if default is not None:
+            is_list = default.type in ("argument_list", "initializer_list")
+            value = tuple(default.named_children) if is_list else (default,)
+        shown = text(name_node)
+        is_indirect = shown.startswith(("*", "&"))
+        yield shown.lstrip("*& ").partition("[")[0].strip(), Declared(kind, value, place, is_indirect)
+
+
+def _reset(node: Node) -> tuple[str, tuple[Node, ...]] | None:
+    """Return the smart pointer that a call `pointer.reset(value)` gives a value, and the value."""
+    function = node.child_by_field_name("function") if node.type == "call_expression" else None
+    if function is None or function.type != "field_expression" or text(child_of(function, "field")) != "reset":
+        return None
+    arguments = arguments_of(node)
+    return (text(child_of(function, "argument")), (arguments[0],)) if arguments else None
+
+
+def _key(place: Place) -> str:
+    return f"{place.file.shown}:{place.function.start_byte}" if place.function is not None else ""
+
+
+def as_text(value: Const | Text) -> Text:
+    """Return a value as a text."""
+    return value if isinstance(value, Text) else Text((str(value.value),))

@@ -1,0 +1,112 @@
+"""The model of a package, from its source."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ros_model.language.metamodel import Position
+from ros_model.language.packages import Artifact, Package, PackageSet
+
+from ros_model_extraction.names import executable_name
+from ros_model_extraction.packages.catkin_package import CatkinPackage, Executable, read_package
+from ros_model_extraction.packages.message_files import read_specs
+from ros_model_extraction.python.modules import Library
+from ros_model_extraction.source import NodeSource, Remark, SourceError, unique
+
+NOT_READ = "not read"
+"""How remarks begin that say that a file was not understood at all."""
+
+Parameters = Callable[[str], Any]
+
+_LEGEND = (
+    "A name with braces is not known from the source: in braces stands the expression, after the @ its place.",
+    "Left out, because every node has it: publishing /rosout, listening to /clock, ~get_loggers, ~set_logger_level.",
+)
+
+
+@dataclass(frozen=True)
+class ExtractedPackage:
+    """The model of a package, what was found of each executable (by its file's name), and what is to be said."""
+
+    package: Package
+    nodes: Mapping[str, NodeSource]
+    remarks: tuple[Remark, ...]
+
+    def model(self) -> PackageSet:
+        """Return the content of a `.ros` file, with remarks as its first comments."""
+        renamed = [
+            f"The artifact {executable_name(name)} is the executable {name}: a reference can't hold the dot."
+            for name, node in self.nodes.items()
+            if node.is_node and executable_name(name) != name
+        ]
+        no_nodes = [name for name, node in self.nodes.items() if not node.is_node]
+        lines = [f"The package {self.package.name}, from its source. Written by rosmodel extract.", *_LEGEND, *renamed]
+        if no_nodes:
+            lines.append(f"Executables that start no ROS node: {', '.join(no_nodes)}.")
+        return PackageSet((self.package,), "\n".join([*lines, *map(str, self.remarks)]))
+
+    @property
+    def unread(self) -> tuple[Remark, ...]:
+        """Remarks about files that could not be read at all."""
+        return tuple(remark for remark in self.remarks if remark.text.startswith(NOT_READ))
+
+
+def extract_package(folder: Path) -> ExtractedPackage:
+    """Return the model of the package in a folder.
+
+    Raises:
+        ModelError: its package.xml can't be read. Other files that can't be read are remarks.
+    """
+    package = read_package(folder)
+    nodes = {}
+    remarks = list(package.remarks)
+    library = Library([folder / "src", folder], folder)
+    for executable in package.executables:
+        try:
+            nodes[executable.name] = read_executable(package, executable, library)
+        except SourceError as error:
+            remarks.append(error.remark)
+    remarks += library.remarks
+    for node in nodes.values():
+        remarks += node.remarks
+    specs, said = read_specs(folder)
+    artifacts = tuple(
+        Artifact(executable_name(name), (named(node, name).declared(),), position=node.position)
+        for name, node in nodes.items()
+        if node.is_node
+    )
+    model = Package(
+        package.name,
+        artifacts,
+        specs,
+        package.dependencies,
+        external_dependencies=package.external_dependencies,
+        position=Position(str(folder), 1, 1),
+    )
+    return ExtractedPackage(model, nodes, unique([*remarks, *said]))
+
+
+def read_executable(
+    package: CatkinPackage, executable: Executable, library: Library, parameters: Parameters | None = None
+) -> NodeSource:
+    """Return what an executable's source makes of a node; it `is_node` where it is one.
+
+    Raises:
+        SourceError: it can't be read.
+    """
+    if executable.is_python:
+        from ros_model_extraction.python.source import read_python_node
+
+        return read_python_node(executable.sources[0], library, package.plugins, parameters)
+    from ros_model_extraction.cpp.source import read_cpp_node
+
+    return read_cpp_node(executable.sources, package.folder, parameters)
+
+
+def named(node: NodeSource, executable: str) -> NodeSource:
+    """Return the node with a name that a reference can hold: that of its executable, where its own is not known."""
+    name = node.name if node.name and "{" not in node.name else executable
+    return replace(node, name=executable_name(name.strip("/").replace("/", "_")))

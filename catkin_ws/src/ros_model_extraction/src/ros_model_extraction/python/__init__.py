@@ -1,0 +1,1 @@
+"""rospy nodes from their source."""

@@ -1,0 +1,307 @@
+"""From a snapshot of the running graph to the models of its packages and of the system."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from ros_model.language.metamodel import (
+    Component,
+    Connection,
+    ConnectionKind,
+    Port,
+    PortKind,
+    PortPath,
+    Reference,
+    RosParameter,
+    RosSystem,
+    SystemParameter,
+)
+from ros_model.language.packages import Artifact, Node, Package, PackageSet, ParameterDeclaration, PortDeclaration
+
+from ros_model_extraction import ros_defaults as plumbing
+from ros_model_extraction.names import as_seen_from, executable_name, is_known_type, split_name
+from ros_model_extraction.values import UnwritableValueError, leaves, typed
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from ros_model.io.snapshot import GraphSnapshot
+
+    from ros_model_extraction.running.live import Details
+
+NO_PACKAGE = "unknown_package"
+"""Package of nodes whose executable can't be traced; the artifact is then named as the node."""
+
+
+@dataclass(frozen=True)
+class End:
+    """An interface of a running node, by its resolved name."""
+
+    node: str
+    kind: PortKind
+    name: str
+    type: str = ""
+    declared: str = ""  # its name in the source, where that is known
+
+
+@dataclass(frozen=True)
+class Models:
+    """The model of the packages, and that of the system which instantiates them."""
+
+    packages: PackageSet
+    system: RosSystem
+
+
+@dataclass
+class Instance:
+    """A running node on its way into the models; `declared` is what its source says, where that is known."""
+
+    name: str
+    label: str
+    namespace: str | None
+    reference: Reference
+    declared: Node | None = None
+    ends: list[End] = field(default_factory=list)
+    parameters: list[tuple[str, Any]] = field(default_factory=list)  # relative to the node
+
+
+def models_of(
+    snapshot: GraphSnapshot, details: Details, name: str, title: Sequence[str] = (), *, everything: bool = False
+) -> Models:
+    """Return the models of a running graph.
+
+    Args:
+        snapshot: what the master lists.
+        details: what the nodes tell.
+        name: name of the system.
+        title: first lines of both files' comments.
+        everything: keep what ROS itself makes for every node, and what roslaunch leaves on the parameter server.
+    """
+    remarks = _Remarks(snapshot, details, everything)
+    ends = [end for end in interfaces(snapshot, details) if everything or not plumbing.is_plumbing(end)]
+    running = [
+        node for node in snapshot.nodes if node not in details.dead and (everything or node not in plumbing.NODES)
+    ]
+    instances = _instances(running, details, remarks)
+    for end in ends:
+        if end.node in instances:
+            instances[end.node].ends.append(end)
+    unowned = share_out(snapshot.parameters, instances)
+    if not everything:
+        unowned = [(key, value) for key, value in unowned if not plumbing.is_roslaunch_parameter(key)]
+    return assemble(name, instances, unowned, [*title, *remarks.lines()])
+
+
+def assemble(
+    name: str, instances: Mapping[str, Instance], unowned: Sequence[tuple[str, Any]], lines: Sequence[str]
+) -> Models:
+    """Return the models of nodes.
+
+    Args:
+        name: name of the system.
+        instances: the nodes by their full names, with interfaces and parameters.
+        unowned: parameters of no node, by their full names without the leading slash.
+        lines: comments at the top of both models; values that can't be written are added to them.
+    """
+    unwritable: dict[str, str] = {}
+    system = RosSystem(
+        name,
+        tuple(_component(instance, unwritable) for instance in instances.values()),
+        tuple(_connections(instances)),
+        tuple(_system_parameters(unowned, unwritable)),
+    )
+    said = [f"Left out: the value of the parameter {name}: {why}." for name, why in sorted(unwritable.items())]
+    header = "\n".join([*lines, *said])
+    return Models(PackageSet(_packages(instances.values()), header), replace(system, header=header))
+
+
+def interfaces(snapshot: GraphSnapshot, details: Details) -> Iterator[End]:
+    """Yield all interfaces of all nodes; an action is one, and what else touches its topics is a topic's end."""
+    for name, node in snapshot.nodes.items():
+        for kind, topics in ((PortKind.PUBLISHER, node.publications), (PortKind.SUBSCRIBER, node.subscriptions)):
+            for topic in topics:
+                type_name = snapshot.topics[topic].type
+                yield End(name, kind, topic, type_name if is_known_type(type_name) else "")
+        for service in node.services:
+            yield End(name, PortKind.SERVICE_SERVER, service, details.service_types.get(service, ""))
+        for kind, actions in (
+            (PortKind.ACTION_SERVER, node.action_servers),
+            (PortKind.ACTION_CLIENT, node.action_clients),
+        ):
+            for action in actions:
+                yield End(name, kind, action, snapshot.actions[action].type)
+
+
+def _instances(names: Sequence[str], details: Details, remarks: _Remarks) -> dict[str, Instance]:
+    """Give every node its label, unique in the system, and the reference to the executable that it runs."""
+    found = {}
+    for name in names:
+        origin = details.origins.get(name)
+        package = origin.package if origin else NO_PACKAGE
+        label = split_name(name)[1]
+        artifact = executable_name(origin.executable) if origin else executable_name(label)
+        if origin and artifact != origin.executable:
+            remarks.renamed[origin.executable] = artifact
+        reference = Reference(package, artifact, executable_name(label))
+        found[name] = Instance(name, *label_of(name, names), reference)
+    return found
+
+
+def label_of(name: str, names: Sequence[str]) -> tuple[str, str | None]:
+    """Return a node's name and namespace in the model; the whole name where its last part is not unique among all.
+
+    The ends of connections have nothing but that name.
+    """
+    namespace, label = split_name(name)
+    if sum(split_name(other)[1] == label for other in names) > 1:
+        return name.strip("/"), None
+    return label, namespace or None
+
+
+def share_out(tree: Mapping[str, Any], instances: Mapping[str, Instance]) -> list[tuple[str, Any]]:
+    """Give each node its private parameters; return the others, by their full names without the leading slash."""
+    unowned = []
+    for name, value in leaves(tree):
+        parts = name.split("/")
+        owner = next(
+            (
+                instances[node]
+                for end in range(len(parts) - 1, 0, -1)
+                if (node := "/" + "/".join(parts[:end])) in instances
+            ),
+            None,
+        )
+        if owner:
+            owner.parameters.append((f"/{name}".removeprefix(f"{owner.name}/"), value))
+        else:
+            unowned.append((name, value))
+    return unowned
+
+
+def _component(instance: Instance, unwritable: dict[str, str]) -> Component:
+    reference = instance.reference
+    ports = tuple(
+        Port(name, end.kind, replace(reference, name=end.declared or name))
+        for end in sorted(instance.ends, key=_order)
+        for name in [as_seen_from(instance.name, end.name)]
+    )
+    parameters = []
+    for key, raw in instance.parameters:
+        try:
+            _, value = typed(raw)
+        except UnwritableValueError as error:
+            unwritable[f"{instance.name}/{key}"] = str(error)
+            value = None
+        parameters.append(RosParameter(key, replace(reference, name=key), value))
+    return Component(instance.label, reference, instance.namespace, ports, tuple(parameters))
+
+
+def _order(end: End) -> tuple[int, str]:
+    return list(PortKind).index(end.kind), end.name
+
+
+def _connections(instances: Mapping[str, Instance]) -> Iterator[Connection]:
+    """Connect what bears the same name: publishers and subscribers, action servers and clients."""
+    for kind, source_kind, target_kind in (
+        (ConnectionKind.TOPIC, PortKind.PUBLISHER, PortKind.SUBSCRIBER),
+        (ConnectionKind.ACTION, PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT),
+    ):
+        sources, targets = (_paths(instances.values(), end) for end in (source_kind, target_kind))
+        for name in sorted(sources.keys() & targets.keys()):
+            yield Connection(name.lstrip("/"), kind, tuple(sources[name]), tuple(targets[name]))
+
+
+def _paths(instances: Iterable[Instance], kind: PortKind) -> dict[str, list[PortPath]]:
+    found: dict[str, list[PortPath]] = defaultdict(list)
+    for instance in instances:
+        for end in instance.ends:
+            if end.kind is kind and "{" not in end.name:
+                found[end.name].append(PortPath(instance.label, as_seen_from(instance.name, end.name)))
+    return found
+
+
+def _system_parameters(parameters: Iterable[tuple[str, Any]], unwritable: dict[str, str]) -> Iterator[SystemParameter]:
+    for name, raw in parameters:
+        try:
+            kind, value = typed(raw)
+        except UnwritableValueError as error:
+            unwritable[f"/{name}"] = str(error)
+            continue
+        yield SystemParameter(name, kind, value)
+
+
+def _packages(instances: Iterable[Instance]) -> tuple[Package, ...]:
+    """Declare what the instances refer to; instances of one node of one executable share its declaration."""
+    declared: dict[str, dict[str, dict[str, _Declaration]]] = defaultdict(lambda: defaultdict(dict))
+    for instance in instances:
+        reference = instance.reference
+        nodes = declared[reference.package][reference.artifact]
+        declaration = nodes.setdefault(reference.node, _Declaration({}, {}))
+        for port in instance.declared.ports if instance.declared else ():
+            declaration.ports.setdefault((port.kind, port.name), port)
+        for parameter in instance.declared.parameters if instance.declared else ():
+            declaration.parameters.setdefault(parameter.name, parameter)
+        for end in sorted(instance.ends, key=_order):
+            name = end.declared or as_seen_from(instance.name, end.name)
+            declaration.ports.setdefault((end.kind, name), PortDeclaration(name, end.kind, end.type))
+        for key, raw in instance.parameters:
+            try:
+                kind = typed(raw)[0]
+            except UnwritableValueError:
+                kind = None
+            declaration.parameters.setdefault(key, ParameterDeclaration(key, kind))
+    return tuple(
+        Package(
+            package,
+            tuple(
+                Artifact(
+                    artifact,
+                    tuple(
+                        Node(node, tuple(found.ports.values()), tuple(found.parameters.values()))
+                        for node, found in sorted(nodes.items())
+                    ),
+                )
+                for artifact, nodes in sorted(artifacts.items())
+            ),
+        )
+        for package, artifacts in sorted(declared.items())
+    )
+
+
+@dataclass
+class _Declaration:
+    ports: dict[tuple[PortKind, str], PortDeclaration]
+    parameters: dict[str, ParameterDeclaration]
+
+
+class _Remarks:
+    """What the models leave out or can't know, for the comments at their top."""
+
+    def __init__(self, snapshot: GraphSnapshot, details: Details, everything: bool) -> None:
+        self._snapshot = snapshot
+        self._details = details
+        self._everything = everything
+        self.renamed: dict[str, str] = {}
+
+    def lines(self) -> Iterator[str]:
+        """Yield the lines."""
+        yield "Not known, because a ROS 1 master doesn't: who calls which service."
+        snapshot, details = self._snapshot, self._details
+        if silent := [name for name in snapshot.services if not details.service_types.get(name) and self._alive(name)]:
+            yield f"Not known, because their nodes don't answer: the types of the services {', '.join(silent)}."
+        if untyped := [topic.name for topic in snapshot.topics.values() if not is_known_type(topic.type)]:
+            yield f"Not known, because nobody publishes them: the types of the topics {', '.join(untyped)}."
+        for node, why in sorted(details.unknown.items()):
+            if self._everything or node not in plumbing.NODES:
+                yield f"Not known: the package and executable of {node}: {why}."
+        if details.dead:
+            yield f"Left out: {', '.join(sorted(details.dead))}: the master lists them, but nobody listens there."
+        for executable, artifact in sorted(self.renamed.items()):
+            yield f"The artifact {artifact} is the executable {executable}: a reference can't hold the dot."
+        if not self._everything:
+            yield plumbing.REMARK
+
+    def _alive(self, service: str) -> bool:
+        return not set(self._snapshot.services[service].servers) <= self._details.dead

@@ -1,0 +1,66 @@
+"""Parameters as Python has them (from the master, YAML, source code), in the terms of the metamodel."""
+
+from __future__ import annotations
+
+import base64
+import datetime
+import math
+import xmlrpc.client
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from ros_model.language.metamodel import ParameterType, Value
+
+
+class UnwritableValueError(ValueError):
+    """A value has no notation in the languages; the message says why."""
+
+
+def leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield (name, value) of all parameters of a tree, names joined by slashes; empty namespaces hold none."""
+    for key, value in sorted(tree.items(), key=lambda item: str(item[0])):
+        name = f"{prefix}/{key}" if prefix else str(key)
+        if isinstance(value, Mapping):
+            yield from leaves(value, name)
+        else:
+            yield name, value
+
+
+def typed(raw: Any) -> tuple[ParameterType, Value]:
+    """Return the declared type that fits a value, and the value as the metamodel has it.
+
+    Raises:
+        UnwritableValueError: the value, or one inside it, has no notation.
+    """
+    match raw:
+        case bool() | int() | str():
+            return ParameterType(_PRIMITIVES[type(raw)]), raw
+        case float():
+            if not math.isfinite(raw):
+                raise UnwritableValueError(f"{raw} is no finite number")
+            return ParameterType("Double"), raw
+        case xmlrpc.client.Binary() | bytes():
+            data = raw.data if isinstance(raw, xmlrpc.client.Binary) else raw
+            return ParameterType("Base64"), base64.b64encode(data).decode("ascii")
+        case xmlrpc.client.DateTime() | datetime.date():
+            return ParameterType("Date"), str(raw)
+        case list() | tuple():
+            return _list([typed(item) for item in raw])
+        case dict() if raw:
+            members = {str(name): typed(item) for name, item in raw.items()}
+            declared = tuple((name, kind) for name, (kind, _) in members.items())
+            return ParameterType("Struct", members=declared), {name: value for name, (_, value) in members.items()}
+    raise UnwritableValueError("a value of no kind that the language has" if raw is not None else "it has no value")
+
+
+_PRIMITIVES = {bool: "Boolean", int: "Integer", str: "String"}
+
+
+def _list(items: list[tuple[ParameterType, Value]]) -> tuple[ParameterType, Value]:
+    kinds = [kind for kind, _ in items]
+    values = [value for _, value in items]
+    if kinds and {kind.kind for kind in kinds} == {"Integer", "Double"}:
+        return ParameterType("Array", (ParameterType("Double"),)), values
+    if kinds and all(kind == kinds[0] for kind in kinds):
+        return ParameterType("Array", (kinds[0],)), values
+    return ParameterType("List", tuple(kinds)), values

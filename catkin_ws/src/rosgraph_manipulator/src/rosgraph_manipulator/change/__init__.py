@@ -1,0 +1,1 @@
+"""Changes of configuration: tactics, order, journal, and supervision of what runs. Pure."""

@@ -1,0 +1,1 @@
+"""The commands `plan`, `request` and `status`."""

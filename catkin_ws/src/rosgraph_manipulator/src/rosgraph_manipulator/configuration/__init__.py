@@ -1,0 +1,1 @@
+"""Configurations: which launch file deploys which, and what they consist of."""

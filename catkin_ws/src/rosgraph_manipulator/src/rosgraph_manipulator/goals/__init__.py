@@ -1,0 +1,1 @@
+"""The pending goal of an action across changes of its server. Pure."""

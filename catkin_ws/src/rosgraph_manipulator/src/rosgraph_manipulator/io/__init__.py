@@ -1,0 +1,1 @@
+"""Launch files, processes, and calls to the master and to nodes."""

@@ -1,0 +1,212 @@
+"""Reads launch files, through roslaunch, into descriptions; and turns a node's description into a command."""
+
+from __future__ import annotations
+
+import xml.parsers.expat
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.dom import minidom
+
+import rosgraph
+import rosgraph.names
+import roslaunch.config
+import roslaunch.core
+import roslaunch.loader
+import roslaunch.node_args
+import roslaunch.substitution_args
+import roslaunch.xmlloader
+import rospkg
+from ros_model.errors import ModelError
+from ros_model.generators.launch import launch_file
+from ros_model.language.reader import read_system
+
+from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
+
+
+class LaunchFileError(Exception):
+    """A launch file cannot be used; the message names it and says why, in one line."""
+
+
+@dataclass(frozen=True)
+class LaunchFile:
+    """What a launch file asks for.
+
+    Attributes:
+        system: nodes and parameters.
+        clear: full names of parameters to delete first.
+        commands: `rosparam` calls (arguments) to run first.
+    """
+
+    system: SystemDescription
+    clear: tuple[str, ...] = ()
+    commands: tuple[tuple[str, ...], ...] = ()
+
+
+def read_launch_file(path: str | Path, args: Sequence[str] = ()) -> LaunchFile:
+    """Read a launch file with its arguments (`NAME:=VALUE`).
+
+    Raises:
+        LaunchFileError: it is missing or malformed, starts nothing, or wants what can't be done here.
+    """
+    config = roslaunch.config.ROSLaunchConfig()
+    try:
+        _Loader().load(str(path), config, argv=list(args), verbose=False)
+    except _ERRORS as error:
+        raise LaunchFileError(f"{path}: {_one_line(error)}") from error
+    return _checked(path, config)
+
+
+def read_model(path: Path) -> LaunchFile:
+    """Read a `.rossystem` model as the launch file that is generated from it.
+
+    Raises:
+        LaunchFileError: the model can't be read or launched.
+    """
+    config = roslaunch.config.ROSLaunchConfig()
+    try:
+        _Loader().load_string(launch_file(read_system(path)), config, verbose=False)
+    except (ModelError, *_ERRORS) as error:
+        raise LaunchFileError(f"{path}: {_one_line(error)}") from error
+    return _checked(path, config)
+
+
+def command_line(node: NodeDescription) -> tuple[list[str], int]:
+    """Return the words that start a node, without `__log:=`, and how many of them are its launch-prefix.
+
+    Raises:
+        LaunchFileError: there is no such package or executable.
+    """
+    prefix = node.launch_prefix or ""
+    try:
+        words = roslaunch.node_args.create_local_process_args(_roslaunch_node(node), roslaunch.core.local_machine())
+    except (roslaunch.node_args.NodeParamsException, rospkg.ResourceNotFound, ValueError) as error:
+        raise LaunchFileError(f"node {node.name}: {_one_line(error)}") from error
+    bare = roslaunch.node_args._launch_prefix_args(_roslaunch_node(node)) if prefix else []
+    return list(words), len(bare)
+
+
+def process_environment(node: NodeDescription, environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the whole environment of a node's process."""
+    return dict(
+        roslaunch.core.setup_env(
+            _roslaunch_node(node), roslaunch.core.local_machine(), rosgraph.get_master_uri(), env=dict(environment)
+        )
+    )
+
+
+_ERRORS = (
+    roslaunch.core.RLException,
+    roslaunch.xmlloader.XmlParseException,
+    roslaunch.loader.LoadException,
+    roslaunch.substitution_args.SubstitutionException,
+    rospkg.ResourceNotFound,
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,  # roslaunch lets it through for values that are no text
+)
+
+
+class _StableNames(dict[str, str]):
+    """What `$(anon NAME)` stands for: the same at every reading, so that two readings can be compared."""
+
+    def __contains__(self, _key: object) -> bool:
+        return True
+
+    def __missing__(self, key: str) -> str:
+        return f"{key}_launched"
+
+
+class _Loader(roslaunch.xmlloader.XmlLoader):
+    """roslaunch's reader, without XML entities and with stable anonymous names."""
+
+    ignore_unset_args = False
+
+    @property
+    def root_context(self) -> Any:
+        return self._root_context
+
+    @root_context.setter
+    def root_context(self, context: Any) -> None:
+        self._root_context = context
+        if context is not None:
+            context.resolve_dict["anon"] = _StableNames()
+
+    def _parse_launch(self, filename: str, verbose: bool) -> Any:  # noqa: ARG002
+        data = Path(filename).read_bytes()
+        check = xml.parsers.expat.ParserCreate()
+        check.StartDoctypeDeclHandler = _refuse_doctype
+        try:
+            check.Parse(data, True)
+        except xml.parsers.expat.ExpatError as error:
+            raise roslaunch.xmlloader.XmlParseException(f"{filename}: not well-formed XML: {error}") from error
+        roots = minidom.parseString(data).getElementsByTagName("launch")  # noqa: S318, no entities are left
+        if len(roots) != 1:
+            raise roslaunch.xmlloader.XmlParseException(f"{filename}: must have one root element <launch>")
+        return roots[0]
+
+
+def _refuse_doctype(*_: object) -> None:
+    raise roslaunch.xmlloader.XmlParseException("a document type declaration is not allowed: take it out")
+
+
+def _checked(path: str | Path, config: Any) -> LaunchFile:
+    try:
+        config.assign_machines()
+    except roslaunch.core.RLException as error:
+        raise LaunchFileError(f"{path}: {_one_line(error)}") from error
+    if config.config_errors:
+        raise LaunchFileError(f"{path}: {_one_line(config.config_errors[0])}")
+    if not config.nodes:
+        raise LaunchFileError(f"{path}: starts no node")
+    if config.has_remote_nodes():
+        raise LaunchFileError(f"{path}: has nodes for another machine: only local ones can be started")
+    nodes = {}
+    left = {key: parameter.value for key, parameter in config.params.items()}
+    for node in config.nodes:
+        name = rosgraph.names.ns_join(node.namespace, node.name)
+        private = {key: left.pop(key) for key in list(left) if key.startswith(f"{name}/")}
+        nodes[name] = _description(name, node, {key.removeprefix(f"{name}/"): value for key, value in private.items()})
+    return LaunchFile(
+        SystemDescription(nodes, left),
+        clear=tuple(config.clear_params),
+        commands=tuple((str(e.command), *map(str, e.args)) for e in config.executables),
+    )
+
+
+def _description(name: str, node: Any, parameters: dict[str, Any]) -> NodeDescription:
+    return NodeDescription(
+        name=name,
+        namespace=node.namespace,
+        package=node.package,
+        executable=node.type,
+        args=node.args or "",
+        remaps=tuple((source, target) for source, target in node.remap_args),
+        environment=tuple((key, value) for key, value in node.env_args),
+        cwd=node.cwd,
+        output=node.output or "log",
+        respawn=bool(node.respawn),
+        launch_prefix=node.launch_prefix or None,
+        parameters=parameters,
+    )
+
+
+def _roslaunch_node(node: NodeDescription) -> Any:
+    return roslaunch.core.Node(
+        node.package,
+        node.executable,
+        name=node.name.rpartition("/")[2],
+        namespace=node.namespace,
+        args=node.args,
+        remap_args=list(node.remaps),
+        env_args=list(node.environment),
+        output=node.output,
+        cwd=node.cwd,
+        launch_prefix=node.launch_prefix,
+    )
+
+
+def _one_line(error: object) -> str:
+    return " ".join(str(error).split())

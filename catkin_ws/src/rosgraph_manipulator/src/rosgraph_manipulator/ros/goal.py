@@ -1,0 +1,164 @@
+"""The pending goal of an action, kept over changes of its server: the ROS shell around `goal_keeper`.
+
+The goal stands on the parameter server, as `ACTION/resume_goal`, as long as it is pending. A server that knows the
+parameter takes it over before its first status, whoever starts it; a manipulator that comes back finds it there.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import contextlib
+import io
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import genpy
+import roslib.message
+import rospy
+from actionlib_msgs.msg import GoalID, GoalStatusArray
+
+from rosgraph_manipulator.configuration.configuration_file import ConfigurationError
+from rosgraph_manipulator.goals.goal_keeper import GoalKeeper
+
+QUEUE = 10
+SEND_PERIOD = 0.5  # s, wall, between two sendings of a goal that the new server does not have: it tells every 0.2 s
+
+
+class PendingGoal:
+    """Carries the pending goal of an action over to a new server."""
+
+    def __init__(self, action: str, action_type: str, adopt: bool = False, changing: bool = False) -> None:
+        """Begin to watch the action.
+
+        Args:
+            action: its name.
+            action_type: e.g. `move_base_msgs/MoveBaseAction`.
+            adopt: take over the goal that an earlier manipulator has left; else it is forgotten.
+            changing: its server is being replaced at this moment.
+
+        Raises:
+            ConfigurationError: the type is not installed.
+        """
+        self._action = action
+        self._parameter = f"{action}/resume_goal"
+        self._goal_type = action_type + "Goal"
+        self._keeper = GoalKeeper()
+        self._lock = threading.RLock()
+        self._sent_at = 0.0  # time.monotonic()
+        self._stored: str | None = None  # id of the goal in the parameter
+        self._server: object = None  # what stands for the present server's connection
+        self._old_server: object = None
+        goal_class = _message_class(self._goal_type)
+        result_class = _message_class(action_type + "Result")
+        self._keeper.server_changes(changing)
+        self._recall(goal_class, adopt)
+        self._goal_publisher = rospy.Publisher(f"{action}/goal", goal_class, queue_size=1)
+        self._cancel_publisher = rospy.Publisher(f"{action}/cancel", GoalID, queue_size=QUEUE)
+        self._subscribers = [
+            rospy.Subscriber(f"{action}/goal", goal_class, self._locked(self._keeper.on_goal), queue_size=QUEUE),
+            rospy.Subscriber(f"{action}/result", result_class, self._locked(self._keeper.on_result), queue_size=QUEUE),
+            rospy.Subscriber(f"{action}/cancel", GoalID, self._locked(self._keeper.on_cancel), queue_size=QUEUE),
+            rospy.Subscriber(f"{action}/status", GoalStatusArray, self._locked(self._on_status), queue_size=QUEUE),
+        ]
+
+    @property
+    def status_topic(self) -> str:
+        """Resolved name of the server's status topic."""
+        return str(rospy.resolve_name(f"{self._action}/status"))
+
+    def server_stops(self) -> None:
+        """Note that the server is about to be stopped, or has died."""
+        with self._lock:
+            self._keeper.server_changes(True)
+            self._old_server = self._server
+            self._store(again=True)
+
+    @property
+    def is_between_servers(self) -> bool:
+        """Whether a server was stopped, and `server_started` has not been called since."""
+        return self._keeper.server_is_changing
+
+    @property
+    def server_is_new(self) -> bool:
+        """Whether a server has published its status that is not the one of `server_stops`."""
+        return self._server is not None and self._server is not self._old_server
+
+    def server_started(self) -> None:
+        """Note that a new server is there, and tell it what was cancelled meanwhile."""
+        with self._lock:
+            self._keeper.server_changes(False)
+            strays = self._keeper.strays
+            self._sent_at = 0.0
+            self._store(again=True)  # the server may have taken it from there
+        for goal_id in strays:
+            self._cancel_publisher.publish(GoalID(id=goal_id))
+
+    def deliver(self) -> bool:
+        """Send the goal again while the new server does not have it; return whether it has, or there is none.
+
+        The server may say that it is there before it hears goals, and a topic holds nothing back: so it is sent more
+        than once, which a server that has it already ignores.
+        """
+        with self._lock:
+            goal = self._keeper.pending
+            if goal is None or self._keeper.is_at_work:
+                return True
+            if time.monotonic() - self._sent_at > SEND_PERIOD:
+                rospy.loginfo("sending the pending goal %s to the new server of %s", goal.goal_id.id, self._action)
+                self._goal_publisher.publish(goal)
+                self._sent_at = time.monotonic()
+        return False
+
+    def _on_status(self, status: GoalStatusArray) -> None:
+        # Each connection has a header of its own, so another one is another process.
+        self._server = status._connection_header
+        self._keeper.on_status(status)
+
+    def _locked(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        def locked(message: Any) -> None:
+            with self._lock:
+                callback(message)
+                self._store()
+
+        return locked
+
+    def _store(self, again: bool = False) -> None:
+        """Bring the parameter up to date."""
+        goal_id = self._keeper.pending_id
+        if goal_id == self._stored and not (again and goal_id is not None):
+            return
+        with contextlib.suppress(rospy.ROSException, OSError):  # without a master there is nothing to keep it for
+            if goal_id is None:
+                with contextlib.suppress(KeyError):
+                    rospy.delete_param(self._parameter)
+            else:
+                buffer = io.BytesIO()
+                self._keeper.pending.serialize(buffer)
+                data = base64.b64encode(buffer.getvalue()).decode("ascii")
+                rospy.set_param(self._parameter, {"type": self._goal_type, "data": data})
+            self._stored = goal_id
+
+    def _recall(self, goal_class: Any, adopt: bool) -> None:
+        left = rospy.get_param(self._parameter, None)
+        if left is None:
+            return
+        try:
+            if not adopt or left["type"] != self._goal_type:
+                raise ValueError("it is from another time")
+            goal = goal_class().deserialize(base64.b64decode(left["data"], validate=True))
+        except (KeyError, TypeError, ValueError, binascii.Error, genpy.DeserializationError):
+            rospy.delete_param(self._parameter)
+            return
+        self._keeper.adopt(goal)
+        self._stored = goal.goal_id.id
+        rospy.loginfo("took over the pending goal %s of %s", goal.goal_id.id, self._action)
+
+
+def _message_class(name: str) -> Any:
+    message_class = roslib.message.get_message_class(name)
+    if message_class is None:
+        raise ConfigurationError(f"parameter 'goal_msg_type': message type {name} is not installed")
+    return message_class

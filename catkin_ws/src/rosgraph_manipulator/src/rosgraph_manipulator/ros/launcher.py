@@ -1,0 +1,162 @@
+"""Node rosgraph_launcher: the ROS shell around `launcher`."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import queue
+import select
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import rosgraph
+import rospy
+from metacontrol_msgs.msg import LauncherState, Phase
+from metacontrol_msgs.srv import ChangeConfiguration, ChangeConfigurationRequest, ChangeConfigurationResponse
+from node_kit.ros.lifetime import LONGEST_END, Lifetime
+
+from rosgraph_manipulator.change.supervision import RestartPolicy
+from rosgraph_manipulator.configuration.parameters import SettingError, boolean, number
+from rosgraph_manipulator.io.launcher import Launcher, LauncherError, Options
+
+LOOK_PERIOD = 0.2  # s, wall, between two looks at whether the node is to end
+STANDBY_DELAY = 0.5  # s, wall, after a change: a warm process's imports must not slow the new nodes down
+
+
+@dataclass
+class _Job:
+    """A request that waits for the main thread."""
+
+    work: Callable[[], Any]
+    done: threading.Event = field(default_factory=threading.Event)
+    answer: Any = None
+
+
+class LauncherNode:
+    """Services and topic of the launcher; everything but the service callbacks runs in the main thread."""
+
+    def __init__(self, options: Options, life: Lifetime) -> None:
+        self._jobs: queue.Queue[_Job] = queue.Queue()
+        self._wake_read, self._wake_write = os.pipe()
+        os.set_blocking(self._wake_write, False)
+        self._ends = ""
+        self._closed = threading.Event()
+        self._changed_at = time.monotonic()
+        self._life = life
+        life.consequence = "its nodes are stopped, and it ends"
+        # Twice: a change that is under way ends first, then all.
+        self._longest_end = LONGEST_END + 2 * (options.shutdown_timeout + options.sigint_timeout)
+        self._state = rospy.Publisher("~state", LauncherState, queue_size=10, latch=True)
+        self._launcher = Launcher(options, self._publish, rospy.logwarn)
+        self._publish()
+        self._service = rospy.Service("~change", ChangeConfiguration, self._on_change)
+
+    def end(self, reason: str) -> None:
+        """Have the main thread stop the nodes, and then end this one."""
+        self._ends = self._ends or reason
+        self._life.cut_off(self._longest_end)
+        self._wake()
+
+    def _end_on_request(self) -> None:
+        self.end("it was asked to end")
+        if threading.current_thread() is not threading.main_thread():
+            self._closed.wait()  # before the process ends
+
+    def spin(self) -> None:
+        """Serve requests and look after the nodes until the node is told to end; then stop what runs."""
+        # Not before: nothing is to be stopped yet, and rospy may hang in what it registers.
+        self._life.longest_end, self._life.on_end = self._longest_end, self.end
+        rospy.on_shutdown(self._end_on_request)
+        while not self._ends:
+            self._wait()
+            with contextlib.suppress(queue.Empty):
+                job = self._jobs.get_nowait()
+                job.answer = job.work()
+                job.done.set()
+                self._changed_at = time.monotonic()
+            self._launcher.look_after()
+            if self._jobs.empty() and time.monotonic() - self._changed_at > STANDBY_DELAY:
+                self._launcher.stand_by()
+        self._launcher.close(gently=not self._life.watch.lost)
+        self._closed.set()
+
+    def _wait(self) -> None:
+        due = self._launcher.next_due()
+        timeout = LOOK_PERIOD if due is None else min(LOOK_PERIOD, max(0.0, due - time.monotonic()))
+        poll = select.poll()
+        poll.register(self._wake_read, select.POLLIN)
+        for descriptor in self._launcher.pidfds():
+            poll.register(descriptor, select.POLLIN)
+        for descriptor, _ in poll.poll(math.ceil(1000.0 * timeout)):
+            if descriptor == self._wake_read:
+                os.read(self._wake_read, 4096)
+
+    def _wake(self) -> None:
+        with contextlib.suppress(BlockingIOError):  # full: it will wake up
+            os.write(self._wake_write, b"\0")
+
+    def _on_change(self, request: ChangeConfigurationRequest) -> ChangeConfigurationResponse:
+        job = _Job(lambda: self._change(request))
+        self._jobs.put(job)
+        self._wake()
+        while not job.done.wait(0.5):
+            if self._ends:
+                raise rospy.ServiceException("the launcher is shutting down")
+        return job.answer
+
+    def _change(self, request: ChangeConfigurationRequest) -> ChangeConfigurationResponse:
+        try:
+            phases = self._launcher.change(
+                request.configuration, request.launch_file, list(request.args), list(request.start)
+            )
+        except LauncherError as error:
+            return ChangeConfigurationResponse(ok=False, message=str(error), change=self._launcher.changes)
+        return ChangeConfigurationResponse(
+            ok=True, change=self._launcher.changes, phases=[Phase(*phase) for phase in phases.items()]
+        )
+
+    def _publish(self) -> None:
+        launcher = self._launcher
+        message = LauncherState(
+            configuration=launcher.configuration,
+            change=launcher.changes,
+            state=launcher.state,
+            nodes=list(launcher.nodes),
+            dead=list(launcher.dead),
+            message=launcher.message,
+        )
+        message.header.stamp = rospy.Time.now()
+        self._state.publish(message)
+
+
+def read_options() -> Options:
+    """Read the node's parameters.
+
+    Raises:
+        SettingError: one can't be used.
+    """
+    get = rospy.get_param
+    policy = RestartPolicy()
+    return Options(
+        mark=f"{rosgraph.get_master_uri()}{rospy.get_name()}",
+        run_id=str(get("/run_id", "")),
+        shutdown_timeout=number("~shutdown_timeout", get("~shutdown_timeout", Options.shutdown_timeout), low=0.0),
+        sigint_timeout=number("~sigint_timeout", get("~sigint_timeout", Options.sigint_timeout), low=0.0),
+        standby=boolean("~standby", get("~standby", Options.standby)),
+        policy=RestartPolicy(
+            intensity=int(number("~restart_intensity", get("~restart_intensity", policy.intensity), low=0)),
+            period=number("~restart_period", get("~restart_period", policy.period), low=0.1),
+            first_delay=number("~restart_delay", get("~restart_delay", policy.first_delay), low=0.0),
+        ),
+    )
+
+
+def main() -> None:
+    """Run the node; exit status 2 when it can't start."""
+    with Lifetime("rosgraph_launcher", SettingError) as life:
+        life.start()
+        LauncherNode(read_options(), life).spin()

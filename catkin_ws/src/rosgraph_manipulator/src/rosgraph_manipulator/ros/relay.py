@@ -1,0 +1,116 @@
+"""Node action_relay: stands between the clients of an action and a server that is replaced now and then."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import actionlib
+import roslib.message
+import rospy
+from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
+from node_kit.ros.lifetime import Lifetime
+
+from rosgraph_manipulator.configuration.configuration_file import ConfigurationError, action_type
+from rosgraph_manipulator.goals.relay import Ending, Link
+
+PERIOD = 0.05  # s, wall, between two looks at whether goals can be sent
+BUSY = (FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING)
+
+
+class _Goal:
+    """A client's goal with its counterpart at the server behind."""
+
+    def __init__(self, outer: actionlib.ServerGoalHandle) -> None:
+        self.outer = outer
+        self.link = Link()
+        self.inner: actionlib.ClientGoalHandle | None = None
+
+
+class Relay:
+    """Goals in, goals out, results and feedback back."""
+
+    def __init__(self, action: str, server: str, kind: Any) -> None:
+        """Begin to serve `action` by the server of the action `server`; both are of a type."""
+        self._goals: dict[str, _Goal] = {}
+        self._lock = threading.RLock()
+        self._changing = False
+        self._client = actionlib.ActionClient(server, kind)
+        self._server = actionlib.ActionServer(action, kind, self._on_goal, self._on_cancel, auto_start=False)
+        rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)
+        self._server.start()
+
+    def spin(self) -> None:
+        """Send what can be sent, until the node ends."""
+        end = threading.Event()
+        rospy.on_shutdown(end.set)
+        while not end.wait(PERIOD):
+            self._send_goals()
+
+    def _send_goals(self) -> None:
+        if not any(goal.link.needs_sending(self._changing) for goal in list(self._goals.values())):
+            return
+        if not self._client.wait_for_server(rospy.Duration.from_sec(0.001)):
+            return
+        with self._lock:
+            for goal in list(self._goals.values()):
+                if goal.link.needs_sending(self._changing):
+                    goal.link.sent = True
+                    goal.inner = self._client.send_goal(
+                        goal.outer.get_goal(),
+                        transition_cb=lambda inner, goal=goal: self._on_transition(goal, inner),
+                        feedback_cb=lambda _inner, feedback, goal=goal: goal.outer.publish_feedback(feedback),
+                    )
+
+    def _on_goal(self, handle: actionlib.ServerGoalHandle) -> None:
+        with self._lock:
+            handle.set_accepted()
+            self._goals[handle.get_goal_id().id] = _Goal(handle)
+        self._send_goals()
+
+    def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
+        with self._lock:
+            goal = self._goals.get(handle.get_goal_id().id)
+            if goal is None:
+                return
+            ending = goal.link.cancel()
+            if ending:
+                self._end(goal, ending, None, "taken back while there was no server")
+            elif goal.inner is not None:
+                goal.inner.cancel()
+
+    def _on_transition(self, goal: _Goal, inner: actionlib.ClientGoalHandle) -> None:
+        with self._lock:
+            if inner.get_comm_state() != actionlib.CommState.DONE or not goal.link.sent:
+                return
+            ending = goal.link.ended_behind(inner.get_terminal_state(), self._changing)
+            if ending:
+                self._end(goal, ending, inner.get_result(), inner.get_goal_status_text())
+            else:
+                rospy.loginfo("goal %s is sent again to the next server", goal.outer.get_goal_id().id)
+
+    def _end(self, goal: _Goal, ending: Ending, result: Any, text: str) -> None:
+        self._goals.pop(goal.outer.get_goal_id().id, None)
+        finish = {
+            Ending.SUCCEEDED: goal.outer.set_succeeded,
+            Ending.ABORTED: goal.outer.set_aborted,
+            Ending.CANCELLED: goal.outer.set_canceled,
+        }[ending]
+        finish(result, text)
+
+    def _on_configuration(self, active: ActiveConfiguration) -> None:
+        self._changing = any(grounding.state in BUSY for grounding in active.functions)
+
+
+def main() -> None:
+    """Run the node; exit status 2 where it is not told what to relay."""
+    with Lifetime("action_relay", ConfigurationError) as life:
+        life.start()
+        names = [rospy.get_param(f"~{key}", "") for key in ("action", "server")]
+        if not all(isinstance(name, str) and name for name in names) or names[0] == names[1]:
+            raise ConfigurationError("parameters '~action' and '~server' must be two different names of actions")
+        kind = action_type(rospy.get_param("~type", ""), "~type")
+        message_class = roslib.message.get_message_class(kind)
+        if message_class is None:
+            raise ConfigurationError(f"parameter '~type': message type {kind} is not installed")
+        Relay(names[0], names[1], message_class).spin()

@@ -1,0 +1,1 @@
+"""What is said on /diagnostics, and how it is shown. Pure."""

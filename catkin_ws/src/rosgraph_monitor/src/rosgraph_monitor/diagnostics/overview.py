@@ -1,0 +1,115 @@
+"""What diagnostics say of nodes, qualities and findings at present, as tables for a terminal. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from rosgraph_monitor.diagnostics import status as s
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+_FORGET = 3.0
+"""Wall s after which a finding that is not repeated is over."""
+_STYLE = {s.Level.OK: "green", s.Level.WARN: "yellow", s.Level.ERROR: "bold red", s.Level.STALE: "magenta"}
+_THRESHOLD = "nfr_"
+
+
+@dataclass
+class _Row:
+    at: float
+    level: int
+    text: str
+
+
+@dataclass
+class Board:
+    """The present state, by name."""
+
+    components: dict[str, _Row] = field(default_factory=dict)
+    qualities: dict[str, _Row] = field(default_factory=dict)
+    findings: dict[tuple[str, str, str], _Row] = field(default_factory=dict)
+    usage: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def take(self, statuses: Iterable[Any], now: float) -> None:
+        """Take in statuses (diagnostic_msgs/DiagnosticStatus) that arrived at wall time `now` in s."""
+        for status in statuses:
+            level = _level(status)
+            first = status.values[0] if status.values else None
+            if status.message == s.COMPONENT_STATUS and first:
+                self.components[first.key] = _Row(now, level, first.value)
+            elif status.message in (s.QA_STATUS, s.QA_STALE) and first:
+                self.qualities[first.key] = _Row(now, level, first.value)
+            elif status.message in (s.CPU_USAGE, s.MEMORY_USAGE) and first:
+                self.usage[status.name, status.message] = first.value
+            elif level != s.Level.OK:
+                values = ", ".join(f"{value.key}: {value.value}" for value in status.values)
+                key = (status.name, status.message, first.value if first else "")
+                self.findings[key] = _Row(now, level, values)
+
+    def render(self, nodes: Iterable[str], parameters: Mapping[str, Any], now: float) -> Group:
+        """Return the tables.
+
+        Args:
+            nodes: names of the nodes that the master lists.
+            parameters: the master's tree of parameters, in which `nfr_QUALITY` are thresholds.
+            now: wall time in s.
+        """
+        self.findings = {key: row for key, row in self.findings.items() if now - row.at <= _FORGET}
+        return Group(self._nodes(nodes), self._qualities(thresholds(parameters), now), self._findings())
+
+    def _nodes(self, nodes: Iterable[str]) -> Table:
+        table = Table("node or component", "status", "CPU %", "MB", title="Nodes", title_justify="left")
+        names = {name.lstrip("/") for name in nodes}
+        gone = {name: message for name, message, _ in self.findings if message == s.MISSING_NODE}
+        for name in sorted(names | gone.keys() | self.components.keys()):
+            row = self.components.get(name)
+            level, text = (s.Level.OK, "registered") if row is None else (row.level, row.text)
+            if name in gone:
+                level, text = s.Level.ERROR, self._reason(name)
+            table.add_row(
+                Text(name),
+                Text(text, _STYLE.get(s.Level(level), "")),
+                self.usage.get((name, s.CPU_USAGE), ""),
+                self.usage.get((name, s.MEMORY_USAGE), ""),
+            )
+        return table
+
+    def _reason(self, node: str) -> str:
+        return next(reason for name, message, reason in self.findings if (name, message) == (node, s.MISSING_NODE))
+
+    def _qualities(self, limits: Mapping[str, float], now: float) -> Table:
+        table = Table("quality", "level", "required", "age s", title="Quality attributes", title_justify="left")
+        for name, row in sorted(self.qualities.items()):
+            limit = f"{limits[name]:g}" if name in limits else ""
+            table.add_row(Text(name), Text(row.text, _STYLE.get(s.Level(row.level), "")), limit, f"{now - row.at:.1f}")
+        return table
+
+    def _findings(self) -> Table:
+        table = Table("what", "finding", "values", title="Findings", title_justify="left")
+        for (name, message, _), row in sorted(self.findings.items()):
+            table.add_row(Text(name), Text(message, _STYLE.get(s.Level(row.level), "")), Text(row.text))
+        return table
+
+
+def thresholds(parameters: Mapping[str, Any]) -> dict[str, float]:
+    """Return the required level of each quality, from the parameters `nfr_QUALITY` of any node."""
+    found: dict[str, float] = {}
+    for key, value in parameters.items():
+        if isinstance(value, dict):
+            found |= thresholds(value)
+        elif key.startswith(_THRESHOLD) and isinstance(value, (int, float)):
+            found[key.removeprefix(_THRESHOLD)] = float(value)
+    return found
+
+
+def _level(status: Any) -> int:
+    """Return the level, which generated messages hold as a number or as a byte."""
+    level = status.level
+    number = level[0] if isinstance(level, bytes) and level else int(level or 0)
+    return number if number in set(s.Level) else int(s.Level.ERROR)

@@ -1,0 +1,239 @@
+"""One evaluation of the monitor: snapshot, liveness and desired system in, statuses out. Pure; time is an argument."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from ros_model.language.metamodel import PortKind
+
+from rosgraph_monitor.diagnostics.status import Status, graph_ok, graph_problem
+from rosgraph_monitor.graph.comparison import NOT_REGISTERED, Scope, compare, wrong_topic_types
+from rosgraph_monitor.graph.findings import Finding, MissingNode, PortFinding, concerned, finding_statuses
+from rosgraph_monitor.graph.names import instance, relative, resolved
+from rosgraph_monitor.health.components import ComponentTracker, NodeCondition, component_statuses
+from rosgraph_monitor.health.liveness import Life
+from rosgraph_monitor.health.topics import Verdict, verdict_statuses
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from ros_model.io.snapshot import GraphSnapshot
+    from ros_model.language.metamodel import RosSystem
+
+    from rosgraph_monitor.graph.desired import Desired
+
+_CONDITION = {Life.ALIVE: NodeCondition.ALIVE, Life.UNKNOWN: NodeCondition.UNKNOWN}
+_ENDED = "ended", "ended: it has unregistered from the master"
+
+
+@dataclass(frozen=True)
+class Patience:
+    """Wall seconds for which something that may be about to change is not reported.
+
+    Attributes:
+        startup: in which an expected node may come up for the first time, and complete its interfaces.
+        restart: in which the manipulator may announce that it restarts a variant's node, before that node's death is
+            reported. Deaths of the base's nodes are reported at once.
+        ports: for which a difference in interfaces must last: nodes connect one after the other.
+    """
+
+    startup: float = 10.0
+    restart: float = 1.0
+    ports: float = 1.0
+
+
+@dataclass
+class _Told:
+    """What was found of the nodes so far."""
+
+    gone: dict[str, tuple[str, str]] = field(default_factory=dict)
+    alive_since: dict[tuple[str, str], float] = field(default_factory=dict)
+    ports_since: dict[PortFinding, float] = field(default_factory=dict)
+
+
+class GraphMonitor:
+    """Judges the graph, evaluation after evaluation."""
+
+    def __init__(
+        self,
+        component_of: Mapping[str, str],
+        *,
+        scope: Scope | None = None,
+        patience: Patience = Patience(),
+    ) -> None:
+        """Start with nothing known.
+
+        Args:
+            component_of: component by name of the node (relative to the namespace).
+            scope: what is compared; the usual, in the root namespace, if None.
+            patience: what is waited for.
+        """
+        self._component_of = dict(component_of)
+        self._scope = scope or Scope()
+        self._patience = patience
+        self._tracker = ComponentTracker(component_of, patience.startup)
+        self._told = _Told()
+        self._publisher: dict[str, str] = {}
+        self._last: tuple[tuple[Any, ...], tuple[Finding, ...]] | None = None
+
+    def evaluate(
+        self,
+        snapshot: GraphSnapshot,
+        lives: Mapping[tuple[str, str], Life],
+        desired: Desired,
+        now: float,
+        *,
+        topics: Sequence[Verdict] = (),
+        others: Mapping[str, NodeCondition] | None = None,
+    ) -> list[Status]:
+        """Judge the graph.
+
+        Args:
+            snapshot: what the master lists.
+            lives: what is known of each node, by name and address.
+            desired: what should run.
+            now: wall seconds.
+            topics: what is wrong with topics.
+            others: conditions of components that are no nodes, by name of the component.
+
+        Returns:
+            The statuses of components, then the findings, or "running OK" where there are none.
+        """
+        life = {name: lives.get((name, node.uri), Life.UNKNOWN) for name, node in snapshot.nodes.items()}
+        conditions = {**self._conditions(life, desired), **(others or {})}
+        self._add_topics(conditions, snapshot, life, topics)
+        components = self._tracker.update(
+            conditions,
+            now,
+            excused=desired.excused,
+            patience=dict.fromkeys(desired.variant_nodes, self._patience.restart),
+        )
+        statuses = component_statuses(components)
+        if desired.problem:
+            statuses.append(graph_problem(f"desired model: {desired.problem}"))
+        findings = self._findings(snapshot, life, desired, now)
+        problems = [*finding_statuses(findings), *verdict_statuses(topics)]
+        statuses.extend(problems)
+        if desired.system is not None and not problems and not desired.problem:
+            statuses.append(graph_ok())
+        return statuses
+
+    def excused_topics(self, snapshot: GraphSnapshot, desired: Desired, topics: Iterable[str]) -> frozenset[str]:
+        """Return those of the topics that only nodes under reconfiguration publish."""
+        if not desired.excused:
+            return frozenset()
+        modelled: dict[str, set[str]] = {}
+        for component in desired.system.components if desired.system else ():
+            for port in component.ports:
+                if port.kind is PortKind.PUBLISHER:
+                    modelled.setdefault(port.name.strip("/"), set()).add(component.graph_name)
+        found = set()
+        for topic in topics:
+            nodes = {self._relative(node) for node in self._publishers(snapshot, topic)} | modelled.get(topic, set())
+            if nodes and nodes <= desired.excused:
+                found.add(topic)
+        return frozenset(found)
+
+    def _findings(
+        self, snapshot: GraphSnapshot, life: Mapping[str, Life], desired: Desired, now: float
+    ) -> list[Finding]:
+        self._told.alive_since = {
+            (name, node.uri): self._told.alive_since.get((name, node.uri), now)
+            for name, node in snapshot.nodes.items()
+            if life[name] is Life.ALIVE
+        }
+        if desired.system is None:
+            return [*wrong_topic_types(snapshot, self._scope.topic_types, self._scope.namespace)]
+        dead = {name: (known.name.lower(), known.value) for name, known in life.items() if known not in _CONDITION}
+        excused = desired.excused | self._tracker.waited_for
+        findings = self._compared(snapshot, desired.system, dead, excused)
+        settled = self._settled([f for f in findings if isinstance(f, PortFinding)], now)
+        return [self._worded(f) for f in findings if not isinstance(f, PortFinding) or f in settled]
+
+    def _compared(
+        self, snapshot: GraphSnapshot, system: RosSystem, dead: dict[str, tuple[str, str]], excused: frozenset[str]
+    ) -> tuple[Finding, ...]:
+        """Compare, unless all is as it was the last time: most of the time, nothing changes."""
+        if self._last is not None:
+            (last_snapshot, last_system, *last), findings = self._last
+            if last_snapshot is snapshot and last_system is system and last == [dead, excused]:
+                return findings
+        findings = compare(snapshot, system, dead=dead, excused=excused, scope=self._scope)
+        self._last = (snapshot, system, dead, excused), findings
+        return findings
+
+    def _settled(self, findings: Sequence[PortFinding], now: float) -> set[PortFinding]:
+        """Return the findings that have lasted, on nodes that have had the time to start."""
+        since = {finding: self._told.ports_since.get(finding, now) for finding in findings}
+        self._told.ports_since = since
+        young = {
+            self._relative(name)
+            for (name, _), at in self._told.alive_since.items()
+            if now - at < self._patience.startup
+        }
+        return {
+            finding
+            for finding, at in since.items()
+            if now - at >= self._patience.ports and young.isdisjoint(concerned(finding))
+        }
+
+    def _worded(self, finding: Finding) -> Finding:
+        """Tell a node that has ended from one that never came, and keep the words for one that died before."""
+        if not isinstance(finding, MissingNode):
+            return finding
+        state, reason = finding.state, finding.reason
+        if (state, reason) == NOT_REGISTERED and self._tracker.has_run(finding.node):
+            state, reason = self._told.gone.get(finding.node, _ENDED)
+        elif (state, reason) != NOT_REGISTERED:
+            self._told.gone[finding.node] = state, reason
+        return MissingNode(finding.node, state, reason)
+
+    def _conditions(self, life: Mapping[str, Life], desired: Desired) -> dict[str, NodeCondition]:
+        expected = dict.fromkeys(
+            component.graph_name for component in (desired.system.components if desired.system else ())
+        )
+        expected |= dict.fromkeys(self._component_of)
+        conditions = {}
+        candidates = {name for name, known in life.items() if known in _CONDITION}
+        for name in expected:
+            running = instance(resolved(name, self._scope.namespace), candidates)
+            condition = NodeCondition.GONE if running is None else self._condition(life[running])
+            conditions[name] = condition
+            if condition is NodeCondition.ALIVE:
+                self._told.gone.pop(name, None)
+        return conditions
+
+    def _add_topics(
+        self,
+        conditions: dict[str, NodeCondition],
+        snapshot: GraphSnapshot,
+        life: Mapping[str, Life],
+        topics: Sequence[Verdict],
+    ) -> None:
+        """Let what is wrong with topics count for the components that they stand for, or else for their publishers."""
+        for verdict in topics:
+            topic, component = verdict.spec.name, verdict.spec.component
+            nodes = self._publishers(snapshot, topic)
+            if len(nodes) == 1:
+                self._publisher[topic] = self._relative(nodes[0])
+            if component:
+                key = next((n for n, c in self._component_of.items() if c == component), component)
+                conditions.setdefault(key, NodeCondition.ALIVE if verdict.heard else NodeCondition.UNKNOWN)
+            elif topic in self._publisher:
+                key = self._publisher[topic]
+                conditions.setdefault(key, self._condition(life.get(resolved(key, self._scope.namespace))))
+            else:
+                continue
+            if verdict.message and conditions[key] in (NodeCondition.ALIVE, NodeCondition.UNKNOWN):
+                conditions[key] = NodeCondition.FAILED
+
+    def _condition(self, known: Life | None) -> NodeCondition:
+        return NodeCondition.GONE if known is None else _CONDITION.get(known, NodeCondition.GONE)
+
+    def _publishers(self, snapshot: GraphSnapshot, topic: str) -> tuple[str, ...]:
+        state = snapshot.topics.get(resolved(topic, self._scope.namespace))
+        return state.publishers if state else ()
+
+    def _relative(self, node: str) -> str:
+        return relative(node, self._scope.namespace) or node

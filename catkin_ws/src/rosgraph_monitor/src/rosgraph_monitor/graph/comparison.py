@@ -1,0 +1,150 @@
+"""Comparison of what runs with what should run: a snapshot and the desired system in, findings out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from rosgraph_monitor.graph.findings import (
+    NO_NODE,
+    NOT_SET,
+    AdditionalNode,
+    Finding,
+    MissingNode,
+    PortFinding,
+    WrongParameter,
+    WrongType,
+)
+from rosgraph_monitor.graph.names import (
+    IGNORED_NODES,
+    IGNORED_PORTS,
+    instance,
+    is_ignored_node,
+    relative,
+    resolved,
+)
+from rosgraph_monitor.graph.values import same_value
+from rosgraph_monitor.graph.wiring import Live, PortTypes, compare_ports
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping
+
+    from ros_model.io.snapshot import GraphSnapshot
+    from ros_model.language.metamodel import Component, RosSystem
+
+NOT_REGISTERED = "absent", "not registered with the master"
+CONVENTIONS = ("qa_", "min_rate/", "max_age/", "stuck_after/")
+"""Names of system parameters that say something of the system, and that nobody need set on the parameter server."""
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What is compared.
+
+    Attributes:
+        ignored_nodes: shell patterns of names of nodes that may run beside the model.
+        ignored_ports: shell patterns of topics, services and actions that nodes may have beside the model.
+        types: of ports, by `.ros` models.
+        topic_types: of topics, by name relative to the namespace.
+        namespace: where the system lives; nodes outside it are none of its business.
+    """
+
+    ignored_nodes: tuple[str, ...] = IGNORED_NODES
+    ignored_ports: tuple[str, ...] = IGNORED_PORTS
+    types: PortTypes = field(default_factory=dict)
+    topic_types: Mapping[str, str] = field(default_factory=dict)
+    namespace: str = "/"
+
+
+def compare(
+    snapshot: GraphSnapshot,
+    desired: RosSystem,
+    *,
+    dead: Mapping[str, tuple[str, str]],
+    excused: Collection[str] = (),
+    scope: Scope = Scope(),
+) -> tuple[Finding, ...]:
+    """Compare a snapshot with the desired system.
+
+    Args:
+        snapshot: what the master lists.
+        desired: what should run: the base composed with the active variants.
+        dead: resolved names of nodes that are known not to run, with their state in one word and the reason in words.
+        excused: names (relative, as in the findings) of desired nodes that raise no alarm now.
+        scope: what is compared.
+
+    Returns:
+        Missing nodes, wrong parameters, findings on ports, additional nodes; names are relative to the namespace.
+    """
+    alive = snapshot.nodes.keys() - dead.keys()
+    missing: list[Finding] = []
+    live: dict[str, Live] = {}
+    expected = set()
+    for component in desired.components:
+        name = resolved(component.graph_name, scope.namespace)
+        running = instance(name, alive)
+        expected.add(running or name)
+        if component.graph_name in excused:
+            continue
+        if running:
+            live[component.name] = Live(component, snapshot.nodes[running])
+        else:
+            state = dead.get(instance(name, dead) or name, NOT_REGISTERED)
+            missing.append(MissingNode(component.graph_name, *state))
+    additional = [
+        AdditionalNode(name)
+        for name in (relative(node, scope.namespace) for node in sorted(alive - expected))
+        if name is not None and name not in excused and not is_ignored_node(name, scope.ignored_nodes)
+    ]
+    return (
+        *missing,
+        *(wrong for entry in live.values() for wrong in _wrong_parameters(snapshot, entry.component, entry.node.name)),
+        *(() if excused else _wrong_system_parameters(snapshot, desired, scope.namespace)),
+        *compare_ports(
+            snapshot, desired, live, ignored=scope.ignored_ports, types=scope.types, namespace=scope.namespace
+        ),
+        *wrong_topic_types(snapshot, scope.topic_types, scope.namespace),
+        *additional,
+    )
+
+
+def wrong_topic_types(snapshot: GraphSnapshot, types: Mapping[str, str], namespace: str = "/") -> list[PortFinding]:
+    """Compare the types of topics with those that settings give, for topics that exist."""
+    found: list[PortFinding] = []
+    for topic, expected in types.items():
+        state = snapshot.topics.get(resolved(topic, namespace))
+        if state and state.type not in ("", "*", expected):
+            owner = (relative(node, namespace) or node for node in (*state.publishers, *state.subscribers))
+            found.append(WrongType(next(owner, NO_NODE), topic, expected, state.type))
+    return found
+
+
+def _wrong_parameters(snapshot: GraphSnapshot, component: Component, node: str) -> list[WrongParameter]:
+    wrong = []
+    for parameter in component.parameters:
+        if parameter.value is None:
+            continue
+        parts = (node, parameter.namespace or "", parameter.key)
+        actual = _actual(snapshot, "/".join(part.strip("/") for part in parts if part.strip("/")))
+        if not same_value(parameter.value, actual):
+            wrong.append(WrongParameter(component.graph_name, parameter.key, parameter.value, actual))
+    return wrong
+
+
+def _wrong_system_parameters(snapshot: GraphSnapshot, desired: RosSystem, namespace: str) -> list[WrongParameter]:
+    wrong = []
+    for parameter in desired.parameters:
+        if parameter.value is None or parameter.name.startswith(CONVENTIONS):
+            continue
+        name = "/".join(part.strip("/") for part in (parameter.namespace, parameter.name) if part)
+        actual = _actual(snapshot, resolved(name, namespace))
+        if not same_value(parameter.value, actual):
+            wrong.append(WrongParameter(NO_NODE, name, parameter.value, actual))
+    return wrong
+
+
+def _actual(snapshot: GraphSnapshot, name: str) -> object:
+    try:
+        return snapshot.parameter(name)
+    except KeyError:
+        return NOT_SET

@@ -1,0 +1,146 @@
+"""What the comparison of the graph with the model finds, and how it is said on /diagnostics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rosgraph_monitor.diagnostics.status import (
+    ADDITIONAL_NODE,
+    ADDITIONAL_PORT,
+    MISSING_CONNECTION,
+    MISSING_NODE,
+    MISSING_PORT,
+    WRONG_PARAMETER,
+    WRONG_TYPE,
+    Level,
+    Status,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class _NotSet:
+    def __str__(self) -> str:
+        return "<not set>"
+
+
+NOT_SET = _NotSet()
+NO_NODE = "ROS Graph"
+"""Stands for the node in findings that concern no single one."""
+
+
+@dataclass(frozen=True)
+class MissingNode:
+    """A node of the model that does not run: its state in one word, and the reason in words."""
+
+    node: str
+    state: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class AdditionalNode:
+    """A node that runs but is not in the model."""
+
+    node: str
+
+
+@dataclass(frozen=True)
+class MissingPort:
+    """An interface of the model that a running node lacks."""
+
+    node: str
+    kind: str
+    name: str
+
+
+@dataclass(frozen=True)
+class AdditionalPort:
+    """An interface of a running node that is not in the model."""
+
+    node: str
+    kind: str
+    name: str
+
+
+@dataclass(frozen=True)
+class WrongType:
+    """A topic or action whose type is not the expected one."""
+
+    node: str
+    name: str
+    expected: str
+    actual: str
+
+
+@dataclass(frozen=True)
+class MissingConnection:
+    """Two running nodes that the model connects, and that share no such topic or action."""
+
+    name: str
+    source: str
+    target: str
+    actual: str
+    nodes: tuple[str, str]
+
+
+@dataclass(frozen=True)
+class WrongParameter:
+    """A parameter whose value is not the model's. The parameter's name is relative to the node."""
+
+    node: str
+    parameter: str
+    expected: Any
+    actual: Any
+
+
+PortFinding = MissingPort | AdditionalPort | WrongType | MissingConnection
+Finding = MissingNode | AdditionalNode | WrongParameter | PortFinding
+
+
+def concerned(finding: PortFinding) -> tuple[str, ...]:
+    """Return the nodes that a finding concerns."""
+    return finding.nodes if isinstance(finding, MissingConnection) else (finding.node,)
+
+
+def finding_statuses(findings: Iterable[Finding]) -> list[Status]:
+    """Return the findings as statuses, one each; but the wrong parameters of one node share a status.
+
+    The values of "Wrong param configuration" are (parameter, actual value), and then (`expected/PARAMETER`, value).
+    Other findings have the values `expected` and `actual`.
+    """
+    statuses = []
+    wrong: dict[str, list[WrongParameter]] = {}
+    for finding in findings:
+        if isinstance(finding, WrongParameter):
+            wrong.setdefault(finding.node, []).append(finding)
+        else:
+            statuses.append(_status(finding))
+    for node, parameters in wrong.items():
+        actual = tuple((p.parameter, str(p.actual)) for p in parameters)
+        expected = tuple((f"expected/{p.parameter}", str(p.expected)) for p in parameters)
+        statuses.append(Status(Level.ERROR, node, WRONG_PARAMETER, actual + expected))
+    return statuses
+
+
+def _status(finding: MissingNode | AdditionalNode | PortFinding) -> Status:
+    match finding:
+        case MissingNode(node, state, reason):
+            values = (("reason", reason), ("expected", "running"), ("actual", state))
+            return Status(Level.ERROR, node, MISSING_NODE, values)
+        case AdditionalNode(node):
+            return Status(Level.WARN, node, ADDITIONAL_NODE, (("expected", "not running"), ("actual", "running")))
+        case MissingPort(node, kind, name):
+            values = (("port", name), ("expected", kind), ("actual", "none"))
+            return Status(Level.ERROR, node, MISSING_PORT, values)
+        case AdditionalPort(node, kind, name):
+            values = (("port", name), ("expected", "none"), ("actual", kind))
+            return Status(Level.WARN, node, ADDITIONAL_PORT, values)
+        case WrongType(node, name, expected, actual):
+            values = (("port", name), ("expected", expected), ("actual", actual))
+            return Status(Level.ERROR, node, WRONG_TYPE, values)
+        case MissingConnection(name, source, target, actual):
+            values = (("connection", name), ("expected", f"{source} -> {target}"), ("actual", actual))
+            return Status(Level.ERROR, name, MISSING_CONNECTION, values)

@@ -1,0 +1,246 @@
+"""Interfaces, types and connections: what the model says of them against what the master lists. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ros_model.language.metamodel import ConnectionKind, PortKind
+
+from rosgraph_monitor.graph.findings import (
+    AdditionalPort,
+    MissingConnection,
+    MissingPort,
+    PortFinding,
+    WrongType,
+)
+from rosgraph_monitor.graph.names import COMMON_TOPICS, in_node, is_ignored_port, relative
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from ros_model.io.snapshot import GraphSnapshot, NodeState
+    from ros_model.language.metamodel import Component, Connection, Port, PortPath, Reference, RosSystem
+    from ros_model.language.packages import PackageSet
+
+_SERVER_SENDS = ("status", "feedback", "result")
+_CLIENT_SENDS = ("goal", "cancel")
+_CONNECTS = {
+    ConnectionKind.TOPIC: (PortKind.PUBLISHER, PortKind.SUBSCRIBER),
+    ConnectionKind.ACTION: (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT),
+}
+_UNKNOWN_TYPES = ("", "*")
+
+PortTypes = dict[tuple[str, str, str, PortKind, str], str]
+"""Type of a port by package, artifact, node, kind and name, as `.ros` models declare them."""
+
+
+def port_types(models: Iterable[PackageSet]) -> PortTypes:
+    """Collect the types that `.ros` models declare."""
+    return {
+        (package.name, artifact.name, node.name, port.kind, port.name): port.type
+        for model in models
+        for package in model.packages
+        for artifact in package.artifacts
+        for node in artifact.nodes
+        for port in node.ports
+        if port.type
+    }
+
+
+@dataclass(frozen=True)
+class Live:
+    """A component that runs: its model, and its node in the graph."""
+
+    component: Component
+    node: NodeState
+
+
+def compare_ports(
+    snapshot: GraphSnapshot,
+    system: RosSystem,
+    live: Mapping[str, Live],
+    *,
+    ignored: Iterable[str],
+    types: PortTypes,
+    namespace: str = "/",
+) -> Iterator[PortFinding]:
+    """Compare the interfaces of the components that run, given by their names, with the model.
+
+    A component without any port in the model is not judged: its model says nothing of interfaces. A node to which
+    nobody listens may leave out subscriptions, as lazy publishers do. Services' clients are not known to the master.
+
+    Yields:
+        Missing ports, wrong types, additional ports, missing connections. Names are relative to the namespace.
+    """
+    patterns = tuple(ignored)
+    called: dict[tuple[str, str], set[str]] = {}
+    for connection in system.connections:
+        for end in (*connection.sources, *connection.targets):
+            called.setdefault((end.component, end.port), set()).add(connection.name)
+    wanted = {name: _wanted(called, entry) for name, entry in live.items()}
+    for name, entry in live.items():
+        yield from _component_ports(snapshot, entry, wanted[name], patterns, types, namespace)
+    for connection in system.connections:
+        yield from _connection(snapshot, connection, live, wanted, namespace)
+
+
+_Wanted = dict[tuple[PortKind, str], tuple["Port", frozenset[str]]]
+"""Of one component: by kind and name of the port, the port and the resolved names that it may have in the graph."""
+
+
+def _wanted(called: Mapping[tuple[str, str], Iterable[str]], entry: Live) -> _Wanted:
+    """Return what a component should have, given the connections' names by component and port.
+
+    A port is called as its connection, as itself, or as in the node's code: which one depends on the launch file.
+    """
+    component, node = entry.component, entry.node.name
+    wanted = {}
+    for port in component.ports:
+        names = {port.name, port.name.lstrip("/") if port.namespace is not None else port.name}
+        if port.reference and port.reference.name:
+            names.add(port.reference.name)
+        for name in called.get((component.name, port.name), ()):
+            names |= {name, f"/{name.lstrip('/')}"}
+        wanted[port.kind, port.name] = port, frozenset(in_node(name, node) for name in names)
+    return wanted
+
+
+def _component_ports(
+    snapshot: GraphSnapshot, entry: Live, wanted: _Wanted, patterns: tuple[str, ...], types: PortTypes, namespace: str
+) -> Iterator[PortFinding]:
+    name = entry.component.graph_name
+    if not wanted:
+        return
+    has = {kind: _has(entry.node, kind) for kind in PortKind}
+    idle = _nobody_listens(snapshot, entry.node)
+    for (kind, port_name), (port, names) in wanted.items():
+        if kind is PortKind.SERVICE_CLIENT or (kind is PortKind.SUBSCRIBER and idle):
+            continue
+        present = names & has[kind]
+        if not present:
+            yield MissingPort(name, kind.value, port_name)
+        expected = types.get(_declared(port)) if port.reference else None
+        for topic in present if expected else ():
+            actual = _type(snapshot, topic)
+            if expected and actual not in _UNKNOWN_TYPES and _stem(actual, kind) != _stem(expected, kind):
+                yield WrongType(name, _shown(topic, namespace), expected, actual)
+    for kind, listed in _listed(entry.node).items():
+        known = {topic for (_, _), (port, topics) in wanted.items() for topic in _covered(port.kind, topics, kind)}
+        for topic in listed:
+            if topic not in known and not is_ignored_port(topic, entry.node.name, patterns):
+                yield AdditionalPort(name, kind.value, _shown(topic, namespace))
+
+
+def _connection(
+    snapshot: GraphSnapshot,
+    connection: Connection,
+    live: Mapping[str, Live],
+    wanted: Mapping[str, _Wanted],
+    namespace: str,
+) -> Iterator[PortFinding]:
+    kinds = _CONNECTS.get(connection.kind)
+    if kinds is None:  # who calls a service, the master does not know
+        return
+    for source in connection.sources:
+        out = _names_of(source, kinds[0], live, wanted)
+        for target in connection.targets:
+            into = _names_of(target, kinds[1], live, wanted)
+            if out is None or into is None or _is_lazy(snapshot, target, kinds[1], live):
+                continue
+            if not out & into:
+                given = ", ".join(sorted(_shown(topic, namespace) for topic in out)) or "nothing"
+                taken = ", ".join(sorted(_shown(topic, namespace) for topic in into)) or "nothing"
+                yield MissingConnection(
+                    connection.name,
+                    str(source),
+                    str(target),
+                    f"{source} gives {given}, {target} takes {taken}",
+                    (live[source.component].component.graph_name, live[target.component].component.graph_name),
+                )
+
+
+def _names_of(
+    end: PortPath, kind: PortKind, live: Mapping[str, Live], wanted: Mapping[str, _Wanted]
+) -> frozenset[str] | None:
+    """Return the names under which an end is in the graph; None where it can't be judged."""
+    if end.component not in live or (kind, end.port) not in wanted[end.component]:
+        return None
+    return wanted[end.component][kind, end.port][1] & _has(live[end.component].node, kind)
+
+
+def _is_lazy(snapshot: GraphSnapshot, end: PortPath, kind: PortKind, live: Mapping[str, Live]) -> bool:
+    return kind is PortKind.SUBSCRIBER and _nobody_listens(snapshot, live[end.component].node)
+
+
+def _nobody_listens(snapshot: GraphSnapshot, node: NodeState) -> bool:
+    """Say whether a node publishes something of its own, to which nobody listens."""
+    own = [topic for topic in node.publications if topic not in COMMON_TOPICS]
+    return bool(own) and not any(snapshot.topics[topic].subscribers for topic in own)
+
+
+def _has(node: NodeState, kind: PortKind) -> frozenset[str]:
+    """Return all names of that kind, with the topics of actions unfolded: a model may name those, too."""
+    match kind:
+        case PortKind.PUBLISHER:
+            return frozenset(
+                (
+                    *node.publications,
+                    *_unfolded(node.action_servers, _SERVER_SENDS),
+                    *_unfolded(node.action_clients, _CLIENT_SENDS),
+                )
+            )
+        case PortKind.SUBSCRIBER:
+            return frozenset(
+                (
+                    *node.subscriptions,
+                    *_unfolded(node.action_servers, _CLIENT_SENDS),
+                    *_unfolded(node.action_clients, _SERVER_SENDS),
+                )
+            )
+    return frozenset(_listed(node).get(kind, ()))
+
+
+def _listed(node: NodeState) -> dict[PortKind, tuple[str, ...]]:
+    return {
+        PortKind.PUBLISHER: node.publications,
+        PortKind.SUBSCRIBER: node.subscriptions,
+        PortKind.SERVICE_SERVER: node.services,
+        PortKind.ACTION_SERVER: node.action_servers,
+        PortKind.ACTION_CLIENT: node.action_clients,
+    }
+
+
+def _covered(kind: PortKind, names: Iterable[str], listed: PortKind) -> Iterable[str]:
+    """Return the names of another kind that a port accounts for: a topic of an action stands for the action."""
+    if kind is listed:
+        return names
+    if listed in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT):
+        return [name.rpartition("/")[0] for name in names if name.endswith((*_SERVER_SENDS, *_CLIENT_SENDS))]
+    if kind in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT):
+        return list(_unfolded(names, (*_SERVER_SENDS, *_CLIENT_SENDS)))
+    return ()
+
+
+def _unfolded(actions: Iterable[str], suffixes: Iterable[str]) -> Iterator[str]:
+    return (f"{action}/{suffix}" for action in actions for suffix in suffixes)
+
+
+def _declared(port: Port) -> tuple[str, str, str, PortKind, str]:
+    reference: Reference = port.reference  # type: ignore[assignment]
+    return reference.package, reference.artifact, reference.node, port.kind, reference.name
+
+
+def _stem(type_name: str, kind: PortKind) -> str:
+    """Return the type without the suffix of an action, which models may leave out."""
+    return type_name.removesuffix("Action") if kind in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT) else type_name
+
+
+def _type(snapshot: GraphSnapshot, name: str) -> str:
+    if name in snapshot.actions:
+        return snapshot.actions[name].type
+    return snapshot.topics[name].type if name in snapshot.topics else ""
+
+
+def _shown(name: str, namespace: str) -> str:
+    return relative(name, namespace) or name

@@ -1,0 +1,1 @@
+"""State of nodes, topics, batteries and components over time. Pure."""

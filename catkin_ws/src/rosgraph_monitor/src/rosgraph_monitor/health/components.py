@@ -1,0 +1,195 @@
+"""Status of components: what the state of nodes and topics means for them, over time. Pure; time is an argument."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from rosgraph_monitor.diagnostics.status import COMPONENT_STATUS, Level, Status
+from rosgraph_monitor.health.battery import BatterySpec
+from rosgraph_monitor.health.topics import DEFAULT_MAX_AGE, TopicSpec, parse_spec
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping
+
+
+class ComponentStatus(enum.Enum):
+    """Values of c_status in the vocabulary."""
+
+    TRUE = "TRUE"
+    FALSE = "FALSE"
+    RECOVERED = "RECOVERED"
+
+
+class NodeCondition(enum.Enum):
+    """What is known of a node at this moment. FAILED: it runs, but does not do what it should."""
+
+    ALIVE = "alive"
+    GONE = "gone"
+    FAILED = "failed"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """History of a node: absent since when (None: it runs), whether it ever ran, whether FALSE was said."""
+
+    absent_since: float | None
+    ever_alive: bool = False
+    failed: bool = False
+
+
+@dataclass(frozen=True)
+class ComponentMap:
+    """What stands for components.
+
+    Attributes:
+        of_node: component by name of the node, relative to the system's namespace.
+        topics: what is expected of topics that stand for components, by name of the topic.
+        batteries: batteries that stand for components.
+    """
+
+    of_node: dict[str, str] = field(default_factory=dict)
+    topics: dict[str, TopicSpec] = field(default_factory=dict)
+    batteries: tuple[BatterySpec, ...] = ()
+
+
+def parse_mapping(value: Any) -> ComponentMap:
+    """Return what stands for each component.
+
+    An entry is `{node: NAME}`, `{topic: NAME, max_age: S, min_rate: HZ, stuck_after: N}` (limits as one likes), both
+    in one, or `{topic: NAME, below: CHARGE, above: CHARGE}` for a battery.
+
+    Raises:
+        ValueError: the value has another shape; the message names the entry.
+    """
+    if not isinstance(value, dict):
+        raise ValueError(f"components: must map each component to {{node: NAME}} or {{topic: NAME}}, not {value!r}")
+    of_node, topics, batteries = {}, {}, []
+    for component, entry in value.items():
+        settings = dict(entry) if isinstance(entry, dict) else {}
+        node, topic = settings.pop("node", None), settings.pop("topic", None)
+        if not (node or topic) or not all(isinstance(n, str) and n.strip("/") for n in (node, topic) if n is not None):
+            raise ValueError(f"components/{component}: must be {{node: NAME}} or {{topic: NAME}}, not {entry!r}")
+        if node:
+            of_node[node.strip("/")] = str(component)
+        if topic and settings.keys() & {"below", "above"}:
+            batteries.append(_battery(str(component), topic, settings))
+        elif topic:
+            spec = parse_spec(topic, settings | {"component": str(component)}, where=f"components/{component}")
+            topics[spec.name] = (
+                spec
+                if spec.is_watched
+                else TopicSpec(
+                    spec.name, spec.type, max_age=DEFAULT_MAX_AGE, component=spec.component, wall_time=spec.wall_time
+                )
+            )
+        elif settings:
+            raise ValueError(f"components/{component}: {', '.join(settings)} need a topic")
+    return ComponentMap(of_node, topics, tuple(batteries))
+
+
+def _battery(component: str, topic: str, settings: dict[str, Any]) -> BatterySpec:
+    below, above = settings.pop("below", None), settings.pop("above", None)
+    above = below if above is None else above
+    good = all(isinstance(v, (int, float)) and not isinstance(v, bool) and math.isfinite(v) for v in (below, above))
+    if settings or not good or not 0.0 < below <= above <= 1.0:
+        raise ValueError(f"components/{component}: a battery has topic, below and above, with 0 < below <= above <= 1")
+    return BatterySpec(component, topic, float(below), float(above))
+
+
+class ComponentTracker:
+    """Follows nodes, and says what becomes of their components.
+
+    A node that ran and went has failed at once, unless somebody may restart it (it has patience then); one that never
+    ran, after a grace; one that runs but does not do what it should, at once. A node that is excused (being
+    reconfigured) is not judged; if it had failed before and runs afterwards, it has recovered.
+    """
+
+    def __init__(self, component_of: Mapping[str, str], grace: float = 10.0) -> None:
+        """Start with nothing known.
+
+        Args:
+            component_of: component of each node, by name of the node; others bear their node's name.
+            grace: wall seconds in which an expected node may come up for the first time.
+        """
+        self._component_of = dict(component_of)
+        self._grace = grace
+        self._seen: dict[str, _Seen] = {}
+        self._waited_for: frozenset[str] = frozenset()
+
+    @property
+    def waited_for(self) -> frozenset[str]:
+        """Nodes that are absent but not failed yet, as of the last update."""
+        return self._waited_for
+
+    def has_run(self, name: str) -> bool:
+        """Say whether an expected node was seen alive, as of the last update."""
+        return name in self._seen and self._seen[name].ever_alive
+
+    def update(
+        self,
+        conditions: Mapping[str, NodeCondition],
+        now: float,
+        excused: Collection[str] = (),
+        patience: Mapping[str, float] | None = None,
+    ) -> list[tuple[str, ComponentStatus]]:
+        """Take in what is known of the expected nodes.
+
+        Args:
+            conditions: of each expected node; nodes that are no longer expected are forgotten.
+            now: wall seconds.
+            excused: nodes that are not judged now.
+            patience: wall seconds by node for which its absence is no failure yet; 0 for those not given.
+
+        Returns:
+            Status of each component that is judged now. RECOVERED appears once per return.
+        """
+        statuses = []
+        waited_for = []
+        seen = {}
+        for name, condition in conditions.items():
+            before = self._seen.get(name, _Seen(absent_since=now))
+            if name in excused:
+                # The wait for a first sign of life begins when the excuse ends.
+                seen[name] = _Seen(now, before.ever_alive, before.failed)
+                continue
+            seen[name], status = self._judge(before, condition, now, (patience or {}).get(name, 0.0))
+            if status:
+                statuses.append((self._component_of.get(name, name), status))
+            elif condition is NodeCondition.GONE:
+                waited_for.append(name)
+        self._seen = seen
+        self._waited_for = frozenset(waited_for)
+        return statuses
+
+    def _judge(
+        self, before: _Seen, condition: NodeCondition, now: float, patience: float
+    ) -> tuple[_Seen, ComponentStatus | None]:
+        if condition is NodeCondition.ALIVE:
+            status = ComponentStatus.RECOVERED if before.failed else ComponentStatus.TRUE
+            return _Seen(None, ever_alive=True), status
+        if before.failed:
+            return before, ComponentStatus.FALSE
+        if condition is NodeCondition.UNKNOWN:
+            return before, None
+        if condition is NodeCondition.FAILED:
+            return _Seen(now, ever_alive=True, failed=True), ComponentStatus.FALSE
+        since = now if before.absent_since is None else before.absent_since
+        failed = now - since >= (patience if before.ever_alive else self._grace)
+        return _Seen(since, before.ever_alive, failed), ComponentStatus.FALSE if failed else None
+
+
+def component_statuses(components: Iterable[tuple[str, ComponentStatus]]) -> list[Status]:
+    """Return the components' statuses in the published form."""
+    return [
+        Status(
+            Level.ERROR if status is ComponentStatus.FALSE else Level.OK,
+            component,
+            COMPONENT_STATUS,
+            ((component, status.value),),
+        )
+        for component, status in components
+    ]

@@ -1,0 +1,1 @@
+"""Threads, connections to nodes, and resources of processes."""

@@ -1,0 +1,102 @@
+"""Looks at the graph in a thread of its own, so that a slow master holds up nothing else."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ros_model.io.snapshot import SnapshotError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ros_model.io.snapshot import GraphSnapshot, MasterClient
+
+    from rosgraph_monitor.health.liveness import Life
+    from rosgraph_monitor.io.node_connections import Watcher
+
+_SHORTEST = 0.1
+"""Wall s between looks at least: many nodes may come or go at once."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What was seen.
+
+    Attributes:
+        snapshot: what the master lists.
+        lives: what was known of each node before the master was asked: a node that was dead by then and is listed
+            has not unregistered.
+        duration: wall s that the master took.
+    """
+
+    snapshot: GraphSnapshot
+    lives: dict[tuple[str, str], Life]
+    duration: float
+
+
+class Looker:
+    """Asks the master at a fixed rate and on request. Start it once, close it at the end."""
+
+    def __init__(
+        self, client: MasterClient, watcher: Watcher, period: float, own_name: str, on_look: Callable[[], None]
+    ) -> None:
+        """Prepare.
+
+        Args:
+            client: asks the master; nobody else may use it.
+            watcher: is told which nodes to watch.
+            period: wall s between looks.
+            own_name: resolved name of this node, which need not be watched.
+            on_look: called in the looking thread after each look; one that fails leaves the latest as it was.
+        """
+        self._client = client
+        self._watcher = watcher
+        self._period = period
+        self._own_name = own_name
+        self._on_look = on_look
+        self._requested = threading.Event()
+        self._closing = False
+        self.latest: Look | None = None
+        self.count = 0
+        self._thread = threading.Thread(target=self._run, name="look", daemon=True)
+
+    def start(self) -> None:
+        """Begin to look."""
+        self._thread.start()
+
+    def request(self) -> None:
+        """Look soon, and not only when it is due."""
+        self._requested.set()
+
+    def close(self) -> None:
+        """Stop looking."""
+        self._closing = True
+        self._requested.set()
+        self._thread.join(timeout=2.0)
+
+    def _run(self) -> None:
+        due = time.monotonic()
+        while not self._closing:
+            self._requested.clear()
+            begin = time.monotonic()
+            self._look(begin)
+            if begin >= due:
+                due = max(due + self._period, begin)
+            if not self._requested.wait(max(due - time.monotonic(), 0.0)):
+                continue
+            time.sleep(max(begin + _SHORTEST - time.monotonic(), 0.0))
+        self._client.close()
+
+    def _look(self, begin: float) -> None:
+        lives = self._watcher.lives()
+        try:
+            snapshot = self._client.snapshot()
+        except SnapshotError:
+            return  # who watches the master tells of it
+        self.count += 1
+        self.latest = Look(snapshot, lives, time.monotonic() - begin)
+        self._watcher.watch({name: node.uri for name, node in snapshot.nodes.items() if name != self._own_name})
+        self._on_look()

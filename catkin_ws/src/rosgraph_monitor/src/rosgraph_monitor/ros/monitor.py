@@ -1,0 +1,262 @@
+"""ROS shell of the monitor: parameters and the active configuration in, diagnostics out."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import diagnostic_updater
+import rosgraph
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from metacontrol_msgs.msg import ActiveConfiguration
+from node_kit.master import PATIENCE
+from node_kit.ros.lifetime import Lifetime
+from ros_model.errors import ModelError
+from ros_model.files import resolve, safe_file_name
+from ros_model.io.snapshot import MasterClient
+from ros_model.language.reader import read_system
+
+from rosgraph_monitor.evaluation import GraphMonitor
+from rosgraph_monitor.graph.desired import DesiredModel, Grounding
+from rosgraph_monitor.graph.names import resolved
+from rosgraph_monitor.health.liveness import Life
+from rosgraph_monitor.health.topics import merged, model_topics
+from rosgraph_monitor.io.graph_poller import Look, Looker
+from rosgraph_monitor.io.node_connections import Watcher
+from rosgraph_monitor.io.usage import UsageMeter
+from rosgraph_monitor.ros import parameters as parameters_node
+from rosgraph_monitor.ros.observers import ObserverHost
+from rosgraph_monitor.ros.topics import BatteryListener, TopicListener
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from ros_model.language.metamodel import RosSystem
+
+    from rosgraph_monitor.diagnostics.status import Status
+
+NAME = "rosgraph_monitor"
+_MASTER_TIMEOUT = 1.2
+"""Wall seconds for one answer of the master."""
+_COALESCE = 0.02
+"""Wall seconds between evaluations at least, for events that come in a bunch."""
+_LONGEST_REST = 0.2
+"""The same at most, after an evaluation that took long."""
+_FRESH = 0.15
+"""Wall seconds to wait, after a node died, for a look that says whether it has unregistered."""
+_TOPIC_PERIOD = 0.05
+_USAGE_PERIOD = 1.0
+_LAUNCHER = "rosgraph_launcher"
+_METACONTROL_NODES = [NAME, "reasoner", "rosgraph_manipulator", _LAUNCHER]
+
+
+class MonitorNode:
+    """The node /rosgraph_monitor."""
+
+    def __init__(self, load: Iterable[str]) -> None:
+        """Read the parameters and start watching.
+
+        Args:
+            load: observers to start, beside those of `~observers`.
+
+        Raises:
+            ParameterError: a parameter has the wrong type or range.
+            ModelError: the base model can't be read.
+        """
+        self._events = threading.Event()
+        self._looked = threading.Event()
+        self._watcher = Watcher(self._on_life, parameters_node.timing(), rospy.get_name())
+        self._period = 1.0 / parameters_node.number("~rate", 2.0)
+        self._looker = Looker(
+            MasterClient(rosgraph.get_master_uri(), rospy.get_name(), _MASTER_TIMEOUT),
+            self._watcher,
+            self._period,
+            rospy.get_name(),
+            self._on_look,
+        )
+        self._ending = False
+        rospy.on_shutdown(self._end)
+        self._watcher.start()
+        self._looker.start()
+        self._namespace = rospy.get_namespace()
+        self._variants = parameters_node.text("~variants")
+        components = parameters_node.components()
+        self._topic_specs = merged(components.topics, parameters_node.topics())
+        patience = parameters_node.patience()
+        self._monitor = GraphMonitor(
+            components.of_node, scope=parameters_node.scope(self._topic_specs), patience=patience
+        )
+        base = parameters_node.text("~desired_rossystem")
+        self._model = DesiredModel(read_system(resolve(base)) if base else None, self._read_variant)
+        self._metacontrol = parameters_node.names("~metacontrol_nodes", _METACONTROL_NODES)
+        self._meter = UsageMeter(alone=frozenset({_LAUNCHER}))
+        self._usage_due = 0.0
+        self._running_observers = 0
+        self._evaluation = 0.0
+        observers = dict.fromkeys((*parameters_node.names("~observers", []), *load))
+        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
+        self._updater = diagnostic_updater.Updater()
+        self._updater.setHardwareID("none")
+        self._updater.add("look at the graph", self._tell_look)
+        self._observers = ObserverHost(self._diagnostics)
+        self._observers.follow(self._model.current.system)
+        for name in observers:
+            self._observers.load(name)
+        self._topics = TopicListener(patience.startup)
+        self._topic_states: dict[str, str] = {}
+        self._follow_topics()
+        self._batteries = BatteryListener(components.batteries, self._events.set)
+        self._subscriber = rospy.Subscriber(
+            "rosgraph_manipulator/active_configuration", ActiveConfiguration, self._follow, queue_size=5
+        )
+
+    def run(self) -> None:
+        """Evaluate after every look, and whenever a node or topic fails or returns, until node or master end."""
+        while not self._ending:
+            look = self._looker.latest
+            if look:
+                begin = time.monotonic()
+                self._publish(self._evaluate(look))
+                self._evaluation = time.monotonic() - begin
+                # It rests as long again, up to a limit: hundreds of nodes may come or go together.
+                time.sleep(min(max(_COALESCE, self._evaluation), _LONGEST_REST))
+            self._wait()
+
+    def _end(self) -> None:
+        self._ending = True
+        self._events.set()
+
+    def _on_life(self) -> None:
+        """A node died or came back: look whether it has unregistered or has another address, then evaluate."""
+        self._looked.clear()
+        self._looker.request()
+        self._events.set()
+
+    def _on_look(self) -> None:
+        self._looked.set()
+        self._events.set()
+
+    def _wait(self) -> None:
+        """Wait until there is something to evaluate."""
+        while not self._events.wait(_TOPIC_PERIOD if self._topics.topics else None):
+            if self._topics_changed():
+                return
+        self._events.clear()
+        if not self._ending:
+            self._looked.wait(_FRESH)
+
+    def _topics_changed(self) -> bool:
+        states = {v.spec.name: v.message for v in self._topics.judge(self._excused_topics())}
+        return states != self._topic_states
+
+    def _excused_topics(self) -> frozenset[str]:
+        look = self._looker.latest
+        desired = self._model.current
+        return self._monitor.excused_topics(look.snapshot, desired, self._topics.topics) if look else frozenset()
+
+    def _evaluate(self, look: Look) -> list[Status]:
+        lives = look.lives if self._looked.is_set() else self._watcher.lives()
+        own = look.snapshot.nodes.get(rospy.get_name())
+        if own:
+            lives[own.name, own.uri] = Life.ALIVE
+        now = time.monotonic()
+        verdicts = self._topics.judge(self._excused_topics())
+        self._topic_states = {verdict.spec.name: verdict.message for verdict in verdicts}
+        statuses = self._monitor.evaluate(
+            look.snapshot, lives, self._model.current, now, topics=verdicts, others=self._batteries.conditions
+        )
+        if now >= self._usage_due:
+            self._usage_due = now + _USAGE_PERIOD
+            statuses.extend(self._meter.measure(self._metacontrol_pids(look), now))
+            self._running_observers = self._observers.supervise()
+            self._updater.force_update()  # `update` would ask the master for its period, and wait for the answer
+        return statuses
+
+    def _tell_look(self, status: Any) -> Any:
+        """Tell how the monitor itself fares."""
+        look = self._looker.latest
+        if look is None or look.duration > self._period:
+            status.summary(DiagnosticStatus.WARN, "the master is slow")
+        else:
+            status.summary(DiagnosticStatus.OK, "in time")
+        if look:
+            status.add("seconds for a look", f"{look.duration:.4f}")
+            status.add("seconds for an evaluation", f"{self._evaluation:.4f}")
+            status.add("looks", str(self._looker.count))
+            status.add("nodes", str(len(look.snapshot.nodes)))
+        status.add("observers", str(self._running_observers))
+        return status
+
+    def _metacontrol_pids(self, look: Look) -> dict[str, int]:
+        """Return the process ids of the meta-controller's nodes that run on this host."""
+        pids = self._watcher.pids() | {rospy.get_name(): os.getpid()}
+        nodes = look.snapshot.nodes
+        local = {}
+        for name in self._metacontrol:
+            graph_name = resolved(name, self._namespace)
+            if graph_name in pids and graph_name in nodes and _is_local(nodes[graph_name].uri):
+                local[name] = pids[graph_name]
+        return local
+
+    def _publish(self, statuses: list[Status]) -> None:
+        if not statuses:
+            return
+        array = DiagnosticArray(status=[_message(status) for status in statuses])
+        array.header.stamp = rospy.Time.now()
+        self._diagnostics.publish(array)
+
+    def _follow(self, msg: ActiveConfiguration) -> None:
+        """Take the desired model from the active configuration."""
+        before = self._model.current
+        current = self._model.follow(Grounding(f.function, f.configuration, f.state) for f in msg.functions)
+        if current.problem and current.problem != before.problem:
+            rospy.logerr("desired model stays as it was: %s", current.problem)
+        if current.system != before.system:
+            self._observers.follow(current.system)
+            self._follow_topics()
+        self._looked.clear()
+        self._looker.request()
+        self._events.set()
+
+    def _follow_topics(self) -> None:
+        """Watch the topics of which the settings or the active model expect something; settings go first."""
+        system = self._model.current.system
+        self._topics.follow(merged(model_topics(system) if system else {}, self._topic_specs))
+
+    def _read_variant(self, name: str) -> RosSystem:
+        if not self._variants:
+            raise ModelError(f"configuration {name!r}: set ~variants to the folder of the variants' models")
+        return read_system(resolve(self._variants) / f"{safe_file_name(name, 'configuration')}.rossystem")
+
+
+def main() -> None:
+    """Run the node; exit with status 2 and one line if it can't start."""
+    parser = argparse.ArgumentParser(prog="monitor", description="Compares the live ROS graph with the desired one.")
+    parser.add_argument("--load", nargs="+", default=[], metavar="NAME", help="observers to start")
+    options = parser.parse_args(rospy.myargv()[1:])
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))  # a connection to each node
+    with Lifetime(NAME, parameters_node.ParameterError, ModelError) as life:
+        life.start()
+        life.watch.patience = parameters_node.number("~master_patience", PATIENCE)
+        MonitorNode(options.load).run()
+
+
+def _message(status: Status) -> DiagnosticStatus:
+    return DiagnosticStatus(
+        level=int(status.level),
+        name=status.name,
+        message=status.message,
+        hardware_id=status.hardware_id,
+        values=[KeyValue(key, value) for key, value in status.values],
+    )
+
+
+def _is_local(uri: str) -> bool:
+    host, _ = rosgraph.network.parse_http_host_and_port(uri)
+    return bool(rosgraph.network.is_local_address(host))

@@ -1,0 +1,245 @@
+"""ROS shell of the observers: subscriptions, a thread at a fixed rate of ROS time for each, services."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from metacontrol_msgs.srv import (
+    ListObservers,
+    ListObserversResponse,
+    LoadObserver,
+    LoadObserverResponse,
+    UnloadObserver,
+    UnloadObserverResponse,
+)
+
+from rosgraph_monitor.observer import ServiceObserver
+from rosgraph_monitor.observers import plugins
+from rosgraph_monitor.ros.topics import unpacked
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ros_model.language.metamodel import RosSystem
+
+    from rosgraph_monitor.observer import Observer
+
+_LARGEST_MESSAGE = 1 << 24
+_WARNING_PERIOD = 10.0
+_INBOX = 100
+"""Messages that wait for an observer's next evaluation; of more, the oldest are dropped."""
+_PATIENCE = 5.0
+_PATIENCE_PERIODS = 5.0
+"""Wall s, and periods, that an evaluation may take before the observer counts as hung."""
+_BASE = "Observer"
+
+
+class ObserverHost:
+    """Loads, runs and unloads observers; offers the four services. One that fails never stops another."""
+
+    def __init__(self, diagnostics: rospy.Publisher) -> None:
+        """Publish statuses with this publisher of DiagnosticArray."""
+        self._diagnostics = diagnostics
+        self._runners: dict[str, _Runner] = {}
+        self._system: RosSystem | None = None
+        self._lock = threading.RLock()
+        self._services = (
+            rospy.Service("load_observer", LoadObserver, lambda r: LoadObserverResponse(self.load(r.name))),
+            rospy.Service("unload_observer", UnloadObserver, lambda r: UnloadObserverResponse(self.unload(r.name))),
+            rospy.Service("active_observers", ListObservers, lambda _: self._active()),
+            rospy.Service("list_observers", ListObservers, lambda _: self._available()),
+        )
+
+    def load(self, name: str) -> bool:
+        """Start an observer; False, with a line that says why, if that fails or it runs already."""
+        with self._lock:
+            if name in self._runners:
+                rospy.logwarn("observer %s runs already", name)
+                return False
+            try:
+                observer = plugins.make(name)
+                observer.configure(rospy.get_param(f"~{observer.name}", {}))
+                observer.follow(self._system)
+                self._runners[name] = _Runner(observer, self._diagnostics)
+            except plugins.PluginError as error:
+                rospy.logerr("%s", error)
+                return False
+            except (Exception, SystemExit) as error:  # a plug-in is somebody else's code
+                rospy.logerr("observer %s can't start: %s: %s", name, type(error).__name__, error)
+                return False
+        rospy.loginfo("observer %s at %g Hz", name, observer.rate_hz)
+        return True
+
+    def unload(self, name: str) -> bool:
+        """Stop an observer; False if there is none of that name."""
+        with self._lock:
+            runner = self._runners.pop(name, None)
+        if runner is None:
+            rospy.logwarn("observer %s does not run", name)
+            return False
+        runner.stop()
+        rospy.loginfo("observer %s unloaded", name)
+        return True
+
+    def follow(self, system: RosSystem | None) -> None:
+        """Tell all observers which system is active."""
+        with self._lock:
+            self._system = system
+            runners = tuple(self._runners.values())
+        for runner in runners:
+            runner.follow(system)
+
+    def supervise(self) -> int:
+        """Say of observers that hang that they do; call it now and then. Returns how many run."""
+        with self._lock:
+            runners = tuple(self._runners.values())
+        for runner in runners:
+            lasted = runner.hangs_for()
+            if lasted:
+                runner.say_stale(f"observer hangs: its evaluation has been going on for {lasted:.0f} s")
+        return len(runners)
+
+    def _active(self) -> ListObserversResponse:
+        with self._lock:
+            running = {name: type(runner.observer).__mro__[1].__name__ for name, runner in self._runners.items()}
+        return ListObserversResponse(types=list(running), base_classes=list(running.values()))
+
+    def _available(self) -> ListObserversResponse:
+        found = plugins.available()
+        return ListObserversResponse(types=list(found), base_classes=[_BASE] * len(found))
+
+
+class _Runner:
+    """Runs one observer until it is stopped.
+
+    The observer is touched by its own thread alone: whatever it does there, callbacks of topics that it shares with
+    others, and those who tell it something, only leave things for it to pick up.
+    """
+
+    def __init__(self, observer: Observer, diagnostics: rospy.Publisher) -> None:
+        self.observer = observer
+        self._diagnostics = diagnostics
+        self._subscribers: dict[tuple[str, type], rospy.Subscriber] = {}
+        self._publishers = {
+            topic: rospy.Publisher(topic, message_class, queue_size=1) for topic, message_class in observer.outputs
+        }
+        self._inbox: deque[tuple[str, type, Any, float]] = deque(maxlen=_INBOX)
+        self._news: deque[RosSystem | None] = deque(maxlen=1)
+        self._busy_since: float | None = None
+        self._warned = "", 0.0
+        self._stopped = threading.Event()
+        if isinstance(observer, ServiceObserver):
+            observer.client = rospy.ServiceProxy(*observer.service)
+        self._subscribe()
+        threading.Thread(target=self._run, name=f"observer {observer.name}", daemon=True).start()
+
+    def stop(self) -> None:
+        """End the thread soon, and the subscriptions now."""
+        self._stopped.set()
+        for end in (*self._subscribers.copy().values(), *self._publishers.values()):
+            end.unregister()
+
+    def follow(self, system: RosSystem | None) -> None:
+        """Tell the observer which system is active."""
+        self._news.append(system)
+
+    def hangs_for(self) -> float:
+        """Return for how many wall s its evaluation has been going on beyond all patience; 0 where it has not."""
+        since = self._busy_since
+        lasted = 0.0 if since is None else time.monotonic() - since
+        return lasted if lasted > max(_PATIENCE, _PATIENCE_PERIODS / self.observer.rate_hz) else 0.0
+
+    def say_stale(self, reason: str) -> None:
+        """Publish that the quality attribute is not known now."""
+        self._publish([self.observer.stale(reason)], [], rospy.Time.now())
+
+    def _run(self) -> None:
+        rate = rospy.Rate(self.observer.rate_hz, reset=True)
+        while not self._stopped.is_set() and not rospy.is_shutdown():
+            try:
+                rate.sleep()
+            except rospy.exceptions.ROSTimeMovedBackwardsException:
+                self._inbox.clear()
+                self._guarded(self.observer.reset)
+                rate = rospy.Rate(self.observer.rate_hz, reset=True)
+                continue
+            except rospy.ROSInterruptException:
+                return
+            if self._stopped.is_set():
+                return
+            self._busy_since = time.monotonic()
+            self._evaluate(rospy.Time.now())
+            self._busy_since = None
+
+    def _evaluate(self, now: rospy.Time) -> None:
+        while self._news:
+            self._guarded(self.observer.follow, self._news.popleft())
+        while self._inbox:
+            self._guarded(self._take, *self._inbox.popleft())
+        try:
+            self._subscribe()
+            statuses = self.observer.evaluate(now.to_sec())
+            outputs = self.observer.take_outputs()
+            if not self._stopped.is_set():
+                self._publish(statuses, outputs, now)
+        except (Exception, SystemExit) as error:  # a plug-in is somebody else's code: it must not end the monitor
+            if rospy.is_shutdown() or self._stopped.is_set():
+                return
+            self._warn(error)
+            self.say_stale(f"observer fails: {type(error).__name__}: {error}")
+
+    def _guarded(self, call: Callable[..., Any], *arguments: Any) -> None:
+        try:
+            call(*arguments)
+        except (Exception, SystemExit) as error:  # a plug-in is somebody else's code
+            self._warn(error)
+
+    def _publish(self, statuses: list[DiagnosticStatus], outputs: list[tuple[str, Any]], now: rospy.Time) -> None:
+        try:
+            for topic, msg in outputs:
+                self._publishers[topic].publish(msg)
+            if statuses:
+                array = DiagnosticArray(status=statuses)
+                array.header.stamp = now
+                self._diagnostics.publish(array)
+        except rospy.ROSException:
+            if not (rospy.is_shutdown() or self._stopped.is_set()):
+                raise
+
+    def _subscribe(self) -> None:
+        """Listen to the topics that the observer wants now, and to no others."""
+        wanted = list(self.observer.topics)
+        for gone in self._subscribers.keys() - set(wanted):
+            self._subscribers.pop(gone).unregister()
+        for topic, message_class in wanted:
+            if (topic, message_class) not in self._subscribers and not self._stopped.is_set():
+                self._subscribers[topic, message_class] = rospy.Subscriber(
+                    topic,
+                    message_class,
+                    self._receive,
+                    (topic, message_class),
+                    queue_size=1,
+                    buff_size=_LARGEST_MESSAGE,
+                    tcp_nodelay=True,
+                )
+
+    def _receive(self, msg: Any, whence: tuple[str, type]) -> None:
+        self._inbox.append((*whence, msg, rospy.get_time()))
+
+    def _take(self, topic: str, message_class: type, msg: Any, received: float) -> None:
+        self.observer.receive(topic, unpacked(msg, message_class), received)
+
+    def _warn(self, error: BaseException) -> None:
+        """Log an error, one of the same kind only now and then.
+
+        rospy's own throttling mixes up observers that fail in turns.
+        """
+        kind, now = type(error).__name__, time.monotonic()
+        if kind != self._warned[0] or now - self._warned[1] >= _WARNING_PERIOD:
+            self._warned = kind, now
+            rospy.logwarn("observer %s fails: %s: %s", self.observer.name, kind, error)

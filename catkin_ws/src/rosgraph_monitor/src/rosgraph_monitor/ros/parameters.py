@@ -1,0 +1,107 @@
+"""The monitor's parameters, read and checked."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import rospy
+from ros_model.files import resolve
+
+from rosgraph_monitor.evaluation import Patience
+from rosgraph_monitor.graph.comparison import Scope
+from rosgraph_monitor.graph.names import IGNORED_NODES, IGNORED_PORTS
+from rosgraph_monitor.graph.wiring import PortTypes, port_types
+from rosgraph_monitor.health.components import ComponentMap, parse_mapping
+from rosgraph_monitor.health.liveness import Timing
+from rosgraph_monitor.health.topics import TopicSpec, parse_topics
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+class ParameterError(Exception):
+    """A parameter of the node is not usable; the message names it."""
+
+
+def number(name: str, default: float) -> float:
+    """Return a positive number."""
+    value = rospy.get_param(name, default)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
+        raise ParameterError(f"parameter {rospy.resolve_name(name)}: {value!r} is no positive number")
+    return float(value)
+
+
+def text(name: str) -> str:
+    """Return a text, "" where it is not set."""
+    value = rospy.get_param(name, "")
+    if not isinstance(value, str):
+        raise ParameterError(f"parameter {rospy.resolve_name(name)}: {value!r} is no text")
+    return value
+
+
+def names(name: str, default: list[str]) -> list[str]:
+    """Return a list of names."""
+    value = rospy.get_param(name, default)
+    if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
+        raise ParameterError(f"parameter {rospy.resolve_name(name)}: {value!r} is no list of names")
+    return value
+
+
+def components() -> ComponentMap:
+    """Return what stands for components."""
+    try:
+        return parse_mapping(rospy.get_param("~components", {}))
+    except ValueError as error:
+        raise ParameterError(f"parameter {rospy.resolve_name('~components')}: {error}") from error
+
+
+def topics() -> Mapping[str, TopicSpec]:
+    """Return what is expected of topics."""
+    try:
+        return parse_topics(rospy.get_param("~topics", {}))
+    except ValueError as error:
+        raise ParameterError(f"parameter {rospy.resolve_name('~topics')}: {error}") from error
+
+
+def timing() -> Timing:
+    """Return periods and deadlines of probes."""
+    return Timing(
+        probe_period=number("~probe_period", Timing.probe_period),
+        probe_deadline=number("~probe_deadline", Timing.probe_deadline),
+    )
+
+
+def patience() -> Patience:
+    """Return for how long changes are waited for."""
+    return Patience(
+        startup=number("~startup_grace", Patience.startup),
+        restart=number("~restart_patience", Patience.restart),
+        ports=number("~port_patience", Patience.ports),
+    )
+
+
+def scope(specs: Mapping[str, TopicSpec]) -> Scope:
+    """Return what is compared, given what is expected of topics.
+
+    Raises:
+        ParameterError: a parameter has the wrong type.
+        ModelError: a `.ros` model can't be read.
+    """
+    return Scope(
+        ignored_nodes=(*IGNORED_NODES, *names("~ignore", [])),
+        ignored_ports=(*IGNORED_PORTS, *names("~ignore_ports", [])),
+        types=_port_types(names("~ros_models", [])),
+        topic_types={name: spec.type for name, spec in specs.items() if spec.type},
+        namespace=rospy.get_namespace(),
+    )
+
+
+def _port_types(paths: list[str]) -> PortTypes:
+    if not paths:
+        return {}
+    from ros_model.language.packages_reader import (
+        read_packages,  # grammars take a while to load: only where they are needed
+    )
+
+    return port_types(read_packages(resolve(path)) for path in paths)

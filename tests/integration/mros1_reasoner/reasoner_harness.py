@@ -1,0 +1,190 @@
+"""What the tests of the node reasoner share: a manipulator of their own, and reasoners started as processes."""
+
+import subprocess
+import sys
+import xmlrpc.client
+from pathlib import Path
+
+import actionlib
+import rosgraph
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from helpers.waiting import DEADLINE_S, wait_for
+from metacontrol_msgs.msg import (
+    ActiveConfiguration,
+    Decision,
+    FunctionGrounding,
+    MvpReconfigurationAction,
+    MvpReconfigurationResult,
+)
+from rosgraph_msgs.msg import Log
+
+HERE = Path(__file__).resolve().parent
+MODEL = HERE / "data" / "application.owl"
+NODE = HERE.parents[2] / "catkin_ws" / "src" / "mros1_reasoner" / "nodes" / "reasoner"
+PARAMETERS = {
+    "model_file": MODEL,
+    "nfr_safety": 0.6,
+    "nfr_energy": 0.62,
+    "qa_direction": "{performance: higher_is_better}",
+    "components": "{laser: {node: front_laser}}",
+    "violation_window": 0.5,
+    "cool_down": 0.5,
+    "backoff": 0.2,
+    "start_grace": 1.0,
+    "reasoning_rate": 0.5,
+}
+
+
+def node_api(node):
+    """Return a node's own API."""
+    return xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node))
+
+
+def node_pid(node):
+    """Return the process id of a node."""
+    return node_api(node).getPid("/test")[2]
+
+
+def status(message, *values, level=0, name=""):
+    """Return a status with pairs of key and value."""
+    return DiagnosticStatus(level=level, name=name, message=message, values=[KeyValue(*pair) for pair in values])
+
+
+class Diagnostics:
+    """Publishes statuses on /diagnostics."""
+
+    def __init__(self):
+        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
+
+    def reaches(self, node):
+        """Tell whether a node is connected to it."""
+        return any(info[1] == node for info in self._publisher.impl.get_stats_info())
+
+    def tell(self, *statuses, stamp=None):
+        """Publish statuses in one array, and return its stamp."""
+        array = DiagnosticArray(status=list(statuses))
+        array.header.stamp = stamp or rospy.Time.now()
+        self._publisher.publish(array)
+        return array.header.stamp
+
+    def component(self, name, value):
+        """Publish the status of a component."""
+        return self.tell(status("Component status", (name, value), name=name, level=2 if value == "FALSE" else 0))
+
+
+class Manipulator:
+    """Deploys in no time: announces, answers with the result that the test has set, None: not at all."""
+
+    def __init__(self, namespace="", serves=True):
+        self.result = 1
+        self.requests = []
+        self.running = ""
+        self._namespace = namespace
+        self._active = rospy.Publisher(
+            f"{namespace}/rosgraph_manipulator/active_configuration", ActiveConfiguration, queue_size=5, latch=True
+        )
+        if serves:
+            self.serve()
+
+    def serve(self):
+        """Offer the action from now on."""
+        name = f"{self._namespace}/rosgraph_manipulator_action_server"
+        self._server = actionlib.SimpleActionServer(name, MvpReconfigurationAction, self._execute, auto_start=False)
+        self._server.start()
+
+    @property
+    def is_known(self):
+        """Whether a client has found the action, on each of its topics."""
+        server = self._server.action_server
+        ends = (server.goal_sub, server.cancel_sub, server.status_pub, server.feedback_pub, server.result_pub)
+        return all(end.get_num_connections() for end in ends)
+
+    def announce(self, configuration, state="STABLE"):
+        """Say what runs."""
+        self.running = configuration
+        grounding = FunctionGrounding("f_move", configuration, state)
+        self._active.publish(ActiveConfiguration(functions=[grounding]))
+
+    def _execute(self, goal):
+        name = goal.desired_configuration_name
+        self.requests.append(name)
+        if self.result is None:
+            wait_for(self._server.is_preempt_requested, "a request to give up")
+            self._server.set_preempted()
+        elif self.result == 1:
+            self.announce(name, "RECONFIGURING")
+            self.announce(name)
+            self._server.set_succeeded(MvpReconfigurationResult(1))
+        else:
+            self._server.set_aborted(MvpReconfigurationResult(self.result), "it did not come up")
+
+
+class Listener:
+    """Hears a reasoner's decisions and log lines, and the diagnostics about reconfigurations."""
+
+    def __init__(self, namespace=""):
+        self.node = f"{namespace}/reasoner"
+        self.decisions, self.log, self.lines, self.troubles = [], [], [], []
+        rospy.Subscriber(f"{namespace}/mros1_reasoner/decision", Decision, self.decisions.append, queue_size=50)
+        rospy.Subscriber("/rosout", Log, self._on_log, queue_size=500)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=500)
+
+    def _on_log(self, message):
+        if message.name == self.node:
+            self.log.append(message.msg)
+            self.lines.append(message)
+
+    def _on_diagnostics(self, array):
+        self.troubles += [s for s in array.status if s.hardware_id == self.node and "econfiguration" in s.message]
+
+    def decided(self, state, count=1):
+        """Wait until so many decisions of a state were heard; return the last."""
+        found = wait_for(
+            lambda: [d for d in self.decisions if d.state == state][count - 1 :], f"decision {count} of state {state}"
+        )
+        return found[0]
+
+    def logged(self, text, start=0):
+        """Wait until a line of the log holds a text; return the line."""
+        return wait_for(lambda: [line for line in self.log[start:] if text in line], f"in the log: {text}")[0]
+
+
+class Reasoner:
+    """A reasoner as a process, in a namespace of its own; ends with the block."""
+
+    def __init__(self, namespace, diagnostics, **parameters):
+        self.namespace = namespace
+        self.node = f"{namespace}/reasoner"
+        self._diagnostics = diagnostics
+        self._parameters = {**PARAMETERS, **parameters}
+        self.listener = Listener(namespace)
+        self._process = None
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.kill()
+
+    def start(self):
+        """Start it and wait until it is ready."""
+        before = len(self.listener.log)
+        arguments = [f"_{name}:={value}" for name, value in self._parameters.items()]
+        self._process = subprocess.Popen(
+            [sys.executable, str(NODE), f"__ns:={self.namespace}", *arguments], stdout=subprocess.DEVNULL
+        )
+        self.listener.logged("Reasoner Initialization Ok", before)
+        wait_for(lambda: self._diagnostics.reaches(self.node), "the reasoner hears diagnostics")
+
+    def kill(self):
+        """End it without a word, and wait until it is gone."""
+        self._process.kill()
+        self._process.wait()
+
+    def service(self, name, kind, *arguments):
+        """Call one of its services."""
+        full = f"{self.node}/{name}"
+        rospy.wait_for_service(full, DEADLINE_S)
+        return rospy.ServiceProxy(full, kind)(*arguments)

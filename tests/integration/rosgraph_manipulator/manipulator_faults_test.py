@@ -1,0 +1,86 @@
+#!/usr/bin/env python3
+"""Configurations that can't be started: the running one is left alone or restored."""
+
+import os
+import shutil
+import socket
+import tempfile
+from pathlib import Path
+
+import rostest
+from geometry_msgs.msg import Twist
+from helpers.waiting import wait_for
+from manipulator_harness import CONFIGURATIONS, SERVER, PairTest, configuration, is_alive, pid_of
+
+FOLDER = tempfile.mkdtemp()
+
+
+def own_file(name):
+    path = shutil.copy(SERVER, Path(FOLDER) / name)
+    return {"function": "f_wait", "launch": str(path), "args": [f"period:={name.split('.')[0]}"]}
+
+
+class FaultsTest(PairTest):
+    manipulator_parameters = {"ready_timeout": 15.0, "settle_time": 2.0}
+
+    @classmethod
+    def setUpClass(cls):
+        cls.occupied = socket.create_server(("127.0.0.1", 0))
+        cls.addClassCleanup(shutil.rmtree, FOLDER)
+        cls.addClassCleanup(cls.occupied.close)
+        port = cls.occupied.getsockname()[1]
+        cls.configurations = {
+            **CONFIGURATIONS,
+            "port": configuration(args=f"--port {port}"),
+            "vanishes": own_file("vanishes.launch"),
+            "breaks": own_file("breaks.launch"),
+        }
+        # What nodes write there meets a full disk.
+        logs = Path(FOLDER) / "log"
+        logs.mkdir()
+        for name in ("wait_server.log", "wait_server-stdout.log"):
+            (logs / name).symlink_to("/dev/full")
+        cls.configurations["full"] = configuration(output="log", period="full")
+        cls.environment = {"ROS_LOG_DIR": str(logs)}
+        super().setUpClass()
+
+    def setUp(self):
+        self.assertEqual(self.request("slow"), 1, self.manipulator.said())
+
+    def test_what_cannot_be_started_leaves_the_running_nodes_untouched(self):
+        Path(self.configurations["vanishes"]["launch"]).unlink()
+        before = pid_of("/wait_server")
+        for name, words in (("malformed", "well-formed"), ("no_node", "no_such_node"), ("vanishes", "vanishes")):
+            with self.subTest(name):
+                self.assertEqual(self.request(name), 0)
+                self.assertIn(words, self.text)
+                self.wait_for_state("slow")
+        # Each was refused before anything was stopped, or the way back led to the same nodes.
+        self.assertTrue(is_alive(before))
+        self.assertEqual(pid_of("/wait_server"), before)
+
+    def test_unknown_name_is_refused(self):
+        self.assertEqual(self.request("no_such_configuration"), -1)
+        self.assertIn("no_such_configuration", self.text)
+
+    def test_port_in_use_is_rolled_back(self):
+        self.assertEqual(self.request("port"), 0)
+        self.wait_for_state("slow")
+
+    def test_full_disk_keeps_no_node_from_running(self):
+        self.assertEqual(self.request("full"), 1)
+        self.assertIsNotNone(pid_of("/wait_server"))
+
+    def test_robot_is_stopped_when_nothing_can_be_restored(self):
+        self.assertEqual(self.request("breaks"), 1)
+        Path(self.configurations["breaks"]["launch"]).write_text("<launch>")
+        self.commands.clear()
+        self.assertEqual(self.request("exits"), -2)
+        self.wait_for_state("exits", "FAILED")
+        wait_for(lambda: Twist() in self.commands, "the robot is commanded to stop")
+        self.assertEqual(self.launched(), [])
+
+
+if __name__ == "__main__":
+    os.chdir(Path(__file__).parent)
+    rostest.rosrun("metacontrol_tests", "manipulator_faults", FaultsTest)

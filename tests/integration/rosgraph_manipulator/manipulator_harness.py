@@ -1,0 +1,228 @@
+"""What the tests of manipulator and launcher share: the pair as processes, requests, and what they say."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import tempfile
+import threading
+import time
+import unittest
+import xmlrpc.client
+from pathlib import Path
+
+import actionlib
+import psutil
+import rosgraph
+import rospy
+from actionlib.msg import TestAction, TestGoal
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from geometry_msgs.msg import Twist
+from helpers.waiting import DEADLINE_S, wait_for
+from metacontrol_msgs.msg import (
+    ActiveConfiguration,
+    LauncherState,
+    MvpReconfigurationAction,
+    MvpReconfigurationGoal,
+)
+from rosgraph_manipulator.io.processes import MARK
+
+HERE = Path(__file__).resolve().parent / "data"
+SERVER = str(HERE / "server.launch")
+
+
+def pid_of(node):
+    """Process id of a node, or None when it does not answer."""
+    try:
+        uri = rosgraph.Master("/test").lookupNode(node)
+        return xmlrpc.client.ServerProxy(uri).getPid("/test")[2]
+    except (rosgraph.MasterException, OSError, xmlrpc.client.Error):
+        return None
+
+
+def is_alive(pid):
+    """Whether a process runs; one that ended but was not waited for by its parent does not."""
+    try:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
+def configuration(**arguments):
+    """A configuration of the server's launch file."""
+    return {"function": "f_wait", "launch": SERVER, "args": [f"{key}:={value}" for key, value in arguments.items()]}
+
+
+CONFIGURATIONS = {
+    "slow": configuration(period="slow"),
+    "fast": {**configuration(period="fast"), "topics": ["wait/status"]},
+    "exits": configuration(args="--exit-at-once"),
+    "hangs": configuration(args="--hang"),
+    "stubborn": configuration(args="--stubborn"),
+    "dies": configuration(args="--die-after 0.3"),
+    "dies_later": configuration(args="--die-after 4.5"),
+    "malformed": {"function": "f_wait", "launch": str(HERE / "malformed.launch")},
+    "no_node": {"function": "f_wait", "launch": str(HERE / "no_node.launch")},
+    "once": {"function": "f_wait", "launch": str(HERE / "once.launch")},
+    "tuned_1": {"function": "f_wait", "launch": str(HERE / "tuned.launch"), "args": ["rate:=1.0"]},
+    "tuned_2": {"function": "f_wait", "launch": str(HERE / "tuned.launch"), "args": ["rate:=2.0"]},
+    "tuned_wrong": {"function": "f_wait", "launch": str(HERE / "tuned.launch"), "args": ["rate:=1000.0"]},
+    "tuned_other": {"function": "f_wait", "launch": str(HERE / "tuned.launch"), "args": ["rate:=1.0", "other:=2"]},
+}
+
+
+class Node:
+    """A node as a process of the test's own, with what it says."""
+
+    def __init__(self, *words, environment=None):
+        self.output = tempfile.NamedTemporaryFile("w")  # noqa: SIM115, it lives as long as the node
+        self._process = subprocess.Popen(
+            ["/usr/bin/rosrun", *words],
+            stdout=self.output,
+            stderr=subprocess.STDOUT,
+            env={**os.environ, "PYTHONUNBUFFERED": "1", **(environment or {})},  # what it says is read at once
+        )
+        self.pid = self._process.pid
+
+    def end(self, how=signal.SIGINT):
+        with contextlib.suppress(ProcessLookupError):
+            self._process.send_signal(how)
+        return self._process.wait(DEADLINE_S)
+
+    def wait(self):
+        return self._process.wait(DEADLINE_S)
+
+    def said(self):
+        return Path(self.output.name).read_text()  # opened anew: the node's place in the file stays where it is
+
+
+class PairTest(unittest.TestCase):
+    """Tests with a launcher and a manipulator, started anew for each class."""
+
+    configurations = CONFIGURATIONS
+    manipulator_parameters = {}
+    launcher_parameters = {}
+    environment = {}
+
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("manipulator_test", anonymous=True)
+        cls.states, cls.launcher_states, cls.commands = [], [], []
+        cls.server_goals, cls.server = {}, None
+        rospy.set_param(
+            "rosgraph_manipulator",
+            {
+                "configurations": cls.configurations,
+                "save_action": "wait",
+                "goal_msg_type": "actionlib.msg.TestAction",
+                "initial_configuration": "slow",
+                "ready_timeout": 30.0,
+                "launcher_timeout": 40.0,
+                **cls.manipulator_parameters,
+            },
+        )
+        rospy.set_param("rosgraph_launcher", {"restart_intensity": 3, **cls.launcher_parameters})
+        cls.subscribers = [
+            rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, cls.states.append),
+            rospy.Subscriber("rosgraph_launcher/state", LauncherState, cls.launcher_states.append),
+            rospy.Subscriber("cmd_vel", Twist, cls.commands.append),
+            rospy.Subscriber("wait/status", GoalStatusArray, cls.on_status),
+        ]
+        cls.addClassCleanup(cls.end_pair)
+        cls.launcher = cls.manipulator = None
+        cls.start_launcher()
+        cls.start_manipulator()
+        cls.client = actionlib.SimpleActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
+        cls.waiting = actionlib.ActionClient("wait", TestAction)
+        assert cls.client.wait_for_server(rospy.Duration(DEADLINE_S)), cls.manipulator.said()
+
+    @classmethod
+    def start_launcher(cls):
+        cls.launcher = Node("rosgraph_manipulator", "rosgraph_launcher", environment=cls.environment)
+
+    @classmethod
+    def start_manipulator(cls):
+        cls.manipulator = Node("rosgraph_manipulator", "rosgraph_manipulator", environment=cls.environment)
+
+    @classmethod
+    def end_pair(cls):
+        for subscriber in cls.subscribers:
+            subscriber.unregister()
+        for node in (cls.manipulator, cls.launcher):
+            if node:
+                node.end()
+
+    @classmethod
+    def on_status(cls, message):
+        cls.server = message._connection_header
+        cls.server_goals = {entry.goal_id.id: entry.status for entry in message.status_list}
+
+    def request(self, name):
+        self.client.send_goal(MvpReconfigurationGoal(name))
+        self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)), f"no result for {name}")
+        return self.client.get_result().result
+
+    @property
+    def text(self):
+        return self.client.get_goal_status_text()
+
+    def is_in(self, name, state):
+        return bool(self.states) and (
+            self.states[-1].functions[0].configuration == name and self.states[-1].functions[0].state == state
+        )
+
+    def wait_for_state(self, name, state="STABLE"):
+        wait_for(lambda: self.is_in(name, state), f"{name} is {state}")
+
+    def forget_goals(self):
+        """Cancel what the server has at work, and wait until it has nothing."""
+
+        def is_idle():
+            return not {GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING} & set(self.server_goals.values())
+
+        if not is_idle():
+            self.waiting.cancel_all_goals()
+            wait_for(is_idle, "the server has nothing to do")
+
+    def send_goal(self):
+        """Send a goal that stays pending; return its id and handle."""
+        self.assertTrue(self.waiting.wait_for_server(rospy.Duration(DEADLINE_S)))
+        return wait_for(self.try_goal, "a goal is at work")
+
+    def try_goal(self):
+        """The goal's topic may not have found a new server yet, and holds nothing back for it."""
+        handle = self.waiting.send_goal(TestGoal(0))
+        goal_id = handle.comm_state_machine.action_goal.goal_id.id
+        deadline = time.monotonic() + 3.0
+        while time.monotonic() < deadline:
+            if self.server_goals.get(goal_id) == GoalStatus.ACTIVE:
+                return goal_id, handle
+            time.sleep(0.02)
+        handle.cancel()
+        return None
+
+    def wait_for_goal(self, goal_id, old_server):
+        """Wait until another server works at the goal."""
+        wait_for(
+            lambda: self.server is not old_server and self.server_goals.get(goal_id) == GoalStatus.ACTIVE,
+            "another server works at the goal",
+        )
+
+    @staticmethod
+    def launched(master=None):
+        """The processes that the launcher at a master has started; its reaper bears no mark."""
+        found = []
+        for process in psutil.process_iter():
+            with contextlib.suppress(psutil.Error):
+                mark = process.environ().get(MARK, "")
+                if mark.startswith(master or rosgraph.get_master_uri()) and process.status() != psutil.STATUS_ZOMBIE:
+                    found.append(process.pid)
+        return found
+
+
+def later(seconds, action):
+    """Do something in a while, in a thread."""
+    timer = threading.Timer(seconds, action)
+    timer.daemon = True
+    timer.start()
+    return timer

@@ -1,0 +1,57 @@
+#!/usr/bin/env python3
+"""The relay before an unmodified server: its clients see one goal, at work from the beginning to the end."""
+
+import actionlib
+import rospy
+import rostest
+from actionlib.msg import TestAction, TestGoal
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from helpers.waiting import DEADLINE_S, wait_for
+from manipulator_harness import PairTest, pid_of
+
+
+class RelayTest(PairTest):
+    manipulator_parameters = {"save_action": "", "settle_time": 0.2, "probation": 0.0}
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.seen = []  # (goal, state) as clients are told
+        rospy.Subscriber("asked/status", GoalStatusArray, cls.on_outer_status)
+        cls.outer = actionlib.ActionClient("asked", TestAction)
+        assert cls.outer.wait_for_server(rospy.Duration(DEADLINE_S))
+
+    @classmethod
+    def on_outer_status(cls, message):
+        cls.seen += [(entry.goal_id.id, entry.status) for entry in message.status_list]
+
+    def setUp(self):
+        self.assertEqual(self.request("slow"), 1, self.manipulator.said())
+
+    def at_work(self):
+        return [goal for goal, status in self.server_goals.items() if status == GoalStatus.ACTIVE]
+
+    def test_goal_goes_on_over_changes_and_deaths_of_its_server(self):
+        handle = self.outer.send_goal(TestGoal(0))
+        goal_id = handle.comm_state_machine.action_goal.goal_id.id
+        wait_for(lambda: len(self.at_work()) == 1, "the server has the goal")
+        for name in ("fast", "slow"):
+            server = self.server
+            self.assertEqual(self.request(name), 1)
+            wait_for(lambda: self.server is not server and len(self.at_work()) == 1, "the next server has the goal")  # noqa: B023
+        self.assertEqual({state for goal, state in self.seen if goal == goal_id}, {GoalStatus.ACTIVE})
+        handle.cancel()
+        wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, "the goal is taken back")
+        self.assertEqual(handle.get_goal_status(), GoalStatus.PREEMPTED)
+        wait_for(lambda: not self.at_work(), "the server has dropped it")
+
+    def test_results_are_passed_on(self):
+        client = actionlib.SimpleActionClient("asked", TestAction)
+        self.assertTrue(client.wait_for_server(rospy.Duration(DEADLINE_S)))
+        self.assertIsNotNone(pid_of("/action_relay"))
+        client.send_goal_and_wait(TestGoal(7), rospy.Duration(DEADLINE_S))
+        self.assertEqual((client.get_state(), client.get_result().result), (GoalStatus.SUCCEEDED, 7))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "manipulator_relay", RelayTest)

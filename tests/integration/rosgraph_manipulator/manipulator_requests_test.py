@@ -1,0 +1,122 @@
+#!/usr/bin/env python3
+"""Requests that cross each other or are taken back, at any moment."""
+
+import random
+import time
+
+import actionlib
+import rospy
+import rostest
+from actionlib_msgs.msg import GoalID, GoalStatus
+from helpers.waiting import DEADLINE_S, wait_for
+from manipulator_harness import CONFIGURATIONS, PairTest, pid_of
+from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
+
+
+class RequestsTest(PairTest):
+    # The manipulator publishes cmd_vel, and no node of the configuration does.
+    configurations = {**CONFIGURATIONS, "mute": {**CONFIGURATIONS["fast"], "topics": ["wait/status", "cmd_vel"]}}
+    manipulator_parameters = {"settle_time": 0.2, "probation": 0.0}
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.requests = actionlib.ActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
+        assert cls.requests.wait_for_server(rospy.Duration(DEADLINE_S))
+
+    def setUp(self):
+        self.assertEqual(self.request("slow"), 1, self.manipulator.said())
+        self.forget_goals()
+
+    def restart_with(self, **parameters):
+        for name, value in parameters.items():
+            rospy.set_param(f"rosgraph_manipulator/{name}", value)
+        self.manipulator.end()
+        type(self).start_manipulator()
+        wait_for(lambda: pid_of("/rosgraph_manipulator") == self.manipulator.pid, "the manipulator is there")
+        # what was said before it heard us is lost, on either topic
+        wait_for(self.is_heard, "it answers")
+        wait_for(lambda: self.requests.pub_cancel.get_num_connections() > 0, "it hears what is taken back")
+
+    def is_heard(self):
+        handle = self.ask("no_such_configuration")
+        try:
+            wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, "an answer", 1.0)
+        except AssertionError:
+            return False
+        return True
+
+    def ask(self, name):
+        return self.requests.send_goal(MvpReconfigurationGoal(name))
+
+    def take_back(self, handle):
+        """Cancel a request. The handle's own cancel would have it wait for ever where the result is there already."""
+        self.requests.pub_cancel.publish(GoalID(id=handle.comm_state_machine.action_goal.goal_id.id))
+
+    @staticmethod
+    def finish(handle):
+        wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, "the request has a result")
+        return handle.get_goal_status(), handle.get_result() and handle.get_result().result
+
+    def test_configuration_without_its_topics_is_not_ready(self):
+        self.restart_with(ready_timeout=10.0)
+        self.addCleanup(self.restart_with, ready_timeout=30.0)
+        self.assertEqual(self.request("mute"), 0)
+        self.assertIn("not all of the topics /cmd_vel, /wait/status are published", self.text)
+        self.wait_for_state("slow")
+
+    def test_requests_wait_for_their_turn(self):
+        self.restart_with(concurrency="wait")
+        first, second = self.ask("fast"), self.ask("slow")
+        self.assertEqual(self.finish(first), (GoalStatus.SUCCEEDED, 1))
+        self.assertEqual(self.finish(second), (GoalStatus.SUCCEEDED, 1))
+        self.wait_for_state("slow")
+
+    def test_waiting_request_can_be_taken_back(self):
+        self.restart_with(concurrency="wait")
+        first, second = self.ask("fast"), self.ask("slow")
+        self.take_back(second)
+        self.assertEqual(self.finish(second)[1], 0)
+        self.assertEqual(self.finish(first), (GoalStatus.SUCCEEDED, 1))
+        self.wait_for_state("fast")
+
+    def test_request_is_refused_while_another_one_runs(self):
+        self.restart_with(concurrency="refuse")
+        first = self.ask("fast")
+        wait_for(lambda: self.is_in("fast", "RECONFIGURING"), "the change has begun")
+        second = self.ask("slow")
+        self.assertEqual(self.finish(second)[0], GoalStatus.REJECTED)
+        self.assertEqual(self.finish(first), (GoalStatus.SUCCEEDED, 1))
+        self.wait_for_state("fast")
+
+    def test_request_replaces_the_one_that_runs(self):
+        self.restart_with(concurrency="replace")
+        goal_id, _ = self.send_goal()
+        hanging = self.ask("hangs")
+        wait_for(lambda: self.launcher_states[-1].configuration == "hangs", "it is being started")
+        server = self.server
+        better = self.ask("fast")
+        self.assertEqual(self.finish(hanging), (GoalStatus.PREEMPTED, 0))
+        self.assertEqual(self.finish(better), (GoalStatus.SUCCEEDED, 1))
+        self.wait_for_goal(goal_id, server)
+
+    def test_request_taken_back_at_any_moment_leaves_one_good_configuration(self):
+        self.restart_with(concurrency="wait")
+        goal_id, _ = self.send_goal()
+        generator = random.Random(6)
+        for number in range(5):
+            running = self.states[-1].functions[0].configuration
+            wanted = "slow" if running == "fast" else "fast"
+            handle = self.ask(wanted)
+            time.sleep(generator.uniform(0.0, 1.2))
+            self.take_back(handle)
+            status, result = self.finish(handle)
+            with self.subTest(number, status=status, result=result):
+                self.assertIn((status, result), [(GoalStatus.PREEMPTED, 0), (GoalStatus.SUCCEEDED, 1)])
+                self.wait_for_state(wanted if result == 1 else running)
+                wait_for(lambda: pid_of("/wait_server"), "a server runs")
+        wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the goal is still at work")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "manipulator_requests", RequestsTest)

@@ -1,0 +1,192 @@
+#!/usr/bin/env python3
+"""Nodes, launcher, manipulator and master die in the middle of everything; the mission comes back, nothing is left."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import rosgraph
+import rospy
+import rostest
+from actionlib_msgs.msg import GoalStatus
+from geometry_msgs.msg import Twist
+from helpers.waiting import DEADLINE_S, wait_for
+from manipulator_harness import Node, PairTest, is_alive, later, pid_of
+from metacontrol_experiments.io.processes import free_port
+from metacontrol_msgs.msg import MvpReconfigurationGoal
+
+
+class SurvivalTest(PairTest):
+    manipulator_parameters = {"probation": 0.0, "settle_time": 0.2}
+    launcher_parameters = {"restart_intensity": 1}
+
+    def setUp(self):
+        self.wait_until_it_serves()
+        self.assertEqual(self.request("slow"), 1, self.manipulator.said())
+        self.forget_goals()
+        wait_for(lambda: GoalStatus.ACTIVE not in self.server_goals.values(), "no goal is at work")
+
+    def kill_server(self):
+        pid = pid_of("/wait_server")
+        os.kill(pid, signal.SIGKILL)
+        return pid
+
+    def restart_launcher(self):
+        self.launcher.wait()
+        self.start_launcher()
+
+    def restart_manipulator(self):
+        self.manipulator.wait()
+        self.start_manipulator()
+
+    def test_node_that_dies_is_started_again_and_works_at_the_goal(self):
+        goal_id, _ = self.send_goal()
+        server, told = self.server, len(self.states)
+        before = self.kill_server()
+        self.wait_for_goal(goal_id, server)
+        self.assertNotEqual(pid_of("/wait_server"), before)
+        wait_for(lambda: self.states[-1].tactic == "recovery", "the recovery is told")
+        self.assertEqual([message.functions[0].state for message in self.states[told:]], ["RECOVERING", "STABLE"])
+
+    def test_node_that_dies_too_often_fails_its_configuration_and_stops_the_robot(self):
+        self.assertEqual(self.request("fast"), 1)  # another configuration starts without deaths
+        self.commands.clear()
+        first = self.kill_server()
+        wait_for(lambda: (pid_of("/wait_server") or first) != first, "it is started again")
+        self.wait_for_state("fast", "STABLE")
+        self.kill_server()
+        self.wait_for_state("fast", "FAILED")
+        self.assertIn("too many", self.states[-1].message)
+        wait_for(lambda: Twist() in self.commands, "the robot is commanded to stop")
+        self.assertEqual(self.launched(), [])
+        self.assertEqual(self.request("fast"), 1)
+
+    def test_killed_launcher_leaves_nothing_behind_and_brings_all_back(self):
+        goal_id, _ = self.send_goal()
+        server, launched = self.server, self.launched()
+        self.assertTrue(launched)
+        self.launcher.end(signal.SIGKILL)
+        wait_for(lambda: not any(map(is_alive, launched)), "its nodes end with it")
+        self.restart_launcher()
+        self.wait_for_goal(goal_id, server)
+        self.wait_for_state("slow")
+
+    def test_killed_manipulator_comes_back_without_touching_what_runs(self):
+        goal_id, _ = self.send_goal()
+        before, server = pid_of("/wait_server"), self.server
+        self.manipulator.end(signal.SIGKILL)
+        self.restart_manipulator()
+        wait_for(lambda: "took over the running configuration" in self.manipulator.said(), "it takes over")
+        self.assertTrue(self.client.wait_for_server(rospy.Duration(DEADLINE_S)))
+        self.assertEqual(pid_of("/wait_server"), before)
+        self.wait_until_it_serves()
+        self.assertEqual(self.request("fast"), 1)
+        self.wait_for_goal(goal_id, server)
+
+    def test_goal_that_ends_while_there_is_no_manipulator_is_not_resurrected(self):
+        goal_id, handle = self.send_goal()
+        server = self.server
+        self.manipulator.end(signal.SIGKILL)
+        handle.cancel()
+        wait_for(lambda: self.server_goals.get(goal_id) != GoalStatus.ACTIVE, "the goal is cancelled")
+        self.restart_manipulator()
+        self.wait_until_it_serves()
+        self.assertEqual(self.request("fast"), 1)
+        wait_for(lambda: self.server is not server, "the new server tells its goals")
+        self.assertNotEqual(self.server_goals.get(goal_id), GoalStatus.ACTIVE)
+
+    def test_manipulator_killed_in_the_middle_of_a_change_finishes_it(self):
+        for delay in (0.05, 0.3):
+            with self.subTest(delay):
+                self.assertEqual(self.request("slow"), 1)
+                goal_id, _ = self.send_goal()
+                server, before = self.server, pid_of("/wait_server")
+                self.client.send_goal(MvpReconfigurationGoal("fast"))
+                wait_for(lambda: self.is_in("fast", "RECONFIGURING"), "the change has begun")
+                time.sleep(delay)
+                self.manipulator.end(signal.SIGKILL)
+                self.restart_manipulator()
+                self.wait_for_state("fast")
+                self.wait_for_goal(goal_id, server)
+                self.assertFalse(is_alive(before))
+                self.wait_until_it_serves()
+                self.forget_goals()
+
+    def test_killed_pair_brings_the_mission_back(self):
+        goal_id, _ = self.send_goal()
+        server = self.server
+        for node in (self.manipulator, self.launcher):
+            node.end(signal.SIGKILL)
+        self.start_launcher()
+        self.start_manipulator()
+        self.wait_for_goal(goal_id, server)
+        self.wait_for_state("slow")
+        self.wait_until_it_serves()
+
+    def test_killed_launcher_in_the_middle_of_a_change_is_waited_for(self):
+        goal_id, _ = self.send_goal()
+        server = self.server
+        self.client.send_goal(MvpReconfigurationGoal("fast"))
+        wait_for(lambda: self.launcher_states[-1].state == "CHANGING", "the change has begun")
+        self.launcher.end(signal.SIGKILL)
+        self.restart_launcher()
+        self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
+        self.assertIn(self.client.get_result().result, (0, 1))
+        self.wait_for_goal(goal_id, server)
+        wait_for(lambda: self.states[-1].functions[0].state == "STABLE", "a configuration is stable")
+
+    def test_lost_master_ends_the_pair_in_one_line_each_and_leaves_nothing(self):
+        port = free_port()
+        folder = tempfile.mkdtemp()
+        environment = {"ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": folder}
+        master = subprocess.Popen(
+            [sys.executable, "-c", f"import rosmaster; rosmaster.rosmaster_main(['--core', '-p', '{port}'])"],
+            env={**os.environ, **environment},
+            stdout=subprocess.DEVNULL,
+        )
+        try:
+            api = rosgraph.Master("/test", environment["ROS_MASTER_URI"])
+            wait_for(lambda: answers(api), "the master answers")
+            api.setParam("/rosgraph_manipulator", rospy.get_param("/rosgraph_manipulator"))
+            launcher = Node("rosgraph_manipulator", "rosgraph_launcher", environment=environment)
+            manipulator = Node("rosgraph_manipulator", "rosgraph_manipulator", environment=environment)
+            mark = environment["ROS_MASTER_URI"]
+            wait_for(lambda: "is deployed" in manipulator.said(), "a configuration is deployed")
+            launched = self.launched(mark)
+            self.assertTrue(launched)
+            later(0.2, master.kill)
+            master.wait(DEADLINE_S)
+            for node, name in ((launcher, "rosgraph_launcher"), (manipulator, "rosgraph_manipulator")):
+                self.assertEqual(node.wait(), 0, node.said())
+                lines = [line for line in node.said().splitlines() if "is gone" in line]
+                self.assertEqual(len(lines), 1, node.said())
+                self.assertTrue(lines[0].startswith(f"/{name}: "), lines)
+                self.assertNotIn("Traceback", node.said())
+            wait_for(lambda: not any(map(is_alive, launched)), "the nodes have ended")
+        finally:
+            master.kill()
+            master.wait(DEADLINE_S)
+
+    def wait_until_it_serves(self):
+        """Wait until the (new) manipulator answers requests: an unknown one is refused at once."""
+        wait_for(lambda: pid_of("/rosgraph_manipulator") == self.manipulator.pid, "the manipulator is there")
+
+        def answers():
+            self.client.send_goal(MvpReconfigurationGoal("no_such_configuration"))
+            return self.client.wait_for_result(rospy.Duration(1)) and self.client.get_result().result == -1
+
+        wait_for(answers, "the manipulator answers")
+
+
+def answers(api):
+    try:
+        return bool(api.getPid())
+    except OSError:
+        return False
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "manipulator_survival", SurvivalTest)

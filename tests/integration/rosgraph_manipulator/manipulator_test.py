@@ -1,0 +1,117 @@
+#!/usr/bin/env python3
+"""The manipulator against real processes: deploying, keeping the goal, rolling back, surviving its launcher."""
+
+import os
+import signal
+import unittest
+
+import actionlib
+import rospy
+import rostest
+from actionlib.msg import TestAction, TestGoal
+from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from helpers.waiting import DEADLINE_S, wait_for
+from manipulator_harness import is_alive, pid_of
+from metacontrol_msgs.msg import ActiveConfiguration, MvpReconfigurationAction, MvpReconfigurationGoal
+
+
+class ManipulatorTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("manipulator_test")
+        cls.active = None
+        cls.server_goals = {}
+        cls.server_count = 0  # servers seen so far
+        cls.status_count = 0  # status messages of the present one
+        rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, cls.on_active)
+        rospy.Subscriber("wait/status", GoalStatusArray, cls.on_status)
+        cls.client = actionlib.SimpleActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
+        assert cls.client.wait_for_server(rospy.Duration(DEADLINE_S))
+
+    @classmethod
+    def on_active(cls, message):
+        cls.active = message.functions[0]
+
+    @classmethod
+    def on_status(cls, message):
+        if message.header.seq <= cls.status_count:  # a new process counts from the start
+            cls.server_count += 1
+        cls.status_count = message.header.seq
+        cls.server_goals = {entry.goal_id.id: entry.status for entry in message.status_list}
+
+    def setUp(self):
+        self.assertEqual(self.request("slow"), 1)
+
+    def request(self, name):
+        self.client.send_goal(MvpReconfigurationGoal(name))
+        self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)), f"no result for {name}")
+        return self.client.get_result().result
+
+    def change_to(self, name):
+        """Deploy a configuration, and wait until its server has told its goals three times."""
+        before = self.server_count
+        self.assertEqual(self.request(name), 1)
+        wait_for(lambda: self.server_count > before and self.status_count >= 3, "the new server tells its goals")
+
+    def is_stable(self, name):
+        return self.active.configuration == name and self.active.state == "STABLE"
+
+    def test_request_replaces_the_nodes_and_says_so(self):
+        before = pid_of("/wait_server")
+        self.assertEqual(self.request("fast"), 1)
+        wait_for(lambda: self.is_stable("fast"), "fast is stable")
+        self.assertEqual(self.active.function, "f_navigate")
+        self.assertNotEqual(pid_of("/wait_server"), before)
+        self.assertFalse(is_alive(before))
+        self.assertEqual(rospy.get_param("/wait_server/period"), "fast")
+
+    def test_keys_of_the_file_become_parameters_as_published(self):
+        command = "roslaunch metacontrol_tests server.launch period:=fast"
+        self.assertEqual(rospy.get_param("/configurations/fast/command"), command)
+        self.assertEqual(rospy.get_param("/save_action"), "wait")
+
+    def test_running_configuration_is_left_alone(self):
+        before = pid_of("/wait_server")
+        self.assertEqual(self.request("slow"), 1)
+        self.assertEqual(pid_of("/wait_server"), before)
+
+    def test_unknown_configuration_is_refused(self):
+        self.assertEqual(self.request("no_such_configuration"), -1)
+        self.assertIn("no_such_configuration", self.client.get_goal_status_text())
+
+    def test_configuration_that_does_not_come_up_is_rolled_back(self):
+        for name in ("exits", "malformed"):
+            with self.subTest(name):
+                self.assertEqual(self.request(name), 0)
+                wait_for(lambda: self.is_stable("slow"), "slow is restored")
+                self.assertIsNotNone(pid_of("/wait_server"))
+
+    def test_pending_goal_reaches_the_new_server_with_its_id(self):
+        client = actionlib.ActionClient("wait", TestAction)
+        self.assertTrue(client.wait_for_server(rospy.Duration(DEADLINE_S)))
+        handle = client.send_goal(TestGoal(0))
+        goal_id = handle.comm_state_machine.action_goal.goal_id.id
+        wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the goal is active")
+        self.change_to("fast")
+        self.assertEqual(self.server_goals.get(goal_id), GoalStatus.ACTIVE)
+        client.cancel_all_goals()
+        wait_for(lambda: self.server_goals.get(goal_id) != GoalStatus.ACTIVE, "the goal is cancelled")
+
+    def test_finished_goal_is_not_resurrected(self):
+        client = actionlib.SimpleActionClient("wait", TestAction)
+        self.assertTrue(client.wait_for_server(rospy.Duration(DEADLINE_S)))
+        client.send_goal_and_wait(TestGoal(7), rospy.Duration(DEADLINE_S))
+        self.assertEqual(client.get_result().result, 7)
+        self.change_to("fast")
+        self.assertEqual(self.server_goals, {})
+
+    def test_killed_launcher_takes_its_nodes_along_and_brings_the_configuration_back(self):
+        before = pid_of("/wait_server")
+        os.kill(pid_of("/rosgraph_launcher"), signal.SIGKILL)
+        wait_for(lambda: not is_alive(before), "the launched node died with its launcher")
+        wait_for(lambda: (pid_of("/wait_server") or before) != before, "the node was started again")
+        wait_for(lambda: self.is_stable("slow"), "slow is stable again")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "manipulator", ManipulatorTest)

@@ -1,0 +1,3 @@
+"""Synthetic bags of missions as fixtures."""
+
+from helpers.mission_bags import bag, mission_bag  # noqa: F401

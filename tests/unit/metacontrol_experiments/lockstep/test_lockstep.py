@@ -1,0 +1,155 @@
+"""Missions in lockstep: deterministic, driven by the same cores as on ROS."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from metacontrol_bags.metrics import summarise
+from metacontrol_experiments.cli import main as cli
+from metacontrol_experiments.contingency.contingency import parse_contingency
+from metacontrol_experiments.lockstep.frames import KEPT_S, Frames
+from metacontrol_experiments.lockstep.lockstep import Lockstep, LockstepError, navigation_parameters
+from metacontrol_experiments.mission.mission import Outcome
+from metacontrol_experiments.mission.routes import Pose, Route
+from metacontrol_experiments.mission.settings import Settings
+from pybullet_simulator.robot.robot import Robot
+from robot_formulas.geometry import Pose as SimPose
+
+PACKAGE = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_sim"
+WAY = Route("short", Pose(-8.0, -8.0, 0.78), Pose(-5.0, -5.6, 0.0))
+FAR = Route("far", Pose(-8.0, -8.0, 0.78), Pose(5.4, 6.0, 0.0))
+
+
+def settings(tmp_path, *texts, **changes):
+    usual = {"metacontrol": False, "contingencies": tuple(map(parse_contingency, texts)), "timeout_s": 60.0}
+    return Settings(**({"route": WAY, "output": tmp_path} | usual | changes))
+
+
+def test_frames_answer_as_tf_does():
+    frames = Frames(Robot())
+    assert frames.lookup("map", "base_link", None) is None and frames.newest("map", "odom") is None
+    frames.add(1.0, SimPose(1.0, 0.0, 0.0), SimPose(0.0, 2.0, math.pi / 2))
+    frames.add(1.02, SimPose(1.0, 0.0, 0.0), SimPose(0.0, 3.0, math.pi / 2))
+    assert frames.lookup("map", "base_link", 1.0)[:2, 3] == pytest.approx([1.0, 2.0])
+    assert frames.lookup("map", "front_laser", None)[:3, 3] == pytest.approx([1.0, 3.393, 0.18])
+    assert frames.lookup("odom", "map", 1.0)[:2, 3] == pytest.approx([-1.0, 0.0])
+    assert frames.lookup("map", "base_link", 1.03) is None and frames.lookup("map", "base_link", 0.9) is None
+    assert frames.lookup("map", "nowhere", None) is None and frames.newest("map", "nowhere") is None
+    assert frames.newest("map", "camera_link") == 1.02
+    assert frames.newest("base_link", "camera_link") == math.inf
+
+
+def test_frames_forget_what_is_old():
+    frames = Frames(Robot())
+    for tick in range(int(3 * KEPT_S * 10)):
+        frames.add(tick / 10, SimPose(0.0, 0.0, 0.0), SimPose(0.0, 0.0, 0.0))
+    assert frames.lookup("map", "odom", 0.1) is None
+    assert frames.lookup("map", "odom", 3 * KEPT_S - 5.0) is not None
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "models/variants").glob("*.rossystem")), ids=lambda path: path.stem)
+def test_every_variant_has_its_own_parameters(path):
+    parameters = navigation_parameters(PACKAGE, path.stem)
+    frequency, speed, radius = ((15, 20, 25), (0.3, 0.5, 0.75), (0.5, 0.65, 0.8))
+    numbers = [int(part[1]) - 1 for part in path.stem.split("_")[:3]]
+    assert parameters.controller_frequency == frequency[numbers[0]]
+    assert parameters.controller.max_vel_x == speed[numbers[1]]
+    for costmap in (parameters.global_costmap, parameters.local_costmap):
+        assert [layer.inflation_radius for layer in costmap.layers if layer.kind == "inflation"] == [radius[numbers[2]]]
+        kind = "PointCloud2" if path.stem.endswith("_k") else "LaserScan"
+        assert [source.data_type for source in costmap.sources] == [kind]
+
+
+def test_mission_reaches_its_goal_and_repeats_byte_for_byte(tmp_path):
+    one = Lockstep(settings(tmp_path, "clutter:2", "power:1.4@time:3"), PACKAGE).run()
+    assert one.state.outcome is Outcome.REACHED
+    summary = summarise(one.record)
+    assert summary["engine"] == "lockstep" and summary["goal_reached"] and summary["collisions"] == 0
+    assert summary["control"] == {"rate_hz": 20.0, "periods_missed": 0.0}
+    assert [entry["name"] for entry in summary["perturbations"]] == ["clutter:2", "power:1.4"]
+    assert summary["contingency"] == {"clutter": 2, "power": 1.4, "component": None}
+    assert one.log == Lockstep(settings(tmp_path, "clutter:2", "power:1.4@time:3"), PACKAGE).run().log
+    other = Lockstep(settings(tmp_path, "clutter:2", "power:1.4@time:3", seed=2), PACKAGE).run()
+    assert other.log != one.log
+
+
+def test_baseline_stands_still_when_its_laser_dies(tmp_path):
+    outcome = Lockstep(settings(tmp_path, "kill:front_laser@time:3", timeout_s=10.0), PACKAGE).run()
+    assert outcome.state.outcome is Outcome.TIMEOUT
+    late = outcome.record.poses[outcome.record.poses[:, 0] > outcome.state.started_s + 6.0, 1:]
+    assert np.ptp(late, axis=0).max() < 0.01
+
+
+def test_meta_controller_goes_on_with_the_camera_and_repeats_byte_for_byte(tmp_path):
+    asked = settings(tmp_path, "kill:front_laser@time:2", metacontrol=True)
+    one = Lockstep(asked, PACKAGE).run()
+    assert one.state.outcome is Outcome.REACHED
+    summary = summarise(one.record)
+    (change,) = [entry for entry in summary["reconfigurations"] if entry["trigger"] == "component:front_laser"]
+    assert change["to"].endswith("_k") and summary["final_configuration"].endswith("_k")
+    assert 0.0 < change["detect_s"] < 1.0 and 0.0 <= change["decide_s"] < 1.0 and 0.5 < change["execute_s"] < 5.0
+    assert one.log == Lockstep(asked, PACKAGE).run().log
+
+
+def test_energy_over_its_limit_is_answered_without_a_stop(tmp_path):
+    changes = {"route": FAR, "initial_configuration": "f3_v3_r1", "timeout_s": 12.0}
+    asked = settings(tmp_path, "power:2.5@time:1", metacontrol=True, **changes)
+    record = Lockstep(asked, PACKAGE).run().record
+    change = next(entry for entry in summarise(record)["reconfigurations"] if entry["trigger"] == "qa:energy")
+    assert change["execute_s"] < 1.0
+    began = record.start_stamp + change["stamp_s"]
+    during = record.poses[(record.poses[:, 0] > began) & (record.poses[:, 0] < began + 1.0), 1:]
+    assert np.hypot(*(during[-1] - during[0])) > 0.1
+
+
+def test_frozen_laser_that_thaws_is_waited_for(tmp_path):
+    outcome = Lockstep(settings(tmp_path, "freeze:front_laser@time:2", "thaw:front_laser@time:6"), PACKAGE).run()
+    assert outcome.state.outcome is Outcome.REACHED
+
+
+def test_laser_that_repeats_itself_is_not_believed_until_it_thaws(tmp_path):
+    strikes = ("repeat:front_laser@time:2", "thaw:front_laser@time:8")
+    outcome = Lockstep(settings(tmp_path, *strikes), PACKAGE).run()
+    assert outcome.state.outcome is Outcome.REACHED
+    seconds = outcome.record.poses[:, 0] - outcome.state.started_s
+    standing = outcome.record.poses[(seconds > 4.0) & (seconds < 8.0), 1:]
+    assert len(standing) > 100 and np.ptp(standing, axis=0).max() < 0.01
+
+
+def test_laser_whose_stamps_jump_still_leads_to_the_goal(tmp_path):
+    outcome = Lockstep(settings(tmp_path, "jump:front_laser@time:2"), PACKAGE).run()
+    assert outcome.state.outcome is Outcome.REACHED
+    assert summarise(outcome.record)["collisions"] == 0
+
+
+def test_camera_variant_drives(tmp_path):
+    camera = settings(tmp_path, initial_configuration="f2_v1_r3_k")
+    assert Lockstep(camera, PACKAGE).run().state.outcome is Outcome.REACHED
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"contingencies": (parse_contingency("kill:battery_load_control"),)}, "in lockstep there are only"),
+        ({"route": Route("bad", Pose(-10.0, 0.0), Pose(0.0, 0.0))}, "puts the robot into"),
+    ],
+)
+def test_what_lockstep_cannot_do_is_refused(tmp_path, changes, said):
+    with pytest.raises(LockstepError, match=said):
+        Lockstep(replace(settings(tmp_path), **changes), PACKAGE)
+
+
+def test_command_leaves_log_summary_and_figure(tmp_path):
+    (tmp_path / "routes.yaml").write_text("short: {start: [-8, -8, 0.78], goal: [-5, -5.6]}\n")
+    arguments = ["run", "--engine", "lockstep", "--no-metacontrol", "--failure", "none", "--route", "short"]
+    files = ["--routes", str(tmp_path / "routes.yaml"), "--output", str(tmp_path / "out")]
+    result = CliRunner().invoke(cli.metacontrol, [*arguments, *files])
+    assert result.exit_code == 0, result.output
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"mission.log", "summary.json", "mission.png"}
+    refused = CliRunner().invoke(cli.metacontrol, [*arguments, *files, "--contingency", "kill:simulator"])
+    assert refused.exit_code == 2 and "in lockstep there are only" in refused.output
+    refused = CliRunner().invoke(cli.metacontrol, [*arguments, *files, "--rviz"])
+    assert refused.exit_code == 2 and "has no window" in refused.output

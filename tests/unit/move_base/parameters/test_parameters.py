@@ -1,0 +1,124 @@
+"""Parameters: published names and defaults, one clear error per mistake."""
+
+import pytest
+from move_base.parameters.parameters import DEFAULT_UPDATE_PERIOD, read_parameters
+from move_base.parameters.tree import ParameterError
+
+
+def test_base_file_of_d2_loads(tree):
+    parameters = read_parameters(tree())
+    assert parameters.controller.max_vel_x == 0.5
+    assert [layer.kind for layer in parameters.global_costmap.layers] == ["static", "obstacle", "inflation"]
+    assert [source.topic for source in parameters.local_costmap.sources] == ["front/scan"]
+    assert parameters.local_costmap.padded_footprint().max(axis=0) == pytest.approx([0.58, 0.5])
+
+
+def test_whole_numbers_are_taken_for_real_ones(tree):
+    assert read_parameters(tree(controller_frequency=15)).controller_frequency == 15.0
+
+
+def test_several_sources_are_read(tree):
+    parameters = read_parameters(tree(local_costmap__obstacles_layer__observation_sources="scan point_cloud"))
+    assert [source.data_type for source in parameters.local_costmap.sources] == ["LaserScan", "PointCloud2"]
+
+
+def test_layer_that_is_not_enabled_is_not_used(tree):
+    off = read_parameters(tree(local_costmap__obstacles_layer__enabled=False)).local_costmap
+    assert off.sources == ()
+
+
+def test_footprint_may_be_a_text(tree):
+    text = "[[0.3, 0.2], [0.3, -0.2], [-0.3, 0.0]]"
+    assert read_parameters(tree(local_costmap__footprint=text)).local_costmap.footprint[0] == (0.3, 0.2)
+
+
+def test_radius_replaces_an_empty_footprint(tree):
+    footprint = read_parameters(
+        tree(local_costmap__footprint=[], local_costmap__robot_radius=0.3)
+    ).local_costmap.footprint
+    assert len(footprint) == 16
+    assert footprint[0] == pytest.approx((0.3, 0.0))
+
+
+def test_lateral_samples_may_be_a_text(tree):
+    parameters = read_parameters(tree(TrajectoryPlannerROS__y_vels="[-0.2, 0.2]"))
+    assert parameters.controller.y_vels == (-0.2, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("former", "name", "value"),
+    [
+        ("max_rotational_vel", "max_vel_theta", 0.7),
+        ("min_in_place_rotational_vel", "min_in_place_vel_theta", 0.3),
+        ("acc_lim_th", "acc_lim_theta", 2.0),
+        ("backup_vel", "escape_vel", -0.2),
+        ("pdist_scale", "path_distance_bias", 0.9),
+        ("gdist_scale", "goal_distance_bias", 0.4),
+    ],
+)
+def test_former_names_are_understood_and_yield_to_the_present_ones(tree, former, name, value):
+    given = tree()
+    given["TrajectoryPlannerROS"].pop(name, None)
+    given["TrajectoryPlannerROS"][former] = value
+    assert getattr(read_parameters(given).controller, name) == value
+    given["TrajectoryPlannerROS"][name] = 2 * value
+    assert getattr(read_parameters(given).controller, name) == 2 * value
+
+
+def test_missing_update_period_gets_the_documented_one(tree):
+    changed = tree()
+    del changed["local_costmap"]["obstacles_layer"]["scan"]["expected_update_rate"]
+    (source,) = read_parameters(changed).local_costmap.sources
+    assert source.expected_update_rate == DEFAULT_UPDATE_PERIOD
+
+
+@pytest.mark.parametrize(
+    ("samples", "limits", "expected"),
+    [
+        ([-0.3, 0.3], {"max_vel_y": 0.2}, (-0.2, 0.2)),
+        ([-0.3, 0.3], {"max_vel_y": 0.5, "min_vel_y": -0.1}, (-0.1, 0.3)),
+        ([-0.3, -0.1, 0.1, 0.3], {"max_vel_y": 0.5, "min_vel_y": 0.2}, (-0.3, 0.3)),
+    ],
+)
+def test_lateral_limits_clip_the_samples(tree, samples, limits, expected):
+    changes = {f"TrajectoryPlannerROS__{name}": value for name, value in limits.items()}
+    parameters = read_parameters(tree(TrajectoryPlannerROS__y_vels=samples, **changes))
+    assert parameters.controller.y_vels == expected
+
+
+def test_costmap_that_no_memory_holds_is_refused(tree):
+    size = {f"local_costmap__{name}": value for name, value in (("width", 900.0), ("height", 900.0))}
+    with pytest.raises(ParameterError, match=r"local_costmap/resolution: gives the costmap over 50,000,000 cells"):
+        read_parameters(tree(local_costmap__resolution=0.01, **size))
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "rule"),
+    [
+        ("controller_frequency", "fast", "must be a number"),
+        ("controller_frequency", True, "must be a number"),
+        ("controller_frequency", 0.0, "must be at least 0.1"),
+        ("planner_patience", float("nan"), "must be a number"),
+        ("TrajectoryPlannerROS__max_vel_x", -0.5, "must be over 0"),
+        ("TrajectoryPlannerROS__min_vel_x", 0.6, "must not be over max_vel_x"),
+        ("TrajectoryPlannerROS__vx_samples", 2.5, "must be a whole number"),
+        ("TrajectoryPlannerROS__y_vels", [0.1, "left"], "must be a list of numbers"),
+        ("TrajectoryPlannerROS__y_vels", "to the left", "must be a list of numbers"),
+        ("TrajectoryPlannerROS__y_vels", [float("inf")], "must be a list of finite numbers"),
+        ("TrajectoryPlannerROS", 3, "must be a group of parameters"),
+        ("global_costmap__inflater_layer__inflation_radius", float("inf"), "must be finite"),
+        ("global_costmap__plugins", [], "must list the layers"),
+        ("global_costmap__plugins", [{"name": "a", "type": "b"}], "unknown type; known are costmap_2d::StaticLayer"),
+        ("global_costmap__footprint", [[1.0, 2.0]], "at least three"),
+        ("global_costmap__footprint", "round", "list of [x, y] corners"),
+        ("local_costmap__rolling_window", "yes", "must be true or false"),
+        ("local_costmap__obstacles_layer__observation_sources", "sonar", "has no parameters"),
+        ("local_costmap__obstacles_layer__observation_sources", "scan scan", "names a source twice"),
+        ("local_costmap__obstacles_layer__scan__data_type", "Image", "must be LaserScan or PointCloud2"),
+    ],
+)
+def test_mistake_is_named(tree, path, value, rule):
+    with pytest.raises(ParameterError) as error:
+        read_parameters(tree(**{path: value}))
+    assert path.split("__")[-1] in str(error.value)
+    assert rule in str(error.value)

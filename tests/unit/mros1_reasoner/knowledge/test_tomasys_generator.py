@@ -1,0 +1,73 @@
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.knowledge.model import Direction, Quality
+from mros1_reasoner.knowledge.tomasys_generator import generate
+from ros_model.generators import find_generators
+from ros_model.project.project import load_project
+
+SOURCES = Path(__file__).parents[4] / "catkin_ws" / "src"
+D2 = SOURCES / "metacontrol_sim" / "models"
+
+
+@pytest.fixture(scope="module")
+def project():
+    return load_project(D2)
+
+
+@pytest.fixture
+def written(project, tmp_path):
+    (path,) = generate(project, tmp_path)
+    return path
+
+
+def test_generator_is_found_through_the_export(project, tmp_path):
+    (path,) = find_generators()["tomasys"](project, tmp_path)
+    assert path == tmp_path / "models" / "d2.owl"
+
+
+def test_committed_model_is_the_generated_one(written):
+    assert written.read_text() == (D2 / "d2.owl").read_text(), "run rosmodel generate tomasys"
+
+
+def test_every_variant_is_a_design_with_its_levels_and_components(project, written):
+    knowledge_base = KnowledgeBase([written])
+    assert set(knowledge_base.designs) == {variant.name for variant in project.variants}
+    required = project.required_components()
+    for variant in project.variants:
+        design = knowledge_base.designs[variant.name]
+        assert design.function == "f_navigate"
+        assert design.expected == variant.expected_qas
+        assert design.components == required[variant.name]
+
+
+def test_laser_variants_require_the_laser_and_camera_variants_the_camera(written):
+    designs = KnowledgeBase([written]).designs.values()
+    assert all(("front_laser" in d.components) != d.name.endswith("_k") for d in designs)
+    assert all(("camera" in d.components) == d.name.endswith("_k") for d in designs)
+
+
+def test_objectives_and_directions_are_those_of_metacontrol_yaml(written):
+    knowledge_base = KnowledgeBase([written])
+    assert [(o.name, o.function, dict(o.limits)) for o in knowledge_base.objectives] == [
+        ("o_navigate", "f_navigate", {"safety": 0.6, "energy": 0.62})
+    ]
+    assert knowledge_base.qualities["performance"].direction is Direction.HIGHER_IS_BETTER
+    assert knowledge_base.qualities["energy"].direction is Direction.LOWER_IS_BETTER
+
+
+def test_ranges_and_comparisons_are_those_of_metacontrol_yaml(project, tmp_path):
+    settings = {**project.settings, "quality_attributes": {**project.settings["quality_attributes"]}}
+    settings["quality_attributes"]["energy"] = {
+        "direction": "lower_is_better",
+        "range": [0.0, 2.5],
+        "reaching_violates": True,
+    }
+    settings["objectives"] = {"o_go": {"function": "f_navigate", "always_improve": True}}
+    (path,) = generate(replace(project, settings=settings), tmp_path)
+    knowledge_base = KnowledgeBase([path])
+    assert knowledge_base.qualities["energy"] == Quality(Direction.LOWER_IS_BETTER, True, 0.0, 2.5)
+    assert knowledge_base.qualities["safety"] == Quality(Direction.LOWER_IS_BETTER, False, 0.0, 1.0)
+    assert knowledge_base.objectives[0].always_improve is True

@@ -1,0 +1,277 @@
+"""Functions that require functions, on the model of a dual-arm mobile manipulator that builds a pyramid (D1)."""
+
+import pytest
+from hierarchy_helpers import D1, PICK_AND_PLACE, model
+from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.knowledge.model import Objective
+from mros1_reasoner.loop.mape import Mape, MapeError
+from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.planning.decision import DECIDED, EXECUTED, FAILED
+
+
+class Robot:
+    """A loop whose decisions are carried out at once, but for designs that do not come up."""
+
+    def __init__(self, core, broken=()):
+        self.core, self.broken, self.now = core, set(broken), 0.0
+
+    def run(self, seconds=0.0):
+        """Let time pass, and carry out what is decided; return (objective, configuration, state) of everything."""
+        done, self.now = [], self.now + seconds
+        for _ in range(20):
+            decisions = self.core.step(self.now)
+            for decision in decisions:
+                state = decision.state
+                if state == DECIDED:
+                    ok = decision.to_configuration not in self.broken
+                    state = self.core.report(self.now, decision.id, ok, "it did not come up").state
+                done.append((decision.objective, decision.to_configuration, state))
+            if not decisions:
+                due = self.core.due(self.now)
+                if due is None or due > self.now + 2.0:
+                    return done
+                self.now = due
+        raise AssertionError(f"it does not come to rest: {done}")
+
+    @property
+    def groundings(self):
+        return {name: running for name, running in self.core.facts.groundings.items() if name in self.core.objectives}
+
+
+@pytest.fixture
+def make(load, pellet):
+    """Return a function that makes a robot that has a model and objectives, and nothing deployed."""
+
+    def make(objectives=(PICK_AND_PLACE,), broken=(), text=None, **settings):
+        knowledge_base = load(text or model())
+        pellet.load(knowledge_base.ontology)
+        return Robot(Mape(knowledge_base, pellet, objectives, Settings(start_grace=0.0, **settings)), broken)
+
+    return make
+
+
+@pytest.fixture
+def one_arm(make):
+    """Return a robot on which FD1 runs, with the functions that it requires."""
+    robot = make(desired="FD1")
+    robot.run()
+    return robot
+
+
+def test_grounding_a_root_grounds_what_it_requires_the_deepest_first(make):
+    robot = make(desired="FD1")
+    assert robot.run() == [
+        ("o_F2", "FD2.1", EXECUTED),
+        ("o_F1", "FD1.1", EXECUTED),
+        ("o_build", "FD1", EXECUTED),
+    ]
+    assert robot.groundings == {"o_build": "FD1", "o_F1": "FD1.1", "o_F2": "FD2.1"}
+    assert robot.core.facts.requires["o_build"] == ("o_F1",)
+
+
+def test_decision_about_a_requirement_says_what_it_is_for(make):
+    core = make(desired="FD1").core
+    (decision,) = core.step(0.0)
+    assert (decision.trigger, decision.from_configuration) == ("initial", "")
+    assert "o_build: no configuration runs: o_F2: nothing -> FD2.1, which FD1 of o_build requires" in (
+        decision.explanation
+    )
+
+
+def test_design_without_requirements_is_grounded_alone(make):
+    robot = make()
+    assert robot.run() == [("o_build", "FD2", EXECUTED)]
+    assert set(robot.core.objectives) == {"o_build"}
+
+
+def test_scenario_1_tag_is_not_found_under_the_present_light(one_arm):
+    one_arm.core.observe_task(one_arm.now, "F2", True, message="no tag is seen")
+    assert one_arm.run() == [("o_F2", "FD2.2", EXECUTED)]
+    assert one_arm.groundings == {"o_build": "FD1", "o_F1": "FD1.1", "o_F2": "FD2.2"}
+    # The light changes back while the error log holds the other camera settings no longer.
+    one_arm.run(seconds=100.0)
+    one_arm.core.observe_task(one_arm.now, "o_F2", True)
+    assert one_arm.run() == [("o_F2", "FD2.1", EXECUTED)]
+
+
+def test_scenario_2_blocked_arm_makes_the_base_move(make):
+    robot = make()
+    robot.run()
+    robot.core.observe_component(1.0, "left_arm", "FALSE")
+    assert robot.run(seconds=1.0) == [
+        ("o_F2", "FD2.1", EXECUTED),
+        ("o_F1", "FD1.1", EXECUTED),
+        ("o_build", "FD1", EXECUTED),
+    ]
+
+
+def test_error_of_a_leaf_climbs_in_the_ontology(one_arm):
+    one_arm.core.pause()
+    one_arm.core.observe_task(one_arm.now, "o_F2", True)
+    one_arm.run(seconds=1.0)
+    assert {o.status for o in one_arm.core.analysis.objectives.values()} == {v.IN_ERROR_NFR}
+
+
+def test_only_when_no_design_of_the_leaf_is_left_the_error_climbs(one_arm):
+    for expected in ([("o_F2", "FD2.2", EXECUTED)], [("o_build", "FD2", EXECUTED)]):
+        one_arm.core.observe_task(one_arm.now, "o_F2", True)
+        assert one_arm.run(seconds=1.0) == expected
+    assert set(one_arm.core.objectives) == {"o_build"}, "what FD1 required is released"
+
+
+def test_decision_that_climbs_names_what_failed_and_what_is_released(one_arm):
+    core = one_arm.core
+    core.observe_component(1.0, "rgbd", "FALSE")
+    (decision,) = core.step(1.0)
+    assert (decision.objective, decision.to_configuration) == ("o_build", "FD2")
+    assert decision.trigger == "component:rgbd"
+    assert decision.reasons[0].rules == "compError, compErrFG, S1a, S6b"
+    assert decision.releases == ("o_F1", "o_F2")
+    refused = {c.design.name: c.refused_because for c in decision.candidates}
+    assert refused["FD1"] == "requires F1, which no design can provide now"
+
+
+def test_leaf_that_cannot_be_helped_is_told_once_where_nothing_above_helps(one_arm):
+    one_arm.core.observe_component(1.0, "left_arm", "FALSE")
+    one_arm.core.observe_component(1.0, "rgbd", "FALSE")
+    assert one_arm.run(seconds=1.0) == [("o_F2", "", FAILED)]
+    assert one_arm.run(seconds=1.0) == []
+    assert one_arm.groundings == {"o_build": "FD1", "o_F1": "FD1.1", "o_F2": "FD2.1"}
+
+
+def test_requirement_that_does_not_come_up_gives_way_to_another_then_to_another_root_design(make):
+    robot = make(broken=["FD2.1", "FD2.2"], text=model(components={"left_arm": ("FD2",)}), desired="FD1")
+    assert robot.run(seconds=1.0) == [
+        ("o_F2", "FD2.1", FAILED),
+        ("o_F2", "FD2.2", FAILED),
+        ("o_build", "FD2", EXECUTED),
+    ]
+    assert set(robot.core.objectives) == {"o_build"}
+
+
+def test_root_in_trouble_itself_goes_before_its_leaf(one_arm):
+    one_arm.core.observe_task(one_arm.now, "o_F2", True)
+    one_arm.core.observe_component(1.0, "base", "FALSE")
+    assert one_arm.run(seconds=1.0) == [("o_build", "FD2", EXECUTED)]
+
+
+def test_failed_task_of_a_root_objective_is_a_violation(make):
+    robot = make()
+    robot.run()
+    robot.core.observe_task(3.0, "", True, stamp=2.5, message="goal aborted")
+    (decision,) = robot.core.step(3.0)
+    assert decision.trigger == "task:o_build"
+    assert decision.causes == ("the task failed: goal aborted",)
+    assert decision.stamp_monitored == 2.5
+    assert robot.core.analysis.objectives["o_build"].status == v.IN_ERROR_NFR
+    assert decision.to_configuration == "FD2.1"
+
+
+def test_failed_task_is_forgotten_when_it_goes_on(one_arm):
+    one_arm.core.observe_task(one_arm.now, "o_build", True)
+    one_arm.core.observe_task(one_arm.now, "o_build", False)
+    assert one_arm.run(seconds=1.0) == []
+
+
+def test_task_that_nobody_knows_is_refused(make):
+    core = make().core
+    with pytest.raises(MapeError, match="known: o_build"):
+        core.observe_task(1.0, "o_fly", True)
+    with pytest.raises(MapeError, match="nothing is deployed for it"):
+        core.observe_task(1.0, "o_build", True)
+
+
+def test_several_roots_are_served_and_share_what_they_require(make):
+    designs = {**D1, "FD3": ("F3", 0.5, ("F2",))}
+    robot = make([PICK_AND_PLACE, Objective("o_look", "F3")], text=model(designs, {}), broken=["FD2"])
+    done = robot.run(seconds=1.0)
+    assert ("o_look", "FD3", EXECUTED) in done
+    assert [entry for entry in done if entry[0] == "o_F2"] == [("o_F2", "FD2.1", EXECUTED)]
+    assert robot.groundings == {"o_build": "FD1", "o_F1": "FD1.1", "o_F2": "FD2.1", "o_look": "FD3"}
+    robot.core.remove_objective("o_look")
+    robot.run(seconds=1.0)
+    assert set(robot.core.objectives) == {"o_build", "o_F1", "o_F2"}
+    robot.core.remove_objective("o_build")
+    robot.run(seconds=1.0)
+    assert robot.core.objectives == {}
+
+
+def test_root_objective_that_another_root_requires_stays_when_that_one_lets_go(make):
+    robot = make([PICK_AND_PLACE, Objective("o_see", "F2", {"error": 0.5})], desired="FD1")
+    robot.run()
+    assert set(robot.core.objectives) == {"o_build", "o_F1", "o_see"}
+    robot.core.observe_component(1.0, "base", "FALSE")
+    assert robot.run(seconds=1.0) == [("o_build", "FD2", EXECUTED)]
+    assert robot.groundings == {"o_build": "FD2", "o_see": "FD2.1"}
+
+
+def test_what_runs_at_the_start_is_taken_over_with_everything_it_requires(make):
+    robot = make()
+    for function, design in (("F2", "FD2.2"), ("F0", "FD1"), ("F1", "FD1.1")):
+        robot.core.observe_active(0.0, function, design, "STABLE")
+    assert robot.run() == []
+    assert robot.groundings == {"o_build": "FD1", "o_F1": "FD1.1", "o_F2": "FD2.2"}
+
+
+def test_requirement_that_nobody_has_deployed_is_grounded(make):
+    robot = make()
+    robot.core.observe_active(0.0, "F0", "FD1", "STABLE")
+    assert robot.run() == [("o_F2", "FD2.1", EXECUTED), ("o_F1", "FD1.1", EXECUTED)]
+
+
+def test_locked_requirement_keeps_the_root_as_it_is(one_arm):
+    one_arm.core.lock("o_F2")
+    one_arm.core.observe_task(one_arm.now, "o_F2", True)
+    assert one_arm.run(seconds=1.0) == [("o_F2", "", FAILED)]
+    one_arm.core.unlock("o_F2")
+    assert one_arm.run(seconds=1.0) == [("o_F2", "FD2.2", EXECUTED)]
+
+
+def test_violated_limit_of_a_root_is_not_blamed_on_its_requirements(make):
+    robot = make([Objective("o_build", "F0", {"error": 0.5})], desired="FD1")
+    robot.run()
+    done = []
+    for now in (10.0, 11.0, 12.0):
+        robot.core.observe_level(now, "error", 0.9, "fg_o_build_FD1")
+        done += robot.run(seconds=now - robot.now)
+    assert done == [("o_build", "FD2", EXECUTED)]
+
+
+def test_feasible_heeds_requirements(make):
+    core = make().core
+    core.step(0.0)
+    assert core.feasible() == {"F0": ("FD2", "FD1"), "F1": ("FD1.1",), "F2": ("FD2.1", "FD2.2")}
+    core.observe_component(1.0, "rgbd", "FALSE")
+    assert core.feasible() == {"F0": ("FD2",), "F1": (), "F2": ()}
+
+
+def test_saved_knowledge_base_asks_for_the_root_only(one_arm, tmp_path):
+    one_arm.core.observe_task(one_arm.now, "o_F2", True)
+    one_arm.core.pause()
+    one_arm.run(seconds=1.0)
+    one_arm.core.save(tmp_path / "saved.owl")
+    again = KnowledgeBase([tmp_path / "saved.owl"])
+    assert again.objectives == (PICK_AND_PLACE,)
+    assert again.designs["FD1"].requires == ("F1",)
+    text = (tmp_path / "saved.owl").read_text()
+    assert "requiresO" in text
+    assert "IN_ERROR_NFR" in text
+
+
+def test_requirement_whose_configuration_has_failed_before_is_replaced_when_it_is_needed(make):
+    robot = make()
+    robot.core.observe_active(0.0, "F2", "FD2.1", "FAILED")
+    robot.core.observe_active(0.0, "F0", "FD1", "STABLE")
+    robot.core.observe_active(0.0, "F1", "FD1.1", "STABLE")
+    (decision,) = robot.core.step(5.0)
+    assert (decision.objective, decision.trigger, decision.to_configuration) == ("o_F2", "component:FD2.1", "FD2.2")
+    assert decision.stamp_monitored == 5.0
+
+
+def test_locked_requirement_is_not_released_by_a_change_above(one_arm):
+    one_arm.core.lock("o_F2")
+    one_arm.core.observe_component(1.0, "rgbd", "FALSE")
+    assert one_arm.run(seconds=1.0) == [("o_F2", "", FAILED)]
+    one_arm.core.unlock("o_F2")
+    assert one_arm.run(seconds=1.0) == [("o_build", "FD2", EXECUTED)]

@@ -1,0 +1,85 @@
+"""Parameters of the node, as a mapping."""
+
+import math
+
+import pytest
+from mros1_reasoner.loop.parameters import ParameterError, Parameters
+from reasoner_helpers import application
+
+
+@pytest.fixture
+def model(tmp_path):
+    path = tmp_path / "application.owl"
+    path.write_text(application())
+    return path
+
+
+def given(model, **values):
+    return Parameters({"model_file": str(model), **values})
+
+
+def test_any_number_of_limits(model):
+    parameters = given(model, nfr_safety=0.5, nfr_energy=1, nfr_performance=0.1)
+    (objective,) = parameters.objectives(parameters.knowledge_base())
+    assert objective.name == "o_moveA"
+    assert objective.limits == {"safety": 0.5, "energy": 1.0, "performance": 0.1}
+
+
+def test_limit_of_an_unknown_quality_is_left_out_with_a_warning(model, caplog):
+    parameters = given(model, nfr_comfort=0.5)
+    (objective,) = parameters.objectives(parameters.knowledge_base())
+    assert objective.limits == {}
+    assert "Unsupported QA TYPE received: comfort" in caplog.text
+
+
+def test_every_setting_of_the_loop_has_a_parameter(model):
+    parameters = given(model, cool_down=7, approval=True, dry_run="true", always_improve=1, error_log_expiry=0)
+    settings = parameters.settings(parameters.knowledge_base())
+    assert (settings.cool_down, settings.error_log_expiry) == (7.0, 0.0)
+    assert (settings.approval, settings.dry_run, settings.always_improve) == (True, True, True)
+
+
+def test_without_a_manipulator_nothing_is_waited_for(model):
+    parameters = given(model, use_reconfigure_srv=False)
+    assert not parameters.asks
+    assert parameters.settings(parameters.knowledge_base()).start_grace == 0.0
+
+
+def test_models_as_list_or_separated_by_commas(model, tmp_path):
+    more = tmp_path / "more.owl"
+    assert given(model, model_file=[str(model), str(more)]).model_files == [model, more]
+    assert given(model, model_file=f"{model}, {more}").model_files == [model, more]
+
+
+def test_nodes_of_components(model):
+    parameters = given(model, components={"laser": {"node": "/front_laser"}, "base": {}, "odd": 3})
+    assert parameters.nodes == {"front_laser": "laser"}
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"nfr_safety": "high"}, "~nfr_safety is 'high': expected a finite number"),
+        ({"nfr_safety": math.nan}, "~nfr_safety is nan"),
+        ({"nfr_safety": True}, "~nfr_safety is True"),
+        ({"cool_down": -1}, "~cool_down is -1: expected 0 or more"),
+        ({"dry_run": "perhaps"}, "~dry_run is 'perhaps': expected true or false"),
+        ({"qa_direction": {"safety": "sideways"}}, "~qa_direction/safety is 'sideways'"),
+        ({"qa_direction": "safety"}, "~qa_direction is 'safety': expected a mapping"),
+        ({"desired_configuration": "fly"}, "~desired_configuration is 'fly': no FunctionDesign"),
+        ({"components": [1]}, r"~components is \[1\]: expected a mapping"),
+        ({"task_actions": "move_base"}, "~task_actions is 'move_base': expected a mapping"),
+        ({"reasoning_rate": 0}, "~reasoning_rate is 0: expected more than 0"),
+        ({"model_file": ""}, "~model_file is not set"),
+    ],
+)
+def test_what_can_not_be_used_is_named(model, values, message):
+    def use():
+        parameters = given(model, **values)
+        knowledge_base = parameters.knowledge_base()
+        parameters.objectives(knowledge_base)
+        parameters.settings(knowledge_base)
+        return parameters.nodes, parameters.task_actions, parameters.period
+
+    with pytest.raises(ParameterError, match=message):
+        use()

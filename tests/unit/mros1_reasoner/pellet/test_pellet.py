@@ -1,0 +1,181 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.knowledge.model import Facts, Objective
+from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, ReasonerError
+from mros1_reasoner.pellet import process as pellet_module
+from mros1_reasoner.pellet.owlready import OwlreadyReasoner
+from mros1_reasoner.pellet.process import ChildLostError, NoJavaError, PelletReasoner, SteadyReasoner, make_reasoner
+from reasoner_helpers import DESIGNS, OBJECTIVE, application
+
+DEADLINE_S = 20.0
+
+
+def wait_for(condition):
+    until = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def test_facts_of_one_analysis_do_not_stay_for_the_next(knowledge_base, reasoner):
+    wrong = Facts((OBJECTIVE,), {"o_move": "scan_slow"}, {("o_move", "safety"): 0.9}, {"laser": "FALSE"})
+    fine = Facts((OBJECTIVE,), {"o_move": "camera_slow"})
+    first = knowledge_base.analyse(wrong, reasoner)
+    assert not knowledge_base.analyse(fine, reasoner).unrealisable
+    assert knowledge_base.analyse(wrong, reasoner) == first
+
+
+def test_killed_child_is_replaced_and_the_analysis_repeated(knowledge_base):
+    reasoner = PelletReasoner()
+    try:
+        reasoner.load(knowledge_base.ontology)
+        first = reasoner.pid
+        os.kill(first, signal.SIGKILL)
+        result = knowledge_base.analyse(Facts((OBJECTIVE,), components={"laser": "FALSE"}), reasoner)
+        assert set(result.unrealisable) == {name for name in DESIGNS if name.startswith("scan")}
+        assert reasoner.pid != first
+    finally:
+        reasoner.close()
+
+
+def test_hanging_child_is_replaced_after_the_deadline(knowledge_base):
+    reasoner = PelletReasoner(deadline=2.0)
+    try:
+        reasoner.load(knowledge_base.ontology)
+        first = reasoner.pid
+        os.kill(first, signal.SIGSTOP)
+        knowledge_base.analyse(Facts((OBJECTIVE,)), reasoner)
+        assert reasoner.pid != first
+        assert not os.path.exists(f"/proc/{first}")
+    finally:
+        reasoner.close()
+
+
+def test_child_dies_with_its_parent():
+    code = (
+        "import os, sys; from mros1_reasoner.pellet.process import PelletReasoner; r = PelletReasoner(); "
+        "print(r.pid, flush=True); sys.stdin.read()"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    child = int(parent.stdout.readline())
+    assert os.path.exists(f"/proc/{child}")
+    parent.kill()
+    parent.communicate()
+
+    def is_gone():
+        try:
+            with open(f"/proc/{child}/stat") as file:
+                return file.read().rsplit(")", 1)[1].split()[0] == "Z"
+        except (FileNotFoundError, ProcessLookupError):
+            return True
+
+    wait_for(is_gone)
+
+
+def test_no_java_is_told_with_the_remedy(monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("JAVA_HOME", raising=False)
+    with pytest.raises(NoJavaError, match="no Java runtime found: install openjdk-17-jre-headless"):
+        make_reasoner()
+
+
+def test_child_that_can_not_run_gives_way_to_owlready2_with_a_warning(monkeypatch, caplog):
+    monkeypatch.setattr(pellet_module.importlib.util, "find_spec", lambda name: None)
+    assert isinstance(make_reasoner(), OwlreadyReasoner)
+    assert "JPype1 is missing" in caplog.text
+
+
+class Broken:
+    """A child that can't be kept running."""
+
+    def __init__(self):
+        self.calls = 0
+
+    def load(self, ontology):
+        self.infer(ontology, ())
+
+    def infer(self, facts, properties):
+        self.calls += 1
+        raise ChildLostError("Pellet's process has died, twice in a row")
+
+
+def test_child_that_is_lost_gives_way_to_owlready2_and_is_tried_again_later(knowledge_base, caplog):
+    now = [0.0]
+    child = Broken()
+    steady = SteadyReasoner(child, clock=lambda: now[0])
+    steady.load(knowledge_base.ontology)
+    assert caplog.text.count("going on with a new JVM for every analysis") == 1
+    facts = Facts((OBJECTIVE,), components={"laser": "FALSE"})
+    result = knowledge_base.analyse(facts, steady)
+    assert set(result.unrealisable) == {name for name in DESIGNS if name.startswith("scan")}
+    assert child.calls == 1
+    now[0] = pellet_module.RETRY_AFTER
+    knowledge_base.analyse(facts, steady)
+    assert child.calls == 2
+
+
+def test_lost_child_that_works_again_gets_its_ontology_back(knowledge_base, pellet):
+    now = [0.0]
+    child = Broken()
+    steady = SteadyReasoner(child, clock=lambda: now[0])
+    steady.load(knowledge_base.ontology)
+    pellet.load("")
+    steady._child, now[0] = pellet, pellet_module.RETRY_AFTER
+    result = knowledge_base.analyse(Facts((OBJECTIVE,), components={"laser": "FALSE"}), steady)
+    assert len(result.unrealisable) == 3
+
+
+def test_child_that_runs_out_of_memory_is_replaced_and_then_given_up(load, caplog):
+    designs = {f"d{i}": ({}, ["laser"]) for i in range(3000)}
+    knowledge_base = load(application(designs))
+    reasoner = PelletReasoner(heap_mb=16)
+    try:
+        with pytest.raises(ChildLostError, match="has died, twice in a row"):
+            reasoner.load(knowledge_base.ontology)
+        assert "starting it again" in caplog.text
+    finally:
+        reasoner.close()
+
+
+def test_jvm_that_does_not_start_is_told(knowledge_base):
+    reasoner = PelletReasoner(heap_mb=0)  # -Xmx0m is refused
+    try:
+        with pytest.raises(ChildLostError, match=r"Pellet's process (does not start|has died)"):
+            reasoner.load(knowledge_base.ontology)
+    finally:
+        reasoner.close()
+
+
+def test_contradiction_is_an_error_of_its_own_and_the_next_analysis_works(knowledge_base, reasoner):
+    facts = knowledge_base.assertions(Facts((OBJECTIVE,), components={"laser": "FALSE"}))
+    contradiction = facts[-1]._replace(value="TRUE")
+    with pytest.raises(InconsistentError, match="contradicts itself"):
+        reasoner.infer([*facts, contradiction], v.CONCLUSIONS)
+    assert reasoner.infer(facts, v.CONCLUSIONS)
+
+
+def test_unknown_property_is_refused(reasoner):
+    with pytest.raises(ReasonerError, match="unknown"):
+        reasoner.infer([Assertion("http://a#x", "http://a#p", "http://a#y")], v.CONCLUSIONS)
+
+
+def test_ontology_that_is_no_ntriples_is_refused(pellet):
+    with pytest.raises(ReasonerError):
+        pellet.load("this is no triple")
+
+
+def test_objectives_are_kept_apart(load, pellet):
+    knowledge_base = load()
+    pellet.load(knowledge_base.ontology)
+    other = Objective("o_other", "f_move", {"safety": 0.9})
+    levels = {("o_move", "safety"): 0.7, ("o_other", "safety"): 0.7}
+    facts = Facts((OBJECTIVE, other), {"o_move": "scan_slow", "o_other": "camera_slow"}, levels)
+    result = knowledge_base.analyse(facts, pellet)
+    assert result.objectives["o_move"].violated == ("safety",)
+    assert result.objectives["o_other"].violated == ()

@@ -1,0 +1,164 @@
+from dataclasses import replace
+
+import pytest
+from mros1_reasoner.knowledge.model import Design, Direction, Objective, Quality
+from mros1_reasoner.planning.planner import Situation, difference, plan
+from mros1_reasoner.planning.utility import quality as expected_level
+
+OBJECTIVE = Objective("o", "f", {"risk": 0.6, "power": 0.62})
+UTILITY = expected_level("use", {"use": Quality(Direction.HIGHER_IS_BETTER)})
+
+
+def design(name, risk=0.1, power=0.1, use=0.5, components=()):
+    return Design(name, "f", {"risk": risk, "power": power, "use": use}, frozenset(components))
+
+
+def choose(*designs, objective=OBJECTIVE, utility=UTILITY, distance=difference, **situation):
+    return plan(objective, designs, Situation(**situation), utility, distance)
+
+
+def reasons(result):
+    return {candidate.design.name: candidate.refused_because for candidate in result.candidates}
+
+
+def test_highest_utility_wins():
+    result = choose(design("a", use=0.5), design("b", use=0.9), design("c", use=0.7))
+    assert result.choice == "b"
+    assert [c.design.name for c in result.candidates] == ["b", "c", "a"]
+    assert [c.chosen for c in result.candidates] == [True, False, False]
+    assert set(reasons(result).values()) == {""}
+    assert not result.degraded
+
+
+@pytest.mark.parametrize("quality", ["risk", "power"])
+def test_every_limit_counts(quality):
+    result = choose(design("good"), design("bad", use=1.0, **{quality: 0.7}))
+    assert result.choice == "good"
+    assert reasons(result)["bad"] == f"{quality} 0.7 > {OBJECTIVE.limits[quality]:g}"
+
+
+def test_level_at_the_limit_keeps_it():
+    assert choose(design("edge", risk=0.6, power=0.62)).degraded is False
+
+
+def test_direction_turns_the_comparison_round():
+    objective = Objective("o", "f", {"use": 0.4})
+    result = choose(
+        design("low", use=0.3),
+        design("high", use=0.5),
+        objective=objective,
+        qualities={"use": Quality(Direction.HIGHER_IS_BETTER)},
+    )
+    assert result.choice == "high"
+    assert reasons(result)["low"] == "use 0.3 < 0.4"
+
+
+def test_unrealisable_design_is_refused_with_the_component():
+    result = choose(design("a", use=0.9), design("b"), unrealisable={"a": ["laser"]})
+    assert result.choice == "b"
+    assert reasons(result)["a"] == "requires laser, which does not work"
+
+
+def test_design_that_was_tried_in_vain_is_refused():
+    result = choose(design("a", use=0.9), design("b"), tried={"a": "tried"})
+    assert result.choice == "b"
+    assert reasons(result)["a"] == "tried"
+
+
+def test_design_without_an_expected_level_is_refused():
+    result = choose(Design("bare", "f", {"use": 1.0}), design("b"))
+    assert result.choice == "b"
+    assert "no risk is expected of it" in reasons(result)["bare"]
+
+
+def test_tie_goes_to_the_smaller_change():
+    near, far = design("z_near", risk=0.2), design("a_far", risk=0.5)
+    result = choose(near, far, design("now", risk=0.2, use=0.1), current="now")
+    assert result.choice == "z_near"
+    assert "smaller change than a_far" in result.reason
+
+
+def test_smaller_change_is_that_of_fewer_components():
+    same, other = design("z", components=["laser"]), design("a", components=["camera"])
+    assert choose(same, other, design("now", use=0.1, components=["laser"]), current="now").choice == "z"
+
+
+def test_given_distance_is_used():
+    result = choose(
+        design("a"), design("b"), design("now", use=0), current="now", distance=lambda _, to: to.name == "a"
+    )
+    assert result.choice == "b"
+
+
+def test_where_none_keeps_every_limit_the_least_violating_one_is_taken_and_it_says_degraded():
+    result = choose(design("a", risk=0.9, use=0.9), design("b", risk=0.65, use=0.1), design("c", risk=0.65, power=0.7))
+    assert result.choice == "b"
+    assert result.degraded
+    assert result.reason.startswith("degraded:")
+
+
+def test_current_design_counts_with_what_was_observed():
+    current, other = design("now", risk=0.1), design("other", risk=0.8)
+    worse = choose(current, other, current="now", tried={"now": "tried"}, observed={"risk": 0.9})
+    assert worse.choice == "other"
+    better = choose(current, other, current="now", tried={"now": "tried"}, observed={"risk": 0.7})
+    assert better.choice == "now"
+
+
+def test_where_all_were_tried_in_vain_they_are_tried_again():
+    result = choose(design("a"), design("b", use=0.9), tried={"a": "x", "b": "x"})
+    assert result.choice == "b"
+    assert result.degraded
+
+
+def test_nothing_can_be_deployed():
+    result = choose(design("a"), unrealisable={"a": ["laser", "base"]})
+    assert result.choice is None
+    assert "base, laser" in result.reason
+
+
+def test_each_loser_has_its_reason():
+    result = choose(
+        design("best", use=0.9),
+        design("less", use=0.5),
+        design("far", use=0.9, power=0.4),
+        design("bad", risk=0.9),
+        design("now", use=0.1),
+        current="now",
+    )
+    assert {c.design.name: c.lost_because for c in result.candidates} == {
+        "best": "",
+        "far": "as useful as the choice, but a bigger change",
+        "less": "utility 0.5 is less than 0.9",
+        "now": "utility 0.1 is less than 0.9",
+        "bad": "risk 0.9 > 0.6",
+    }
+
+
+def test_losers_of_a_degraded_choice_say_how_much_they_violate():
+    result = choose(design("a", risk=0.9), design("b", risk=0.66))
+    assert [c.lost_because for c in result.candidates] == [
+        "",
+        "risk 0.9 > 0.6; violates limits by 0.5, the choice by 0.1",
+    ]
+
+
+def test_where_nothing_can_be_deployed_the_candidates_are_ranked():
+    result = choose(design("a", risk=0.9), design("b"), unrealisable={"a": ["laser"], "b": ["laser"]})
+    assert [c.design.name for c in result.candidates] == ["b", "a"]
+    assert all(c.lost_because for c in result.candidates)
+
+
+def test_no_designs():
+    assert choose().choice is None
+
+
+def test_utility_where_lower_is_better():
+    result = choose(
+        design("a", power=0.1), design("b", power=0.5), utility=expected_level("power", {"power": Quality()})
+    )
+    assert result.choice == "a"
+
+
+def test_difference_of_a_design_to_itself_is_nothing():
+    assert difference(design("a"), replace(design("a"), name="b")) == 0

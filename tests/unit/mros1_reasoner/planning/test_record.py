@@ -1,0 +1,88 @@
+"""A decision to a message and back, and in words."""
+
+import io
+from types import SimpleNamespace
+
+import pytest
+from bag_helpers import Types
+from mros1_reasoner.loop.mape import Mape
+from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.planning.record import read_message, record_of, seconds
+from mros1_reasoner.replay.explain import line, render
+from reasoner_helpers import OBJECTIVE
+from rich.console import Console
+
+
+@pytest.fixture
+def decide(knowledge_base, reasoner):
+    """Return a function that decides because of a limit, or of a component."""
+
+    def decide(cause="qa", **settings):
+        core = Mape(knowledge_base, reasoner, [OBJECTIVE], Settings(correct_expected=False, **settings))
+        core.observe_active(0.0, "f_move", "scan_slow", "STABLE")
+        for tick in range(60):
+            if cause == "qa":
+                core.observe_level(tick / 10, "safety", 0.75, stamp=tick / 10)
+            else:
+                core.observe_component(tick / 10, cause, "FALSE", tick / 10)
+            if decisions := core.step(tick / 10):
+                return record_of(decisions[0])
+        raise AssertionError("no decision")
+
+    return decide
+
+
+def test_message_and_back(decide):
+    record = decide()
+    again = read_message(Types().decision(record, 5.0))
+    assert again.reasons[0].stamp == pytest.approx(record.reasons[0].stamp)
+    assert again.stamp_monitored == pytest.approx(record.stamp_monitored)
+    for name in ("candidates", "causes", "explanation", "degraded", "to_configuration", "state", "releases"):
+        assert getattr(again, name) == getattr(record, name)
+
+
+def test_times_of_rospy_and_of_rosbags():
+    assert seconds(SimpleNamespace(secs=3, nsecs=500_000_000)) == 3.5
+    assert seconds(SimpleNamespace(sec=3, nanosec=500_000_000)) == 3.5
+
+
+def test_log_line_tells_what_was_violated_by_how_much_by_which_rule_and_what_was_considered(decide):
+    text = line(decide())
+    assert "safety 0.75 > 0.6" in text
+    assert "safety by 25%" in text
+    assert "rules: QA" in text
+    assert "scan_slow -> scan_slower" in text
+    assert "1 scan_slower (0.6: chosen)" in text
+    assert "and 2 more" in text
+    assert " ms" in text
+    assert "\n" not in text
+
+
+def test_log_line_of_a_dry_run_says_so(decide):
+    assert line(decide(dry_run=True)).startswith("dry run, nobody is asked")
+
+
+def test_refusal_tells_why_every_design_is_out(decide):
+    record = decide("base")
+    assert record.to_configuration == ""
+    assert "stays with scan_slow" in line(record)
+    assert all(candidate.lost_because for candidate in record.candidates)
+
+
+def test_tables_show_every_candidate_with_its_reason(decide):
+    console = Console(width=160, record=True, file=io.StringIO())
+    record = decide("laser")
+    console.print(render(record))
+    text = console.export_text()
+    for candidate in record.candidates:
+        assert candidate.name in text
+    assert "requires laser, which does not work" in text
+    assert "compError" in text
+
+
+def test_brackets_in_foreign_names_are_no_markup(decide):
+    record = decide("laser")
+    odd = record.candidates[0].__class__(**{**record.candidates[0].__dict__, "name": "[bold]x[/bold]"})
+    console = Console(width=160, record=True, file=io.StringIO())
+    console.print(render(record.__class__(**{**record.__dict__, "candidates": (odd,)})))
+    assert "[bold]x[/bold]" in console.export_text()

@@ -1,0 +1,119 @@
+import itertools
+import math
+from pathlib import Path
+
+import pytest
+import yaml
+from pybullet_simulator.world.grid import FREE, OCCUPIED, UNKNOWN
+from pybullet_simulator.world.world import Box, WorldError, rasterise
+from pybullet_simulator.world.world_file import read_world
+
+WORLDS = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_sim/worlds"
+FLOOR = "floor: {x: [-5, 5], y: [-5, 5]}\n"
+RACK = "racks: [{name: rack, position: [2, 0], size: [0.05, 1], height: 1}]\n"
+
+
+def world_of(tmp_path, text):
+    path = tmp_path / "hall.yaml"
+    path.write_text(text)
+    return read_world(path)
+
+
+def gap(one, other):
+    return min(one.distance(*other.points()).min(), other.distance(*one.points()).min())
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("boxes: [", "is not YAML"),
+        ("- 1", "holds no world"),
+        ("floor: {x: [1, 1], y: [0, 1]}", "floor: each max"),
+        ("floor: {x: [0, .inf], y: [0, 1]}", "floor: x: must be 2 finite numbers"),
+        (FLOOR + "tables: []", "tables: unknown key"),
+        (FLOOR + "boxes: {a: 1}", "boxes: must be a list"),
+        (FLOOR + "boxes: [3]", r"boxes\[0\]: must be a box with a name"),
+        (FLOOR + "boxes: [{name: a, position: [0, 0], size: [1, 1]}]", r"boxes\[0\] 'a': lacks height"),
+        (FLOOR + "boxes: [{name: a, position: [0], size: [1, 1], height: 1}]", r"'a': position: must be 2"),
+        (FLOOR + "boxes: [{name: a, position: [0, 0], size: [1, -1], height: 1}]", "'a': size and height"),
+        (FLOOR + "boxes: [{name: a, position: [0, 0], size: [1, 1], height: x}]", "'a': height: must be 1 finite"),
+        (FLOOR + "boxes: [{name: a, position: [0, 0], size: [1, 1], height: 1, mass: 2}]", "'a': unknown key mass"),
+        (FLOOR + "boxes: [{name: a, position: [9, 0], size: [1, 1], height: 1}]", "'a': position .* off the floor"),
+        (FLOOR + "racks: [&a {name: a, position: [0, 0], size: [1, 1], height: 1}, *a]", "'a': the name stands twice"),
+        (FLOOR + "people: [3]", r"people\[0\]: must be a person with a name"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0]]}]", r"'a': waypoints: give two or more"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, x]]}]", r"'a': waypoints: must be 2 finite"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 9]]}]", "'a': waypoint .* off the floor"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 1]], speed: 0}]", "'a': speed: is 0; give more"),
+        (FLOOR + RACK + "people: [{name: a, waypoints: [[0, 0], [4, 0]]}]", "'a': the way leads into 'rack'"),
+        (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 1]], age: 7}]", "'a': unknown key age"),
+    ],
+)
+def test_bad_world_is_refused_with_file_and_entry(tmp_path, text, message):
+    with pytest.raises(WorldError, match=message) as caught:
+        world_of(tmp_path, text)
+    assert "hall.yaml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_world_is_refused():
+    with pytest.raises(WorldError, match=r"nowhere\.yaml: cannot be read"):
+        read_world(Path("nowhere.yaml"))
+
+
+def test_distance_to_a_turned_box():
+    box = Box("a", "box", 1.0, 1.0, 2.0, 1.0, 1.0, math.pi / 2)
+    assert box.distance(1.0, 1.9) == pytest.approx(0.0)
+    assert box.distance(2.5, 1.0) == pytest.approx(1.0)
+    assert box.distance(1.5 + 0.3, 2.0 + 0.4) == pytest.approx(0.5)
+
+
+def test_people_are_in_the_world_but_not_on_its_map(tmp_path):
+    world = world_of(tmp_path, FLOOR + "people: [{name: ann, waypoints: [[0, 0], [3, 0], [3, 4]], speed: 1.5}]")
+    (ann,) = world.walkers
+    assert ann.speed == 1.5
+    assert [ann.place(walked) for walked in (0.0, 1.0, 5.0, 7.0, 9.0, 14.0)] == [
+        (0.0, 0.0),
+        (1.0, 0.0),
+        (3.0, 2.0),
+        (3.0, 4.0),
+        (3.0, 2.0),
+        (0.0, 0.0),
+    ]
+    assert OCCUPIED not in rasterise(world).cells
+
+
+def test_map_marks_boxes_floor_and_outside(tmp_path):
+    world = world_of(tmp_path, FLOOR + "boxes: [{name: a, position: [2, 1], size: [1, 0.5], height: 1}]")
+    grid = rasterise(world)
+
+    def cell(x, y):
+        return grid.cells[int((y - grid.origin_y) / grid.resolution), int((x - grid.origin_x) / grid.resolution)]
+
+    assert grid.cells.shape == (220, 220)
+    assert (grid.origin_x, grid.origin_y) == (-5.5, -5.5)
+    assert cell(2.4, 1.2) == OCCUPIED
+    assert cell(2.4, 1.4) == FREE
+    assert cell(1.0, 2.0) == FREE
+    assert cell(5.3, 0.0) == UNKNOWN
+    assert (grid.cells == OCCUPIED).sum() == pytest.approx(1.0 * 0.5 / 0.05**2, rel=0.15)
+
+
+def test_factory_aisles_let_the_robot_pass():
+    world = read_world(WORLDS / "factory.yaml")
+    narrow = {
+        (one.name, other.name): distance
+        for one, other in itertools.combinations(world.boxes, 2)
+        if 0.03 < (distance := gap(one, other)) < 2.2
+    }
+    assert narrow == {}
+
+
+def test_routes_start_and_end_clear_of_obstacles():
+    world = read_world(WORLDS / "factory.yaml")
+    routes = yaml.safe_load((WORLDS / "routes.yaml").read_text())["routes"]
+    assert len(routes) == 6
+    for name, route in routes.items():
+        for x, y, _ in (route["start"], route["goal"]):
+            assert world.contains(x, y), name
+            assert world.nearest(x, y)[1] >= 1.0, name

@@ -1,0 +1,65 @@
+import math
+
+import pytest
+from robot_formulas.power import Battery, PowerError, PowerMeter, check_factor, power_load
+from robot_formulas.quality import energy_level
+
+
+@pytest.mark.parametrize(
+    ("speed", "rate", "factor", "energy"),
+    [(0.3, 15.0, 1.0, 0.165), (0.5, 20.0, 1.0, 0.26), (0.75, 25.0, 1.0, 0.37), (0.75, 25.0, 1.6, 0.617)],
+)
+def test_load_at_steady_speed_gives_the_published_energy(speed, rate, factor, energy):
+    assert energy_level(power_load(speed, 0.0, rate, factor)) == pytest.approx(energy, abs=0.005)
+
+
+def test_load_is_clipped():
+    assert power_load(0.0, 0.0, 0.0) == 0.2
+    assert power_load(5.0, 40.0, 50.0) == 5.0
+
+
+@pytest.mark.parametrize("factor", [-0.1, math.nan, math.inf])
+def test_bad_factor_is_refused(factor):
+    with pytest.raises(PowerError, match="refused"):
+        check_factor(factor)
+
+
+def test_load_of_values_that_are_not_finite_is_refused():
+    with pytest.raises(PowerError, match="finite"):
+        power_load(math.nan, 0.0, 0.0)
+
+
+def test_meter_takes_the_largest_values_and_the_rate_since_the_last_tick():
+    meter = PowerMeter(10.0)
+    for speed, acceleration in ((0.2, 1.0), (0.5, -3.0), (0.1, 4.0)):
+        meter.add_speed(speed)
+        meter.add_acceleration(acceleration)
+    for _ in range(40):
+        meter.add_command()
+    assert meter.tick(12.0) == pytest.approx(1.3 * 0.5 + 0.1 * 4.0 + 0.04 * 20.0)
+    assert meter.tick(13.0) == 0.2
+
+
+def test_meter_survives_a_clock_that_stands_or_runs_backwards():
+    meter = PowerMeter(10.0)
+    assert meter.tick(10.0) is None
+    assert meter.tick(3.0) is None
+    meter.add_speed(1.0)
+    assert meter.tick(4.0) == pytest.approx(1.3)
+
+
+def test_meter_refuses_what_is_not_finite():
+    meter = PowerMeter(0.0)
+    for take in (meter.add_speed, meter.add_acceleration):
+        with pytest.raises(PowerError):
+            take(math.nan)
+    assert meter.tick(1.0) == 0.2
+
+
+def test_full_load_empties_the_battery_in_three_hours():
+    battery = Battery()
+    battery.drain(5.0, 1.5 * 3600.0)
+    assert battery.charge == pytest.approx(0.5)
+    battery.drain(5.0, 2.0 * 3600.0)
+    assert battery.charge == 0.0
+    assert battery.current(1.0) < 0.0

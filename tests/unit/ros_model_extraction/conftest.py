@@ -1,0 +1,3 @@
+"""The command rosmodel as a fixture."""
+
+from helpers.rosmodel_command import run  # noqa: F401

@@ -1,0 +1,341 @@
+"""roscpp nodes from their source."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+
+import pytest
+from ros_model_extraction.cpp.source import read_cpp_node
+from ros_model_extraction.source import NodeSource, SourceError
+
+WORKER = """
+    #pragma once
+    #include <ros/ros.h>
+    #define COMMANDS "cmd_vel"
+    namespace demo {
+    typedef actionlib::SimpleActionClient<move_base_msgs::MoveBaseAction> MoveClient;
+    class Worker {
+     public:
+      Worker(ros::NodeHandle nh, ros::NodeHandle pnh, const std::string& prefix);
+      void onScan(const sensor_msgs::LaserScan::ConstPtr& scan);
+      bool onReset(std_srvs::Empty::Request& request, std_srvs::Empty::Response& response);
+     private:
+      ros::NodeHandle nh_, pnh_;
+      MoveClient client_;
+      std::string topic_, other_;
+      tf2_ros::TransformBroadcaster broadcaster_;
+      actionlib::SimpleActionServer<demo_msgs::DockAction> server_;
+    };
+    }
+    """
+WORKER_CODE = """
+    #include "demo/worker.h"
+    namespace demo {
+    Worker::Worker(ros::NodeHandle nh, ros::NodeHandle pnh, const std::string& prefix)
+        : nh_(nh), pnh_(pnh), client_("move_base", true),
+          server_(pnh_, "dock", boost::bind(&Worker::onDock, this, _1), false) {
+      pnh_.param<std::string>("scan_topic", topic_, "front/scan");
+      pnh_.getParam("other_topic", other_);
+      double rate = pnh.param("rate", 10.0);
+      auto a = nh_.advertise<geometry_msgs::Twist>(COMMANDS, 1);
+      auto b = pnh_.advertise<std_msgs::String>(prefix + "/state", 1, true);
+      auto c = nh_.subscribe(topic_, 1, &Worker::onScan, this);
+      auto d = nh_.subscribe<std_msgs::Int32>(other_, 1, boost::bind(&Worker::onOther, this, _1));
+      auto e = pnh_.advertiseService("reset", &Worker::onReset, this);
+      auto f = nh_.serviceClient<nav_msgs::GetMap>("static_map");
+    }
+    }
+    """
+MAIN = """
+    #include "demo/worker.h"
+    static const std::string kName = "worker";
+    int main(int argc, char** argv) {
+      ros::init(argc, argv, kName);
+      ros::NodeHandle nh;
+      ros::NodeHandle pnh("~");
+      demo::Worker worker(nh, pnh, "arm");
+    }
+    """
+
+
+@pytest.fixture
+def node(tmp_path: Path):
+    """Makes a source file of the code, with a main around it, and reads it."""
+
+    def make(code: str, before: str = "", values=None) -> NodeSource:
+        (tmp_path / "main.cpp").write_text(
+            f"#include <ros/ros.h>\n{textwrap.dedent(before)}\nint main(int argc, char** argv) {{\n"
+            f'ros::NodeHandle nh;\nros::NodeHandle pnh("~");\n{textwrap.dedent(code)}\n}}\n'
+        )
+        return read_cpp_node([tmp_path / "main.cpp"], tmp_path, values)
+
+    return make
+
+
+def found(node: NodeSource) -> set[tuple[str, str, str]]:
+    return {(port.kind.value, port.name, port.type) for port in node.ports}
+
+
+def remarks(node: NodeSource) -> str:
+    return "\n".join(map(str, node.remarks))
+
+
+def test_node_of_several_files_is_followed_through_its_class(tmp_path):
+    (tmp_path / "src").mkdir()
+    (tmp_path / "include" / "demo").mkdir(parents=True)
+    (tmp_path / "include" / "demo" / "worker.h").write_text(textwrap.dedent(WORKER))
+    sources = [tmp_path / "src" / "main.cpp", tmp_path / "src" / "worker.cpp"]
+    for path, code in zip(sources, (MAIN, WORKER_CODE), strict=True):
+        path.write_text(textwrap.dedent(code))
+    node = read_cpp_node(sources, tmp_path)
+    assert node.name == "worker"
+    assert found(node) == {
+        ("action client", "move_base", "move_base_msgs/MoveBaseAction"),
+        ("action server", "~dock", "demo_msgs/DockAction"),
+        ("publisher", "cmd_vel", "geometry_msgs/Twist"),
+        ("publisher", "~arm/state", "std_msgs/String"),
+        ("subscriber", "front/scan", "sensor_msgs/LaserScan"),
+        ("subscriber", "{other_}@src/worker.cpp:13", "std_msgs/Int32"),
+        ("service server", "~reset", "std_srvs/Empty"),
+        ("service client", "static_map", "nav_msgs/GetMap"),
+        ("publisher", "/tf", "tf2_msgs/TFMessage"),
+    }
+    assert {(p.name, p.default) for p in node.parameters} == {
+        ("~scan_topic", "front/scan"),
+        ("~other_topic", None),
+        ("~rate", 10.0),
+    }
+    assert 'subscriber front/scan: the default of the parameter "scan_topic"' in remarks(node)
+    assert "src/worker.cpp:13:12: subscriber: its name is not known: {other_}" in remarks(node)
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ('nh.advertise<std_msgs::String>("x", 1);', ("publisher", "x", "std_msgs/String")),
+        ('pnh.advertise<std_msgs::String>("x", 1);', ("publisher", "~x", "std_msgs/String")),
+        ('pnh.advertise<std_msgs::String>("/x", 1);', ("publisher", "/x", "std_msgs/String")),
+        ('ros::NodeHandle a("arm"); a.advertise<std_msgs::String>("x", 1);', ("publisher", "arm/x", "std_msgs/String")),
+        (
+            'ros::NodeHandle a(pnh, "arm"); a.advertise<std_msgs::String>("x", 1);',
+            ("publisher", "~arm/x", "std_msgs/String"),
+        ),
+        (
+            'auto a = std::make_shared<ros::NodeHandle>("~"); a->advertise<std_msgs::String>("x", 1);',
+            ("publisher", "~x", "std_msgs/String"),
+        ),
+        ('std::string t = "x"; nh.advertise<std_msgs::String>(t + "/y", 1);', ("publisher", "x/y", "std_msgs/String")),
+        ('nh.advertise<std_msgs::String>("x" "/y", 1);', ("publisher", "x/y", "std_msgs/String")),
+        ("nh.advertise<std_msgs::String>(TOPIC, 1);", ("publisher", "macro", "std_msgs/String")),
+        ("nh.advertise<std_msgs::String>(demo::kTopic, 1);", ("publisher", "constant", "std_msgs/String")),
+        ("nh.advertise<std_msgs::String>(name(), 1);", ("publisher", "returned", "std_msgs/String")),
+        (
+            'nh.advertise<std_msgs::String>(ros::this_node::getName() + "/x", 1);',
+            ("publisher", "~x", "std_msgs/String"),
+        ),
+        ('nh.subscribe("x", 1, onString);', ("subscriber", "x", "std_msgs/String")),
+        ('nh.subscribe("x", 1, boost::bind(&onString, _1));', ("subscriber", "x", "std_msgs/String")),
+        (
+            'nh.subscribe<std_msgs::Int32>("x", 1, [](const auto& m) {});',
+            ("subscriber", "x", "std_msgs/Int32"),
+        ),
+        (
+            'nh.subscribe("x", 1, +[](const nav_msgs::OdometryConstPtr& m) {});',
+            ("subscriber", "x", "nav_msgs/Odometry"),
+        ),
+        ('ros::topic::waitForMessage<std_msgs::String>("x");', ("subscriber", "x", "std_msgs/String")),
+        (
+            'message_filters::Subscriber<sensor_msgs::Image> s(nh, "x", 1);',
+            ("subscriber", "x", "sensor_msgs/Image"),
+        ),
+        (
+            'actionlib::SimpleActionClient<move_base_msgs::MoveBaseAction> c("x", true);',
+            ("action client", "x", "move_base_msgs/MoveBaseAction"),
+        ),
+        (
+            'image_transport::ImageTransport it(nh); image_transport::Publisher p = it.advertise("x", 1);',
+            ("publisher", "x", "sensor_msgs/Image"),
+        ),
+        (
+            "std::unique_ptr<image_transport::ImageTransport> it; it.reset(new image_transport::ImageTransport(pnh)); "
+            'it->advertise("x", 1);',
+            ("publisher", "~x", "sensor_msgs/Image"),
+        ),
+        (
+            "dynamic_reconfigure::Server<demo::DemoConfig> s;",
+            ("service server", "~set_parameters", "dynamic_reconfigure/Reconfigure"),
+        ),
+        (
+            'std_srvs::Empty e; ros::service::waitForService("x"); ros::service::call("/x", e);',
+            ("service client", "/x", "std_srvs/Empty"),
+        ),
+        ('ros::service::createClient<std_srvs::Empty>("x");', ("service client", "x", "std_srvs/Empty")),
+        (
+            'auto o = ros::AdvertiseOptions::create<std_msgs::String>("x", 1, 0, 0, ros::VoidPtr(), 0); '
+            "pnh.advertise(o);",
+            ("publisher", "~x", "std_msgs/String"),
+        ),
+        (
+            'ros::SubscribeOptions o; o = ros::SubscribeOptions::create<std_msgs::String>("x", 1, f);pnh.subscribe(o);',
+            ("subscriber", "~x", "std_msgs/String"),
+        ),
+        (
+            'pnh.advertiseService(ros::AdvertiseServiceOptions::create<std_srvs::Empty>("x", f, ros::VoidPtr(), 0));',
+            ("service server", "~x", "std_srvs/Empty"),
+        ),
+        ("tf::TransformListener l;", ("subscriber", "/tf", "tf2_msgs/TFMessage")),
+    ],
+)
+def test_interfaces_are_found(node, code, expected):
+    before = """
+        #define TOPIC "macro"
+        namespace demo { constexpr char kTopic[] = "constant"; }
+        std::string name() { return "returned"; }
+        void onString(const std_msgs::String& message) {}
+        """
+    assert expected in found(node(code, before))
+
+
+def test_what_is_not_known_is_marked_with_its_place(node):
+    result = node("nh.advertise<std_msgs::String>(argv[1], 1);\nnh.subscribe(other(), 1, callback);")
+    assert found(result) == {
+        ("publisher", "{argv[1]}@main.cpp:6", "std_msgs/String"),
+        ("subscriber", "{other()}@main.cpp:7", ""),
+    }
+    assert "main.cpp:7:1: subscriber: its type is not known" in remarks(result)
+
+
+def test_handle_that_is_handed_in_has_the_namespaces_of_all_callers(node):
+    before = 'void make(ros::NodeHandle& h) { h.advertise<std_msgs::String>("x", 1); }'
+    assert found(node("make(nh); make(pnh);", before)) == {
+        ("publisher", "x", "std_msgs/String"),
+        ("publisher", "~x", "std_msgs/String"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("worker", "making"),
+    [
+        ('Worker() : pnh_("~") { USE } int rate_; ros::NodeHandle pnh_;', "Worker w;"),
+        ('Worker() : rate_(1), pnh_("~") { USE } int rate_; ros::NodeHandle nh_, pnh_;', "Worker w;"),
+        ('Worker() : pnh_{"~"} { USE } ros::NodeHandle pnh_{"other"};', "Worker w;"),
+        ('Worker() { pnh_ = ros::NodeHandle("~"); USE } ros::NodeHandle pnh_;', "Worker w;"),
+        ("Worker(ros::NodeHandle n, ros::NodeHandle p) : pnh_(p) { USE } ros::NodeHandle pnh_;", "Worker w(nh, pnh);"),
+        ("Worker(ros::NodeHandle p) : pnh_(p) { USE } ros::NodeHandle pnh_;", "auto w = new Worker(pnh);"),
+    ],
+    ids=["above", "second of several", "default member", "assigned", "passed", "passed to new"],
+)
+def test_inline_constructor_above_its_members_makes_them(node, worker, making):
+    use = 'pub_ = pnh_.advertise<std_msgs::String>("a", 1);'
+    result = node(making, f"class Worker {{ public: {worker.replace('USE', use)} ros::Publisher pub_; }};")
+    assert ("publisher", "~a", "std_msgs/String") in found(result)
+    assert ("publisher", "a", "std_msgs/String") not in found(result)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        'std::unique_ptr<ros::NodeHandle> q; q.reset(new ros::NodeHandle("~x"));',
+        'std::unique_ptr<ros::NodeHandle> q(new ros::NodeHandle("~x"));',
+        'std::unique_ptr<ros::NodeHandle> q = nullptr; q = std::make_unique<ros::NodeHandle>("~x");',
+        'ros::NodeHandlePtr q; q = boost::make_shared<ros::NodeHandle>(pnh, "x");',
+        'ros::NodeHandlePtr q = ros::NodeHandlePtr(new ros::NodeHandle("~x"));',
+        'ros::NodeHandle* q; q = new ros::NodeHandle("~x");',
+        'ros::NodeHandle x("~x"); ros::NodeHandle* q = &x;',
+        'auto x = std::make_unique<ros::NodeHandle>("~x"); std::unique_ptr<ros::NodeHandle> q = std::move(x);',
+    ],
+)
+def test_handle_behind_a_pointer_is_what_the_pointer_is_given(node, code):
+    assert found(node(code + 'q->advertise<std_msgs::String>("b", 1);')) == {("publisher", "~x/b", "std_msgs/String")}
+
+
+def test_pointers_that_are_members_or_global_are_followed_too(node):
+    before = """
+        std::shared_ptr<ros::NodeHandle> global;
+        class Worker {
+         public:
+          Worker() { inner_.reset(new ros::NodeHandle("~x")); inner_->advertise<std_msgs::String>("member", 1); }
+          std::unique_ptr<ros::NodeHandle> inner_;
+        };
+        """
+    code = 'global.reset(new ros::NodeHandle("~y")); global->advertise<std_msgs::String>("global", 1);'
+    assert {name for _, name, _ in found(node(code, before))} == {"~x/member", "~y/global"}
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "ros::NodeHandle* q; fill(q);",
+        "std::unique_ptr<ros::NodeHandle> q;",
+        "std::unique_ptr<ros::NodeHandle> q = nullptr; fill(q);",
+        "ros::NodeHandlePtr q = made();",
+        "std::unique_ptr<ros::NodeHandle> q; q.reset(made());",
+        "ros::NodeHandle* q = new ros::NodeHandle(nh, name());",
+        "std::optional<ros::NodeHandle> q; fill(q);",
+        "typedef std::shared_ptr<ros::NodeHandle> Handle; Handle q;",
+    ],
+)
+def test_handle_whose_construction_is_not_known_is_never_the_root(node, code):
+    result = node(code + 'q->advertise<std_msgs::String>("b", 1);')
+    assert [(port.is_resolved, "b@main.cpp:6" in port.name) for port in result.ports] == [(False, True)]
+    assert "publisher: its name is not known" in remarks(result)
+
+
+def test_options_that_are_made_elsewhere_are_marked(node):
+    result = node('nh.advertise(options);\nros::service::call(name, request); ros::service::waitForService("/y");')
+    assert found(result) == {
+        ("publisher", "{options}@main.cpp:6", ""),
+        ("service client", "{name}@main.cpp:7", ""),
+    }
+
+
+def test_parameters_come_with_defaults(node):
+    result = node(
+        """
+        int depth; double rate; std::string frame;
+        nh.param("depth", depth, 3);
+        pnh.param<std::string>("frame", frame, "map");
+        pnh.getParam("rate", rate);
+        ros::param::get("~private", depth);
+        ros::param::get("/global", depth);
+        bool fast = pnh.param("fast", true);
+        """
+    )
+    assert {(p.name, p.default) for p in result.parameters} == {
+        ("depth", 3),
+        ("~frame", "map"),
+        ("~rate", None),
+        ("~private", None),
+        ("/global", None),
+        ("~fast", True),
+    }
+
+
+def test_given_parameter_decides_a_name(node):
+    values = {"~topic": "given"}
+    code = 'std::string t; pnh.param<std::string>("topic", t, "default"); nh.advertise<std_msgs::String>(t, 1);'
+    assert found(node(code, values=values.__getitem__)) == {("publisher", "given", "std_msgs/String")}
+
+
+def test_part_that_does_not_parse_is_told_and_the_rest_read(node):
+    result = node('nh.advertise<std_msgs::String>("x", 1);', before="int broken(;\n")
+    assert ("publisher", "x", "std_msgs/String") in found(result)
+    assert "main.cpp:2:" in remarks(result) and "no C++ that can be parsed" in remarks(result)
+
+
+@pytest.mark.parametrize(
+    "content", [b"\0binary", b"int = 3; int *; class { int; };", b"{" * 200_000, b"\xff\xfe", b"f(" * 50_000, b""]
+)
+def test_bad_sources_neither_hang_nor_crash(tmp_path, content):
+    path = tmp_path / "bad.cpp"
+    path.write_bytes(content)
+    try:
+        assert read_cpp_node([path], tmp_path).ports == ()
+    except SourceError as error:
+        assert "bad.cpp:1:1: not read" in str(error)
+
+
+def test_variables_that_name_each_other_end(node):
+    result = node("std::string a = b; std::string b = a; nh.advertise<std_msgs::String>(a, 1);")
+    assert [port.is_resolved for port in result.ports] == [False]

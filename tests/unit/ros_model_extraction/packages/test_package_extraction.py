@@ -1,0 +1,364 @@
+"""Packages and launch files as a whole, with the command `rosmodel extract`."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+import rospkg
+from ros_model.cli import main
+from ros_model.errors import ModelError
+from ros_model.language.metamodel import ConnectionKind, PortKind
+from ros_model.language.packages import SpecKind
+from ros_model.language.packages_reader import parse_packages, read_packages
+from ros_model.language.packages_writer import write_packages
+from ros_model.language.reader import read_system
+from ros_model_extraction.packages.catkin_package import find_packages, read_package
+from ros_model_extraction.packages.cmake import commands
+from ros_model_extraction.packages.launch_files import read_launch_file
+from ros_model_extraction.packages.package_source import extract_package
+
+TALKER = """#!/usr/bin/env python3
+import rospy
+from std_msgs.msg import String
+rospy.init_node("talker")
+rospy.Publisher(rospy.get_param("~topic", "chatter"), String, queue_size=1)
+rospy.Subscriber("heard", String, print)
+rospy.Service("~reset", rospy.x, print)
+"""
+
+
+def make_package(folder: Path, name: str = "demo", cmake: str = "") -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "package.xml").write_text(
+        f'<package format="2"><name>{name}</name><version>0.1.0</version><description>d</description>'
+        '<maintainer email="a@b.example">m</maintainer><license>MIT</license></package>'
+    )
+    (folder / "CMakeLists.txt").write_text(cmake or f"project({name})\n")
+    return folder
+
+
+def make_script(path: Path, text: str = TALKER, mode: int = 0o755) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    path.chmod(mode)
+    return path
+
+
+def run(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return int(ended.value.code or 0)
+
+
+def executables(folder: Path) -> dict[str, list[str]]:
+    found = read_package(folder).executables
+    return {e.name: [str(s.relative_to(folder)) for s in e.sources] for e in found}
+
+
+def test_installed_programs_and_executable_scripts_are_executables(tmp_path):
+    make_package(tmp_path, cmake="catkin_install_python(PROGRAMS nodes/a DESTINATION x)\n")
+    make_script(tmp_path / "nodes" / "a", mode=0o644)
+    make_script(tmp_path / "scripts" / "b.py")
+    make_script(tmp_path / "scripts" / "library.py", mode=0o644)
+    make_script(tmp_path / "cfg" / "Demo.cfg")
+    make_script(tmp_path / "test" / "check.py")
+    make_script(tmp_path / "setup.py")
+    make_script(tmp_path / "scripts" / "shell", "#!/bin/sh\n")
+    assert executables(tmp_path) == {"a": ["nodes/a"], "b.py": ["scripts/b.py"]}
+
+
+def test_compiled_executables_have_the_sources_of_the_libraries_they_link(tmp_path):
+    make_package(
+        tmp_path,
+        cmake="""
+        project(demo) # ${not_here}
+        set(SOURCES src/a.cpp "src/b.cpp")
+        file(GLOB REST src/lib/*.cpp)
+        add_library(${PROJECT_NAME}_lib ${REST})
+        add_executable(${PROJECT_NAME}_node ${SOURCES} src/gone.cpp ${elsewhere})
+        target_link_libraries(${PROJECT_NAME}_node PRIVATE ${PROJECT_NAME}_lib ${catkin_LIBRARIES})
+        set_target_properties(demo_node PROPERTIES OUTPUT_NAME node PREFIX "")
+        #[[ add_executable(commented src/a.cpp) ]]
+        """,
+    )
+    for name in ("a", "b", "lib/c"):
+        make_script(tmp_path / "src" / f"{name}.cpp", "int x;\n", 0o644)
+    assert executables(tmp_path) == {"node": ["src/a.cpp", "src/b.cpp", "src/lib/c.cpp"]}
+    said = [str(remark) for remark in read_package(tmp_path).remarks]
+    assert said == [
+        "CMakeLists.txt:6:1: not read: the source src/gone.cpp of demo_node is not in the package",
+        "CMakeLists.txt:6:1: not read: the source ${elsewhere} of demo_node is not in the package",
+    ]
+
+
+def test_library_that_no_executable_links_is_told(tmp_path):
+    make_package(tmp_path, cmake="add_library(nodelets src/a.cpp)\n")
+    make_script(tmp_path / "src" / "a.cpp", "int x;\n", 0o644)
+    assert ["library nodelets is linked by no executable" in str(r) for r in read_package(tmp_path).remarks] == [True]
+
+
+def test_script_that_never_starts_its_node_is_named_as_its_file(tmp_path):
+    make_package(tmp_path)
+    make_script(tmp_path / "nodes" / "a", TALKER.replace('rospy.init_node("talker")', ""))
+    make_script(tmp_path / "nodes" / "b", "#!/usr/bin/env python3\n")
+    extracted = extract_package(tmp_path)
+    assert [(a.name, a.nodes[0].name) for a in extracted.package.artifacts] == [("a", "a")]
+    assert "Executables that start no ROS node: b." in extracted.model().header
+
+
+def test_paths_outside_the_package_are_refused(tmp_path):
+    make_package(
+        tmp_path / "demo",
+        cmake="catkin_install_python(PROGRAMS ../../etc/passwd /etc/passwd nodes/gone DESTINATION x)\n",
+    )
+    said = [str(remark) for remark in read_package(tmp_path / "demo").remarks]
+    assert [line.partition("the program ")[2] for line in said] == [
+        "../../etc/passwd is not in the package",
+        "/etc/passwd is not in the package",
+        "nodes/gone is not in the package",
+    ]
+
+
+@pytest.mark.parametrize("text", ["(" * 5000, '"', "set(A ${A}${A})" * 200, "a(b", ")))", "[[", "#[["])
+def test_broken_cmake_neither_hangs_nor_crashes(tmp_path, text):
+    assert all(command.name for command in commands(text, tmp_path))
+
+
+def test_messages_services_and_actions_are_specified(tmp_path):
+    make_package(tmp_path)
+    for kind, text in (
+        ("msg", "# a comment\nstring NAME=a # b\nint8 OK=1\nfloat32[3] data # x\nstd_msgs/Header header\n"),
+        ("srv", "int8 a\n---\nbool ok\n"),
+        ("action", "---\nint8 result\n---\n"),
+    ):
+        (tmp_path / kind).mkdir()
+        (tmp_path / kind / f"Thing.{kind}").write_text(text)
+    (tmp_path / "msg" / "Bad.msg").write_text("int8 a\nwhat is this\n")
+    extracted = extract_package(tmp_path)
+    specs = {spec.kind: dict(spec.parts) for spec in extracted.package.specs}
+    message = [(field.type, field.name, field.constant) for field in specs[SpecKind.TOPIC]["message"]]
+    assert message == [
+        ("string", "NAME", "a # b"),
+        ("int8", "OK", "1"),
+        ("float32[3]", "data", None),
+        ("std_msgs/Header", "header", None),
+    ]
+    assert [len(fields) for fields in specs[SpecKind.SERVICE].values()] == [1, 1]
+    assert [len(fields) for fields in specs[SpecKind.ACTION].values()] == [0, 1, 0]
+    assert [str(remark) for remark in extracted.unread] == [
+        "msg/Bad.msg:2:1: not read: 'what is this' is no field: expected a type and a name"
+    ]
+
+
+def test_packages_below_a_folder_are_found_through_links_but_not_in_circles(tmp_path):
+    make_package(tmp_path / "src" / "a" / "one", "one")
+    make_package(tmp_path / "elsewhere" / "two", "two")
+    make_package(tmp_path / "src" / "ignored" / "three", "three")
+    (tmp_path / "src" / "ignored" / "CATKIN_IGNORE").touch()
+    (tmp_path / "src" / "linked").symlink_to(tmp_path / "elsewhere" / "two")
+    (tmp_path / "src" / "a" / "circle").symlink_to(tmp_path / "src")
+    (tmp_path / "src" / "a" / "one" / "self").symlink_to(tmp_path / "src" / "a" / "one")
+    assert [path.name for path in find_packages(tmp_path / "src")[0]] == ["one", "linked"]
+    assert executables(tmp_path / "src" / "a" / "one") == {}
+
+
+def test_command_writes_a_model_that_reads_back_and_checks(tmp_path, capsys):
+    folder = make_package(tmp_path / "demo")
+    make_script(folder / "nodes" / "talker.py")
+    assert run("extract", tmp_path, "-o", tmp_path / "out") == 0
+    written = read_packages(tmp_path / "out" / "demo.ros")
+    node = written.node("demo", "talker", "talker")
+    assert node and [(p.kind, p.name, p.type) for p in node.ports] == [
+        (PortKind.PUBLISHER, "chatter", "std_msgs/String"),
+        (PortKind.SUBSCRIBER, "heard", "std_msgs/String"),
+        (PortKind.SERVICE_SERVER, "~reset", ""),
+    ]
+    assert "nodes/talker.py:7:1: service server: its type is not known" in written.header
+    assert "artifact talker is the executable talker.py" in written.header
+    assert "1 node, 3 interfaces, 1 not fully known" in capsys.readouterr().out
+    assert run("check", tmp_path / "out" / "demo.ros") == 0
+
+
+def test_command_tells_of_a_file_that_is_not_read_with_its_place(tmp_path, capsys):
+    folder = make_package(tmp_path / "demo")
+    make_script(folder / "nodes" / "talker", "#!/usr/bin/python\nprint 'old'\n")
+    assert run("extract", folder, "-o", tmp_path / "out") == 1
+    assert f"rosmodel: {folder}/nodes/talker:2:1: not read: no Python 3" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "package.xml:1:1: "),
+        (b"<package>\n<name>", "package.xml:2:7: "),
+        (b"\0\1", "not read: it is no text but binary"),
+        (b"<package><name>\xff</name></package>", "not UTF-8"),
+        (b"<!DOCTYPE x [<!ENTITY a 'b'>]><package/>", "no DOCTYPE and no entities"),
+        (b"<package format='2'><name>x</name></package>", "must"),
+    ],
+    ids=["empty", "cut", "binary", "encoding", "entities", "incomplete"],
+)
+def test_bad_manifest_is_one_line_and_other_packages_are_read(tmp_path, capsys, content, said):
+    make_package(tmp_path / "good", "good")
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "package.xml").write_bytes(content)
+    assert run("extract", tmp_path, "-o", tmp_path / "out") == 2
+    error = capsys.readouterr().err
+    assert said in error and "Traceback" not in error and len(error.strip().splitlines()) == 1
+    assert (tmp_path / "out" / "good.ros").exists()
+
+
+def test_folder_without_packages_and_missing_paths_are_refused(tmp_path, capsys):
+    (tmp_path / "circle").symlink_to(tmp_path)
+    assert run("extract", tmp_path) == 2
+    assert "no package.xml here or below" in capsys.readouterr().err
+    assert run("extract", tmp_path / "gone") == 2
+    assert "no such folder" in capsys.readouterr().err
+    assert run("extract", tmp_path, "a:=b") == 2
+    assert "arguments are for a launch file" in capsys.readouterr().err
+
+
+@pytest.fixture
+def forbid(monkeypatch):
+    """Makes a folder one that can't be entered: root, who may run the tests, can enter all."""
+    stat, forbidden = os.stat, []
+
+    def refusing(path, *arguments, **options):
+        if not isinstance(path, int) and any(folder in Path(path).parents for folder in forbidden):
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return stat(path, *arguments, **options)
+
+    monkeypatch.setattr(os, "stat", refusing)
+    return forbidden.append
+
+
+def test_named_folder_that_can_not_be_entered_is_refused_in_one_line(tmp_path, capsys, forbid):
+    make_package(tmp_path / "demo")
+    forbid(tmp_path)
+    for path in (tmp_path, tmp_path / "demo", tmp_path / "demo" / "a.launch"):
+        assert run("extract", path, "-o", tmp_path / "out") == 2
+        error = capsys.readouterr().err
+        assert error.startswith(f"rosmodel: {path}: not read: Permission denied") and len(error.splitlines()) == 1
+
+
+def test_folder_below_that_can_not_be_entered_is_told_and_the_others_read(tmp_path, capsys, forbid):
+    make_package(tmp_path / "src" / "closed", "closed")
+    good = make_package(tmp_path / "src" / "good", "good")
+    make_script(good / "nodes" / "talker", TALKER + "import private.other\nprivate.other.publish()\n")
+    make_script(good / "private" / "other")
+    forbid(tmp_path / "src" / "closed")
+    forbid(good / "private")
+    assert run("extract", tmp_path / "src", "-o", tmp_path / "out") == 1
+    assert capsys.readouterr().err.splitlines() == [
+        f"rosmodel: {tmp_path}/src/closed: not read: Permission denied",
+        f"rosmodel: {good}/private:1:1: not read: Permission denied",
+    ]
+    assert read_packages(tmp_path / "out" / "good.ros").node("good", "talker", "talker")
+    forbid(good)
+    assert run("extract", tmp_path / "src", "-o", tmp_path / "out") == 2
+    assert (
+        f"no package.xml here or below: give the folder of a ROS package, or of several; {tmp_path}/src/closed: "
+        in (capsys.readouterr().err)
+    )
+
+
+def test_listed_executable_that_does_not_exist_is_told(tmp_path, capsys):
+    lines = "catkin_install_python(PROGRAMS nodes/gone)\nadd_executable(gone_too src/gone.cpp)\n"
+    folder = make_package(tmp_path / "demo", cmake=lines)
+    assert run("extract", folder, "-o", tmp_path / "out") == 1
+    assert capsys.readouterr().err.splitlines() == [
+        f"rosmodel: {folder}/CMakeLists.txt:1:1: not read: the program nodes/gone is not in the package",
+        f"rosmodel: {folder}/CMakeLists.txt:2:1: not read: the source src/gone.cpp of gone_too is not in the package",
+    ]
+
+
+@pytest.mark.parametrize("name", ["main.cpp", "package.xml", "noextension"])
+def test_file_that_is_no_launch_file_is_told_what_is_taken(tmp_path, capsys, name):
+    (tmp_path / name).write_text("int main() {}")
+    assert run("extract", tmp_path / name) == 2
+    said = "no launch file (*.launch, *.xml, *.test): give one, or the folder of a ROS package, or of several"
+    assert capsys.readouterr().err == f"rosmodel: {tmp_path / name}: {said}\n"
+
+
+def test_unwritable_output_is_told(tmp_path, capsys):
+    make_package(tmp_path / "demo")
+    (tmp_path / "file").touch()
+    assert run("extract", tmp_path / "demo", "-o", tmp_path / "file" / "x") == 2
+    assert "check its folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["metacontrol_msgs", "metacontrol_sim", "move_base", "rosgraph_manipulator"])
+def test_models_of_our_own_packages_read_back_as_written(name):
+    extracted = extract_package(Path(rospkg.RosPack().get_path(name)))
+    assert extracted.unread == ()
+    assert parse_packages(write_packages(extracted.model())) == extracted.model()
+
+
+# --- launch files
+
+
+@pytest.fixture
+def launched(tmp_path, monkeypatch):
+    """Reads a launch file that may start nodes/talker of the package demo."""
+    folder = make_package(tmp_path / "src" / "demo")
+    make_script(folder / "nodes" / "talker")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path / 'src'}{os.pathsep}{os.environ.get('ROS_PACKAGE_PATH', '')}")
+
+    def read(text: str, *arguments: str):
+        path = tmp_path / "system.launch"
+        path.write_text(f"<launch>{text}</launch>")
+        return read_launch_file(path, arguments)
+
+    return read
+
+
+def test_launch_file_gives_components_wiring_and_parameters(launched, tmp_path, capsys):
+    launched(
+        """<arg name="side"/><param name="gain" value="2"/>
+        <group ns="$(arg side)"><node name="a" pkg="demo" type="talker"><param name="topic" value="said"/>
+        <remap from="heard" to="said_back"/></node></group>
+        <node name="b" pkg="demo" type="talker" args="heard:=left/said _topic:=left/said_back"/>
+        <node name="c" pkg="nowhere" type="thing" launch-prefix="nice"/>""",
+        "side:=left",
+    )
+    assert run("extract", tmp_path / "system.launch", "side:=left", "-o", tmp_path / "out") == 0
+    system = read_system(tmp_path / "out" / "system.rossystem")
+    assert [(c.graph_name, str(c.node)) for c in system.components] == [
+        ("left/a", "demo.talker.talker"),
+        ("b", "demo.talker.talker"),
+        ("c", "nowhere.thing.c"),
+    ]
+    assert {(c.kind, c.name, str(c.sources[0]), str(c.targets[0])) for c in system.connections} == {
+        (ConnectionKind.TOPIC, "left/said", "a.said", "b.left/said"),
+        (ConnectionKind.TOPIC, "left/said_back", "b.left/said_back", "a.said_back"),
+    }
+    assert [(p.key, p.value) for p in system.components[0].parameters] == [("topic", "said")]
+    assert [(p.name, p.value) for p in system.parameters] == [("gain", 2)]
+    assert "The interfaces of /c are not known: the package nowhere is not installed." in system.header
+    assert run("check", tmp_path / "out") == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "said"),
+    [
+        ("<node/>", (), "roslaunch refuses it"),
+        ("<param name='x' value='$(arg a)'/>", (), "roslaunch refuses it"),
+        ("<include file='$(find nowhere)/x.launch'/>", (), "roslaunch refuses it"),
+        ("<include file='/nonexistent.launch'/>", (), "roslaunch refuses it"),
+        ("<node", (), "roslaunch refuses it"),
+        ("", ("a",), "no NAME:=VALUE"),
+        ("\0", (), "binary"),
+        ("<param name='a' type='int' value='x'/>", (), "roslaunch refuses it"),
+        ("<rosparam>a: [</rosparam>", (), "roslaunch"),
+        ("<!DOCTYPE a>", (), "no DOCTYPE"),
+        ("<include file='$(dirname)/system.launch'/>", (), "roslaunch"),
+    ],
+)
+def test_launch_file_that_roslaunch_refuses_is_told_in_one_line(launched, text, arguments, said):
+    with pytest.raises(ModelError) as told:
+        launched(text, *arguments)
+    message = str(told.value).replace("is not NAME:=VALUE", "is no NAME:=VALUE")
+    assert said in message and "\n" not in message

@@ -1,0 +1,241 @@
+"""Models of a running graph, from what a master answers."""
+
+from __future__ import annotations
+
+import xmlrpc.client
+from pathlib import Path
+
+import pytest
+from ros_model.checks.systems import check_system
+from ros_model.io.snapshot import GraphSnapshot, build_snapshot
+from ros_model.language.metamodel import ConnectionKind, PortKind, RosSystem
+from ros_model.language.reader import parse_system
+from ros_model.language.writer import write_system
+from ros_model_extraction.names import as_seen_from, resolve
+from ros_model_extraction.running.graph import NO_PACKAGE, Models, models_of
+from ros_model_extraction.running.live import Details, Origin, executable_of
+from ros_model_extraction.values import UnwritableValueError, leaves, typed
+
+ACTION_TYPES = {
+    "goal": "demo_msgs/MoveActionGoal",
+    "cancel": "actionlib_msgs/GoalID",
+    "status": "actionlib_msgs/GoalStatusArray",
+    "feedback": "demo_msgs/MoveActionFeedback",
+    "result": "demo_msgs/MoveActionResult",
+}
+
+
+def graph(publishers=(), subscribers=(), services=(), types=(), parameters=None) -> GraphSnapshot:
+    nodes = {node for part in (publishers, subscribers, services) for _, names in part for node in names}
+    return build_snapshot(
+        (list(publishers), list(subscribers), list(services)), list(types), parameters or {}, dict.fromkeys(nodes, "u")
+    )
+
+
+def extracted(snapshot: GraphSnapshot, details: Details | None = None, *, everything: bool = False) -> Models:
+    models = models_of(snapshot, details or Details(), "live", everything=everything)
+    again = parse_system(write_system(models.system))
+    assert again == models.system
+    assert check_system(again) == ()
+    return models
+
+
+def ports(system: RosSystem, component: str) -> set[tuple[PortKind, str]]:
+    found = system.component(component)
+    assert found
+    return {(port.kind, port.name) for port in found.ports}
+
+
+def test_publisher_and_subscriber_of_a_topic_are_connected_and_typed():
+    models = extracted(
+        graph([["/scan", ["/laser"]]], [["/scan", ["/map_maker"]]], types=[["/scan", "sensor_msgs/LaserScan"]])
+    )
+    (connection,) = models.system.connections
+    assert (connection.name, connection.kind) == ("scan", ConnectionKind.TOPIC)
+    assert [str(end) for end in (*connection.sources, *connection.targets)] == ["laser.scan", "map_maker.scan"]
+    declared = models.packages.node(NO_PACKAGE, "laser", "laser")
+    assert declared and declared.ports[0].type == "sensor_msgs/LaserScan"
+
+
+def test_five_topics_become_an_action_and_a_watcher_of_its_result_stays_a_subscriber():
+    models = extracted(
+        graph(
+            [[f"/move/{part}", ["/client"]] for part in ("goal", "cancel")]
+            + [[f"/move/{part}", ["/server"]] for part in ("status", "feedback", "result")],
+            [[f"/move/{part}", ["/server"]] for part in ("goal", "cancel")]
+            + [[f"/move/{part}", ["/client"]] for part in ("status", "feedback")]
+            + [["/move/result", ["/client", "/watcher"]]],
+            types=[[f"/move/{part}", kind] for part, kind in ACTION_TYPES.items()],
+        )
+    )
+    assert ports(models.system, "server") == {(PortKind.ACTION_SERVER, "move")}
+    assert ports(models.system, "client") == {(PortKind.ACTION_CLIENT, "move")}
+    assert ports(models.system, "watcher") == {(PortKind.SUBSCRIBER, "move/result")}
+    assert [(c.kind, c.name) for c in models.system.connections] == [(ConnectionKind.ACTION, "move")]
+    declared = models.packages.node(NO_PACKAGE, "server", "server")
+    assert declared and declared.ports[0].type == "demo_msgs/MoveAction"
+
+
+def test_who_sends_goals_but_does_not_hear_all_that_a_server_says_is_a_publisher_and_a_listener():
+    models = extracted(
+        graph(
+            [["/move/goal", ["/keeper"]], ["/move/cancel", ["/keeper"]]]
+            + [[f"/move/{part}", ["/server"]] for part in ("status", "feedback", "result")],
+            [["/move/goal", ["/keeper", "/server"]], ["/move/cancel", ["/server"]], ["/move/result", ["/keeper"]]],
+            types=[[f"/move/{part}", kind] for part, kind in ACTION_TYPES.items()],
+        )
+    )
+    assert ports(models.system, "server") == {(PortKind.ACTION_SERVER, "move")}
+    assert ports(models.system, "keeper") == {
+        (PortKind.PUBLISHER, "move/goal"),
+        (PortKind.PUBLISHER, "move/cancel"),
+        (PortKind.SUBSCRIBER, "move/goal"),
+        (PortKind.SUBSCRIBER, "move/result"),
+    }
+
+
+def test_what_every_node_has_is_left_out_and_said_so():
+    snapshot = graph(
+        [["/rosout", ["/talker"]], ["/chatter", ["/talker"]]],
+        [["/clock", ["/talker"]], ["/rosout", ["/rosout"]]],
+        [["/talker/get_loggers", ["/talker"]], ["/talker/reset", ["/talker"]]],
+        [["/chatter", "std_msgs/String"]],
+        {"run_id": "x", "roslaunch": {"uris": {"host": "u"}}, "use_sim_time": True},
+    )
+    models = extracted(snapshot)
+    assert ports(models.system, "talker") == {
+        (PortKind.PUBLISHER, "chatter"),
+        (PortKind.SERVICE_SERVER, "talker/reset"),
+    }
+    assert [p.name for p in models.system.parameters] == ["use_sim_time"]
+    assert models.system.component("rosout") is None
+    assert "~get_loggers" in models.system.header
+    everything = extracted(snapshot, everything=True)
+    assert (PortKind.SUBSCRIBER, "clock") in ports(everything.system, "talker")
+    assert everything.system.component("rosout")
+
+
+def test_service_has_the_type_that_its_node_told_and_what_is_not_known_is_said():
+    snapshot = graph(services=[["/a/reset", ["/a"]], ["/b/reset", ["/b"]]], subscribers=[["/odd", ["/a"]]])
+    details = Details({"/a": Origin("demo", "a.py")}, {"/b": "it does not answer"}, {"/a/reset": "std_srvs/Empty"})
+    models = extracted(snapshot, details)
+    declared = models.packages.node("demo", "a", "a")
+    assert declared and {port.name: port.type for port in declared.ports} == {"odd": "", "a/reset": "std_srvs/Empty"}
+    header = models.packages.header
+    assert "who calls which service" in header
+    assert "the types of the services /b/reset." in header
+    assert "the types of the topics /odd." in header
+    assert "the package and executable of /b: it does not answer." in header
+    assert "artifact a is the executable a.py" in header
+
+
+def test_private_parameters_go_to_their_node_and_the_others_to_the_system():
+    tree = {"laser": {"filter": {"width": 3}, "name": "front"}, "max_vel": 0.5, "robot": {"arm": {"joints": [1, 2]}}}
+    models = extracted(graph([["/scan", ["/laser"]], ["/x", ["/robot/arm"]]], parameters=tree))
+    laser, arm = (models.system.component(name) for name in ("laser", "arm"))
+    assert laser and {p.key: p.value for p in laser.parameters} == {"filter/width": 3, "name": "front"}
+    assert arm and {p.key: p.value for p in arm.parameters} == {"joints": [1, 2]}
+    assert [(p.name, p.value) for p in models.system.parameters] == [("max_vel", 0.5)]
+
+
+def test_namespaces_are_kept_and_names_written_as_the_node_sees_them():
+    models = extracted(graph([["/robot/scan", ["/robot/laser"]], ["/tf", ["/robot/laser"]]]))
+    laser = models.system.component("laser")
+    assert laser and laser.namespace == "/robot" and laser.graph_name == "robot/laser"
+    assert ports(models.system, "laser") == {(PortKind.PUBLISHER, "scan"), (PortKind.PUBLISHER, "/tf")}
+
+
+def test_same_node_in_two_namespaces_has_two_components_and_one_declaration():
+    publishers = [["/left/scan", ["/left/laser"]], ["/right/scan", ["/right/laser"]]]
+    origins = {"/left/laser": Origin("demo", "laser"), "/right/laser": Origin("demo", "laser")}
+    models = extracted(graph(publishers, [["/left/scan", ["/fusion"]], ["/right/scan", ["/fusion"]]]), Details(origins))
+    assert {c.graph_name for c in models.system.components} == {"fusion", "left/laser", "right/laser"}
+    assert [[str(end) for end in c.sources] for c in models.system.connections] == [
+        ["left/laser.scan"],
+        ["right/laser.scan"],
+    ]
+    declared = models.packages.node("demo", "laser", "laser")
+    assert declared and [port.name for port in declared.ports] == ["scan"]
+
+
+def test_dead_node_is_left_out_and_said_so():
+    models = extracted(graph([["/scan", ["/laser", "/other"]]]), Details(dead=frozenset({"/laser"})))
+    assert [component.name for component in models.system.components] == ["other"]
+    assert "/laser: the master lists them, but nobody listens there" in models.system.header
+
+
+def test_value_without_notation_is_left_out_and_said_so():
+    models = extracted(graph([["/x", ["/a"]]], parameters={"a": {"limit": float("inf")}, "nothing": [{}]}))
+    component = models.system.component("a")
+    assert component and component.parameters[0].value is None
+    assert "the value of the parameter a/limit: inf is no finite number" in models.system.header.replace("/a/", "a/")
+    assert "/nothing" in models.system.header
+
+
+@pytest.mark.parametrize(
+    ("raw", "kind"),
+    [
+        (True, "Boolean"),
+        (1, "Integer"),
+        (1.5, "Double"),
+        ("x\n", "String"),
+        ([1, 2.5], "Array"),
+        ([1, "a"], "List"),
+        ([], "List"),
+        ([{"a": 1}, {"a": 2}], "Array"),
+        ({"a": {"b": [1]}}, "Struct"),
+        (xmlrpc.client.Binary(b"\0\xff"), "Base64"),
+        (xmlrpc.client.DateTime(0), "Date"),
+    ],
+)
+def test_every_kind_of_parameter_has_a_type_that_fits(raw, kind):
+    assert typed(raw)[0].kind == kind
+    extracted(graph([["/x", ["/a"]]], parameters={"p": raw} if not isinstance(raw, dict) else {"p": [raw]}))
+
+
+def test_none_and_empty_structs_have_no_notation():
+    for raw in (None, {}, [None], object()):
+        with pytest.raises(UnwritableValueError):
+            typed(raw)
+    assert list(leaves({"a": {"b": 1, "c": {}}, "d": 2})) == [("a/b", 1), ("d", 2)]
+
+
+def test_names_resolve_and_are_seen_from_a_node():
+    assert [resolve(name, "/robot/arm") for name in ("x", "~x", "/x", "x/y/")] == [
+        "/robot/x",
+        "/robot/arm/x",
+        "/x",
+        "/robot/x/y",
+    ]
+    assert [as_seen_from("/robot/arm", name) for name in ("/robot/x", "/x", "/robotic")] == ["x", "/x", "/robotic"]
+    assert as_seen_from("/arm", "/tf") == "tf"
+
+
+def test_executable_is_found_behind_an_interpreter(tmp_path: Path):
+    script = tmp_path / "lib" / "demo" / "talker.py"
+    script.parent.mkdir(parents=True)
+    script.touch()
+    wanted = Origin("demo", "talker.py")
+    assert executable_of(["/usr/bin/python3", "-u", str(script), "__name:=x"], tmp_path, ["demo"]) == wanted
+    assert executable_of(["lib/demo/talker.py", "scan:=/front"], tmp_path, ["demo"]) == wanted
+    assert executable_of([str(script)], tmp_path, ["other"]) is None
+    assert executable_of(["python3", "-m", "demo.talker"], tmp_path, ["demo"]) is None
+
+
+def test_executable_in_a_source_tree_belongs_to_the_package_around_it(tmp_path: Path):
+    script = tmp_path / "demo" / "scripts" / "talker"
+    script.parent.mkdir(parents=True)
+    script.touch()
+    (tmp_path / "demo" / "package.xml").write_text("<package><name>demo</name></package>")
+    assert executable_of([str(script)], tmp_path, []) == Origin("demo", "talker")
+
+
+def test_executable_is_found_behind_a_module_that_runs_it(tmp_path: Path):
+    runner, script = tmp_path / "lib" / "host" / "run.py", tmp_path / "lib" / "demo" / "talker"
+    for path in (runner, script):
+        path.parent.mkdir(parents=True)
+        path.touch()
+    script.chmod(0o755)
+    arguments = ["/usr/bin/python3", str(runner), str(script), "__name:=x"]
+    assert executable_of(arguments, tmp_path, ["demo", "host"]) == Origin("demo", "talker")
+    assert executable_of(arguments[:2], tmp_path, ["demo", "host"]) == Origin("host", "run.py")

@@ -1,0 +1,142 @@
+"""Carrying out plans, and coming back when none gets there."""
+
+import itertools
+
+import pytest
+from rosgraph_manipulator.change.deployment import CancelledError, DeploymentError, Result, Stopwatch, deploy
+from rosgraph_manipulator.change.tactics import ChangeProcesses, Plan, SetParameters
+from rosgraph_manipulator.configuration.configuration_file import Configuration
+
+OLD = Configuration("old", "f", "old.launch")
+NEW = Configuration("new", "f", "new.launch")
+SETTING = Plan("parameters", 0.05, (SetParameters("/n", {"speed": 1.0}), ChangeProcesses()))
+RESTART = Plan("restart", 0.8, (ChangeProcesses(("/n",), ("/n",)),))
+
+
+class Recorder:
+    """A platform on which some calls fail."""
+
+    def __init__(self, **failures):
+        self.calls = []
+        self._failures = failures
+
+    def _call(self, name, text=""):
+        self.calls.append(f"{name} {text}".strip())
+        if name in self._failures:
+            raise self._failures[name]
+
+    def begin(self, wanted, plan):
+        self._call("begin", f"{wanted.name} by {plan.tactic}")
+
+    def set_parameters(self, server, values):
+        self._call("set_parameters", f"{server} {values}")
+
+    def change_processes(self, stop, start):
+        self._call("change_processes", f"{stop} {start}")
+
+    def wait_until_ready(self):
+        self._call("ready")
+
+    def wait_until_settled(self):
+        self._call("settled")
+
+    def restore(self, configuration):
+        self._call("restore", configuration.name)
+
+    def stop_everything(self):
+        self._call("stop_everything")
+
+
+def run(platform, plans, last_good=OLD):
+    return deploy(platform, NEW, plans, last_good, Stopwatch(itertools.count().__next__))
+
+
+def test_cheapest_plan_that_works_is_the_only_one_carried_out():
+    platform = Recorder()
+    outcome = run(platform, [SETTING, RESTART])
+    assert (outcome.result, outcome.running, outcome.tactic) == (Result.OK, NEW, "parameters")
+    assert platform.calls == [
+        "begin new by parameters",
+        "set_parameters /n {'speed': 1.0}",
+        "change_processes () ()",
+        "ready",
+    ]
+
+
+def test_started_nodes_must_settle():
+    platform = Recorder()
+    assert run(platform, [RESTART]).result is Result.OK
+    assert platform.calls[-1] == "settled"
+
+
+def test_tactic_that_fails_falls_through_to_the_next():
+    platform = Recorder(set_parameters=DeploymentError("it refuses"))
+    outcome = run(platform, [SETTING, RESTART])
+    assert (outcome.result, outcome.tactic) == (Result.OK, "restart")
+    assert "parameters: it refuses" in outcome.message
+
+
+@pytest.mark.parametrize("where", ["change_processes", "ready", "settled"])
+def test_last_good_configuration_is_restored_when_all_plans_fail(where):
+    platform = Recorder(**{where: DeploymentError("it dies")})
+    outcome = run(platform, [RESTART])
+    assert (outcome.result, outcome.running, outcome.tactic) == (Result.FAILED, OLD, "rollback")
+    assert "it dies" in outcome.message
+    assert platform.calls[-1] == "restore old"
+
+
+def test_everything_stops_when_there_is_nothing_to_restore():
+    platform = Recorder(ready=DeploymentError("it dies"))
+    outcome = run(platform, [RESTART], last_good=None)
+    assert (outcome.result, outcome.running) == (Result.GENERAL_ERROR, None)
+    assert platform.calls[-1] == "stop_everything"
+
+
+def test_everything_stops_when_restoring_fails_too():
+    platform = Recorder(ready=DeploymentError("it dies"), restore=DeploymentError("so does the old one"))
+    outcome = run(platform, [RESTART])
+    assert (outcome.result, outcome.running) == (Result.GENERAL_ERROR, None)
+    assert "so does the old one" in outcome.message
+    assert platform.calls[-1] == "stop_everything"
+
+
+def test_failing_stop_is_told_and_changes_nothing_else():
+    error = DeploymentError("no launcher")
+    outcome = run(Recorder(ready=error, restore=error, stop_everything=error), [RESTART])
+    assert outcome.result is Result.GENERAL_ERROR
+
+
+def test_request_taken_back_before_anything_was_touched_leaves_what_runs():
+    platform = Recorder(begin=CancelledError("taken back"))
+    outcome = run(platform, [RESTART])
+    assert (outcome.result, outcome.running, outcome.cancelled) == (Result.FAILED, OLD, True)
+    assert platform.calls == ["begin new by restart"]
+
+
+@pytest.mark.parametrize("where", ["change_processes", "ready", "settled"])
+def test_request_taken_back_later_goes_back_and_tries_nothing_else(where):
+    platform = Recorder(**{where: CancelledError("taken back")})
+    outcome = run(platform, [RESTART, RESTART])
+    assert (outcome.result, outcome.running, outcome.cancelled) == (Result.FAILED, OLD, True)
+    assert platform.calls.count("begin new by restart") == 1
+
+
+def test_superseded_request_leaves_the_rest_to_the_next_one():
+    platform = Recorder(ready=CancelledError("given up", superseded=True))
+    outcome = run(platform, [RESTART])
+    assert (outcome.result, outcome.running, outcome.cancelled) == (Result.FAILED, None, True)
+    assert "restore old" not in platform.calls
+
+
+def test_no_plan_at_all_restores():
+    assert run(Recorder(), []).result is Result.FAILED
+
+
+def test_stopwatch_adds_up_phases_in_order():
+    times = iter([0.0, 1.0, 5.0, 7.0, 8.0, 8.5])
+    watch = Stopwatch(times.__next__)
+    for name in ("stop", "start", "stop"):
+        with watch.phase(name):
+            pass
+    assert watch.phases == {"stop": 1.5, "start": 2.0}
+    assert list(watch.phases) == ["stop", "start"]

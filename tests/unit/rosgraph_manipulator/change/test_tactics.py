@@ -1,0 +1,120 @@
+"""Which plans lead from one configuration to another, and in which order."""
+
+import pytest
+from rosgraph_manipulator.change.tactics import Adjustable, ChangeProcesses, SetParameters, load_tactics, plans
+from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription, compare
+
+TACTICS = load_tactics()
+
+
+class Facts:
+    """Running nodes that take some parameters."""
+
+    def __init__(self, **taken):
+        self._taken = {f"/{name}": parameters for name, parameters in taken.items()}
+
+    def adjustable(self, node):
+        return self._taken.get(node, {})
+
+
+SPEED = {"speed": Adjustable("/a", "speed", "double", 0.0, 2.0), "dwa/mode": Adjustable("/a/dwa", "mode", "str")}
+
+
+def system(**nodes):
+    return SystemDescription(
+        {f"/{name}": NodeDescription(f"/{name}", "/", "p", "x", parameters=values) for name, values in nodes.items()}
+    )
+
+
+def found(running, wanted, facts=None):
+    return plans(compare(running, wanted), facts or Facts(), TACTICS)[0]
+
+
+def names(*arguments):
+    return [plan.tactic for plan in found(*arguments)]
+
+
+def test_equal_configurations_need_nothing():
+    first = found(system(a={"speed": 1}), system(a={"speed": 1}))[0]
+    assert (first.tactic, first.touched) == ("nothing", ())
+
+
+def test_parameters_that_the_node_takes_are_set_while_it_runs():
+    wanted = system(a={"speed": 2, "dwa/mode": "fast"})
+    first = found(system(a={"speed": 1, "dwa/mode": "slow"}), wanted, Facts(a=SPEED))[0]
+    assert first.tactic == "parameters"
+    assert first.steps == (
+        SetParameters("/a", {"speed": 2.0}),
+        SetParameters("/a/dwa", {"mode": "fast"}),
+        ChangeProcesses(),
+    )
+
+
+@pytest.mark.parametrize("value", [2.1, -0.1, "fast", True])
+def test_value_that_the_node_does_not_take_needs_a_restart(value):
+    assert names(system(a={"speed": 1}), system(a={"speed": value}), Facts(a=SPEED))[0] == "restart"
+
+
+def test_parameter_that_the_node_does_not_take_needs_a_restart():
+    wanted = system(a={"speed": 2, "sources": "cloud"})
+    assert names(system(a={"speed": 1, "sources": "scan"}), wanted, Facts(a=SPEED))[0] == "restart"
+
+
+def test_exactly_the_nodes_that_differ_are_restarted():
+    running, wanted = system(a={"x": 1}, b={"x": 1}, gone={}), system(a={"x": 1}, b={"x": 2}, new={})
+    first, second = found(running, wanted)
+    assert first.steps == (ChangeProcesses(("/gone", "/b"), ("/b", "/new")),)
+    assert second.steps == (ChangeProcesses(("/a", "/b", "/gone"), ("/a", "/b", "/new")),)
+
+
+def test_node_that_takes_its_parameters_runs_on_while_another_is_restarted():
+    running, wanted = system(a={"speed": 1}, b={}, gone={}), system(a={"speed": 2}, b={}, new={})
+    first = found(running, wanted, Facts(a=SPEED))[0]
+    assert first.steps == (SetParameters("/a", {"speed": 2.0}), ChangeProcesses(("/gone",), ("/new",)))
+
+
+def test_plan_that_does_the_same_as_a_cheaper_one_is_left_out():
+    assert names(system(a={"x": 1}), system(a={"x": 2})) == ["restart"]
+
+
+def test_from_nothing_everything_is_started():
+    assert [str(plan) for plan in found(SystemDescription(), system(a={}, b={}))] == [
+        "replace\n  1. start /a, /b; store the configuration's parameters"
+    ]
+
+
+def test_plan_prints_what_is_done():
+    running, wanted = system(a={"speed": 1}, b={}, gone={}), system(a={"speed": 2}, b={}, new={})
+    assert str(found(running, wanted, Facts(a=SPEED))[0]) == (
+        "restart\n  1. set at /a: speed = 2.0\n  2. stop /gone; start /new; store the configuration's parameters"
+    )
+
+
+def test_tactic_that_raises_is_named_and_the_others_go_on():
+    def broken(_difference, _facts):
+        raise ZeroDivisionError("oh")
+
+    kept, problems = plans(compare(system(), system(a={})), Facts(), {"broken": broken, **TACTICS})
+    assert [plan.tactic for plan in kept] == ["replace"]
+    assert problems == ["tactic broken makes no plan: ZeroDivisionError: oh"]
+
+
+def test_tactics_are_exported_by_packages():
+    assert set(TACTICS) >= {"nothing", "parameters", "restart", "replace"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "taken"),
+    [
+        ("int", 1, True),
+        ("int", 1.0, False),
+        ("double", 1, True),
+        ("bool", True, True),
+        ("bool", 1, False),
+        ("str", "x", True),
+        ("str", 1, False),
+        ("int", True, False),
+    ],
+)
+def test_types_must_fit(kind, value, taken):
+    assert Adjustable("/a", "x", kind).takes(value) is taken

@@ -1,0 +1,109 @@
+"""The manipulator's configuration file, in both forms."""
+
+import pytest
+from rosgraph_manipulator.configuration.configuration_file import ConfigurationError, parse_settings
+from rosgraph_manipulator.ros.manipulator import read_file
+
+
+@pytest.fixture
+def launch_file(tmp_path):
+    path = tmp_path / "a.launch"
+    path.write_text("<launch/>")
+    return path
+
+
+def test_own_form_names_function_launch_file_and_arguments(launch_file):
+    settings = parse_settings(
+        {"configurations": {"a": {"function": "f", "launch": str(launch_file), "args": ["x:=1"]}}}
+    )
+    configuration = settings.configurations["a"]
+    assert (configuration.function, configuration.launch_file, configuration.args) == ("f", str(launch_file), ("x:=1",))
+
+
+def test_published_command_is_parsed_into_package_file_and_arguments():
+    command = "roslaunch rosgraph_manipulator manipulator.launch config:=/a"
+    settings = parse_settings({"configurations": {"a": {"command": command}}})
+    configuration = settings.configurations["a"]
+    assert configuration.launch_file.endswith("rosgraph_manipulator/launch/manipulator.launch")
+    assert configuration.args == ("config:=/a",)
+
+
+def test_published_action_type_is_understood(launch_file):
+    settings = parse_settings(
+        {
+            "configurations": {"a": {"launch": str(launch_file)}},
+            "save_action": "/move_base",
+            "goal_msg_type": "move_base_msgs.msg.MoveBaseAction",
+            "kill_nodes": ["/move_base"],
+        }
+    )
+    assert settings.save_action == "move_base"
+    assert settings.action_type == "move_base_msgs/MoveBaseAction"
+    assert settings.reconfiguration_action_name == "rosgraph_manipulator_action_server"
+
+
+@pytest.mark.parametrize(
+    ("parameters", "named"),
+    [
+        ({}, "configurations"),
+        ({"configurations": {"a": "roslaunch"}}, "configurations/a"),
+        ({"configurations": {"a": {}}}, "configurations/a"),
+        ({"configurations": {"a": {"command": "rm -rf x; roslaunch a b"}}}, "is not 'roslaunch"),
+        ({"configurations": {"a": {"command": "roslaunch 'a"}}}, "quotation"),
+        ({"configurations": {"a": {"command": "roslaunch no_such_package x.launch"}}}, "no_such_package"),
+        ({"configurations": {"a": {"launch": "/no/such/file.launch"}}}, "/no/such/file.launch"),
+        ({"configurations": {"a": {"launch": "package://rosgraph_manipulator/../../secret"}}}, "configurations/a"),
+    ],
+)
+def test_unusable_configuration_is_refused_and_named(parameters, named):
+    with pytest.raises(ConfigurationError, match=named):
+        parse_settings(parameters)
+
+
+@pytest.mark.parametrize("bad", [{"kill_nodes": "move_base"}, {"save_action": "m", "goal_msg_type": "os.system"}])
+def test_unusable_parameter_is_refused(launch_file, bad):
+    with pytest.raises(ConfigurationError, match=next(reversed(bad))):
+        parse_settings({"configurations": {"a": {"launch": str(launch_file)}}, **bad})
+
+
+PUBLISHED = """
+configurations:
+  f_one:
+    command: "roslaunch metacontrol_sim f1_v1_r1.launch"
+  f_two:
+    command: roslaunch rosgraph_manipulator manipulator.launch config:=/some/file.yaml
+kill_nodes: ['/move_base']
+save_action: 'move_base'
+goal_msg_type: move_base_msgs.msg.MoveBaseAction
+reconfiguration_action_name: 'rosgraph_manipulator_action_server'
+"""
+
+
+def test_published_file_loads_unchanged(tmp_path):
+    path = tmp_path / "configurations.yaml"
+    path.write_text(PUBLISHED)
+    settings = parse_settings(read_file(str(path)))
+    assert list(settings.configurations) == ["f_one", "f_two"]
+    # as roslaunch does, a file is found anywhere in its package
+    assert settings.configurations["f_one"].launch_file.endswith("metacontrol_sim/launch/variants/f1_v1_r1.launch")
+    assert settings.configurations["f_two"].args == ("config:=/some/file.yaml",)
+    assert settings.kill_nodes == ("/move_base",)
+    assert (settings.save_action, settings.action_type) == ("move_base", "move_base_msgs/MoveBaseAction")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"), [("", "found none"), ("a: [", "is not YAML"), ("- a", "found none"), (None, "cannot be read")]
+)
+def test_file_that_is_no_configuration_is_refused(tmp_path, text, words):
+    path = tmp_path / "configurations.yaml"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(ConfigurationError, match=words):
+        read_file(str(path))
+
+
+def test_topics_to_wait_for_are_names(launch_file):
+    entry = {"launch": str(launch_file), "topics": ["plan"]}
+    assert parse_settings({"configurations": {"a": entry}}).configurations["a"].topics == ("plan",)
+    with pytest.raises(ConfigurationError, match="topics"):
+        parse_settings({"configurations": {"a": {**entry, "topics": "plan"}}})

@@ -1,0 +1,108 @@
+"""Reading launch files through roslaunch, and turning nodes into commands."""
+
+import os
+
+import pytest
+from ros_model.files import resolve
+from rosgraph_manipulator.configuration.description import compare
+from rosgraph_manipulator.io.launch_files import (
+    LaunchFileError,
+    command_line,
+    process_environment,
+    read_launch_file,
+    read_model,
+)
+
+NODE = '<node name="n" pkg="move_base" type="move_base"'
+
+
+def write(folder, body):
+    path = folder / "x.launch"
+    path.write_text(f"<launch>{body}</launch>")
+    return path
+
+
+def test_nodes_keep_their_parameters_remaps_and_environment(tmp_path):
+    body = f"""<arg name="speed"/><param name="shared" value="1"/><group ns="robot">
+      {NODE} args="--fast" output="screen" respawn="true"><param name="x/y" value="$(arg speed)"/>
+      <remap from="a" to="b"/><env name="E" value="1"/></node></group>"""
+    launch = read_launch_file(write(tmp_path, body), ["speed:=2.5"])
+    node = launch.system.nodes["/robot/n"]
+    assert node.parameters == {"x/y": 2.5}
+    assert node.remaps == (("a", "b"),)
+    assert ("E", "1") in node.environment
+    assert (node.args, node.output, node.respawn) == ("--fast", "screen", True)
+    assert launch.system.parameters == {"/shared": 1}
+
+
+def test_two_readings_of_anonymous_names_are_the_same(tmp_path):
+    path = write(tmp_path, '<node name="$(anon n)" pkg="move_base" type="move_base"/>')
+    assert list(read_launch_file(path).system.nodes) == list(read_launch_file(path).system.nodes)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("<node name=", "not well-formed"),
+        ("", "starts no node"),
+        ('<node name="n" type="x"/>', "pkg"),
+        (f'<include file="/no/such.launch"/>{NODE}/>', "no/such.launch"),
+        (f'{NODE}/><param name="x" value="$(arg nowhere)"/>', "nowhere"),
+        (f"{NODE}/>{NODE}/>", "multiple nodes named"),
+        (f'<machine name="far" address="192.0.2.1" env-loader="/x"/>{NODE} machine="far"/>', "another machine"),
+    ],
+)
+def test_files_that_cannot_be_used_are_refused_in_one_line(tmp_path, body, words):
+    path = write(tmp_path, body)
+    with pytest.raises(LaunchFileError, match=words) as error:
+        read_launch_file(path)
+    assert str(path) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_missing_file_is_refused():
+    with pytest.raises(LaunchFileError, match=r"/no/such\.launch"):
+        read_launch_file("/no/such.launch")
+
+
+def test_entities_are_refused(tmp_path):
+    path = tmp_path / "x.launch"
+    path.write_text(f'<!DOCTYPE launch [<!ENTITY e "x">]><launch>{NODE} args="&e;"/></launch>')
+    with pytest.raises(LaunchFileError, match="document type"):
+        read_launch_file(path)
+
+
+def test_model_and_its_launch_file_are_the_same_configuration():
+    name = "f2_v2_r2"
+    model = read_model(resolve(f"package://metacontrol_sim/models/variants/{name}.rossystem"))
+    launch = read_launch_file(resolve(f"package://metacontrol_sim/launch/variants/{name}.launch"))
+    difference = compare(model.system, launch.system)
+    assert not difference.touches_nodes
+    assert not difference.shared
+
+
+def test_command_names_executable_and_node(tmp_path):
+    body = f'<group ns="robot">{NODE} args="--fast 1"><remap from="a" to="b"/></node></group>'
+    node = read_launch_file(write(tmp_path, body)).system.nodes["/robot/n"]
+    words, prefixed = command_line(node)
+    assert os.path.basename(words[0]) == "move_base"
+    assert words[1:] == ["--fast", "1", "a:=b", "__name:=n"]
+    assert prefixed == 0
+    assert process_environment(node, {"HOME": "/x"})["ROS_NAMESPACE"].strip("/") == "robot"
+
+
+def test_launch_prefix_comes_first(tmp_path):
+    node = read_launch_file(write(tmp_path, f'{NODE} launch-prefix="nice -n 5"/>')).system.nodes["/n"]
+    words, prefixed = command_line(node)
+    assert (words[:3], prefixed) == (["nice", "-n", "5"], 3)
+
+
+def test_executable_that_does_not_exist_is_refused(tmp_path):
+    path = write(tmp_path, '<node name="n" pkg="move_base" type="no_such_node"/>')
+    with pytest.raises(LaunchFileError, match=r"/n: .*no_such_node"):
+        command_line(read_launch_file(path).system.nodes["/n"])
+
+
+def test_parameters_to_clear_are_kept(tmp_path):
+    launch = read_launch_file(write(tmp_path, f'<group ns="old" clear_params="true"/>{NODE}/>'))
+    assert launch.clear == ("/old/",)

@@ -1,0 +1,89 @@
+"""Tables for a terminal, and names for the aggregator."""
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from rich.console import Console
+from ros_model.io.snapshot import build_snapshot
+from rosgraph_monitor.cli.snapshot import lines
+from rosgraph_monitor.diagnostics.aggregator_names import unique_name
+from rosgraph_monitor.diagnostics.overview import Board, thresholds
+
+
+def status(name, message, *values, level=0):
+    return DiagnosticStatus(level, name, message, "", [KeyValue(key, value) for key, value in values])
+
+
+def shown(board, now, nodes=("/laser",), parameters=None):
+    console = Console(width=160)
+    with console.capture() as capture:
+        console.print(board.render(nodes, parameters or {}, now))
+    return capture.get()
+
+
+def test_board_shows_nodes_qualities_with_thresholds_and_findings():
+    board = Board()
+    board.take(
+        [
+            status("laser", "Component status", ("laser", "TRUE")),
+            status("laser", "CPU Usage", ("laser", "12.50")),
+            status("", "QA status", ("safety", "0.25")),
+            status("camera", "Missing node", ("reason", "dead: gone"), level=2),
+        ],
+        10.0,
+    )
+    text = shown(board, 11.0, parameters={"reasoner": {"nfr_safety": 0.6}})
+    for expected in ("laser", "TRUE", "12.50", "safety", "0.25", "0.6", "Missing node", "dead: gone"):
+        assert expected in text
+
+
+def test_finding_that_is_not_repeated_is_over():
+    board = Board()
+    board.take([status("camera", "Missing node", ("reason", "dead"), level=2)], 10.0)
+    assert "Missing node" in shown(board, 12.0)
+    assert "Missing node" not in shown(board, 14.0)
+
+
+def test_markup_in_names_is_shown_as_it_is():
+    board = Board()
+    board.take([status("[red]x", "Odd [/]", ("k", "[bold]"), level=77)], 0.0)
+    assert "[red]x" in shown(board, 0.0, nodes=("/[/nope]",))
+
+
+def test_thresholds_are_found_wherever_they_stand():
+    tree = {"a": {"reasoner": {"nfr_energy": 1, "nfr_word": "x"}}, "nfr_safety": 0.5}
+    assert thresholds(tree) == {"energy": 1.0, "safety": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        (status("laser", "Component status", ("laser_resender", "TRUE")), "Component laser_resender"),
+        (status("", "QA status", ("safety", "0.5")), "Quality safety"),
+        (status("fg_1", "QA stale", ("safety", "x")), "Quality safety of fg_1"),
+        (status("laser", "Missing node", ("reason", "x")), "Graph laser: Missing node"),
+        (status("laser", "Missing port", ("port", "scan")), "Graph laser: Missing port scan"),
+        (status("scan", "Silent topic"), "Graph scan: Silent topic"),
+        (status("laser", "CPU Usage", ("laser", "1")), "Usage laser: CPU Usage"),
+        (status("ROS Graph", "running OK"), "Graph ROS Graph"),
+        (status("driver: status", "fine"), "driver: status"),
+        (status("odd", "QA status"), "odd"),
+    ],
+)
+def test_each_thing_has_a_name_of_its_own(given, name):
+    assert unique_name(given) == name
+
+
+def test_snapshot_in_lines():
+    graph = build_snapshot(
+        [[["/scan", ["/laser"]]], [["/scan", ["/nav"]]], [["/nav/clear", ["/nav"]]]],
+        [["/scan", "sensor_msgs/LaserScan"]],
+        {},
+        {"/laser": "http://a:1/", "/nav": "http://a:2/"},
+    )
+    assert list(lines(graph)) == [
+        "/laser http://a:1/",
+        "  publishes /scan sensor_msgs/LaserScan",
+        "/nav http://a:2/",
+        "  subscribes /scan sensor_msgs/LaserScan",
+        "  serves /nav/clear",
+    ]

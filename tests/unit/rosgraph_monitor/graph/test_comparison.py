@@ -1,0 +1,160 @@
+"""What runs against what should run."""
+
+import pytest
+from ros_model.io.snapshot import GraphSnapshot, NodeState, build_snapshot
+from ros_model.language.metamodel import Component, Reference, RosParameter, RosSystem, SystemParameter
+from rosgraph_monitor.diagnostics.status import Level
+from rosgraph_monitor.graph.comparison import Scope, compare, wrong_topic_types
+from rosgraph_monitor.graph.findings import (
+    NO_NODE,
+    NOT_SET,
+    AdditionalNode,
+    MissingNode,
+    WrongParameter,
+    WrongType,
+    finding_statuses,
+)
+from rosgraph_monitor.graph.names import instance, is_ignored_node, relative, resolved
+from rosgraph_monitor.graph.values import same_value
+
+
+def graph(*nodes, **parameters):
+    return GraphSnapshot(nodes={n: NodeState(n, f"http://host{n}") for n in nodes}, parameters=parameters)
+
+
+def system(*components):
+    return RosSystem("s", components=components)
+
+
+def parameter(name, value):
+    return RosParameter("label", Reference("p", "a", "n", name), value)
+
+
+BASE = Component("base", parameters=(parameter("local/speed", 0.5), parameter("unset", None)))
+
+
+def test_graph_as_desired_has_no_findings():
+    assert compare(graph("/base", base={"local": {"speed": 0.5}}), system(BASE), dead={}) == ()
+
+
+def test_node_that_is_not_registered_is_missing():
+    assert compare(graph(), system(BASE), dead={}) == (MissingNode("base", "absent", "not registered with the master"),)
+
+
+def test_node_that_is_registered_but_dead_is_missing():
+    assert compare(graph("/base"), system(BASE), dead={"/base": ("dead", "no answer")}) == (
+        MissingNode("base", "dead", "no answer"),
+    )
+
+
+def test_excused_node_raises_no_alarm():
+    assert compare(graph(), system(BASE), dead={}, excused={"base"}) == ()
+
+
+def test_wrong_parameter_has_expected_and_actual_value():
+    findings = compare(graph("/base", base={"local": {"speed": 0.3}}), system(BASE), dead={})
+    assert findings == (WrongParameter("base", "local/speed", 0.5, 0.3),)
+    (status,) = finding_statuses(findings)
+    assert status.message == "Wrong param configuration"
+    assert status.name == "base"
+    assert status.values == (("local/speed", "0.3"), ("expected/local/speed", "0.5"))
+
+
+def test_parameter_that_is_not_set_is_wrong():
+    (status,) = finding_statuses(compare(graph("/base"), system(BASE), dead={}))
+    assert status.values[0] == ("local/speed", "<not set>")
+
+
+def test_additional_node_is_a_warning():
+    findings = compare(graph("/base", "/stray", base={"local": {"speed": 0.5}}), system(BASE), dead={})
+    assert findings == (AdditionalNode("stray"),)
+    (status,) = finding_statuses(findings)
+    assert (status.level, status.name, status.message) == (Level.WARN, "stray", "Additional node")
+
+
+def test_dead_node_is_not_additional():
+    assert compare(graph("/stray"), system(), dead={"/stray": ("dead", "no answer")}) == ()
+
+
+@pytest.mark.parametrize("name", ["rosout", "rosgraph_monitor", "rviz_1700000000123", "any_4711_1700000000123"])
+def test_tools_and_anonymous_nodes_are_ignored(name):
+    assert compare(graph(f"/{name}"), system(), dead={}) == ()
+
+
+def test_additional_patterns_are_a_setting():
+    assert is_ignored_node("tool_a", ("/tool_*",))
+    assert not is_ignored_node("driver_2", ("tool_*",))
+
+
+def test_system_in_a_namespace():
+    live = graph("/robot/base", "/other", robot={"base": {"local": {"speed": 0.5}}})
+    assert compare(live, system(BASE), dead={}, scope=Scope(namespace="/robot")) == ()
+    assert resolved("ns/base", "/robot") == "/robot/ns/base"
+    assert relative("/other", "/robot") is None
+
+
+@pytest.mark.parametrize(
+    ("expected", "actual", "same"),
+    [
+        (0.5, 0.5000000001, True),
+        (15, 15.0, True),
+        (0.5, 0.51, False),
+        (True, 1, False),
+        ("15", 15, True),
+        ("true", True, True),
+        ("scan", "scan", True),
+        ("scan", "point_cloud", False),
+        ([0.1, [1]], [0.1, [1]], True),
+        ([0.1], [0.1, 0.2], False),
+        ({"a": 1}, {"a": 1, "b": 2}, True),
+        ({"a": 1}, {"b": 2}, False),
+        ({"a": 1}, 1, False),
+    ],
+)
+def test_same_value(expected, actual, same):
+    assert same_value(expected, actual) is same
+
+
+def test_nan_equals_nan_only():
+    assert same_value(float("nan"), float("nan"))
+    assert not same_value(float("nan"), 1.0)
+
+
+def test_parameter_in_a_namespace_of_the_node():
+    component = Component("base", parameters=(RosParameter("speed", None, 0.5, namespace="local"),))
+    assert compare(graph("/base", base={"local": {"speed": 0.5}}), system(component), dead={}) == ()
+
+
+def test_parameter_of_the_system_is_compared_but_not_what_only_describes_it():
+    described = RosSystem(
+        "s", parameters=(SystemParameter("robot_name", value="r"), SystemParameter("qa_safety", value=0.4))
+    )
+    assert compare(graph(), described, dead={}) == (WrongParameter(NO_NODE, "robot_name", "r", NOT_SET),)
+    assert compare(graph(robot_name="r"), described, dead={}) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("/talker", "/talker"),
+        ("/listener", "/listener_1700000000000"),
+        ("/pub_11_1600000000000", "/pub_4711_1700000000000"),
+        ("/twin", "/twin_1_1700000000001"),
+    ],
+)
+def test_anonymous_instance_stands_for_a_node_of_the_model(name, found):
+    running = (
+        *("/talker", "/listener_1700000000000", "/pub_4711_1700000000000"),
+        *("/twin_1_1700000000001", "/twin_2_1700000000002"),
+    )
+    assert instance(name, running) == found
+
+
+def test_type_of_a_topic_by_settings():
+    live = build_snapshot(
+        [[["/scan", ["/laser"]]], [], []], [["/scan", "std_msgs/String"]], {}, {"/laser": "http://x:1/"}
+    )
+    assert wrong_topic_types(live, {"scan": "std_msgs/String", "absent": "a/B"}) == []
+    assert wrong_topic_types(live, {"scan": "sensor_msgs/LaserScan"}) == [
+        WrongType("laser", "scan", "sensor_msgs/LaserScan", "std_msgs/String")
+    ]

@@ -1,0 +1,158 @@
+"""Health of topics over time."""
+
+import pytest
+from ros_model.language.metamodel import RosSystem, SystemParameter
+from rosgraph_monitor.diagnostics.status import Level
+from rosgraph_monitor.health.topics import TopicHealth, TopicSpec, merged, model_topics, parse_topics, verdict_statuses
+
+BEGIN = 1e-9
+"""s. A time of 0 means that the clock has not begun."""
+
+
+def health(grace=5.0, **limits):
+    followed = TopicHealth(grace)
+    followed.follow({"scan": TopicSpec("scan", **limits)}, BEGIN, BEGIN)
+    return followed
+
+
+def said(followed, now, **options):
+    return [verdict.message for verdict in followed.judge(now, now, **options)]
+
+
+def feed(followed, begin, end, rate, digest=lambda i: i):
+    for i in range(round((end - begin) * rate)):
+        followed.arrived("scan", begin + i / rate, begin + i / rate, digest(i))
+
+
+def test_topic_may_bring_its_first_message_within_the_grace():
+    followed = health(max_age=1.0)
+    assert said(followed, 5.0) == [""]
+    assert not followed.judge(5.0, 5.0)[0].heard
+    assert said(followed, 5.1) == ["Silent topic"]
+
+
+@pytest.mark.parametrize(("ros", "wall"), [(60.0, 4.0), (4.0, 60.0)])
+def test_neither_a_fast_simulation_nor_a_paused_one_shortens_the_grace(ros, wall):
+    assert health(max_age=1.0).judge(ros, wall)[0].message == ""
+
+
+def test_silence_is_told_when_the_last_message_is_too_old():
+    followed = health(max_age=1.0)
+    followed.arrived("scan", 2.0, 2.0)
+    assert said(followed, 3.0) == [""]
+    (verdict,) = followed.judge(3.1, 3.1)
+    assert verdict.message == "Silent topic"
+    (status,) = verdict_statuses([verdict])
+    assert (status.level, status.name) == (Level.ERROR, "scan")
+    assert dict(status.values)["expected"] == "max_age 1"
+    followed.arrived("scan", 3.2, 3.2)
+    assert said(followed, 3.2) == [""]
+
+
+@pytest.mark.parametrize(("rate", "message"), [(20.0, ""), (10.5, ""), (9.0, "Slow topic"), (3.0, "Slow topic")])
+def test_rate(rate, message):
+    followed = health(min_rate=10.0)
+    feed(followed, 0.0, 6.0, rate)
+    assert said(followed, 6.0) == [message]
+
+
+def test_rate_is_not_judged_before_there_was_time_to_measure_it():
+    followed = health(min_rate=10.0)
+    feed(followed, 0.0, 1.9, 1.0)
+    assert said(followed, 1.9) == [""]
+
+
+def test_topic_that_stops_becomes_slow_even_without_a_limit_of_age():
+    followed = health(min_rate=10.0)
+    feed(followed, 0.0, 4.0, 20.0)
+    assert said(followed, 9.0) == ["Slow topic"]
+
+
+def test_same_data_again_and_again_is_a_stuck_sensor():
+    followed = health(stuck_after=5)
+    feed(followed, 0.0, 0.4, 10.0, digest=lambda i: 7)
+    assert said(followed, 0.4) == [""]
+    followed.arrived("scan", 0.5, 0.5, 7)
+    assert said(followed, 0.5) == ["Stuck topic"]
+    followed.arrived("scan", 0.6, 0.6, 8)
+    assert said(followed, 0.6) == [""]
+
+
+def test_excused_topic_is_fine_and_begins_anew():
+    followed = health(grace=1.0, max_age=1.0)
+    followed.arrived("scan", 0.0, 0.0)
+    assert said(followed, 9.0, excused={"scan"}) == [""]
+    assert said(followed, 9.9) == [""]
+    assert said(followed, 10.1) == ["Silent topic"]
+
+
+def test_time_is_ros_time_unless_wall_time_is_asked_for():
+    followed = TopicHealth(5.0)
+    specs = {"clock": TopicSpec("clock", max_age=1.0, wall_time=True), "scan": TopicSpec("scan", max_age=1.0)}
+    followed.follow(specs, BEGIN, BEGIN)
+    followed.arrived("clock", 1.0, 1.0)
+    followed.arrived("scan", 1.0, 1.0)
+    messages = {v.spec.name: v.message for v in followed.judge(ros=1.5, wall=9.0)}
+    assert messages == {"clock": "Silent topic", "scan": ""}
+
+
+def test_jump_of_time_begins_anew():
+    followed = health(max_age=1.0)
+    followed.arrived("scan", 100.0, 100.0)
+    assert said(followed, 100.5) == [""]
+    assert said(followed, 2.0) == [""]
+    assert said(followed, 3.0) == [""]
+    followed.arrived("scan", 3.0, 3.0)
+    assert said(followed, 4.5) == ["Silent topic"]
+
+
+def test_grace_begins_with_the_clock():
+    followed = TopicHealth(5.0)
+    followed.follow({"scan": TopicSpec("scan", max_age=1.0)}, 0.0, 0.0)
+    assert said(followed, 0.0) == [""]
+    assert said(followed, 1000.0) == [""]
+    assert said(followed, 1005.1) == ["Silent topic"]
+
+
+def test_followed_topics_keep_their_history_and_others_are_forgotten():
+    followed = health(max_age=1.0)
+    followed.arrived("scan", 1.0, 1.0)
+    followed.follow({"scan": TopicSpec("scan", max_age=3.0)}, 1.5, 1.5)
+    assert said(followed, 3.0) == [""]
+    followed.follow({"scan": TopicSpec("scan", type="a/B")}, 3.0, 3.0)
+    followed.arrived("scan", 3.0, 3.0)
+    assert said(followed, 99.0) == []
+
+
+def test_settings_by_topic_as_the_parameter_server_has_them():
+    nested = {"front": {"scan": {"min_rate": 5, "type": "sensor_msgs/LaserScan"}}, "odom": {"max_age": 0.5}}
+    assert parse_topics(nested) == parse_topics({"/front/scan": nested["front"]["scan"], "odom": {"max_age": 0.5}})
+    assert parse_topics(nested)["front/scan"] == TopicSpec("front/scan", "sensor_msgs/LaserScan", 5)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        *([], {"min_rate": 5}, {"scan": {"rate": 5}}, {"scan": {"min_rate": 0}}, {"scan": {"max_age": "1"}}),
+        *({"scan": {"stuck_after": 2.5}}, {"scan": {"max_age": float("inf")}}, {"scan": {"min_rate": True}}),
+    ],
+)
+def test_bad_settings_are_refused(value):
+    with pytest.raises(ValueError, match="topics"):
+        parse_topics(value)
+
+
+def test_model_may_say_what_it_expects_and_settings_go_first():
+    system = RosSystem(
+        "s",
+        parameters=(
+            SystemParameter("min_rate/front/scan", value=5),
+            SystemParameter("max_age/front/scan", value=0.5),
+            SystemParameter("qa_safety", value=0.5),
+            SystemParameter("max_age/odom", value="soon"),
+        ),
+    )
+    from_model = model_topics(system)
+    assert from_model == {"front/scan": TopicSpec("front/scan", min_rate=5.0, max_age=0.5)}
+    settings = {"front/scan": TopicSpec("front/scan", max_age=2.0), "odom": TopicSpec("odom", max_age=1.0)}
+    assert merged(from_model, settings)["front/scan"] == TopicSpec("front/scan", min_rate=5.0, max_age=2.0)

@@ -1,0 +1,85 @@
+"""Looks at the graph, with a master that answers as the test wants."""
+
+import queue
+
+import pytest
+from ros_model.io.snapshot import GraphSnapshot, NodeState, SnapshotError
+from rosgraph_monitor.health.liveness import Life
+from rosgraph_monitor.io.graph_poller import Looker
+
+GRAPH = GraphSnapshot(nodes={name: NodeState(name, f"http://host{name}") for name in ("/laser", "/monitor")})
+DEADLINE = 30.0
+HOURLY = 3600.0
+
+
+class Master:
+    def __init__(self):
+        self.answers = queue.Queue()
+        self.closed = False
+
+    def snapshot(self):
+        answer = self.answers.get(timeout=DEADLINE)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    def close(self):
+        self.closed = True
+
+
+class Watcher:
+    def __init__(self):
+        self.watched = {}
+        self.known = {("/laser", "http://host/laser"): Life.ALIVE}
+
+    def lives(self):
+        return dict(self.known)
+
+    def watch(self, nodes):
+        self.watched = dict(nodes)
+
+
+class Stand:
+    def __init__(self, period):
+        self.master, self.watcher, self.looks = Master(), Watcher(), queue.Queue()
+        self.looker = Looker(self.master, self.watcher, period, "/monitor", lambda: self.looks.put(True))
+
+    def answer(self, *answers):
+        for answer in answers:
+            self.master.answers.put(answer)
+        for _ in answers:
+            self.looks.get(timeout=DEADLINE)
+
+
+@pytest.fixture
+def stand(request):
+    made = Stand(getattr(request, "param", 0.01))
+    made.looker.start()
+    yield made
+    made.master.answers.put(SnapshotError("the test is over"))
+    made.looker.close()
+
+
+def test_look_has_what_was_known_and_tells_the_watcher_whom_to_watch(stand):
+    stand.answer(GRAPH)
+    assert stand.looker.latest.snapshot is GRAPH
+    assert stand.looker.latest.lives == stand.watcher.known
+    assert stand.watcher.watched == {"/laser": "http://host/laser"}
+
+
+def test_look_that_fails_leaves_the_latest_and_the_next_one_counts_again(stand):
+    stand.answer(GRAPH)
+    stand.master.answers.put(SnapshotError("no answer"))
+    later = GraphSnapshot()
+    stand.answer(later)
+    assert stand.looker.latest.snapshot is later
+    assert stand.looker.count == 2
+
+
+@pytest.mark.parametrize("stand", [HOURLY], indirect=True)
+def test_look_on_request_does_not_wait_until_one_is_due(stand):
+    stand.answer(GRAPH)
+    stand.looker.request()
+    stand.answer(GRAPH)
+    assert stand.looker.count == 2
+    stand.looker.request()

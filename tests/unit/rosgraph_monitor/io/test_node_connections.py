@@ -1,0 +1,161 @@
+"""The watcher over real sockets of this process."""
+
+import contextlib
+import socket
+import threading
+import time
+from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+
+import pytest
+from rosgraph_monitor.health.liveness import Life, Timing
+from rosgraph_monitor.io.node_connections import Watcher
+
+TIMING = Timing(probe_period=0.05, probe_deadline=20.0, connect_deadline=20.0, retry_period=0.05)
+HASTY = Timing(probe_period=0.05, probe_deadline=0.3, connect_deadline=0.3, retry_period=0.05)
+
+
+class KeepAlive(SimpleXMLRPCRequestHandler):
+    protocol_version = "HTTP/1.1"
+
+
+class CloseAfterAnswer(SimpleXMLRPCRequestHandler):
+    protocol_version = "HTTP/1.0"
+
+
+@contextlib.contextmanager
+def black_hole():
+    """An address at which no attempt to connect ever ends, as behind a router that drops what it gets."""
+    with socket.create_server(("127.0.0.1", 0), backlog=0) as server, contextlib.ExitStack() as stack:
+        for _ in range(8):  # more than its queue holds: from then on the kernel answers nobody
+            filler = stack.enter_context(socket.socket())
+            filler.setblocking(False)
+            filler.connect_ex(server.getsockname())
+        yield f"http://127.0.0.1:{server.getsockname()[1]}/"
+
+
+@contextlib.contextmanager
+def node(handler=KeepAlive, pid=4711):
+    server = SimpleXMLRPCServer(("127.0.0.1", 0), requestHandler=handler, logRequests=False)
+    server.register_function(lambda _caller: [1, "", pid], "getPid")
+    server.timeout = 0.02
+    ended = threading.Event()
+    connections = []
+    accept = server.get_request
+
+    def get_request():
+        connections.append(accept())
+        # One connection is served in this thread for as long as it lasts: let it end with the server.
+        connections[-1][0].settimeout(0.5)
+        return connections[-1]
+
+    server.get_request = get_request
+
+    def serve():
+        while not ended.is_set():
+            server.handle_request()
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+
+    def end():
+        ended.set()
+        server.socket.close()
+        for connection, _ in connections:
+            with contextlib.suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+        thread.join()
+
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}/", end
+    finally:
+        if not ended.is_set():
+            end()
+
+
+@pytest.fixture
+def watcher(request):
+    changed = threading.Event()
+    watcher = Watcher(changed.set, getattr(request, "param", TIMING))
+    watcher.changed = changed
+    watcher.start()
+    yield watcher
+    watcher.close()
+
+
+hasty = pytest.mark.parametrize("watcher", [HASTY], indirect=True)
+
+
+def wait_for(condition, deadline=30.0):
+    end = time.monotonic() + deadline
+    while not condition():
+        assert time.monotonic() < end, "condition not met in time"
+        time.sleep(0.005)
+
+
+@pytest.mark.parametrize("handler", [KeepAlive, CloseAfterAnswer])
+def test_live_node_is_alive_with_its_pid(watcher, handler):
+    with node(handler) as (uri, _end):
+        watcher.watch({"/n": uri})
+        wait_for(lambda: watcher.lives() == {("/n", uri): Life.ALIVE})
+        assert watcher.pids() == {"/n": 4711}
+        end = time.monotonic() + 0.4
+        while time.monotonic() < end:
+            assert watcher.lives()[("/n", uri)] is Life.ALIVE
+            time.sleep(0.01)
+
+
+def test_death_is_told_at_once(watcher):
+    with node() as (uri, end):
+        watcher.watch({"/n": uri})
+        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE)
+        watcher.changed.clear()
+        end()
+        assert watcher.changed.wait(30.0)
+        wait_for(lambda: watcher.lives()[("/n", uri)] is Life.DEAD)
+
+
+@hasty
+def test_silent_node_is_hung_until_it_answers(watcher):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        hung = f"http://127.0.0.1:{silent.getsockname()[1]}/"
+        watcher.watch({"/hung": hung})
+        wait_for(lambda: watcher.lives().get(("/hung", hung)) is Life.HUNG)
+        connection, _ = silent.accept()
+        with connection:
+            connection.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok")
+            wait_for(lambda: watcher.lives()[("/hung", hung)] is Life.ALIVE)
+
+
+def test_nodes_that_hang_or_cannot_be_reached_delay_no_other(watcher):
+    with socket.create_server(("127.0.0.1", 0)) as silent, node() as (uri, end), black_hole() as hole:
+        bad = {f"/unroutable_{i}": hole for i in range(40)}
+        bad |= {"/hung": f"http://127.0.0.1:{silent.getsockname()[1]}/", "/odd": "nonsense", "/port": "http://h:99999/"}
+        watcher.watch(bad | {"/n": uri})
+        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE)
+        end()
+        wait_for(lambda: watcher.lives()[("/n", uri)] is Life.DEAD)
+        # All this while the others were still waited for.
+        assert watcher.lives()[("/unroutable_0", hole)] is Life.UNKNOWN
+        assert watcher.lives()[("/hung", bad["/hung"])] is Life.UNKNOWN
+        assert watcher.lives()[("/odd", "nonsense")] is Life.UNREACHABLE
+
+
+@hasty
+def test_unroutable_address_is_unreachable(watcher):
+    with black_hole() as hole:
+        watcher.watch({"/n": hole})
+        wait_for(lambda: list(watcher.lives().values()) == [Life.UNREACHABLE])
+
+
+@hasty
+def test_name_without_address_is_unreachable(watcher):
+    watcher.watch({"/n": "http://no-such-host.invalid:1234/"})
+    wait_for(lambda: list(watcher.lives().values()) == [Life.UNREACHABLE])
+
+
+def test_node_that_is_not_watched_any_more_is_forgotten(watcher):
+    with node() as (uri, _end):
+        watcher.watch({"/n": uri})
+        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE)
+        watcher.watch({})
+        wait_for(lambda: watcher.lives() == {})

@@ -1,0 +1,189 @@
+"""Evaluations of the monitor, one after the other."""
+
+from ros_model.io.snapshot import GraphSnapshot, NodeState, build_snapshot
+from ros_model.language.metamodel import Component, Port, PortKind, RosSystem
+from rosgraph_monitor.evaluation import GraphMonitor, Patience
+from rosgraph_monitor.graph.desired import Desired
+from rosgraph_monitor.health.components import NodeCondition
+from rosgraph_monitor.health.liveness import Life
+from rosgraph_monitor.health.topics import TopicSpec, Verdict
+
+LASER = "/front_laser"
+SYSTEM = RosSystem("base", components=(Component("front_laser"), Component("move_base")))
+DESIRED = Desired(SYSTEM)
+
+
+def graph(*nodes):
+    return GraphSnapshot(nodes={name: NodeState(name, f"http://host{name}") for name in nodes})
+
+
+def lives(**life):
+    return {(f"/{name}", f"http://host/{name}"): known for name, known in life.items()}
+
+
+def monitor(**settings):
+    return GraphMonitor({"front_laser": "laser_resender"}, patience=Patience(5.0, 1.0, 1.0), **settings)
+
+
+def said(statuses):
+    return {(s.name, s.message, s.values[0][1] if s.values else "") for s in statuses}
+
+
+BOTH = graph(LASER, "/move_base")
+ALIVE = lives(front_laser=Life.ALIVE, move_base=Life.ALIVE)
+
+
+def test_graph_as_desired_runs_ok():
+    assert said(monitor().evaluate(BOTH, ALIVE, DESIRED, 0.0)) == {
+        ("laser_resender", "Component status", "TRUE"),
+        ("move_base", "Component status", "TRUE"),
+        ("ROS Graph", "running OK", ""),
+    }
+
+
+def test_dead_node_that_the_master_lists_is_missing_and_its_component_false():
+    watched = monitor()
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.0)
+    dead = ALIVE | lives(front_laser=Life.DEAD)
+    assert said(watched.evaluate(BOTH, dead, DESIRED, 0.1)) == {
+        ("laser_resender", "Component status", "FALSE"),
+        ("move_base", "Component status", "TRUE"),
+        ("front_laser", "Missing node", Life.DEAD.value),
+    }
+
+
+def test_start_up_raises_no_alarm_within_the_grace():
+    watched = monitor()
+    assert said(watched.evaluate(graph(), {}, DESIRED, 0.0)) == {("ROS Graph", "running OK", "")}
+    late = said(watched.evaluate(graph(), {}, DESIRED, 5.0))
+    assert ("front_laser", "Missing node", "not registered with the master") in late
+    assert ("laser_resender", "Component status", "FALSE") in late
+
+
+def test_node_of_a_variant_may_be_restarted_before_its_death_is_told():
+    watched = monitor()
+    desired = Desired(SYSTEM, variant_nodes=frozenset({"move_base"}))
+    watched.evaluate(BOTH, ALIVE, desired, 0.0)
+    dead = ALIVE | lives(move_base=Life.DEAD)
+    assert ("ROS Graph", "running OK", "") in said(watched.evaluate(BOTH, dead, desired, 0.1))
+    assert ("move_base", "Component status", "FALSE") in said(watched.evaluate(BOTH, dead, desired, 1.1))
+
+
+def test_restarted_node_has_another_address_and_recovers_when_it_answers():
+    watched = monitor()
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.0)
+    watched.evaluate(BOTH, ALIVE | lives(front_laser=Life.DEAD), DESIRED, 0.1)
+    again = GraphSnapshot(nodes=BOTH.nodes | {LASER: NodeState(LASER, "http://host/again")})
+    waiting = said(watched.evaluate(again, ALIVE, DESIRED, 0.2))
+    assert ("laser_resender", "Component status", "FALSE") in waiting
+    back = ALIVE | {(LASER, "http://host/again"): Life.ALIVE}
+    assert ("laser_resender", "Component status", "RECOVERED") in said(watched.evaluate(again, back, DESIRED, 0.3))
+    assert ("laser_resender", "Component status", "TRUE") in said(watched.evaluate(again, back, DESIRED, 0.4))
+
+
+def test_excused_nodes_raise_no_alarm():
+    watched = monitor()
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.0)
+    in_change = Desired(SYSTEM, frozenset({"move_base"}), excused=frozenset({"move_base"}))
+    assert said(watched.evaluate(graph(LASER), ALIVE, in_change, 9.0)) == {
+        ("laser_resender", "Component status", "TRUE"),
+        ("ROS Graph", "running OK", ""),
+    }
+
+
+def test_problem_of_the_model_is_told_in_place_of_running_ok():
+    (problem,) = monitor().evaluate(BOTH, {}, Desired(SYSTEM, problem="no model x"), 0.0)
+    assert problem.message == "desired model: no model x"
+
+
+def test_without_model_only_mapped_components_are_told():
+    assert said(monitor().evaluate(BOTH, ALIVE, Desired(None), 0.0)) == {("laser_resender", "Component status", "TRUE")}
+
+
+def test_node_that_ends_cleanly_has_its_own_words_and_one_that_died_keeps_its():
+    watched = monitor()
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.0)
+    ended = watched.evaluate(graph("/move_base"), ALIVE, DESIRED, 0.1)
+    assert ("front_laser", "Missing node", "ended: it has unregistered from the master") in said(ended)
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.2)
+    watched.evaluate(BOTH, ALIVE | lives(front_laser=Life.DEAD), DESIRED, 0.3)
+    cleaned_up = watched.evaluate(graph("/move_base"), ALIVE, DESIRED, 0.4)
+    assert ("front_laser", "Missing node", Life.DEAD.value) in said(cleaned_up)
+
+
+def test_what_changes_between_looks_is_found_though_the_graph_is_the_same():
+    watched = monitor()
+    for now, known in ((0.0, Life.ALIVE), (0.1, Life.DEAD), (0.2, Life.ALIVE)):
+        told = {message for _, message, _ in said(watched.evaluate(BOTH, ALIVE | lives(move_base=known), DESIRED, now))}
+        assert ("Missing node" in told) is (known is Life.DEAD)
+    other = Desired(RosSystem("other", components=(*SYSTEM.components, Component("camera"))))
+    watched.evaluate(BOTH, ALIVE, other, 0.3)
+    assert ("camera", "Missing node", "not registered with the master") in said(
+        watched.evaluate(BOTH, ALIVE, other, 9.0)
+    )
+
+
+def test_each_way_to_go_has_its_own_words():
+    assert len({Life.DEAD.value, Life.HUNG.value, Life.UNREACHABLE.value, "ended", "not registered"}) == 5
+
+
+LISTENER = RosSystem(
+    "s",
+    components=(Component("move_base", ports=(Port("scan", PortKind.SUBSCRIBER), Port("map", PortKind.SUBSCRIBER))),),
+)
+
+
+def test_difference_in_interfaces_must_last_and_nodes_may_start():
+    watched = GraphMonitor({}, patience=Patience(5.0, 1.0, 1.0))
+    live = build_snapshot([[], [["/scan", ["/move_base"]]], []], [], {}, {"/move_base": "http://host/move_base"})
+    alive = lives(move_base=Life.ALIVE)
+
+    def missing(now):
+        return [s.values[0][1] for s in watched.evaluate(live, alive, Desired(LISTENER), now) if "port" in s.message]
+
+    assert [missing(now) for now in (0.0, 4.9, 5.0)] == [[], [], ["map"]]
+
+
+SCAN = TopicSpec("front/scan", max_age=1.0)
+SILENT = Verdict(SCAN, "Silent topic", "last message 3.0 s ago", "max_age 1", "3.00")
+PUBLISHED = build_snapshot([[["/front/scan", [LASER]]], [], []], [], {}, {LASER: f"http://host{LASER}"})
+
+
+def test_silent_topic_fails_the_component_of_its_publisher_at_once():
+    watched = monitor()
+    alone = Desired(RosSystem("base", components=(Component("front_laser"),)))
+    watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.0, topics=[Verdict(SCAN)])
+    told = said(watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.1, topics=[SILENT]))
+    assert ("laser_resender", "Component status", "FALSE") in told
+    assert ("front/scan", "Silent topic", "last message 3.0 s ago") in told
+    assert not any(message == "running OK" for _, message, _ in told)
+    back = said(watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.2, topics=[Verdict(SCAN)]))
+    assert ("laser_resender", "Component status", "RECOVERED") in back
+
+
+def test_topic_stands_for_its_component_without_a_model():
+    watched = GraphMonitor({})
+    spec = TopicSpec("front/scan", max_age=1.0, component="laser")
+    unknown = Verdict(spec, heard=False)
+    assert said(watched.evaluate(graph(), {}, Desired(None), 0.0, topics=[unknown])) == set()
+    silent = Verdict(spec, "Silent topic", "none")
+    told = said(watched.evaluate(graph(), {}, Desired(None), 1.0, topics=[silent]))
+    assert told == {("laser", "Component status", "FALSE"), ("front/scan", "Silent topic", "none")}
+
+
+def test_publisher_without_a_mapping_is_a_component_of_its_own_name():
+    told = said(
+        GraphMonitor({}).evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), Desired(None), 0.0, topics=[SILENT])
+    )
+    assert ("front_laser", "Component status", "FALSE") in told
+
+
+def test_topics_of_nodes_under_reconfiguration_are_excused():
+    in_change = Desired(SYSTEM, frozenset({"front_laser"}), excused=frozenset({"front_laser"}))
+    assert monitor().excused_topics(PUBLISHED, in_change, ["front/scan", "odom"]) == {"front/scan"}
+    assert monitor().excused_topics(PUBLISHED, DESIRED, ["front/scan"]) == frozenset()
+
+
+def test_battery_is_a_component():
+    told = said(monitor().evaluate(BOTH, ALIVE, DESIRED, 0.0, others={"battery": NodeCondition.FAILED}))
+    assert ("battery", "Component status", "FALSE") in told
