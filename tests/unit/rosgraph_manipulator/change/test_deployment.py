@@ -14,7 +14,7 @@ RESTART = Plan("restart", 0.8, (ChangeProcesses(("/n",), ("/n",)),))
 
 
 class Recorder:
-    """A platform on which some calls fail."""
+    """An executor of which some calls fail."""
 
     def __init__(self, **failures):
         self.calls = []
@@ -47,15 +47,15 @@ class Recorder:
         self._call("stop_everything")
 
 
-def run(platform, plans, last_good=OLD):
-    return deploy(platform, NEW, plans, last_good, Stopwatch(itertools.count().__next__))
+def run(executor, plans, last_good=OLD):
+    return deploy(executor, NEW, plans, last_good, Stopwatch(itertools.count().__next__))
 
 
 def test_cheapest_plan_that_works_is_the_only_one_carried_out():
-    platform = Recorder()
-    outcome = run(platform, [SETTING, RESTART])
+    executor = Recorder()
+    outcome = run(executor, [SETTING, RESTART])
     assert (outcome.result, outcome.running, outcome.tactic) == (Result.OK, NEW, "parameters")
-    assert platform.calls == [
+    assert executor.calls == [
         "begin new by parameters",
         "set_parameters /n {'speed': 1.0}",
         "change_processes () ()",
@@ -64,40 +64,40 @@ def test_cheapest_plan_that_works_is_the_only_one_carried_out():
 
 
 def test_started_nodes_must_settle():
-    platform = Recorder()
-    assert run(platform, [RESTART]).result is Result.OK
-    assert platform.calls[-1] == "settled"
+    executor = Recorder()
+    assert run(executor, [RESTART]).result is Result.OK
+    assert executor.calls[-1] == "settled"
 
 
 def test_tactic_that_fails_falls_through_to_the_next():
-    platform = Recorder(set_parameters=DeploymentError("it refuses"))
-    outcome = run(platform, [SETTING, RESTART])
+    executor = Recorder(set_parameters=DeploymentError("it refuses"))
+    outcome = run(executor, [SETTING, RESTART])
     assert (outcome.result, outcome.tactic) == (Result.OK, "restart")
     assert "parameters: it refuses" in outcome.message
 
 
 @pytest.mark.parametrize("where", ["change_processes", "ready", "settled"])
 def test_last_good_configuration_is_restored_when_all_plans_fail(where):
-    platform = Recorder(**{where: DeploymentError("it dies")})
-    outcome = run(platform, [RESTART])
+    executor = Recorder(**{where: DeploymentError("it dies")})
+    outcome = run(executor, [RESTART])
     assert (outcome.result, outcome.running, outcome.tactic) == (Result.FAILED, OLD, "rollback")
     assert "it dies" in outcome.message
-    assert platform.calls[-1] == "restore old"
+    assert executor.calls[-1] == "restore old"
 
 
 def test_everything_stops_when_there_is_nothing_to_restore():
-    platform = Recorder(ready=DeploymentError("it dies"))
-    outcome = run(platform, [RESTART], last_good=None)
+    executor = Recorder(ready=DeploymentError("it dies"))
+    outcome = run(executor, [RESTART], last_good=None)
     assert (outcome.result, outcome.running) == (Result.GENERAL_ERROR, None)
-    assert platform.calls[-1] == "stop_everything"
+    assert executor.calls[-1] == "stop_everything"
 
 
 def test_everything_stops_when_restoring_fails_too():
-    platform = Recorder(ready=DeploymentError("it dies"), restore=DeploymentError("so does the old one"))
-    outcome = run(platform, [RESTART])
+    executor = Recorder(ready=DeploymentError("it dies"), restore=DeploymentError("so does the old one"))
+    outcome = run(executor, [RESTART])
     assert (outcome.result, outcome.running) == (Result.GENERAL_ERROR, None)
     assert "so does the old one" in outcome.message
-    assert platform.calls[-1] == "stop_everything"
+    assert executor.calls[-1] == "stop_everything"
 
 
 def test_failing_stop_is_told_and_changes_nothing_else():
@@ -107,25 +107,25 @@ def test_failing_stop_is_told_and_changes_nothing_else():
 
 
 def test_request_taken_back_before_anything_was_touched_leaves_what_runs():
-    platform = Recorder(begin=CancelledError("taken back"))
-    outcome = run(platform, [RESTART])
+    executor = Recorder(begin=CancelledError("taken back"))
+    outcome = run(executor, [RESTART])
     assert (outcome.result, outcome.running, outcome.cancelled) == (Result.FAILED, OLD, True)
-    assert platform.calls == ["begin new by restart"]
+    assert executor.calls == ["begin new by restart"]
 
 
 @pytest.mark.parametrize("where", ["change_processes", "ready", "settled"])
 def test_request_taken_back_later_goes_back_and_tries_nothing_else(where):
-    platform = Recorder(**{where: CancelledError("taken back")})
-    outcome = run(platform, [RESTART, RESTART])
+    executor = Recorder(**{where: CancelledError("taken back")})
+    outcome = run(executor, [RESTART, RESTART])
     assert (outcome.result, outcome.running, outcome.cancelled) == (Result.FAILED, OLD, True)
-    assert platform.calls.count("begin new by restart") == 1
+    assert executor.calls.count("begin new by restart") == 1
 
 
 def test_superseded_request_leaves_the_rest_to_the_next_one():
-    platform = Recorder(ready=CancelledError("given up", superseded=True))
-    outcome = run(platform, [RESTART])
+    executor = Recorder(ready=CancelledError("given up", superseded=True))
+    outcome = run(executor, [RESTART])
     assert (outcome.result, outcome.running, outcome.cancelled) == (Result.FAILED, None, True)
-    assert "restore old" not in platform.calls
+    assert "restore old" not in executor.calls
 
 
 def test_no_plan_at_all_restores():

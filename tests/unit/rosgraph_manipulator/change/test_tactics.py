@@ -1,14 +1,14 @@
 """Which plans lead from one configuration to another, and in which order."""
 
 import pytest
-from rosgraph_manipulator.change.tactics import Adjustable, ChangeProcesses, SetParameters, load_tactics, plans
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription, compare
+from rosgraph_manipulator.change.tactics import Adjustable, ChangeProcesses, SetParameters, load_tactics, plan_change
+from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
 
 TACTICS = load_tactics()
 
 
-class Facts:
-    """Running nodes that take some parameters."""
+class Nodes:
+    """Running nodes that take some parameters by dynamic_reconfigure."""
 
     def __init__(self, **taken):
         self._taken = {f"/{name}": parameters for name, parameters in taken.items()}
@@ -26,8 +26,8 @@ def system(**nodes):
     )
 
 
-def found(running, wanted, facts=None):
-    return plans(compare(running, wanted), facts or Facts(), TACTICS)[0]
+def found(running, wanted, nodes=None):
+    return plan_change(running, wanted, nodes or Nodes(), TACTICS)[0]
 
 
 def names(*arguments):
@@ -41,7 +41,7 @@ def test_equal_configurations_need_nothing():
 
 def test_parameters_that_the_node_takes_are_set_while_it_runs():
     wanted = system(a={"speed": 2, "dwa/mode": "fast"})
-    first = found(system(a={"speed": 1, "dwa/mode": "slow"}), wanted, Facts(a=SPEED))[0]
+    first = found(system(a={"speed": 1, "dwa/mode": "slow"}), wanted, Nodes(a=SPEED))[0]
     assert first.tactic == "parameters"
     assert first.steps == (
         SetParameters("/a", {"speed": 2.0}),
@@ -52,12 +52,12 @@ def test_parameters_that_the_node_takes_are_set_while_it_runs():
 
 @pytest.mark.parametrize("value", [2.1, -0.1, "fast", True])
 def test_value_that_the_node_does_not_take_needs_a_restart(value):
-    assert names(system(a={"speed": 1}), system(a={"speed": value}), Facts(a=SPEED))[0] == "restart"
+    assert names(system(a={"speed": 1}), system(a={"speed": value}), Nodes(a=SPEED))[0] == "restart"
 
 
 def test_parameter_that_the_node_does_not_take_needs_a_restart():
     wanted = system(a={"speed": 2, "sources": "cloud"})
-    assert names(system(a={"speed": 1, "sources": "scan"}), wanted, Facts(a=SPEED))[0] == "restart"
+    assert names(system(a={"speed": 1, "sources": "scan"}), wanted, Nodes(a=SPEED))[0] == "restart"
 
 
 def test_exactly_the_nodes_that_differ_are_restarted():
@@ -69,7 +69,7 @@ def test_exactly_the_nodes_that_differ_are_restarted():
 
 def test_node_that_takes_its_parameters_runs_on_while_another_is_restarted():
     running, wanted = system(a={"speed": 1}, b={}, gone={}), system(a={"speed": 2}, b={}, new={})
-    first = found(running, wanted, Facts(a=SPEED))[0]
+    first = found(running, wanted, Nodes(a=SPEED))[0]
     assert first.steps == (SetParameters("/a", {"speed": 2.0}), ChangeProcesses(("/gone",), ("/new",)))
 
 
@@ -85,16 +85,16 @@ def test_from_nothing_everything_is_started():
 
 def test_plan_prints_what_is_done():
     running, wanted = system(a={"speed": 1}, b={}, gone={}), system(a={"speed": 2}, b={}, new={})
-    assert str(found(running, wanted, Facts(a=SPEED))[0]) == (
+    assert str(found(running, wanted, Nodes(a=SPEED))[0]) == (
         "restart\n  1. set at /a: speed = 2.0\n  2. stop /gone; start /new; store the configuration's parameters"
     )
 
 
 def test_tactic_that_raises_is_named_and_the_others_go_on():
-    def broken(_difference, _facts):
+    def broken(_difference, _nodes):
         raise ZeroDivisionError("oh")
 
-    kept, problems = plans(compare(system(), system(a={})), Facts(), {"broken": broken, **TACTICS})
+    kept, problems = plan_change(system(), system(a={}), Nodes(), {"broken": broken, **TACTICS})
     assert [plan.tactic for plan in kept] == ["replace"]
     assert problems == ["tactic broken makes no plan: ZeroDivisionError: oh"]
 

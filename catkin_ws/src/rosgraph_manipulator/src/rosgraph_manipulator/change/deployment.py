@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from rosgraph_manipulator.change.tactics import Plan, SetParameters
-from rosgraph_manipulator.change.tactics import Platform as StepPlatform
+from rosgraph_manipulator.change.tactics import Plan, SetParameters, StepExecutor
 from rosgraph_manipulator.configuration.configuration_file import Configuration
 
 
@@ -34,7 +33,7 @@ class CancelledError(DeploymentError):
         self.superseded = superseded
 
 
-class Platform(StepPlatform, Protocol):
+class ChangeExecutor(StepExecutor, Protocol):
     """What a deployment needs of the running system; the calls block, and raise DeploymentError."""
 
     def begin(self, wanted: Configuration, plan: Plan) -> None:
@@ -91,7 +90,7 @@ class Stopwatch:
 
 
 def deploy(
-    platform: Platform,
+    executor: ChangeExecutor,
     wanted: Configuration,
     plans: Sequence[Plan],
     last_good: Configuration | None,
@@ -100,7 +99,7 @@ def deploy(
     """Carry out the first plan that gets to the wanted configuration; where none does, restore the last good one.
 
     Args:
-        platform: the running system.
+        executor: the running system.
         wanted: the configuration to deploy.
         plans: cheapest first.
         last_good: what ran before and may be restored; None: there is nothing to go back to.
@@ -110,48 +109,48 @@ def deploy(
     touched = False
     for plan in plans:
         try:
-            platform.begin(wanted, plan)
+            executor.begin(wanted, plan)
             touched = True
-            _carry_out(platform, plan, watch)
+            _carry_out(executor, plan, watch)
         except CancelledError as error:
             reason = f"{wanted.name}: {error}"
             if not touched or error.superseded:
                 return Outcome(Result.FAILED, None if touched else last_good, reason, cancelled=True)
-            return _go_back(platform, last_good, reason, watch, cancelled=True)
+            return _go_back(executor, last_good, reason, watch, cancelled=True)
         except DeploymentError as error:
             reasons.append(f"{plan.tactic}: {error}")
         else:
             failed = f" ({'; '.join(reasons)})" if reasons else ""
             return Outcome(Result.OK, wanted, f"{wanted.name} is deployed by {plan.tactic}{failed}", plan.tactic)
-    return _go_back(platform, last_good, f"{wanted.name}: {'; '.join(reasons) or 'no tactic has a plan'}", watch)
+    return _go_back(executor, last_good, f"{wanted.name}: {'; '.join(reasons) or 'no tactic has a plan'}", watch)
 
 
-def _carry_out(platform: Platform, plan: Plan, watch: Stopwatch) -> None:
+def _carry_out(executor: ChangeExecutor, plan: Plan, watch: Stopwatch) -> None:
     for step in plan.steps:
         with watch.phase("set" if isinstance(step, SetParameters) else "change"):
-            step.run(platform)
+            step.run(executor)
     with watch.phase("ready"):
-        platform.wait_until_ready()
+        executor.wait_until_ready()
     if plan.started:
         with watch.phase("settle"):
-            platform.wait_until_settled()
+            executor.wait_until_settled()
 
 
 def _go_back(
-    platform: Platform, last_good: Configuration | None, reason: str, watch: Stopwatch, cancelled: bool = False
+    executor: ChangeExecutor, last_good: Configuration | None, reason: str, watch: Stopwatch, cancelled: bool = False
 ) -> Outcome:
     try:
         if last_good is None:
             reason = f"{reason}; there is no earlier configuration to restore"
         else:
             with watch.phase("rollback"):
-                platform.restore(last_good)
+                executor.restore(last_good)
             return Outcome(Result.FAILED, last_good, f"{reason}; {last_good.name} was restored", "rollback", cancelled)
     except DeploymentError as error:
         reason = f"{reason}; restoring {last_good.name} failed too: {error}" if last_good else f"{reason}; {error}"
     with watch.phase("stop"):
         try:
-            platform.stop_everything()
+            executor.stop_everything()
         except DeploymentError as error:
             reason = f"{reason}; {error}"
     return Outcome(Result.GENERAL_ERROR, None, reason, cancelled=cancelled)

@@ -1,7 +1,10 @@
-"""Tactics: ways from the running to the wanted configuration, as plans that can be printed before anything is touched.
+"""Tactics: ways to change the running configuration into the wanted one, as plans that can be printed first.
 
-A tactic is a function `(Difference, Facts) -> Plan | None`; None: it can't get there. Packages offer more of them by
-`<export><rosgraph_manipulator tactic="NAME" function="MODULE:FUNCTION"/></export>` in their package.xml.
+`plan_change` takes two descriptions and returns the plans, cheapest first.
+
+A tactic is a function `(Difference, RunningNodes) -> Plan | None`. It returns None where it has no way. A package
+offers another tactic in its package.xml:
+`<export><rosgraph_manipulator tactic="NAME" function="MODULE:FUNCTION"/></export>`.
 """
 
 from __future__ import annotations
@@ -13,17 +16,17 @@ from typing import Any, Protocol
 
 from node_kit.plugins import exported
 
-from rosgraph_manipulator.configuration.description import Difference
+from rosgraph_manipulator.configuration.description import Difference, SystemDescription, compare
 
 PACKAGE = "rosgraph_manipulator"
 
 PARAMETERS_COST, RESTART_COST, REPLACE_COST = 0.05, 0.6, 1.2
-"""Seconds, to compare plans by: measured with D2's move_base (tests/bench/reconfigure_*.py); a restart counts once,
-since nodes start side by side."""
+"""Seconds by which plans are compared, measured with D2's move_base (tests/bench/reconfigure_*.py). A plan counts one
+restart, however many nodes it starts: they start side by side."""
 
 
 class TacticError(Exception):
-    """A tactic plug-in can't be used; the message names the package."""
+    """A tactic plug-in can't be used; the message names its package."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +34,11 @@ class Adjustable:
     """One parameter that a running node takes by dynamic_reconfigure.
 
     Attributes:
-        server: namespace of the server, below which `set_parameters` is.
-        name: of the parameter at this server.
+        server: namespace of the dynamic_reconfigure server, e.g. `/move_base/local_costmap`.
+        name: name of the parameter at this server.
         kind: `bool`, `int`, `double` or `str`.
         low: least value of an int or double.
-        high: largest one.
+        high: largest value of an int or double.
     """
 
     server: str
@@ -45,7 +48,7 @@ class Adjustable:
     high: float = float("inf")
 
     def takes(self, value: Any) -> bool:
-        """Whether a value has the right type and is within the bounds."""
+        """Tell whether a value has the right type and is within the bounds."""
         if self.kind == "str":
             return isinstance(value, str)
         if self.kind == "bool" or isinstance(value, bool):
@@ -54,59 +57,70 @@ class Adjustable:
         return whole and self.low <= value <= self.high
 
 
-class Facts(Protocol):
-    """What can be asked of the running system."""
+class RunningNodes(Protocol):
+    """What a tactic can ask of the nodes that run."""
 
     def adjustable(self, node: str) -> Mapping[str, Adjustable]:
         """Return what a node takes by dynamic_reconfigure, by the parameter's name relative to the node's."""
 
 
-class Platform(Protocol):
-    """What steps are carried out with. Every call blocks until done, and raises DeploymentError."""
+class NoRunningNodes:
+    """The answer where no node can be asked: none takes any parameter while it runs."""
+
+    def adjustable(self, node: str) -> Mapping[str, Adjustable]:  # noqa: ARG002
+        """Return no parameter."""
+        return {}
+
+
+class StepExecutor(Protocol):
+    """What carries out the steps of a plan. Each call blocks until the step is done, or raises DeploymentError."""
 
     def set_parameters(self, server: str, values: Mapping[str, Any]) -> None:
-        """Have a dynamic_reconfigure server take values."""
+        """Set values at a dynamic_reconfigure server."""
 
     def change_processes(self, stop: tuple[str, ...], start: tuple[str, ...]) -> None:
-        """Set the wanted configuration's parameters, stop nodes, wait until they are gone, start nodes."""
+        """Set the wanted configuration's parameters, stop nodes, wait until they have ended, and start nodes."""
 
 
 class Step(Protocol):
-    """One thing to do; its text says what."""
+    """One step of a plan; its text says what it does."""
 
-    def run(self, platform: Platform) -> None:
-        """Do it."""
+    def run(self, executor: StepExecutor) -> None:
+        """Carry out the step."""
 
 
 @dataclass(frozen=True)
 class SetParameters:
-    """A dynamic_reconfigure server takes values, by name."""
+    """Set parameters at a dynamic_reconfigure server, while its node runs."""
 
     server: str
     values: Mapping[str, Any]
 
-    def run(self, platform: Platform) -> None:
-        """Do it."""
-        platform.set_parameters(self.server, self.values)
+    def run(self, executor: StepExecutor) -> None:
+        """Carry out the step."""
+        executor.set_parameters(self.server, self.values)
 
     def __str__(self) -> str:
-        """Return what is done."""
+        """Return what the step does."""
         return f"set at {self.server}: {', '.join(f'{name} = {value}' for name, value in self.values.items())}"
 
 
 @dataclass(frozen=True)
 class ChangeProcesses:
-    """The launcher sets the parameters, stops nodes and starts nodes; with none, it takes note of the configuration."""
+    """Have the launcher set the configuration's parameters, stop nodes and start nodes.
+
+    A node in both tuples is restarted. Without nodes, the launcher only notes which configuration runs.
+    """
 
     stop: tuple[str, ...] = ()
     start: tuple[str, ...] = ()
 
-    def run(self, platform: Platform) -> None:
-        """Do it."""
-        platform.change_processes(self.stop, self.start)
+    def run(self, executor: StepExecutor) -> None:
+        """Carry out the step."""
+        executor.change_processes(self.stop, self.start)
 
     def __str__(self) -> str:
-        """Return what is done."""
+        """Return what the step does."""
         restart = [name for name in self.stop if name in self.start]
         parts = [
             ("stop", [name for name in self.stop if name not in self.start]),
@@ -119,7 +133,13 @@ class ChangeProcesses:
 
 @dataclass(frozen=True)
 class Plan:
-    """A way to the wanted configuration: the tactic's name, its cost (s without the function, about), its steps."""
+    """A way to the wanted configuration.
+
+    Attributes:
+        tactic: name of the tactic that made it.
+        cost: estimate of the time for which the function is missing, s.
+        steps: what to do, in this order.
+    """
 
     tactic: str
     cost: float
@@ -127,48 +147,48 @@ class Plan:
 
     @property
     def touched(self) -> tuple[str, ...]:
-        """Nodes that are started or stopped."""
+        """The nodes that are started or stopped."""
         return tuple(
             name for step in self.steps if isinstance(step, ChangeProcesses) for name in (*step.stop, *step.start)
         )
 
     @property
     def started(self) -> tuple[str, ...]:
-        """Nodes that are started."""
+        """The nodes that are started."""
         return tuple(name for step in self.steps if isinstance(step, ChangeProcesses) for name in step.start)
 
     def __str__(self) -> str:
-        """Return the plan, a line per step."""
+        """Return the plan with one line for each step."""
         return "\n".join([self.tactic, *(f"  {number}. {step}" for number, step in enumerate(self.steps, 1))])
 
 
-Tactic = Callable[[Difference, Facts], Plan | None]
+Tactic = Callable[[Difference, RunningNodes], Plan | None]
 
 
-def nothing(difference: Difference, _facts: Facts) -> Plan | None:
-    """Leave the nodes alone, where none differs."""
+def nothing(difference: Difference, _nodes: RunningNodes) -> Plan | None:
+    """Leave all nodes alone, where none differs."""
     return None if difference.touches_nodes else Plan("nothing", 0.0, (ChangeProcesses(),))
 
 
-def parameters(difference: Difference, facts: Facts) -> Plan | None:
-    """Have the running nodes take their parameters by dynamic_reconfigure, where only parameters differ."""
+def parameters(difference: Difference, nodes: RunningNodes) -> Plan | None:
+    """Set parameters by dynamic_reconfigure, where only parameters differ and the nodes take them."""
     if difference.starts or difference.stops or difference.replaced or not difference.parameters:
         return None
     steps: list[Step] = []
     for node, values in difference.parameters.items():
-        taken = _settings(values, facts.adjustable(node))
+        taken = _calls_to_set(values, nodes.adjustable(node))
         if taken is None:
             return None
         steps += taken
     return Plan("parameters", PARAMETERS_COST, (*steps, ChangeProcesses()))
 
 
-def restart(difference: Difference, facts: Facts) -> Plan | None:
-    """Restart exactly the nodes that differ; those that take their parameters while they run go on."""
+def restart(difference: Difference, nodes: RunningNodes) -> Plan | None:
+    """Restart only the nodes that differ; a node that takes its parameters by dynamic_reconfigure runs on."""
     restarts = list(difference.replaced)
     steps: list[Step] = []
     for node, values in difference.parameters.items():
-        taken = _settings(values, facts.adjustable(node)) if difference.replaced or difference.starts else None
+        taken = _calls_to_set(values, nodes.adjustable(node)) if difference.replaced or difference.starts else None
         if taken is None:
             restarts.append(node)
         else:
@@ -179,24 +199,36 @@ def restart(difference: Difference, facts: Facts) -> Plan | None:
     return Plan("restart", RESTART_COST, (*steps, ChangeProcesses((*difference.stops, *restarts), start)))
 
 
-def replace(difference: Difference, _facts: Facts) -> Plan | None:
-    """Stop everything that runs, start everything that is wanted: this is always possible."""
+def replace(difference: Difference, _nodes: RunningNodes) -> Plan | None:
+    """Stop all running nodes and start all wanted ones, which is always possible."""
     return Plan(
         "replace", REPLACE_COST, (ChangeProcesses(tuple(difference.running.nodes), tuple(difference.wanted.nodes)),)
     )
 
 
-def plans(difference: Difference, facts: Facts, tactics: Mapping[str, Tactic]) -> tuple[list[Plan], list[str]]:
-    """Return what the tactics propose, cheapest first; what does the same as a cheaper plan is left out.
+def plan_change(
+    running: SystemDescription, wanted: SystemDescription, nodes: RunningNodes, tactics: Mapping[str, Tactic]
+) -> tuple[list[Plan], list[str]]:
+    """Return the plans that change one configuration into another, cheapest first.
+
+    A plan with the same steps as a cheaper one is left out. A tactic that raises does not keep the others from
+    planning.
+
+    Args:
+        running: the configuration that runs.
+        wanted: the configuration to deploy.
+        nodes: answers what running nodes take by dynamic_reconfigure.
+        tactics: the tactics to ask, by name.
 
     Returns:
-        The plans, and which tactics failed and why.
+        The plans, and a line for each tactic that raised.
     """
+    difference = compare(running, wanted)
     proposed, problems = [], []
     for name, tactic in tactics.items():
         try:
-            plan = tactic(difference, facts)
-        except Exception as error:  # a plug-in is somebody else's code: there are other tactics
+            plan = tactic(difference, nodes)
+        except Exception as error:  # the code of a plug-in is not ours: the other tactics still plan
             problems.append(f"tactic {name} makes no plan: {type(error).__name__}: {error}")
         else:
             proposed += [plan] if plan else []
@@ -228,7 +260,7 @@ def load_tactics() -> dict[str, Tactic]:
     return found
 
 
-def _settings(values: Mapping[str, Any], adjustable: Mapping[str, Adjustable]) -> list[SetParameters] | None:
+def _calls_to_set(values: Mapping[str, Any], adjustable: Mapping[str, Adjustable]) -> list[SetParameters] | None:
     """Return the calls that set all values, one per server; None where one can't be set."""
     by_server: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
@@ -236,4 +268,4 @@ def _settings(values: Mapping[str, Any], adjustable: Mapping[str, Adjustable]) -
         if found is None or not found.takes(value):
             return None
         by_server.setdefault(found.server, {})[found.name] = float(value) if found.kind == "double" else value
-    return [SetParameters(server, settings) for server, settings in by_server.items()]
+    return [SetParameters(server, taken) for server, taken in by_server.items()]

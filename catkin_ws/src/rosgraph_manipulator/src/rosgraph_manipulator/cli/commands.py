@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
 from typing import Any
 
 import actionlib
@@ -20,12 +19,12 @@ from metacontrol_msgs.msg import (
 from ros_model.errors import ModelError
 from ros_model.files import resolve
 
-from rosgraph_manipulator.change.tactics import Adjustable, TacticError, load_tactics, plans
+from rosgraph_manipulator.change.tactics import NoRunningNodes, TacticError, load_tactics, plan_change
 from rosgraph_manipulator.configuration.configuration_file import ConfigurationError, parse_settings
 from rosgraph_manipulator.configuration.description import SystemDescription, compare
 from rosgraph_manipulator.io.launch_files import LaunchFileError, read_launch_file, read_model
 from rosgraph_manipulator.ros.manipulator import KEYS, read_file
-from rosgraph_manipulator.ros.reconfigurable import RosFacts
+from rosgraph_manipulator.ros.reconfigure_client import ReconfigureClient
 
 FIND_TIMEOUT = 5.0  # s, wall, to find the manipulator
 NODE = "rosgraph_manipulator"
@@ -33,14 +32,6 @@ NODE = "rosgraph_manipulator"
 
 class CommandError(Exception):
     """The command can't do what it is asked; the message says why."""
-
-
-class NoFacts:
-    """Nothing runs that could be asked."""
-
-    def adjustable(self, node: str) -> Mapping[str, Adjustable]:  # noqa: ARG002
-        """Return that nothing is known."""
-        return {}
 
 
 def plan_main() -> None:
@@ -79,13 +70,12 @@ def _plan(a: str, b: str, config: str | None) -> int:
     online = rosgraph.is_master_online()
     if online:
         rospy.init_node("plan", anonymous=True, disable_signals=True)
-    systems = [_system(name, config, online) for name in (a, b)]
-    difference = compare(*systems)
-    facts = RosFacts() if online else NoFacts()
-    found, problems = plans(difference, facts, load_tactics())
+    running, wanted = (_system(name, config, online) for name in (a, b))
+    nodes = ReconfigureClient() if online else NoRunningNodes()
+    found, problems = plan_change(running, wanted, nodes, load_tactics())
     for problem in problems:
         _say(problem)
-    if not online and difference.parameters:
+    if not online and compare(running, wanted).parameters:
         _say("no ROS master: nodes are not asked what they take by dynamic_reconfigure")
     for number, plan in enumerate(found):
         _say(f"{'' if number == 0 else 'else '}{plan}")

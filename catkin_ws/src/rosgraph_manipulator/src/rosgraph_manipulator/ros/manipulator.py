@@ -28,18 +28,17 @@ from node_kit.ros.lifetime import Lifetime
 from rosgraph_manipulator.change.deployment import CancelledError, DeploymentError, Outcome, Result, Stopwatch, deploy
 from rosgraph_manipulator.change.journal import Journal, Resumption, parse_journal, resume
 from rosgraph_manipulator.change.request_queue import Policy, RequestQueue
-from rosgraph_manipulator.change.tactics import Plan, Tactic, TacticError, load_tactics, plans
+from rosgraph_manipulator.change.tactics import Plan, Tactic, TacticError, load_tactics, plan_change
 from rosgraph_manipulator.configuration.configuration_file import (
     Configuration,
     ConfigurationError,
     Settings,
     parse_settings,
 )
-from rosgraph_manipulator.configuration.description import compare
 from rosgraph_manipulator.configuration.parameters import SettingError, choice, number
 from rosgraph_manipulator.io.master import MasterError, set_parameters
+from rosgraph_manipulator.ros.executor import RosExecutor
 from rosgraph_manipulator.ros.goal import PendingGoal
-from rosgraph_manipulator.ros.platform import RosPlatform
 
 KEYS = ("configurations", "kill_nodes", "save_action", "goal_msg_type", "reconfiguration_action_name")
 HEARTBEAT_PERIOD = 2.0  # s, wall
@@ -102,7 +101,7 @@ class Manipulator:
                 adopt=resumption.keep_goal,
                 changing=bool(resumption.deploy),
             )
-        self._platform = RosPlatform(
+        self._executor = RosExecutor(
             self._settings,
             goal,
             ready_timeout=number("~ready_timeout", get("~ready_timeout", 15.0), low=0.1),
@@ -110,8 +109,8 @@ class Manipulator:
             launcher_timeout=launcher_timeout,
             on_state=lambda _state: self._work.put(self._follow_launcher),
         )
-        self._platform.check = self._check
-        self._platform.launcher = self._platform.launcher or state
+        self._executor.check = self._check
+        self._executor.launcher = self._executor.launcher or state
         return resumption
 
     # -- life -----------------------------------------------------------------------------------------------------
@@ -232,15 +231,15 @@ class Manipulator:
         try:
             with watch.phase("plan"):
                 found = self._plans(wanted)
-            outcome = deploy(self._platform, wanted, found, last_good or self._running, watch)
+            outcome = deploy(self._executor, wanted, found, last_good or self._running, watch)
         except (DeploymentError, rospy.ROSException, OSError) as error:
             outcome = self._untouched(wanted, " ".join(str(error).split()))
         self._take(wanted, outcome, watch, began)
         return outcome
 
     def _plans(self, wanted: Configuration) -> list[Plan]:
-        difference = compare(self._platform.running(), self._platform.describe(wanted))
-        found, problems = plans(difference, self._platform.facts, self._tactics)
+        executor = self._executor
+        found, problems = plan_change(executor.running(), executor.describe(wanted), executor.nodes, self._tactics)
         for problem in problems:
             rospy.logwarn("%s", problem)
         return found
@@ -257,7 +256,7 @@ class Manipulator:
         if "change" in phases and outcome.result is Result.OK:
             phases = {}
             for name, duration in watch.phases.items():
-                phases.update(self._platform.launcher_phases if name == "change" else {name: duration})
+                phases.update(self._executor.launcher_phases if name == "change" else {name: duration})
         phases["total"] = time.monotonic() - began
         self._running, self._recovering = outcome.running, False
         if outcome.running:
@@ -265,11 +264,11 @@ class Manipulator:
             self._previous, self._last_good = replaced, outcome.running
             self._deployed_at = time.monotonic()
             self._announce(outcome.running, FunctionGrounding.STABLE, outcome, phases)
-            acquaintance = threading.Timer(ACQUAINTANCE_DELAY, self._platform.get_to_know)
+            acquaintance = threading.Timer(ACQUAINTANCE_DELAY, self._executor.get_to_know)
             acquaintance.daemon = True
             acquaintance.start()
         elif outcome.result is Result.GENERAL_ERROR:
-            self._platform.stop_robot()
+            self._executor.stop_robot()
             self._announce(wanted, FunctionGrounding.FAILED, outcome, phases)
         self._note(wanted="")
         durations = ", ".join(f"{name} {duration:.3f}" for name, duration in phases.items())
@@ -281,7 +280,7 @@ class Manipulator:
 
     def _follow_launcher(self) -> None:
         """See whether what runs is what should run; the launcher has said something new."""
-        state, running = self._platform.launcher, self._running
+        state, running = self._executor.launcher, self._running
         if state is None or running is None or state.state == LauncherState.CHANGING:
             return
         if state.configuration != running.name:
@@ -304,13 +303,13 @@ class Manipulator:
             self._deploy(previous)
             return
         self._recovering = True
-        self._platform.node_died()
+        self._executor.node_died()
         self._announce(running, FunctionGrounding.RECOVERING, Outcome(Result.OK, running, reason))
         self._diagnose(False, reason, running.name)
 
     def _end_recovery(self, running: Configuration) -> None:
         try:
-            self._platform.recovered()
+            self._executor.recovered()
         except DeploymentError as error:
             rospy.logwarn("%s", error)
             return  # the launcher will say how it goes on
@@ -321,7 +320,7 @@ class Manipulator:
     def _give_up(self, running: Configuration, reason: str) -> None:
         self._running = self._last_good = None
         self._recovering = False
-        self._platform.stop_robot()
+        self._executor.stop_robot()
         self._note(wanted="")
         rospy.logerr("%s has failed: %s", running.name, reason)
         self._announce(running, FunctionGrounding.FAILED, Outcome(Result.GENERAL_ERROR, None, reason))

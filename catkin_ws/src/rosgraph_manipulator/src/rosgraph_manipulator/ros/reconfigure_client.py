@@ -1,4 +1,4 @@
-"""Asks running nodes what they take by dynamic_reconfigure, and has them take it: the shell of the tactics' facts."""
+"""Client of dynamic_reconfigure: asks running nodes which parameters they take, and sets them."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ SET_TIMEOUT = 1.0  # s, wall, for a server to take values
 SERVICE = "/set_parameters"
 
 
-class RosFacts:
-    """What nodes describe, kept as long as the node has the same address and servers."""
+class ReconfigureClient:
+    """Asks nodes for their descriptions, and keeps each as long as the node has the same address and servers."""
 
     def __init__(self) -> None:
         self._known: dict[str, tuple[object, Mapping[str, Adjustable]]] = {}
@@ -52,10 +52,10 @@ class RosFacts:
         return known[1]
 
     def set(self, server: str, values: Mapping[str, Any]) -> None:
-        """Have a server take values, and see that it has.
+        """Set values at a server, and check that the server has them.
 
         Raises:
-            DeploymentError: it has not.
+            DeploymentError: the server does not answer, or has other values.
         """
         future = self._pool.submit(rospy.ServiceProxy(server + SERVICE, Reconfigure), _config(values))
         try:

@@ -20,7 +20,7 @@ from rosgraph_manipulator.configuration.description import NodeDescription, Syst
 from rosgraph_manipulator.io.launch_files import LaunchFileError, command_line, read_launch_file
 from rosgraph_manipulator.io.master import MasterError, NodeApi, advertised, publishers
 from rosgraph_manipulator.ros.goal import PendingGoal
-from rosgraph_manipulator.ros.reconfigurable import RosFacts
+from rosgraph_manipulator.ros.reconfigure_client import ReconfigureClient
 
 POLL_PERIOD = 0.01  # s, wall
 STATE_TIMEOUT = 2.0  # s, wall, for the launcher's state to follow its answer
@@ -38,7 +38,7 @@ def wait_until(condition: Callable[[], bool], timeout: float) -> bool:
     return True
 
 
-class RosPlatform:
+class RosExecutor:
     """The launcher, the nodes, the pending goal and the robot."""
 
     def __init__(
@@ -60,7 +60,7 @@ class RosPlatform:
             launcher_timeout: to find the launcher, s, wall.
             on_state: called with every state of the launcher, in a thread of its own.
         """
-        self.facts = RosFacts()
+        self.nodes = ReconfigureClient()
         self.launcher: LauncherState | None = None  # what it said last
         self.check: Callable[[], None] = lambda: None  # raises CancelledError where the change is to be given up
         self.launcher_phases: dict[str, float] = {}
@@ -123,7 +123,7 @@ class RosPlatform:
     def get_to_know(self) -> None:
         """Ask what runs for what it takes by dynamic_reconfigure, so that the next plan need not wait for that."""
         for node in self.launcher.nodes if self.launcher else ():
-            self.facts.adjustable(node)
+            self.nodes.adjustable(node)
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
@@ -137,7 +137,7 @@ class RosPlatform:
         """Have a dynamic_reconfigure server take values."""
         if self.launcher:
             self._doubtful |= {name for name in self.launcher.nodes if f"{server}/".startswith(f"{name}/")}
-        self.facts.set(server, values)
+        self.nodes.set(server, values)
 
     def change_processes(self, stop: tuple[str, ...], start: tuple[str, ...]) -> None:
         """Set the wanted configuration's parameters, stop nodes, wait until they are gone, start nodes."""
