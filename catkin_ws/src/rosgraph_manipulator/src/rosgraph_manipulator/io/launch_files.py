@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from xml.dom import minidom
+from xml.dom import expatbuilder
 
 import rosgraph
 import rosgraph.names
@@ -135,21 +135,21 @@ class _Loader(roslaunch.xmlloader.XmlLoader):
             context.resolve_dict["anon"] = _StableNames()
 
     def _parse_launch(self, filename: str, verbose: bool) -> Any:  # noqa: ARG002
-        data = Path(filename).read_bytes()
-        check = xml.parsers.expat.ParserCreate()
-        check.StartDoctypeDeclHandler = _refuse_doctype
         try:
-            check.Parse(data, True)
+            document = _Builder().parseString(Path(filename).read_bytes())
         except xml.parsers.expat.ExpatError as error:
             raise roslaunch.xmlloader.XmlParseException(f"{filename}: not well-formed XML: {error}") from error
-        roots = minidom.parseString(data).getElementsByTagName("launch")  # noqa: S318, no entities are left
+        roots = document.getElementsByTagName("launch")
         if len(roots) != 1:
             raise roslaunch.xmlloader.XmlParseException(f"{filename}: must have one root element <launch>")
         return roots[0]
 
 
-def _refuse_doctype(*_: object) -> None:
-    raise roslaunch.xmlloader.XmlParseException("a document type declaration is not allowed: take it out")
+class _Builder(expatbuilder.ExpatBuilderNS):
+    """minidom's builder, which refuses XML entities while it parses: they are declared in a document type."""
+
+    def start_doctype_decl_handler(self, *_: object) -> None:
+        raise roslaunch.xmlloader.XmlParseException("a document type declaration is not allowed: remove it")
 
 
 def _checked(path: str | Path, config: Any) -> LaunchFile:

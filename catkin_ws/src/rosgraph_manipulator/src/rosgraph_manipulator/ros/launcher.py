@@ -1,4 +1,4 @@
-"""Node rosgraph_launcher: the ROS shell around `launcher`."""
+"""Node rosgraph_launcher: offers the launcher as a service, and publishes its reports."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from metacontrol_msgs.msg import LauncherState, Phase
 from metacontrol_msgs.srv import ChangeConfiguration, ChangeConfigurationRequest, ChangeConfigurationResponse
 from node_kit.ros.lifetime import LONGEST_END, Lifetime
 
-from rosgraph_manipulator.change.supervision import RestartPolicy
 from rosgraph_manipulator.configuration.parameters import SettingError, boolean, number
-from rosgraph_manipulator.io.launcher import Launcher, LauncherError, Options
+from rosgraph_manipulator.io.launcher import Launcher, LauncherError
+from rosgraph_manipulator.launching.options import LauncherOptions
+from rosgraph_manipulator.launching.report import LauncherReport
+from rosgraph_manipulator.launching.restarts import RestartPolicy
 
-LOOK_PERIOD = 0.2  # s, wall, between two looks at whether the node is to end
-STANDBY_DELAY = 0.5  # s, wall, after a change: a warm process's imports must not slow the new nodes down
+LOOK_PERIOD = 0.2  # s, wall, after which the main thread sees at the latest that the node must end
 
 
 @dataclass
 class _Job:
-    """A request that waits for the main thread."""
+    """Work that another thread wants the main thread to do."""
 
     work: Callable[[], Any]
     done: threading.Event = field(default_factory=threading.Event)
@@ -37,26 +38,24 @@ class _Job:
 
 
 class LauncherNode:
-    """Services and topic of the launcher; everything but the service callbacks runs in the main thread."""
+    """The service and the topic of the launcher. Only the service callbacks run outside the main thread."""
 
-    def __init__(self, options: Options, life: Lifetime) -> None:
+    def __init__(self, options: LauncherOptions, life: Lifetime) -> None:
         self._jobs: queue.Queue[_Job] = queue.Queue()
         self._wake_read, self._wake_write = os.pipe()
         os.set_blocking(self._wake_write, False)
         self._ends = ""
         self._closed = threading.Event()
-        self._changed_at = time.monotonic()
         self._life = life
         life.consequence = "its nodes are stopped, and it ends"
-        # Twice: a change that is under way ends first, then all.
+        # Twice: first for a change that is under way, then for the stop of all nodes.
         self._longest_end = LONGEST_END + 2 * (options.shutdown_timeout + options.sigint_timeout)
         self._state = rospy.Publisher("~state", LauncherState, queue_size=10, latch=True)
         self._launcher = Launcher(options, self._publish, rospy.logwarn)
-        self._publish()
         self._service = rospy.Service("~change", ChangeConfiguration, self._on_change)
 
     def end(self, reason: str) -> None:
-        """Have the main thread stop the nodes, and then end this one."""
+        """Tell the main thread to stop the nodes and then to end this node."""
         self._ends = self._ends or reason
         self._life.cut_off(self._longest_end)
         self._wake()
@@ -67,8 +66,8 @@ class LauncherNode:
             self._closed.wait()  # before the process ends
 
     def spin(self) -> None:
-        """Serve requests and look after the nodes until the node is told to end; then stop what runs."""
-        # Not before: nothing is to be stopped yet, and rospy may hang in what it registers.
+        """Serve requests and look after the nodes until this node must end; then stop all nodes."""
+        # Not before: there was nothing to stop yet, and rospy may hang while it registers.
         self._life.longest_end, self._life.on_end = self._longest_end, self.end
         rospy.on_shutdown(self._end_on_request)
         while not self._ends:
@@ -77,15 +76,14 @@ class LauncherNode:
                 job = self._jobs.get_nowait()
                 job.answer = job.work()
                 job.done.set()
-                self._changed_at = time.monotonic()
             self._launcher.look_after()
-            if self._jobs.empty() and time.monotonic() - self._changed_at > STANDBY_DELAY:
+            if self._jobs.empty():
                 self._launcher.stand_by()
         self._launcher.close(gently=not self._life.watch.lost)
         self._closed.set()
 
     def _wait(self) -> None:
-        due = self._launcher.next_due()
+        due = self._launcher.next_restart()
         timeout = LOOK_PERIOD if due is None else min(LOOK_PERIOD, max(0.0, due - time.monotonic()))
         poll = select.poll()
         poll.register(self._wake_read, select.POLLIN)
@@ -96,7 +94,7 @@ class LauncherNode:
                 os.read(self._wake_read, 4096)
 
     def _wake(self) -> None:
-        with contextlib.suppress(BlockingIOError):  # full: it will wake up
+        with contextlib.suppress(BlockingIOError):  # the pipe is full, so the main thread wakes up anyway
             os.write(self._wake_write, b"\0")
 
     def _on_change(self, request: ChangeConfigurationRequest) -> ChangeConfigurationResponse:
@@ -119,34 +117,33 @@ class LauncherNode:
             ok=True, change=self._launcher.changes, phases=[Phase(*phase) for phase in phases.items()]
         )
 
-    def _publish(self) -> None:
-        launcher = self._launcher
+    def _publish(self, report: LauncherReport) -> None:
         message = LauncherState(
-            configuration=launcher.configuration,
-            change=launcher.changes,
-            state=launcher.state,
-            nodes=list(launcher.nodes),
-            dead=list(launcher.dead),
-            message=launcher.message,
+            configuration=report.configuration,
+            change=report.change,
+            state=report.state,
+            nodes=list(report.nodes),
+            dead=list(report.dead),
+            message=report.message,
         )
         message.header.stamp = rospy.Time.now()
         self._state.publish(message)
 
 
-def read_options() -> Options:
+def read_options() -> LauncherOptions:
     """Read the node's parameters.
 
     Raises:
         SettingError: one can't be used.
     """
     get = rospy.get_param
-    policy = RestartPolicy()
-    return Options(
+    default, policy = LauncherOptions(mark=""), RestartPolicy()
+    return LauncherOptions(
         mark=f"{rosgraph.get_master_uri()}{rospy.get_name()}",
         run_id=str(get("/run_id", "")),
-        shutdown_timeout=number("~shutdown_timeout", get("~shutdown_timeout", Options.shutdown_timeout), low=0.0),
-        sigint_timeout=number("~sigint_timeout", get("~sigint_timeout", Options.sigint_timeout), low=0.0),
-        standby=boolean("~standby", get("~standby", Options.standby)),
+        shutdown_timeout=number("~shutdown_timeout", get("~shutdown_timeout", default.shutdown_timeout), low=0.0),
+        sigint_timeout=number("~sigint_timeout", get("~sigint_timeout", default.sigint_timeout), low=0.0),
+        standby=boolean("~standby", get("~standby", default.standby)),
         policy=RestartPolicy(
             intensity=int(number("~restart_intensity", get("~restart_intensity", policy.intensity), low=0)),
             period=number("~restart_period", get("~restart_period", policy.period), low=0.1),

@@ -1,6 +1,6 @@
 """What stood on the parameter server comes back when a configuration that wrote over it leaves."""
 
-from rosgraph_manipulator.io.launcher import ParameterMemory
+from rosgraph_manipulator.launching.parameters import OverwrittenParameters
 
 
 def adopt(memory, server, wanted):
@@ -13,7 +13,7 @@ def adopt(memory, server, wanted):
 
 
 def test_nothing_is_left_of_an_earlier_configuration():
-    memory, server = ParameterMemory(), {"/a/x": "base"}
+    memory, server = OverwrittenParameters(), {"/a/x": "base"}
     adopt(memory, server, {"/a/x": 1, "/a/y": 1})
     assert server == {"/a/x": 1, "/a/y": 1}
     adopt(memory, server, {"/a/z": 2})

@@ -1,4 +1,4 @@
-"""When a node that died is started again, and when that is given up."""
+"""When a node that ended is started again, and when its configuration is given up."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class RestartPolicy:
-    """Erlang's supervisors, with back-off.
+    """How many deaths are tolerated, as in Erlang's supervisors, and how long a restart is delayed.
 
     Attributes:
-        intensity: this many deaths are made good within `period`; one more, and the configuration has failed.
-        period: s.
-        first_delay: from a death to the restart, s; doubled with every further death of the node within `period`.
-        longest_delay: s.
+        intensity: the most deaths within `period` after which nodes are still restarted.
+        period: length of the window in which deaths are counted, s.
+        first_delay: time from a node's first death to its restart, s. It doubles with each further death of the same
+            node within `period`.
+        longest_delay: upper limit of the delay, s.
     """
 
     intensity: int = 3
@@ -23,7 +24,7 @@ class RestartPolicy:
     longest_delay: float = 5.0
 
 
-class Supervisor:
+class DeathCounter:
     """Counts the deaths of one configuration's nodes."""
 
     def __init__(self, policy: RestartPolicy) -> None:
@@ -31,14 +32,14 @@ class Supervisor:
         self._deaths: deque[tuple[float, str]] = deque()
 
     def reset(self) -> None:
-        """Forget all deaths, for another configuration."""
+        """Forget all deaths, because another configuration begins."""
         self._deaths.clear()
 
-    def died(self, node: str, now: float) -> float | None:
-        """Take in a death at `now` (s).
+    def count(self, node: str, now: float) -> float | None:
+        """Count the death of a node at `now` (s).
 
         Returns:
-            The time at which to start the node again (s); None: there were too many deaths, give up.
+            The time at which to start the node again (s), or None where the configuration has had too many deaths.
         """
         while self._deaths and now - self._deaths[0][0] > self._policy.period:
             self._deaths.popleft()

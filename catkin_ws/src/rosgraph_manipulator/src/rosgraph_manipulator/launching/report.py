@@ -1,0 +1,29 @@
+"""What the launcher reports about its nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+# The states of metacontrol_msgs/LauncherState.
+STABLE, CHANGING, RECOVERING, FAILED = "STABLE", "CHANGING", "RECOVERING", "FAILED"
+
+
+@dataclass(frozen=True)
+class LauncherReport:
+    """The content of metacontrol_msgs/LauncherState.
+
+    Attributes:
+        configuration: name of the configuration; empty where none runs.
+        change: number of the last change that was asked for.
+        state: STABLE, CHANGING, RECOVERING or FAILED.
+        nodes: names of the nodes that should run.
+        dead: names of those among them that do not run.
+        message: how the last node ended; empty where none did.
+    """
+
+    configuration: str = ""
+    change: int = 0
+    state: str = STABLE
+    nodes: tuple[str, ...] = ()
+    dead: tuple[str, ...] = ()
+    message: str = ""
