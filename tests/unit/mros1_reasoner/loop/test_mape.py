@@ -5,10 +5,8 @@ from dataclasses import replace
 import pytest
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.knowledge.reasoner import ReasonerError
-from mros1_reasoner.loop import state
 from mros1_reasoner.loop.mape import Mape, MapeError
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning import decision
 from mros1_reasoner.planning.decision import DECIDED, EXECUTED, FAILED
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
@@ -433,12 +431,3 @@ def test_names_of_qualities_do_not_matter(load, pellet):
     core.step(0.0)
     (decision,) = core.step(2.0)
     assert decision.trigger == "qa:noise"
-
-
-def test_states_are_those_of_the_messages():
-    from metacontrol_msgs.msg import Decision, FunctionGrounding
-
-    for name in ("PROPOSED", "ADVISED", "DECIDED", "EXECUTED", "FAILED"):
-        assert getattr(decision, name) == getattr(Decision, name)
-    for name in ("STABLE", "RECONFIGURING", "RECOVERING", "FAILED"):
-        assert getattr(state, name) == getattr(FunctionGrounding, name)

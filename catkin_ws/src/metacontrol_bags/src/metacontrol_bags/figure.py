@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 
+from metacontrol_bags.words import FunctionGrounding, MissionEvent
+
 mpl.use("Agg")
 
 import numpy as np
@@ -52,13 +54,15 @@ def draw(record: MissionRecord, path: Path) -> None:
 def configuration_spans(record: MissionRecord) -> list[tuple[float, float, str]]:
     """From when to when (stamps in s) each configuration was in force; a change counts from STABLE on."""
     start, end = record.start_stamp, record.end_stamp
-    stable = [report for report in record.configurations if report.state == "STABLE" and report.stamp < end]
+    stable = [
+        report for report in record.configurations if report.state == FunctionGrounding.STABLE and report.stamp < end
+    ]
     changes: list[tuple[float, str]] = []
     for report in stable:
         if not changes or changes[-1][1] != report.configuration:
             changes.append((max(report.stamp, start), report.configuration))
     if not changes:
-        began = record.event("MISSION_START")
+        began = record.event(MissionEvent.MISSION_START)
         changes = [(start, began.values.get("initial_configuration", "unknown") if began else "unknown")]
     changes[0] = (start, changes[0][1])
     ends = [stamp for stamp, _ in changes[1:]] + [end]
@@ -188,7 +192,7 @@ def _colours(record: MissionRecord) -> dict[str, str]:
 
 def _goal(record: MissionRecord) -> tuple[float, float] | None:
     """The goal that MISSION_START tells, "x y yaw"."""
-    began = record.event("MISSION_START")
+    began = record.event(MissionEvent.MISSION_START)
     try:
         x, y, *_ = map(float, (began.values.get("goal", "") if began else "").split())
     except ValueError:

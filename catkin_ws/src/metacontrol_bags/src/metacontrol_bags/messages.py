@@ -17,10 +17,11 @@ from metacontrol_bags.record import (
     GoalReport,
     QualityReport,
 )
+from metacontrol_bags.words import DiagnosticWords
 
 DiagnosticReport = ComponentReport | QualityReport | CostReport
 
-_COST_FIGURES = {"CPU Usage": "cpu", "Memory Usage": "memory"}
+_COST_FIGURES = {DiagnosticWords.CPU_USAGE: "cpu", DiagnosticWords.MEMORY_USAGE: "memory"}
 
 
 def seconds(time: Any) -> float:
@@ -47,11 +48,11 @@ def diagnostics(message: Any, received: float) -> tuple[DiagnosticReport, ...]:
     stamp = header_stamp(message.header, received)
     reports: list[DiagnosticReport] = []
     for status in message.status:
-        if status.message == "Component status":
+        if status.message == DiagnosticWords.COMPONENT_STATUS:
             reports += (ComponentReport(stamp, pair.key, pair.value) for pair in status.values)
-        elif status.message == "QA stale":
+        elif status.message == DiagnosticWords.QA_STALE:
             reports += (QualityReport(stamp, pair.key, None) for pair in status.values)
-        elif status.message == "QA status":
+        elif status.message == DiagnosticWords.QA_STATUS:
             reports += (QualityReport(stamp, name, level) for name, level in _numbers(status.values))
         elif status.message in _COST_FIGURES:
             figure = _COST_FIGURES[status.message]

@@ -25,6 +25,7 @@ import numpy as np
 
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import MissionRecord, Samples
+from metacontrol_bags.words import Decision, DiagnosticWords, FunctionGrounding, MissionEvent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,7 +63,7 @@ _CLOCK_LAG_S = 0.5
 def summarise(record: MissionRecord) -> dict[str, Any]:
     """The content of summary.json; figures that the bag does not hold are None."""
     start, end = record.start_stamp, record.end_stamp
-    began, ended = record.event("MISSION_START"), record.event("MISSION_END")
+    began, ended = record.event(MissionEvent.MISSION_START), record.event(MissionEvent.MISSION_END)
     told = began.values if began else {}
     closing = ended.values if ended else {}
     limits = thresholds(record)
@@ -93,8 +94,8 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
         "final_configuration": configuration_at(record, end) or told.get("initial_configuration"),
         "time_above_threshold": {name: _rounded(value) for name, value in above.items()},
         "mean_qa": {name: _rounded(value) for name, value in means.items()},
-        "reconfigurations": reconfigurations(record, "EXECUTED"),
-        "reconfigurations_failed": reconfigurations(record, "FAILED"),
+        "reconfigurations": reconfigurations(record, Decision.EXECUTED),
+        "reconfigurations_failed": reconfigurations(record, Decision.FAILED),
         "perturbations": _perturbations(record),
         "goals": {
             "sent": len(goals),
@@ -113,7 +114,7 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
 
 def thresholds(record: MissionRecord) -> dict[str, float]:
     """Threshold of each QA, as MISSION_START tells them (`nfr_<qa>`), else D2's."""
-    began = record.event("MISSION_START")
+    began = record.event(MissionEvent.MISSION_START)
     told = began.values if began else {}
     return {name: _number(told, f"nfr_{name}", default) for name, default in DEFAULT_THRESHOLDS.items()}
 
@@ -188,7 +189,7 @@ def path_length(record: MissionRecord, start: float, end: float) -> float:
 
 def reconfigurations(record: MissionRecord, state: str) -> list[dict[str, Any]]:
     """Adaptations of the mission that ended in a state (EXECUTED or FAILED), in the order of time."""
-    decided = {d.id: d for d in record.decisions if d.state == "DECIDED" and d.stamp >= record.start_stamp}
+    decided = {d.id: d for d in record.decisions if d.state == Decision.DECIDED and d.stamp >= record.start_stamp}
     closed = [d for d in record.decisions if d.state == state and d.id in decided and d.stamp <= record.end_stamp + 1.0]
     return [_reconfiguration(record, decided[d.id], d) for d in closed]
 
@@ -221,14 +222,18 @@ def _component_cause(record: MissionRecord, name: str, decided: DecisionReport) 
     strikes = [
         event.stamp
         for event in record.events
-        if event.kind == "PERTURBATION" and event.name == decided.trigger and event.stamp <= decided.stamp
+        if event.kind == MissionEvent.PERTURBATION and event.name == decided.trigger and event.stamp <= decided.stamp
     ]
     struck = strikes[-1] if strikes else None
     reports = [r for r in record.components if r.component == name and r.stamp <= decided.stamp + _SAME_MOMENT_S]
     if struck is not None:
-        after = (r.stamp for r in reports if r.status == "FALSE" and r.stamp >= struck - _SAME_MOMENT_S)
+        after = (
+            r.stamp
+            for r in reports
+            if r.status == DiagnosticWords.COMPONENT_FALSE and r.stamp >= struck - _SAME_MOMENT_S
+        )
         return struck, next(after, None)
-    return None, _start_of_run([(r.stamp, r.status == "FALSE") for r in reports])
+    return None, _start_of_run([(r.stamp, r.status == DiagnosticWords.COMPONENT_FALSE) for r in reports])
 
 
 def _quality_cause(record: MissionRecord, name: str, decided: DecisionReport) -> tuple[float | None, float | None]:
@@ -272,7 +277,7 @@ def _collisions(contacts: Samples, start: float, end: float) -> int | None:
 def _perturbations(record: MissionRecord) -> list[dict[str, Any]]:
     found = []
     for event in record.events:
-        if event.kind == "PERTURBATION":
+        if event.kind == MissionEvent.PERTURBATION:
             entry: dict[str, Any] = {"stamp_s": _rounded(event.stamp - record.start_stamp), "name": event.name}
             if "share" in event.values:
                 entry["share"] = _number(event.values, "share", 0.0)
@@ -324,7 +329,9 @@ def periods_missed(stamps: Sequence[float], rate: float) -> float | None:
 
 def _control(record: MissionRecord, told: dict[str, str], start: float, end: float) -> dict[str, float | None]:
     """Rate of the initial configuration's controller, and the share of its periods that it missed."""
-    changes = [r.stamp for r in record.configurations if r.state != "STABLE" and start <= r.stamp <= end]
+    changes = [
+        r.stamp for r in record.configurations if r.state != FunctionGrounding.STABLE and start <= r.stamp <= end
+    ]
     until = min(changes, default=end)
     rate = _number(told, "controller_hz", 0.0)
     stamps = [stamp for stamp in record.commands if start <= stamp <= until]

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from metacontrol_bags.words import MissionEvent
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -141,11 +143,11 @@ class MissionRecord:
     @property
     def start_stamp(self) -> float:
         """When the mission started; the first message where no event tells."""
-        event = self.event("MISSION_START")
+        event = self.event(MissionEvent.MISSION_START)
         return event.stamp if event else self.first_stamp
 
     @property
     def end_stamp(self) -> float:
         """When the mission ended; the last message where no event tells."""
-        event = self.event("MISSION_END")
+        event = self.event(MissionEvent.MISSION_END)
         return event.stamp if event else self.last_stamp

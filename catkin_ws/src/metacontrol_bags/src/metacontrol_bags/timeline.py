@@ -14,9 +14,12 @@ from metacontrol_bags.record import (
     Event,
     QualityReport,
 )
+from metacontrol_bags.words import Decision, DiagnosticWords, FunctionGrounding, MissionEvent
 
 CALM_S = 5.0
 """A QA that was below its threshold for this long is told again when it rises above it."""
+
+_WELL_AGAIN = (DiagnosticWords.COMPONENT_RECOVERED, DiagnosticWords.COMPONENT_TRUE)
 
 Report = ComponentReport | QualityReport | DecisionReport | ConfigurationReport | Event
 
@@ -64,11 +67,11 @@ class Timeline:
                 return _event(report)
 
     def _component(self, report: ComponentReport) -> tuple[Entry, ...]:
-        former = self._components.get(report.component, "TRUE")
+        former = self._components.get(report.component, DiagnosticWords.COMPONENT_TRUE)
         self._components[report.component] = report.status
-        if report.status == former or (former, report.status) == ("RECOVERED", "TRUE"):
+        if report.status == former or (former, report.status) == _WELL_AGAIN:
             return ()
-        bad = report.status == "FALSE"
+        bad = report.status == DiagnosticWords.COMPONENT_FALSE
         text = "has failed" if bad else "is back"
         return (Entry(report.stamp, "R1", f"component {report.component} {text}", bad),)
 
@@ -93,29 +96,29 @@ class Timeline:
         self._configurations[report.function] = report
         if former is None or (former.configuration, former.state) == (report.configuration, report.state):
             return ()
-        bad = report.state in ("FAILED", "RECOVERING")
+        bad = report.state in (FunctionGrounding.FAILED, FunctionGrounding.RECOVERING)
         return (Entry(report.stamp, "R4", f"{report.function}: {report.configuration} {report.state}", bad),)
 
 
 def _decision(report: DecisionReport) -> tuple[Entry, ...]:
     change = f"{report.from_configuration or 'nothing'} -> {report.to_configuration or 'nothing'}"
-    if report.state == "DECIDED":
+    if report.state == Decision.DECIDED:
         how = ", degraded" if report.degraded else ""
         return (
             Entry(report.stamp, "R2", f"{report.objective} is violated by {report.trigger}", True),
             Entry(report.stamp, "R3", f"{change}{how}", not report.to_configuration),
         )
-    done = "done" if report.state == "EXECUTED" else report.state.lower()
-    return (Entry(report.stamp, "R4", f"{change} {done}", report.state != "EXECUTED"),)
+    done = "done" if report.state == Decision.EXECUTED else report.state.lower()
+    return (Entry(report.stamp, "R4", f"{change} {done}", report.state != Decision.EXECUTED),)
 
 
 def _event(report: Event) -> tuple[Entry, ...]:
     values = report.values
-    if report.kind == "PERTURBATION":
+    if report.kind == MissionEvent.PERTURBATION:
         share = f" after {float(values['share']):.0%} of the way" if "share" in values else ""
         pid = f", pid {values['pid']}: {values.get('how', 'kill')}" if "pid" in values else ""
         return (Entry(report.stamp, "!", f"{report.name} struck{share}{pid}", True),)
-    if report.kind == "MISSION_START":
+    if report.kind == MissionEvent.MISSION_START:
         return (Entry(report.stamp, "-", f"goal sent, route {values.get('route', '?')}"),)
     outcome = values.get("outcome", "?")
     return (Entry(report.stamp, "-", f"mission over: {values.get('reason') or outcome}", outcome != "reached"),)

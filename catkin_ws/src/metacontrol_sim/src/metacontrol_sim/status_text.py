@@ -1,12 +1,11 @@
-"""What stands over the robot in RViz and in PyBullet's window: configuration, quality levels, failed components.
-
-Messages are taken by their fields, so that no message class is imported.
-"""
+"""What stands over the robot in RViz and in PyBullet's window: configuration, quality levels, failed components."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
+
+from metacontrol_msgs.msg import DiagnosticWords, FunctionGrounding
 
 
 class StatusText:
@@ -26,7 +25,7 @@ class StatusText:
     def take_configuration(self, message: Any) -> None:
         """Take a metacontrol_msgs/ActiveConfiguration."""
         self._configurations = [
-            f.configuration if f.state == "STABLE" else f"{f.configuration} {f.state.lower()}"
+            f.configuration if f.state == FunctionGrounding.STABLE else f"{f.configuration} {f.state.lower()}"
             for f in message.functions
         ]
 
@@ -34,12 +33,14 @@ class StatusText:
         """Take a diagnostic_msgs/DiagnosticArray."""
         for status in message.status:
             for pair in status.values:
-                if status.message == "QA status":
+                if status.message == DiagnosticWords.QA_STATUS:
                     self._take_level(pair.key, pair.value)
-                elif status.message == "QA stale":
+                elif status.message == DiagnosticWords.QA_STALE:
                     self._levels[pair.key] = None
-                elif status.message == "Component status":
-                    (self._failed.add if pair.value == "FALSE" else self._failed.discard)(pair.key)
+                elif status.message == DiagnosticWords.COMPONENT_STATUS:
+                    (self._failed.add if pair.value == DiagnosticWords.COMPONENT_FALSE else self._failed.discard)(
+                        pair.key
+                    )
 
     def lines(self) -> tuple[str, ...]:
         """Return the lines, from top to bottom."""

@@ -15,8 +15,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-
-from rosgraph_monitor.diagnostics.status import QA_STALE, QA_STATUS
+from metacontrol_msgs.msg import DiagnosticWords as Words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -129,7 +128,7 @@ class Observer:
         return DiagnosticStatus(
             level=DiagnosticStatus.STALE,
             name=self._id,
-            message=QA_STALE,
+            message=Words.QA_STALE,
             hardware_id=self._name,
             values=[KeyValue(self.qa_name or self._last_qa_name or _qa_name(self._name), reason)],
         )
@@ -142,7 +141,7 @@ class Observer:
         return DiagnosticStatus(
             level=DiagnosticStatus.OK,
             name=self._id,
-            message=QA_STATUS,
+            message=Words.QA_STATUS,
             hardware_id=self._name,
             values=[KeyValue(self.qa_name or _qa_name(self._name), repr(self._reported))],
         )
@@ -151,7 +150,7 @@ class Observer:
         if not isinstance(status, DiagnosticStatus):
             raise TypeError(f"observer {self._name} returned {type(status).__name__}, not a DiagnosticStatus")
         status.hardware_id = status.hardware_id or self._name
-        if status.message == QA_STATUS and status.values:
+        if status.message == Words.QA_STATUS and status.values:
             self._last_qa_name = status.values[0].key
             if not _is_finite(status.values[0].value):
                 return self.stale(f"value {status.values[0].value!r} is not a finite number")

@@ -16,6 +16,7 @@ import rospkg
 import yaml
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import ConfigurationReport, Event, GoalReport, MissionRecord, OccupancyMap
+from metacontrol_msgs.msg import FunctionGrounding, MissionEvent
 from move_base import geometry
 from move_base.costmap.sensors import cloud_observation, scan_observation
 from move_base.costmap.static_map import StaticMap
@@ -164,20 +165,20 @@ class Lockstep:
             "engine": "lockstep",
             "controller_hz": repr(self._parameters.controller_frequency),
         }
-        self._memory.event(Event(now, "MISSION_START", self._settings.route.name, told))
+        self._memory.event(Event(now, MissionEvent.MISSION_START, self._settings.route.name, told))
         for name, values in struck:
-            self._memory.event(Event(now, "PERTURBATION", name, {"share": "0.0000"} | values))
+            self._memory.event(Event(now, MissionEvent.PERTURBATION, name, {"share": "0.0000"} | values))
         self._set_goal(now)
         self._memory.goals.append(GoalReport(now, _GOAL_ID))
         self._memory.configurations.append(
-            ConfigurationReport(now, "f_navigate", self._settings.initial_configuration, "STABLE")
+            ConfigurationReport(now, "f_navigate", self._settings.initial_configuration, FunctionGrounding.STABLE)
         )
 
     def _end(self) -> None:
         state = self._mission
         told = {"outcome": state.outcome.value if state.outcome else "unknown", "reason": state.reason}
         now = state.ended_s if state.ended_s is not None else self._simulation.time
-        self._memory.event(Event(now, "MISSION_END", self._settings.route.name, told))
+        self._memory.event(Event(now, MissionEvent.MISSION_END, self._settings.route.name, told))
 
     def _step(self) -> None:
         """Advance everything by 10 ms: the world, what senses it, what drives through it, and the mission."""
@@ -226,8 +227,8 @@ class Lockstep:
         name, state = change.configuration, change.state
         self._memory.configurations.append(ConfigurationReport(now, self._manager.function, name, state))
         self._memory.lines.append(f"{now:.2f} {name} {state}")
-        self._state, _ = mission.on_configuration(self._mission, now, state == "STABLE")
-        if state != "STABLE":
+        self._state, _ = mission.on_configuration(self._mission, now, state == FunctionGrounding.STABLE)
+        if state != FunctionGrounding.STABLE:
             if change.restarts:
                 self._navigator = None  # its process is stopped first
             return
@@ -286,7 +287,7 @@ class Lockstep:
                     reason = f"a contingency could not strike: {error}"
                     self._state = mission.abort(self._mission, self._simulation.time, reason)
                     return
-                event = Event(self._simulation.time, "PERTURBATION", contingency.event, share | values)
+                event = Event(self._simulation.time, MissionEvent.PERTURBATION, contingency.event, share | values)
                 self._memory.event(event)
 
     def _strike(self, contingency: Contingency) -> dict[str, str]:

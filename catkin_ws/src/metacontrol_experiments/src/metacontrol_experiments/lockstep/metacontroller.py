@@ -13,6 +13,7 @@ import numpy as np
 import yaml
 from geometry_msgs.msg import TransformStamped
 from metacontrol_bags.record import ComponentReport, DecisionReport, QualityReport
+from metacontrol_msgs.msg import DiagnosticWords, FunctionGrounding
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop.mape import Mape
@@ -22,7 +23,6 @@ from mros1_reasoner.planning.decision import DECIDED, EXECUTED, Decision
 from pybullet_simulator.ros.messages import ODOM, OdometryWriter
 from ros_model.language.metamodel import compose
 from ros_model.language.reader import read_system
-from rosgraph_monitor.diagnostics.status import QA_STALE, QA_STATUS
 from rosgraph_monitor.observers.energy import EnergyQualityObserver
 from rosgraph_monitor.observers.safety import SafetyQualityObserver
 from std_msgs.msg import Float32
@@ -128,7 +128,7 @@ class Manager:
             self.close()
             raise ManagerError(str(error)) from error
         self.function = objectives[0].function
-        self._core.observe_active(0.0, self.function, configuration, "STABLE")
+        self._core.observe_active(0.0, self.function, configuration, FunctionGrounding.STABLE)
         self._due: list[tuple[float, str, str]] = []  # time, component, status
         self._pending: _Pending | None = None
 
@@ -148,7 +148,8 @@ class Manager:
 
     def component_changed(self, now: float, component: str, works: bool) -> None:
         """A component's node died or came back; the monitor finds out after a while."""
-        self._due.append((now + self._delays.draw("detect", self._rng), component, "RECOVERED" if works else "FALSE"))
+        status = DiagnosticWords.COMPONENT_RECOVERED if works else DiagnosticWords.COMPONENT_FALSE
+        self._due.append((now + self._delays.draw("detect", self._rng), component, status))
 
     def step(self, now: float, step: int, simulation: Simulation, stamp: genpy.Time) -> Change | None:
         """Observe, reason, and carry out.
@@ -190,10 +191,10 @@ class Manager:
     def _evaluate(self, observer: TopicObserver, now: float) -> None:
         for status in observer.evaluate(now):
             for pair in status.values:
-                if status.message == QA_STATUS:
+                if status.message == DiagnosticWords.QA_STATUS:
                     self._core.observe_level(now, pair.key, float(pair.value), stamp=now)
                     self.observed.append(QualityReport(now, pair.key, float(pair.value)))
-                elif status.message == QA_STALE:
+                elif status.message == DiagnosticWords.QA_STALE:
                     self._core.observe_stale(pair.key)
                     self.observed.append(QualityReport(now, pair.key, None))
 
@@ -225,15 +226,15 @@ class Manager:
         if not pending.begun and now >= pending.decided:
             pending.begun = True
             self.decisions.append(_report(pending.decision, now))
-            return pending.change("RECONFIGURING")
+            return pending.change(FunctionGrounding.RECONFIGURING)
         if now < pending.done:
             return None
         self._pending = None
         self.configuration = pending.decision.to_configuration
-        self._core.observe_active(now, self.function, self.configuration, "STABLE")
+        self._core.observe_active(now, self.function, self.configuration, FunctionGrounding.STABLE)
         self.decisions.append(_report(self._core.report(now, pending.decision.id, True), now))
         self._follow()
-        return pending.change("STABLE")
+        return pending.change(FunctionGrounding.STABLE)
 
     def _follow(self) -> None:
         """Let the observers know which system is active."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from metacontrol_bags.record import MissionRecord
+from metacontrol_msgs.msg import MissionEvent
 from pybullet_simulator.physics.simulation import ENERGY_STEPS, MOTION_STEPS, SAFETY_STEPS
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def with_wall_time(record: MissionRecord, wall_s: float) -> MissionRecord:
     """Return a record whose end tells how long the run took (wall s); the log never does."""
     events = tuple(
         replace(event, values=event.values | {"wall_duration_s": f"{wall_s:.3f}"})
-        if event.kind == "MISSION_END"
+        if event.kind == MissionEvent.MISSION_END
         else event
         for event in record.events
     )

@@ -18,7 +18,7 @@ from metacontrol_bags import messages
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import CostReport, Event, QualityReport
 from metacontrol_bags.timeline import Timeline
-from metacontrol_msgs.msg import ActiveConfiguration, Decision, MissionEvent
+from metacontrol_msgs.msg import ActiveConfiguration, Decision, FunctionGrounding, MissionEvent
 from move_base_msgs.msg import MoveBaseActionGoal, MoveBaseActionResult
 from node_kit.io.inbox import Inbox
 from robot_formulas.geometry import Pose
@@ -307,9 +307,9 @@ class MissionNode:
 
     def _on_configuration(self, message: ActiveConfiguration) -> None:
         reports = messages.configurations(message, rospy.get_time())
-        self._stable = bool(reports) and all(report.state == "STABLE" for report in reports)
+        self._stable = bool(reports) and all(report.state == FunctionGrounding.STABLE for report in reports)
         if self._state is None:
-            broken = [report for report in reports if report.state == "FAILED"]
+            broken = [report for report in reports if report.state == FunctionGrounding.FAILED]
             self._failed = f"the manipulator could not deploy {broken[0].configuration}" if broken else None
         else:
             self._take(mission.on_configuration(self._mission, rospy.get_time(), self._stable))

@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 import click
 import yaml
+from metacontrol_msgs.msg import FunctionGrounding
 from rich.console import Console
 from rich.table import Table
 from ros_model.errors import ModelError
@@ -162,7 +163,7 @@ def _initial(knowledge_base: KnowledgeBase, recording: Recording, configuration:
         known = ", ".join(knowledge_base.designs)
         raise ParameterError(f"--initial: no FunctionDesign is called {configuration!r}: known: {known}")
     function = knowledge_base.designs[configuration].function
-    return [entry(recording.start, "active", function, configuration, "STABLE")]
+    return [entry(recording.start, "active", function, configuration, FunctionGrounding.STABLE)]
 
 
 def _assignments(texts: Sequence[str]) -> list[tuple[str, Any]]:

@@ -7,9 +7,11 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
+from metacontrol_msgs.msg import DiagnosticWords as Words
+
 from mros1_reasoner.knowledge import vocabulary as v
 
-ERROR_LEVEL = 2  # diagnostic_msgs/DiagnosticStatus
 TASK_KEYS = ("objetive_error", "objective_error")
 """Keys with which a "QA status" says that a task failed; the published observer of /obj_error writes the first."""
 _SHOWN = 60  # characters of foreign text in a warning
@@ -110,11 +112,11 @@ class DiagnosticsReader:
         self._components = frozenset(components)
         self._nodes = dict(nodes or {})
         self._readers: dict[str, Callable[[Any], Fact | Remark | None]] = {
-            "QA status": self._quality,
-            "QA stale": self._stale,
-            "Component status": self._component,
-            "Missing node": self._missing,
-            "binding error": self._binding,
+            Words.QA_STATUS: self._quality,
+            Words.QA_STALE: self._stale,
+            Words.COMPONENT_STATUS: self._component,
+            Words.MISSING_NODE: self._missing,
+            Words.BINDING_ERROR: self._binding,
         }
 
     def read(self, statuses: Iterable[Any]) -> Reading:
@@ -142,7 +144,7 @@ class DiagnosticsReader:
     def _quality(self, status: Any) -> Fact | Remark:
         key, value = _first(status)
         if not key:
-            return Remark("QA status", f"QA status of {shown(status.name)} has no value: left out")
+            return Remark(Words.QA_STATUS, f"QA status of {shown(status.name)} has no value: left out")
         if key in TASK_KEYS:
             return _task(status.name, key, value)
         if key not in self._qualities:
@@ -151,16 +153,16 @@ class DiagnosticsReader:
             level = float(value)
         except ValueError:
             say = f"QA status {shown(key)} has the level {shown(value)}, which is no number: left out"
-            return Remark("QA status", say)
+            return Remark(Words.QA_STATUS, say)
         if not math.isfinite(level):
             say = f"QA status {shown(key)} has the level {shown(value)}, which is not finite: left out"
-            return Remark("QA status", say)
+            return Remark(Words.QA_STATUS, say)
         return LevelFact(key, level, status.name, _plain(value.strip()))
 
     def _stale(self, status: Any) -> Fact | Remark:
         key, value = _first(status)
         if not key:
-            return Remark("QA stale", f"QA stale of {shown(status.name)} has no value: left out")
+            return Remark(Words.QA_STALE, f"QA stale of {shown(status.name)} has no value: left out")
         if key not in self._qualities:
             return Remark("Unsupported QA", f"Unsupported QA TYPE received: {_plain(key)}")
         return StaleFact(key, _plain(value))
@@ -170,11 +172,11 @@ class DiagnosticsReader:
         text = value[:_SHOWN].strip().upper()
         if not key or text not in v.COMPONENT_STATUSES:
             say = f"Component status ({shown(key)}, {shown(value)}) is left out: expected (component, "
-            return Remark("Component status", say + "TRUE|FALSE|RECOVERED)")
+            return Remark(Words.COMPONENT_STATUS, say + "TRUE|FALSE|RECOVERED)")
         return self._known(key, text)
 
     def _missing(self, status: Any) -> Fact | Remark | None:
-        if _level(status) < ERROR_LEVEL:
+        if _level(status) < DiagnosticStatus.ERROR:
             return None
         node = status.name.strip("/")
         return self._known(self._nodes.get(node, node), v.FAILED)
@@ -189,8 +191,8 @@ class DiagnosticsReader:
     @staticmethod
     def _binding(status: Any) -> Fact | Remark:
         if not status.name:
-            return Remark("binding error", "binding error without the name of a grounding: left out")
-        return BindingFact(status.name, _level(status) >= ERROR_LEVEL)
+            return Remark(Words.BINDING_ERROR, "binding error without the name of a grounding: left out")
+        return BindingFact(status.name, _level(status) >= DiagnosticStatus.ERROR)
 
 
 def shown(text: str) -> str:
@@ -206,7 +208,9 @@ def _plain(text: str) -> str:
 def _task(name: str, key: str, value: str) -> Fact | Remark:
     text = value[:_SHOWN].strip().lower()
     if text not in (*_TRUE, *_FALSE):
-        return Remark("QA status", f"QA status {key} has the value {shown(value)}: expected True or False: left out")
+        return Remark(
+            Words.QA_STATUS, f"QA status {key} has the value {shown(value)}: expected True or False: left out"
+        )
     return TaskFact(name, text in _TRUE)
 
 

@@ -12,13 +12,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
+from metacontrol_msgs.msg import FunctionGrounding
+
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Reasoner
 from mros1_reasoner.loop.deliberation import Deliberation, Timing
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.loop.state import BUSY, STABLE, Component, State
+from mros1_reasoner.loop.state import BUSY, Component, State
 from mros1_reasoner.planning.decision import DECIDED, EXECUTED, FAILED, OPERATOR, PROPOSED, Decision
 from mros1_reasoner.planning.planner import Distance, Utility, difference
 from mros1_reasoner.planning.utility import make_utility
@@ -417,10 +419,13 @@ class Mape:
         self._seen = None
         running = self._state.running[decision.objective]
         if ok:
-            if running.state in (*BUSY, FAILED):
-                running.state, running.busy_since = STABLE, None
+            if running.state in (*BUSY, FunctionGrounding.FAILED):
+                running.state, running.busy_since = FunctionGrounding.STABLE, None
             self._state.deployed(decision.objective, decision.to_configuration, now)
-            self._state.active[self.objectives[decision.objective].function] = decision.to_configuration, STABLE
+            self._state.active[self.objectives[decision.objective].function] = (
+                decision.to_configuration,
+                FunctionGrounding.STABLE,
+            )
             running.calm_until = now + self.settings.cool_down
             running.attempts = 0
             running.degraded = decision.degraded

@@ -6,15 +6,16 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from metacontrol_msgs.msg import FunctionGrounding
+
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
 from mros1_reasoner.loop.levels import Levels
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning.decision import FAILED, Decision
+from mros1_reasoner.planning.decision import Decision
 
-STABLE, RECONFIGURING, RECOVERING = "STABLE", "RECONFIGURING", "RECOVERING"  # FunctionGrounding.msg, with FAILED
-BUSY = (RECONFIGURING, RECOVERING)
+BUSY = (FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING)
 
 
 @dataclass
@@ -45,7 +46,7 @@ class Running:
     @property
     def is_broken(self) -> bool:
         """Whether the design is known not to run, or not as a whole."""
-        return self.state == FAILED or self.binding_error
+        return self.state == FunctionGrounding.FAILED or self.binding_error
 
 
 class State:
@@ -155,10 +156,10 @@ class State:
         running = self.running[name]
         if state in BUSY:
             running.busy_since = running.busy_since if running.state in BUSY else now
-        if state != running.state and state == FAILED:
+        if state != running.state and state == FunctionGrounding.FAILED:
             running.failed_stamp = max(now, 0.0)  # 0: before anything was asked for
         running.state = state
-        if state != RECONFIGURING and running.design != configuration:
+        if state != FunctionGrounding.RECONFIGURING and running.design != configuration:
             self.deployed(name, configuration, now)  # while it reconfigures, it may be the old or the new one
 
     def deployed(self, objective: str, design: str, now: float) -> None:

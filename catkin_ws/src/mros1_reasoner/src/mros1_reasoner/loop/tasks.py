@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-_FAILED = (4, 5, 9)  # actionlib_msgs/GoalStatus: ABORTED, REJECTED, LOST
+from actionlib_msgs.msg import GoalStatus
+
+_FAILED = (GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.LOST)
 
 
 def newest_goal(statuses: Any) -> tuple[str, bool] | None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from metacontrol_msgs import msg as messages
+
 from mros1_reasoner.planning.planner import Candidate
 
-DECIDED, EXECUTED, FAILED = "DECIDED", "EXECUTED", "FAILED"  # Decision.msg
-PROPOSED = "PROPOSED"  # waits for an operator's approval
-ADVISED = "ADVISED"  # in a dry run: nothing follows
+DECIDED, EXECUTED, FAILED = messages.Decision.DECIDED, messages.Decision.EXECUTED, messages.Decision.FAILED
+PROPOSED = messages.Decision.PROPOSED  # waits for an operator's approval
+ADVISED = messages.Decision.ADVISED  # in a dry run: nothing follows
 RECOVERY = "compRecov"  # the rule by which the return of a component is a cause
 OPERATOR = "operator"
 

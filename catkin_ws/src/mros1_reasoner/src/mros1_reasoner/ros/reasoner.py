@@ -20,6 +20,7 @@ from node_kit.ros.lifetime import Lifetime
 from ros_model.errors import ModelError
 from std_msgs.msg import Bool
 
+from mros1_reasoner.knowledge import vocabulary
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase, KnowledgeBaseError
 from mros1_reasoner.knowledge.model import Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
@@ -332,7 +333,7 @@ def _warm_up(knowledge_base: KnowledgeBase, reasoner: Reasoner, objectives: tupl
         objectives=objectives,
         groundings={o.name: d.name for o in objectives for d in knowledge_base.solving(o.function)[:1]},
         levels={(o.name, quality): limit for o in objectives for quality, limit in o.limits.items()},
-        components=dict.fromkeys(knowledge_base.components, "FALSE"),
+        components=dict.fromkeys(knowledge_base.components, vocabulary.FAILED),
     )
     for _ in range(_WARM_UP):
         knowledge_base.analyse(facts, reasoner)

@@ -91,7 +91,7 @@ class Requests:
         self._queue(lambda: self._take_result(request, status, text, code))
 
     def _take_result(self, request: _Request, status: int, text: str, code: int | None) -> None:
-        ok = code == 1 and status == GoalStatus.SUCCEEDED
+        ok = code == messages.ReconfigurationResult.OK and status == GoalStatus.SUCCEEDED
         reason = text or _MEANINGS.get(-2 if code is None else code, "the manipulator gave no result")
         self._end(request, ok, "" if ok else reason, blame=code in _MEANINGS)
 

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from metacontrol_msgs.msg import ReconfigurationResult
+
 from rosgraph_manipulator.change.tactics import Plan, SetParameters, StepExecutor
 from rosgraph_manipulator.configuration.configuration_file import Configuration
 
@@ -15,10 +17,10 @@ from rosgraph_manipulator.configuration.configuration_file import Configuration
 class Result(enum.IntEnum):
     """The result codes of metacontrol_msgs/MvpReconfiguration."""
 
-    OK = 1
-    FAILED = 0
-    UNKNOWN = -1
-    GENERAL_ERROR = -2
+    OK = ReconfigurationResult.OK
+    FAILED = ReconfigurationResult.FAILED
+    UNKNOWN = ReconfigurationResult.UNKNOWN_CONFIGURATION
+    GENERAL_ERROR = ReconfigurationResult.GENERAL_ERROR
 
 
 class DeploymentError(Exception):

@@ -15,6 +15,7 @@ from metacontrol_msgs.msg import (
     LauncherState,
     MvpReconfigurationAction,
     MvpReconfigurationGoal,
+    ReconfigurationResult,
 )
 from ros_model.errors import ModelError
 from ros_model.files import resolve
@@ -118,7 +119,7 @@ def _request(name: str) -> int:
     if client.get_state() == GoalStatus.SUCCEEDED:
         _status_lines(_latest(f"{NODE}/active_configuration", ActiveConfiguration))
         return 0
-    return 1 if result is not None and result.result == 0 else 2
+    return 1 if result is not None and result.result == ReconfigurationResult.FAILED else 2
 
 
 def _status() -> int:

@@ -9,11 +9,14 @@ import copy
 from collections import OrderedDict
 from typing import Any
 
-# States of actionlib_msgs/GoalStatus.
-PENDING, ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED, PREEMPTING, RECALLING, RECALLED, LOST = range(10)
-TERMINAL = frozenset({PREEMPTED, SUCCEEDED, ABORTED, REJECTED, RECALLED})
+from actionlib_msgs.msg import GoalStatus
+
+AT_WORK = frozenset({GoalStatus.PENDING, GoalStatus.ACTIVE})
+TERMINAL = frozenset(
+    {GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.RECALLED}
+)
 # What a server says of a goal that it drops because it is being shut down.
-DROPPED_BY_SHUTDOWN = frozenset({PREEMPTED, ABORTED, RECALLED})
+DROPPED_BY_SHUTDOWN = frozenset({GoalStatus.PREEMPTED, GoalStatus.ABORTED, GoalStatus.RECALLED})
 REMEMBERED = 1000  # ids of goals that have ended: many more than can be told twice
 CONFIRMATIONS = 3  # statuses with a goal at work, every 0.2 s: more than a server needs to heed a cancellation
 
@@ -71,12 +74,12 @@ class GoalKeeper:
 
     def on_status(self, status: Any) -> None:
         """Take in a message of the topic `status`: it ends goals, and names those sent without an id."""
-        self._listed = frozenset(entry.goal_id.id for entry in status.status_list if entry.status in (PENDING, ACTIVE))
+        self._listed = frozenset(entry.goal_id.id for entry in status.status_list if entry.status in AT_WORK)
         for entry in status.status_list:
             goal_id, state = entry.goal_id.id, entry.status
             if state in TERMINAL:
                 self._end(goal_id, state)
-            elif self._goal is not None and not self._goal.goal_id.id and state in (PENDING, ACTIVE):
+            elif self._goal is not None and not self._goal.goal_id.id and state in AT_WORK:
                 # The server made up an id for a goal that came without one.
                 self._goal.goal_id.id, self._goal.goal_id.stamp = goal_id, entry.goal_id.stamp
         self._doubt_cancellation()

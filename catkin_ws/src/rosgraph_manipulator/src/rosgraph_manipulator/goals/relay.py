@@ -8,9 +8,10 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-# States of actionlib_msgs/GoalStatus.
-_PREEMPTED, _SUCCEEDED, _ABORTED, _REJECTED, _RECALLED, _LOST = 2, 3, 4, 5, 8, 9
-_DROPPED = frozenset({_PREEMPTED, _ABORTED, _RECALLED})  # what a server says of its goals when it is shut down
+from actionlib_msgs.msg import GoalStatus
+
+# What a server says of its goals when it is shut down.
+_DROPPED = frozenset({GoalStatus.PREEMPTED, GoalStatus.ABORTED, GoalStatus.RECALLED})
 
 
 class Ending(enum.Enum):
@@ -53,10 +54,10 @@ class Link:
             How it ends for the client; None: it does not, and is to be sent again.
         """
         self.sent = False
-        if state == _SUCCEEDED:
+        if state == GoalStatus.SUCCEEDED:
             return Ending.SUCCEEDED
         if self.cancelled:
             return Ending.CANCELLED
-        if state == _LOST or (changing and state in _DROPPED):
+        if state == GoalStatus.LOST or (changing and state in _DROPPED):
             return None
-        return Ending.CANCELLED if state in (_PREEMPTED, _RECALLED) else Ending.ABORTED
+        return Ending.CANCELLED if state in (GoalStatus.PREEMPTED, GoalStatus.RECALLED) else Ending.ABORTED

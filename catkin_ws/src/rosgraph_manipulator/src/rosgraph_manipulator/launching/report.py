@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-# The states of metacontrol_msgs/LauncherState.
-STABLE, CHANGING, RECOVERING, FAILED = "STABLE", "CHANGING", "RECOVERING", "FAILED"
+from metacontrol_msgs.msg import LauncherState
+
+STABLE: str = LauncherState.STABLE
+CHANGING: str = LauncherState.CHANGING
+RECOVERING: str = LauncherState.RECOVERING
+FAILED: str = LauncherState.FAILED
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from rosgraph_monitor.diagnostics import status as s
+from metacontrol_msgs.msg import DiagnosticWords as Words
 
 COMPONENT, QUALITY, GRAPH, USAGE = "Component ", "Quality ", "Graph ", "Usage "
 """Prefixes of the groups, as config/diagnostic_aggregator.yaml has them."""
 
-_OF_NODES = (s.MISSING_NODE, s.ADDITIONAL_NODE, s.WRONG_PARAMETER, s.MISSING_CONNECTION)
-_OF_PORTS = (s.MISSING_PORT, s.ADDITIONAL_PORT, s.WRONG_TYPE)
-_OF_TOPICS = (s.SILENT_TOPIC, s.SLOW_TOPIC, s.STUCK_TOPIC)
-_OF_USAGE = (s.CPU_USAGE, s.MEMORY_USAGE)
+_OF_NODES = (Words.MISSING_NODE, Words.ADDITIONAL_NODE, Words.WRONG_PARAMETER, Words.MISSING_CONNECTION)
+_OF_PORTS = (Words.MISSING_PORT, Words.ADDITIONAL_PORT, Words.WRONG_TYPE)
+_OF_TOPICS = (Words.SILENT_TOPIC, Words.SLOW_TOPIC, Words.STUCK_TOPIC)
+_OF_USAGE = (Words.CPU_USAGE, Words.MEMORY_USAGE)
 
 
 def unique_name(status: Any) -> str:
@@ -28,13 +28,13 @@ def unique_name(status: Any) -> str:
     message, name = status.message, status.name
     key, value = (status.values[0].key, status.values[0].value) if status.values else ("", "")
     names = {
-        **dict.fromkeys((s.QA_STATUS, s.QA_STALE), f"{QUALITY}{key}" + (f" of {name}" if name else "")),
+        **dict.fromkeys((Words.QA_STATUS, Words.QA_STALE), f"{QUALITY}{key}" + (f" of {name}" if name else "")),
         **dict.fromkeys(_OF_NODES, f"{GRAPH}{name}: {message}"),
         **dict.fromkeys(_OF_PORTS, f"{GRAPH}{name}: {message} {value}"),
         **dict.fromkeys(_OF_TOPICS, f"{GRAPH}{name}: {message}"),
         **dict.fromkeys(_OF_USAGE, f"{USAGE}{name}: {message}"),
-        s.COMPONENT_STATUS: f"{COMPONENT}{key}",
+        Words.COMPONENT_STATUS: f"{COMPONENT}{key}",
     }
     if message in names and (key or message in _OF_TOPICS):
         return names[message]
-    return f"{GRAPH}{name}" if name == s.graph_ok().name else str(name)
+    return f"{GRAPH}{name}" if name == Words.GRAPH else str(name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from metacontrol_msgs.msg import DiagnosticWords as Words
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -41,11 +42,11 @@ class Board:
         for status in statuses:
             level = _level(status)
             first = status.values[0] if status.values else None
-            if status.message == s.COMPONENT_STATUS and first:
+            if status.message == Words.COMPONENT_STATUS and first:
                 self.components[first.key] = _Row(now, level, first.value)
-            elif status.message in (s.QA_STATUS, s.QA_STALE) and first:
+            elif status.message in (Words.QA_STATUS, Words.QA_STALE) and first:
                 self.qualities[first.key] = _Row(now, level, first.value)
-            elif status.message in (s.CPU_USAGE, s.MEMORY_USAGE) and first:
+            elif status.message in (Words.CPU_USAGE, Words.MEMORY_USAGE) and first:
                 self.usage[status.name, status.message] = first.value
             elif level != s.Level.OK:
                 values = ", ".join(f"{value.key}: {value.value}" for value in status.values)
@@ -66,7 +67,7 @@ class Board:
     def _nodes(self, nodes: Iterable[str]) -> Table:
         table = Table("node or component", "status", "CPU %", "MB", title="Nodes", title_justify="left")
         names = {name.lstrip("/") for name in nodes}
-        gone = {name: message for name, message, _ in self.findings if message == s.MISSING_NODE}
+        gone = {name: message for name, message, _ in self.findings if message == Words.MISSING_NODE}
         for name in sorted(names | gone.keys() | self.components.keys()):
             row = self.components.get(name)
             level, text = (s.Level.OK, "registered") if row is None else (row.level, row.text)
@@ -75,13 +76,13 @@ class Board:
             table.add_row(
                 Text(name),
                 Text(text, _STYLE.get(s.Level(level), "")),
-                self.usage.get((name, s.CPU_USAGE), ""),
-                self.usage.get((name, s.MEMORY_USAGE), ""),
+                self.usage.get((name, Words.CPU_USAGE), ""),
+                self.usage.get((name, Words.MEMORY_USAGE), ""),
             )
         return table
 
     def _reason(self, node: str) -> str:
-        return next(reason for name, message, reason in self.findings if (name, message) == (node, s.MISSING_NODE))
+        return next(reason for name, message, reason in self.findings if (name, message) == (node, Words.MISSING_NODE))
 
     def _qualities(self, limits: Mapping[str, float], now: float) -> Table:
         table = Table("quality", "level", "required", "age s", title="Quality attributes", title_justify="left")

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import TYPE_CHECKING
 
+from metacontrol_msgs.msg import FunctionGrounding
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import RosSystem, compose
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-_IN_CHANGE = frozenset({"RECONFIGURING", "RECOVERING"})
-_STABLE = "STABLE"
+_IN_CHANGE = frozenset({FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING})
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class DesiredModel:
                 self.current.system, self.current.variant_nodes, self.current.variant_nodes, problem=str(error)
             )
             return self.current
-        self._stable |= {g.function: g.configuration for g in groundings if g.state == _STABLE}
+        self._stable |= {g.function: g.configuration for g in groundings if g.state == FunctionGrounding.STABLE}
         self.current = Desired(
             None if self._base is None else reduce(compose, active, self._base),
             variant_nodes=_nodes(active),

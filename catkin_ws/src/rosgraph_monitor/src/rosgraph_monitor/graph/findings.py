@@ -5,17 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rosgraph_monitor.diagnostics.status import (
-    ADDITIONAL_NODE,
-    ADDITIONAL_PORT,
-    MISSING_CONNECTION,
-    MISSING_NODE,
-    MISSING_PORT,
-    WRONG_PARAMETER,
-    WRONG_TYPE,
-    Level,
-    Status,
-)
+from metacontrol_msgs.msg import DiagnosticWords as Words
+
+from rosgraph_monitor.diagnostics.status import Level, Status
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -27,7 +19,7 @@ class _NotSet:
 
 
 NOT_SET = _NotSet()
-NO_NODE = "ROS Graph"
+NO_NODE: str = Words.GRAPH
 """Stands for the node in findings that concern no single one."""
 
 
@@ -121,7 +113,7 @@ def finding_statuses(findings: Iterable[Finding]) -> list[Status]:
     for node, parameters in wrong.items():
         actual = tuple((p.parameter, str(p.actual)) for p in parameters)
         expected = tuple((f"expected/{p.parameter}", str(p.expected)) for p in parameters)
-        statuses.append(Status(Level.ERROR, node, WRONG_PARAMETER, actual + expected))
+        statuses.append(Status(Level.ERROR, node, Words.WRONG_PARAMETER, actual + expected))
     return statuses
 
 
@@ -129,18 +121,18 @@ def _status(finding: MissingNode | AdditionalNode | PortFinding) -> Status:
     match finding:
         case MissingNode(node, state, reason):
             values = (("reason", reason), ("expected", "running"), ("actual", state))
-            return Status(Level.ERROR, node, MISSING_NODE, values)
+            return Status(Level.ERROR, node, Words.MISSING_NODE, values)
         case AdditionalNode(node):
-            return Status(Level.WARN, node, ADDITIONAL_NODE, (("expected", "not running"), ("actual", "running")))
+            return Status(Level.WARN, node, Words.ADDITIONAL_NODE, (("expected", "not running"), ("actual", "running")))
         case MissingPort(node, kind, name):
             values = (("port", name), ("expected", kind), ("actual", "none"))
-            return Status(Level.ERROR, node, MISSING_PORT, values)
+            return Status(Level.ERROR, node, Words.MISSING_PORT, values)
         case AdditionalPort(node, kind, name):
             values = (("port", name), ("expected", "none"), ("actual", kind))
-            return Status(Level.WARN, node, ADDITIONAL_PORT, values)
+            return Status(Level.WARN, node, Words.ADDITIONAL_PORT, values)
         case WrongType(node, name, expected, actual):
             values = (("port", name), ("expected", expected), ("actual", actual))
-            return Status(Level.ERROR, node, WRONG_TYPE, values)
+            return Status(Level.ERROR, node, Words.WRONG_TYPE, values)
         case MissingConnection(name, source, target, actual):
             values = (("connection", name), ("expected", f"{source} -> {target}"), ("actual", actual))
-            return Status(Level.ERROR, name, MISSING_CONNECTION, values)
+            return Status(Level.ERROR, name, Words.MISSING_CONNECTION, values)

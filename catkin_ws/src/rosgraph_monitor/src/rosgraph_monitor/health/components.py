@@ -7,7 +7,9 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from rosgraph_monitor.diagnostics.status import COMPONENT_STATUS, Level, Status
+from metacontrol_msgs.msg import DiagnosticWords as Words
+
+from rosgraph_monitor.diagnostics.status import Level, Status
 from rosgraph_monitor.health.battery import BatterySpec
 from rosgraph_monitor.health.topics import DEFAULT_MAX_AGE, TopicSpec, parse_spec
 
@@ -18,9 +20,9 @@ if TYPE_CHECKING:
 class ComponentStatus(enum.Enum):
     """Values of c_status in the vocabulary."""
 
-    TRUE = "TRUE"
-    FALSE = "FALSE"
-    RECOVERED = "RECOVERED"
+    TRUE = Words.COMPONENT_TRUE
+    FALSE = Words.COMPONENT_FALSE
+    RECOVERED = Words.COMPONENT_RECOVERED
 
 
 class NodeCondition(enum.Enum):
@@ -188,7 +190,7 @@ def component_statuses(components: Iterable[tuple[str, ComponentStatus]]) -> lis
         Status(
             Level.ERROR if status is ComponentStatus.FALSE else Level.OK,
             component,
-            COMPONENT_STATUS,
+            Words.COMPONENT_STATUS,
             ((component, status.value),),
         )
         for component, status in components

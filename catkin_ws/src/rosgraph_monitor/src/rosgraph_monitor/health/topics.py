@@ -7,7 +7,9 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from rosgraph_monitor.diagnostics.status import SILENT_TOPIC, SLOW_TOPIC, STUCK_TOPIC, Level, Status
+from metacontrol_msgs.msg import DiagnosticWords as Words
+
+from rosgraph_monitor.diagnostics.status import Level, Status
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
@@ -205,22 +207,22 @@ class TopicHealth:
             waited = min(now - seen.since, wall - seen.since_wall)
             if waited <= max(self._grace, spec.max_age):
                 return Verdict(spec, heard=False)
-            return Verdict(spec, SILENT_TOPIC, f"no message in {waited:.1f} s", "messages", "none")
+            return Verdict(spec, Words.SILENT_TOPIC, f"no message in {waited:.1f} s", "messages", "none")
         age = now - seen.last
         if spec.max_age and age > spec.max_age:
             return Verdict(
-                spec, SILENT_TOPIC, f"last message {age:.1f} s ago", f"max_age {spec.max_age:g}", f"{age:.2f}"
+                spec, Words.SILENT_TOPIC, f"last message {age:.1f} s ago", f"max_age {spec.max_age:g}", f"{age:.2f}"
             )
         if spec.min_rate:
             rate = _rate(seen.arrivals, spec.min_rate, seen.last, now)
             if rate is not None and rate < spec.min_rate:
                 return Verdict(
-                    spec, SLOW_TOPIC, f"{rate:.2f} messages per s", f"min_rate {spec.min_rate:g}", f"{rate:.2f}"
+                    spec, Words.SLOW_TOPIC, f"{rate:.2f} messages per s", f"min_rate {spec.min_rate:g}", f"{rate:.2f}"
                 )
         if spec.stuck_after and seen.same >= spec.stuck_after:
             return Verdict(
                 spec,
-                STUCK_TOPIC,
+                Words.STUCK_TOPIC,
                 f"the same data {seen.same} times in a row",
                 f"stuck_after {spec.stuck_after}",
                 str(seen.same),

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import psutil
+from metacontrol_msgs.msg import DiagnosticWords as Words
 
-from rosgraph_monitor.diagnostics.status import CPU_USAGE, MEMORY_USAGE, Level, Status
+from rosgraph_monitor.diagnostics.status import Level, Status
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -78,7 +79,7 @@ class UsageMeter:
             before = self._before.get((node, pid))
             cpu = cpu_percent(before, sample) if before else None
             if cpu is not None:
-                statuses.append(Status(Level.OK, node, CPU_USAGE, ((node, f"{cpu:.2f}"),)))
-            statuses.append(Status(Level.OK, node, MEMORY_USAGE, ((node, f"{sample.memory_mb:.1f}"),)))
+                statuses.append(Status(Level.OK, node, Words.CPU_USAGE, ((node, f"{cpu:.2f}"),)))
+            statuses.append(Status(Level.OK, node, Words.MEMORY_USAGE, ((node, f"{sample.memory_mb:.1f}"),)))
         self._before = samples
         return statuses
