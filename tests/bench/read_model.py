@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from ros_model.language.reader import read_system
+from ros_model.io.models import read_system
 from support.figures import entry, seconds
 
 _SIZE = 432_000  # bytes, as large as the largest published model

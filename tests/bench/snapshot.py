@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 from typing import TYPE_CHECKING, Any
 
-from ros_model.io.snapshot import MasterClient
+from ros_model.io.master import MasterClient
 from support.figures import entry, seconds
 from support.stand import NAIVE, naive_snapshot, stand
 

@@ -1,7 +1,7 @@
 """What the tests of ros_model share."""
 
 import pytest
-from ros_model.cli import main
+from ros_model.cli.rosmodel import main
 
 
 @pytest.fixture

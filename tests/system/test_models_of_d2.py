@@ -17,16 +17,18 @@ from pathlib import Path
 
 import pytest
 import rospkg
-from ros_model.io.snapshot import GraphSnapshot, SnapshotError, take_snapshot
+from ros_model.graph.snapshot import GraphSnapshot
+from ros_model.io.master import SnapshotError, take_snapshot
+from ros_model.io.models import read_system
 from ros_model.language.metamodel import PortKind
-from ros_model.language.reader import read_system
 from ros_model_extraction import ros_defaults as plumbing
+from ros_model_extraction.found import FoundPort
+from ros_model_extraction.io.live_nodes import ask_nodes
 from ros_model_extraction.names import resolve
 from ros_model_extraction.packages.catkin_package import find_packages
 from ros_model_extraction.packages.package_source import ExtractedPackage, extract_package
+from ros_model_extraction.running.details import Details
 from ros_model_extraction.running.graph import End, interfaces
-from ros_model_extraction.running.live import Details, look_at
-from ros_model_extraction.source import FoundPort
 
 START_S = 120.0
 SETTLED_S = 3.0
@@ -115,7 +117,7 @@ def seen(tmp_path_factory):
     with running_d2(folder) as uri:
         command = rosmodel("snapshot", "--master", uri, "-o", folder / "models")
         snapshot = take_snapshot(uri)
-        details = look_at(snapshot, uri, PATIENCE_S)
+        details = ask_nodes(snapshot, uri, PATIENCE_S)
     return Seen(snapshot, details, command, folder / "models")
 
 

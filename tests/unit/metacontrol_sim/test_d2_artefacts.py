@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 import yaml
-from ros_model.cli import main
-from ros_model.files import resolve
-from ros_model.language.reader import read_system
+from ros_model.cli.rosmodel import main
+from ros_model.io.files import resolve
+from ros_model.io.models import read_system
+from ros_model.io.project import load_project
 from ros_model.language.writer import write_system
-from ros_model.project.project import load_project
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 

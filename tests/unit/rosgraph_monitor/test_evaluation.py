@@ -1,6 +1,6 @@
 """Evaluations of the monitor, one after the other."""
 
-from ros_model.io.snapshot import GraphSnapshot, NodeState, build_snapshot
+from ros_model.graph.snapshot import GraphSnapshot, NodeState, build_snapshot
 from ros_model.language.metamodel import Component, Port, PortKind, RosSystem
 from rosgraph_monitor.evaluation import GraphMonitor, Patience
 from rosgraph_monitor.graph.desired import Desired

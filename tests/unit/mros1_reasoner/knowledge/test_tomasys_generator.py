@@ -6,7 +6,7 @@ from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Direction, Quality
 from mros1_reasoner.knowledge.tomasys_generator import generate
 from ros_model.generators import find_generators
-from ros_model.project.project import load_project
+from ros_model.io.project import load_project
 
 SOURCES = Path(__file__).parents[4] / "catkin_ws" / "src"
 D2 = SOURCES / "metacontrol_sim" / "models"

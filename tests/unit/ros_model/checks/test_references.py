@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from ros_model.checks.packages import check_packages
 from ros_model.checks.systems import check_family, check_system, families
-from ros_model.cli import main
+from ros_model.cli.rosmodel import main
+from ros_model.io.installed import InstalledPackages
 from ros_model.language.library import Library
 from ros_model.language.packages_reader import parse_packages
 from ros_model.language.reader import parse_system
@@ -43,7 +44,7 @@ ServiceConnections { ServiceConnection reset { From ( 'a.reset' ) To 'a.again' }
 
 
 def library(*texts):
-    return Library(package for text in texts for package in parse_packages(text).packages)
+    return Library((package for text in texts for package in parse_packages(text).packages), InstalledPackages())
 
 
 def found(text, *models):

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 from catkin_pkg.packages import find_packages
-from ros_model.cli import main
-from ros_model.language.reader import read_system
-from ros_model.project.project import load_project
+from ros_model.cli.rosmodel import main
+from ros_model.io.models import read_system
+from ros_model.io.project import load_project
 from rosgraph_manipulator.configuration.configuration_file import parse_settings
 from roslaunch.config import load_config_default
 from roslaunch.rlutil import resolve_launch_arguments

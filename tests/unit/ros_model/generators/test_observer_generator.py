@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 import yaml
 from geometry_msgs.msg import Twist
-from ros_model.cli import main
+from ros_model.cli.rosmodel import main
 from ros_model.errors import ModelError
 from ros_model.generators.observer import write_observers
+from ros_model.io.models import read_packages
 from ros_model.language.metamodel import PortKind
-from ros_model.language.packages_reader import read_packages
 from ros_model.project.observers import ObserverModel, camel_case, snake_case, variables
 from rosgraph_monitor.observer import TopicObserver
 from rosgraph_monitor.observers.plugins import available, make

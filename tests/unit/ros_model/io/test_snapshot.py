@@ -7,7 +7,8 @@ import threading
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
-from ros_model.io.snapshot import MasterClient, MasterGoneError, SnapshotError, build_snapshot, take_snapshot
+from ros_model.graph.snapshot import build_snapshot
+from ros_model.io.master import MasterClient, MasterGoneError, SnapshotError, take_snapshot
 
 STATE = [
     [

@@ -6,9 +6,9 @@ from random import Random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ros_model.cli import main
-from ros_model.commands.format import formatted_text
-from ros_model.language.model_files import parse_all
+from ros_model.cli.format import formatted_text
+from ros_model.cli.rosmodel import main
+from ros_model.language.either import parse_all
 
 SYSTEM = """// The robot.
 /* Drawn up by hand. */

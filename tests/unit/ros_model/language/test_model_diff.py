@@ -1,7 +1,7 @@
 """What differs between two models, whatever the order, the spelling and the names of connections."""
 
 import pytest
-from ros_model.cli import main
+from ros_model.cli.rosmodel import main
 from ros_model.language.difference import differences
 from ros_model.language.packages_reader import parse_packages
 from ros_model.language.reader import parse_system

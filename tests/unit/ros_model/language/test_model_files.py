@@ -2,7 +2,8 @@
 
 import pytest
 from ros_model.errors import ModelError
-from ros_model.files import resolve, safe_file_name
+from ros_model.file_names import safe_file_name
+from ros_model.io.files import resolve
 
 
 @pytest.fixture

@@ -6,19 +6,19 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
-import ros_model.language.syntax
+import ros_model.language.parser
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.lark import from_lark
 from lark import Lark
 from ros_model.checks.packages import check_packages
 from ros_model.checks.systems import check_system
-from ros_model.cli import main
+from ros_model.cli.rosmodel import main
 from ros_model.errors import ModelError
-from ros_model.files import MAX_SIZE
 from ros_model.io.drawing import dot
 from ros_model.language.difference import differences
 from ros_model.language.library import Library
+from ros_model.language.metamodel import MAX_SIZE
 from ros_model.language.packages import PackageSet
 from ros_model.language.packages_reader import parse_packages
 from ros_model.language.packages_writer import write_packages
@@ -26,7 +26,7 @@ from ros_model.language.reader import parse_system
 from ros_model.language.writer import write_system
 
 CORPUS = os.environ.get("MROS_CORPUS")
-GRAMMARS = Path(ros_model.language.syntax.__file__).parent / "grammar"
+GRAMMARS = Path(ros_model.language.parser.__file__).parent / "grammar"
 WORDS = ["a", "p.a.n.x", "move_base//goal", "~rate", "true", "-1", "2.5e3", "0b01", "2026-1-2T10:20:30"]
 STRINGS = ["'a b'", '"x"', "'it\\'s'", "''", "'a.b'", "'{'"]
 MARKS = [

@@ -7,6 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from ros_model.errors import ModelError
+from ros_model.io.models import read_system
+from ros_model.language.builder import MAX_NESTING
 from ros_model.language.metamodel import (
     ConnectionKind,
     ParameterType,
@@ -16,8 +18,7 @@ from ros_model.language.metamodel import (
     RosParameter,
     SystemParameter,
 )
-from ros_model.language.reader import parse_system, read_system
-from ros_model.language.syntax import MAX_NESTING
+from ros_model.language.reader import parse_system
 from ros_model.language.writer import write_system
 
 CORPUS = os.environ.get("MROS_CORPUS")

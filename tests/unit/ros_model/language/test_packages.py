@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ros_model.errors import ModelError
+from ros_model.io.models import read_packages
 from ros_model.language.metamodel import ParameterType, PortKind
 from ros_model.language.packages import (
     Artifact,
@@ -20,7 +21,7 @@ from ros_model.language.packages import (
     Spec,
     SpecKind,
 )
-from ros_model.language.packages_reader import parse_packages, read_packages
+from ros_model.language.packages_reader import parse_packages
 from ros_model.language.packages_writer import write_packages
 
 CORPUS = os.environ.get("MROS_CORPUS")

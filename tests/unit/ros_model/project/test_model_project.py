@@ -3,9 +3,8 @@
 import pytest
 import yaml
 from ros_model.errors import ModelError
+from ros_model.io.project import load_project, problems_of
 from ros_model.language.metamodel import PortPath, compose
-from ros_model.project.project import load_project
-from ros_model.project.settings import problems_of
 
 BASE = """RosSystem { Name base
     RosComponents (

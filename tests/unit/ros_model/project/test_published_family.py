@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
-from ros_model.cli import main
-from ros_model.project.project import load_project
+from ros_model.cli.rosmodel import main
+from ros_model.io.project import load_project
 from roslaunch.config import load_config_default
 
 CORPUS = os.environ.get("MROS_CORPUS")

@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from ros_model.errors import ModelError
 from ros_model.generators.deployment import manipulator, monitor, reasoner
 from ros_model.generators.launch import launch_file
+from ros_model.io.project import load_project, problems_of
 from ros_model.language.metamodel import compose
 from ros_model.language.packages_writer import write_packages
 from ros_model.language.writer import write_system
 from ros_model.project.observers import described_observers, observer_packages
-from ros_model.project.project import load_project
-from ros_model.project.settings import problems_of
 
 BASE = """RosSystem { Name base
     RosComponents (

@@ -6,8 +6,8 @@ import textwrap
 from pathlib import Path
 
 import pytest
-from ros_model_extraction.cpp.source import read_cpp_node
-from ros_model_extraction.source import NodeSource, SourceError
+from ros_model_extraction.cpp.node_reader import read_cpp_node
+from ros_model_extraction.found import NodeSource, SourceError
 
 WORKER = """
     #pragma once

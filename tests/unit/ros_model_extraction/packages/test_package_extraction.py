@@ -8,16 +8,16 @@ from pathlib import Path
 
 import pytest
 import rospkg
-from ros_model.cli import main
+from ros_model.cli.rosmodel import main
 from ros_model.errors import ModelError
+from ros_model.io.models import read_packages, read_system
 from ros_model.language.metamodel import ConnectionKind, PortKind
 from ros_model.language.packages import SpecKind
-from ros_model.language.packages_reader import parse_packages, read_packages
+from ros_model.language.packages_reader import parse_packages
 from ros_model.language.packages_writer import write_packages
-from ros_model.language.reader import read_system
+from ros_model_extraction.io.launch_files import read_launch_file
 from ros_model_extraction.packages.catkin_package import find_packages, read_package
 from ros_model_extraction.packages.cmake import commands
-from ros_model_extraction.packages.launch_files import read_launch_file
 from ros_model_extraction.packages.package_source import extract_package
 
 TALKER = """#!/usr/bin/env python3

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ros_model.language.metamodel import PortKind
+from ros_model_extraction.found import NodeSource, SourceError
+from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.packages.package_source import ExtractedPackage, extract_package
-from ros_model_extraction.python.modules import Library
-from ros_model_extraction.python.source import read_python_node
-from ros_model_extraction.source import NodeSource, SourceError
+from ros_model_extraction.python.node_reader import read_python_node
 
 MANIFEST = """<package format="2"><name>demo</name><version>0.1.0</version><description>d</description>
 <maintainer email="a@b.example">m</maintainer><license>MIT</license><exec_depend>rospy</exec_depend>

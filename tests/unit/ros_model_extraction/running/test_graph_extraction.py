@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 from ros_model.checks.systems import check_system
-from ros_model.io.snapshot import GraphSnapshot, build_snapshot
+from ros_model.graph.snapshot import GraphSnapshot, build_snapshot
 from ros_model.language.metamodel import ConnectionKind, PortKind, RosSystem
 from ros_model.language.reader import parse_system
 from ros_model.language.writer import write_system
+from ros_model_extraction.io.live_nodes import executable_of
 from ros_model_extraction.names import as_seen_from, resolve
+from ros_model_extraction.running.details import Details, Origin
 from ros_model_extraction.running.graph import NO_PACKAGE, Models, models_of
-from ros_model_extraction.running.live import Details, Origin, executable_of
 from ros_model_extraction.values import UnwritableValueError, leaves, typed
 
 ACTION_TYPES = {

@@ -3,7 +3,7 @@
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rich.console import Console
-from ros_model.io.snapshot import build_snapshot
+from ros_model.graph.snapshot import build_snapshot
 from rosgraph_monitor.cli.snapshot import lines
 from rosgraph_monitor.diagnostics.aggregator_names import unique_name
 from rosgraph_monitor.diagnostics.overview import Board, thresholds

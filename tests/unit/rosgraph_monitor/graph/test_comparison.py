@@ -1,7 +1,7 @@
 """What runs against what should run."""
 
 import pytest
-from ros_model.io.snapshot import GraphSnapshot, NodeState, build_snapshot
+from ros_model.graph.snapshot import GraphSnapshot, NodeState, build_snapshot
 from ros_model.language.metamodel import Component, Reference, RosParameter, RosSystem, SystemParameter
 from rosgraph_monitor.diagnostics.status import Level
 from rosgraph_monitor.graph.comparison import Scope, compare, wrong_topic_types

@@ -1,7 +1,7 @@
 """Interfaces, types and connections against the model."""
 
 import pytest
-from ros_model.io.snapshot import build_snapshot
+from ros_model.graph.snapshot import build_snapshot
 from ros_model.language.metamodel import (
     Component,
     Connection,

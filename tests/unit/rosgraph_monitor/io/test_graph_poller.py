@@ -3,7 +3,8 @@
 import queue
 
 import pytest
-from ros_model.io.snapshot import GraphSnapshot, NodeState, SnapshotError
+from ros_model.graph.snapshot import GraphSnapshot, NodeState
+from ros_model.io.master import SnapshotError
 from rosgraph_monitor.health.liveness import Life
 from rosgraph_monitor.io.graph_poller import Looker
 

@@ -47,6 +47,11 @@ def printable(text: str) -> str:
     return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in text)
 
 
+def short(text: str) -> str:
+    """Return a text as a message can quote it."""
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
 def first_of(errors: Iterable[ModelError]) -> ModelError:
     """Return the error that comes first in the file, with the rest as its others; errors that say the same are one."""
     first, *others = sorted({str(error): error for error in errors}.values(), key=_place)

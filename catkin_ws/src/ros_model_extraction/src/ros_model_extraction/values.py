@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import datetime
 import math
-import xmlrpc.client
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -39,10 +38,9 @@ def typed(raw: Any) -> tuple[ParameterType, Value]:
             if not math.isfinite(raw):
                 raise UnwritableValueError(f"{raw} is no finite number")
             return ParameterType("Double"), raw
-        case xmlrpc.client.Binary() | bytes():
-            data = raw.data if isinstance(raw, xmlrpc.client.Binary) else raw
+        case bytes(data) | object(data=bytes(data)):  # the latter is a Binary of xmlrpc.client
             return ParameterType("Base64"), base64.b64encode(data).decode("ascii")
-        case xmlrpc.client.DateTime() | datetime.date():
+        case datetime.date() | object(value=str()):  # the latter is a DateTime of xmlrpc.client
             return ParameterType("Date"), str(raw)
         case list() | tuple():
             return _list([typed(item) for item in raw])

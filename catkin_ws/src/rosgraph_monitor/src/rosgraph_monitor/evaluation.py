@@ -18,7 +18,7 @@ from rosgraph_monitor.health.topics import Verdict, verdict_statuses
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from ros_model.io.snapshot import GraphSnapshot
+    from ros_model.graph.snapshot import GraphSnapshot
     from ros_model.language.metamodel import RosSystem
 
     from rosgraph_monitor.graph.desired import Desired

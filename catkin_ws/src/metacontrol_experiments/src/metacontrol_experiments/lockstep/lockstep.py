@@ -31,7 +31,7 @@ from pybullet_simulator.ros.messages import stamp
 from pybullet_simulator.world.world import WorldError, rasterise
 from pybullet_simulator.world.world_file import read_world
 from robot_formulas.geometry import Pose
-from ros_model.language.reader import read_system
+from ros_model.io.models import read_system
 
 from metacontrol_experiments.contingency.contingency import Kind, StrikeError
 from metacontrol_experiments.lockstep.drivers import Drivers

@@ -21,8 +21,8 @@ from mros1_reasoner.loop.parameters import ParameterError, Parameters
 from mros1_reasoner.pellet.process import make_reasoner
 from mros1_reasoner.planning.decision import DECIDED, EXECUTED, Decision
 from pybullet_simulator.ros.messages import ODOM, OdometryWriter
+from ros_model.io.models import read_system
 from ros_model.language.metamodel import compose
-from ros_model.language.reader import read_system
 from rosgraph_monitor.observers.energy import EnergyQualityObserver
 from rosgraph_monitor.observers.safety import SafetyQualityObserver
 from std_msgs.msg import Float32

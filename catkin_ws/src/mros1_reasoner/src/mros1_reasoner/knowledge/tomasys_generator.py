@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
-from ros_model.files import safe_file_name
+from ros_model.file_names import safe_file_name
 from ros_model.generators import write_file
 
 from mros1_reasoner.knowledge import vocabulary as v

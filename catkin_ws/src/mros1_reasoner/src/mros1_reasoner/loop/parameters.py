@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import rospkg
-from ros_model.files import resolve
+from ros_model.io.files import resolve
 
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Direction, Objective

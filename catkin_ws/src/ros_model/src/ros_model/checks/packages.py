@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ros_model.checks.systems import misfits
 from ros_model.findings import WARNING, Finding, sorted_by_place
-from ros_model.language.library import BUILTIN_TYPES, full_type, installed_parts
+from ros_model.language.library import BUILTIN_TYPES, full_type
 from ros_model.language.metamodel import CONNECTION_OF
 from ros_model.language.packages import SpecKind
 
@@ -69,7 +69,7 @@ def _spec(spec: Spec, package: str, library: Library) -> Iterator[Finding]:
             if problem:
                 text = f"field '{field.name}' of '{spec.name}': {problem.message}"
                 yield Finding(text, field.position, "unknown-type", problem.severity)
-    installed = installed_parts(package, spec) if spec.parts else {}
+    installed = library.installed.parts(package, spec) if spec.parts else {}
     for part, fields in spec.parts:
         if part in installed and _told(fields, package) != _told(installed[part], package):
             text = f"the {part} of '{spec.name}' is not that of the installed package '{package}'"

@@ -6,16 +6,19 @@ A package adds one with `<export><ros_model generator="NAME" function="module:fu
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from node_kit.plugins import exported
 
 from ros_model.errors import ModelError
+from ros_model.io.files import write_file, write_files
 
 if TYPE_CHECKING:
     from ros_model.project.project import Project
+
+__all__ = ["Generator", "find_generators", "write_file", "write_files"]
 
 Generator = Callable[["Project", Path], list[Path]]
 
@@ -38,31 +41,6 @@ def find_generators() -> dict[str, Generator]:
             raise ModelError(f"package {package}: package.xml: generator {name!r} {problem}")
         found[name] = _load(package, name, function)
     return found
-
-
-def write_files(texts: Mapping[Path, str], root: Path) -> list[Path]:
-    """Write generated files, all of whose texts are known before the first is written; return their paths.
-
-    Raises:
-        ModelError: as write_file.
-    """
-    return [write_file(path, text, root) for path, text in texts.items()]
-
-
-def write_file(path: Path, text: str, root: Path) -> Path:
-    """Write a generated file, UTF-8, where it does not leave the root; return its path.
-
-    Raises:
-        ModelError: the path is outside the root, or can't be written.
-    """
-    if not path.resolve().is_relative_to(root.resolve()):
-        raise ModelError(f"{path}: leaves the folder {root}: nothing is written there")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ModelError(f"{path}: can't be written ({error.strerror or error}): check its folder") from error
-    return path
 
 
 def _load(package: str, name: str, function: str) -> Generator:

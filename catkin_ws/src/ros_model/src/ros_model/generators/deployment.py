@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from ros_model.files import safe_file_name
+from ros_model.file_names import safe_file_name
 from ros_model.generators import write_files
 from ros_model.generators.launch import topic_of
 from ros_model.language.metamodel import PortKind, compose

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ros_model.files import safe_file_name
+from ros_model.file_names import safe_file_name
 from ros_model.generators import write_files
 from ros_model.language.writer import write_system
 

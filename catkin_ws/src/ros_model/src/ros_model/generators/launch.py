@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
-from ros_model.files import safe_file_name
+from ros_model.file_names import safe_file_name
 from ros_model.generators import variant_packages, write_files
 from ros_model.generators.launch_parameters import parameter_element, sent
 from ros_model.language.metamodel import CONNECTION_OF, ConnectionKind, PortPath, compose

@@ -1,1 +1,1 @@
-"""The running graph, and drawings."""
+"""Files, installed packages, the ROS master, graphviz: all that reaches outside of the process."""

@@ -1,24 +1,21 @@
-"""What is known of packages: the `.ros` models at hand, and the message types of installed packages."""
+"""What is known of packages: the `.ros` models at hand, and what somebody tells of installed packages."""
 
 from __future__ import annotations
 
 import difflib
-import functools
 import re
 from collections import defaultdict
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-import rospkg
+from typing import TYPE_CHECKING, Protocol
 
 from ros_model.findings import ERROR, WARNING
-from ros_model.language.packages import EXTENSIONS, PARTS, MessageField, Node, Package, Spec, SpecKind
+from ros_model.language.packages import Node, Package, Spec, SpecKind
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from ros_model.language.metamodel import Reference
+    from ros_model.language.packages import MessageField
 
 BUILTIN_TYPES = frozenset(
     ["bool", "byte", "char", "string", "time", "duration", "float32", "float64", "Header"]
@@ -28,7 +25,6 @@ BUILTIN_TYPES = frozenset(
 
 _WORDS = {SpecKind.TOPIC: "message", SpecKind.SERVICE: "service", SpecKind.ACTION: "action"}
 _TYPE = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)", re.ASCII)
-_OF_AN_ACTION = re.compile(r"(\w+?)(?:Action(?:Goal|Result|Feedback)?|Goal|Result|Feedback)", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -39,14 +35,45 @@ class Unknown:
     severity: str = ERROR
 
 
+class Installed(Protocol):
+    """Tells what is installed; `ros_model.io.installed` looks on ROS_PACKAGE_PATH."""
+
+    def has_package(self, name: str) -> bool:
+        """Return whether a package of that name is installed."""
+
+    def has_type(self, package: str, kind: SpecKind, name: str) -> bool:
+        """Return whether an installed package has the type; messages that are made of an action count, too."""
+
+    def parts(self, package: str, spec: Spec) -> Mapping[str, tuple[MessageField, ...]]:
+        """Return the fields of an installed message or service by its parts; nothing where there is none."""
+
+
+class NothingInstalled:
+    """Stands for a host without a single package."""
+
+    def has_package(self, name: str) -> bool:  # noqa: ARG002 - interface
+        """Return False."""
+        return False
+
+    def has_type(self, package: str, kind: SpecKind, name: str) -> bool:  # noqa: ARG002 - interface
+        """Return False."""
+        return False
+
+    def parts(self, package: str, spec: Spec) -> Mapping[str, tuple[MessageField, ...]]:  # noqa: ARG002 - interface
+        """Return nothing."""
+        return {}
+
+
 class Library:
     """Packages by their names; several models may declare parts of one package, and of one node.
 
     Args:
         packages: what the models at hand declare.
+        installed: what is known of installed packages.
     """
 
-    def __init__(self, packages: Iterable[Package] = ()) -> None:
+    def __init__(self, packages: Iterable[Package] = (), installed: Installed = NothingInstalled()) -> None:  # noqa: B008 - without state
+        self.installed = installed
         self._nodes: dict[str, dict[str, dict[str, Node]]] = {}
         self._specs: dict[str, dict[tuple[SpecKind, str], Spec]] = defaultdict(dict)
         for package in packages:
@@ -66,7 +93,7 @@ class Library:
         """Return the node that a reference names."""
         artifacts = self._nodes.get(reference.package)
         if artifacts is None:
-            if _installed(reference.package):
+            if self.installed.has_package(reference.package):
                 return Unknown(
                     f"no .ros model declares the installed package '{reference.package}': extract one, or give its "
                     "folder with --path",
@@ -91,10 +118,9 @@ class Library:
             return Unknown(f"'{name}' names no {_WORDS[kind]} type: write package.Type")
         package, plain = match.groups()
         declared = self._specs.get(package, {})
-        folder = _installed(package)
-        if (kind, plain) in declared or (folder and _is_installed(folder, kind, plain)):
+        if (kind, plain) in declared or self.installed.has_type(package, kind, plain):
             return None
-        if not declared and folder is None:
+        if not declared and not self.installed.has_package(package):
             text = f"no .ros model or installed package declares the messages of '{package}', so not '{name}' either"
             return Unknown(text, WARNING)
         others = [other for other, word in _WORDS.items() if other is not kind and (other, plain) in declared]
@@ -107,42 +133,13 @@ class Library:
 
     def knows_package(self, name: str) -> bool:
         """Whether a model declares the package, or it is installed."""
-        return name in self._nodes or _installed(name) is not None
+        return name in self._nodes or self.installed.has_package(name)
 
 
 def hint(word: str, known: Iterable[str]) -> str:
     """Return `: did you mean ...?` where a known word is almost the one found."""
     found = difflib.get_close_matches(word[:80], [*known], n=1)
     return f": did you mean '{found[0]}'?" if found else ""
-
-
-def installed_parts(package: str, spec: Spec) -> dict[str, tuple[MessageField, ...]]:
-    """Return the fields of an installed message or service by its parts; nothing where there is none."""
-    folder = _installed(package)
-    if folder is None or spec.kind is SpecKind.ACTION or not _TYPE.fullmatch(f"{package}/{spec.name}"):
-        return {}
-    path = folder / EXTENSIONS[spec.kind] / f"{spec.name}.{EXTENSIONS[spec.kind]}"
-    if not path.is_file():
-        return {}
-    from genmsg import InvalidMsgSpec, MsgContext
-    from genmsg.msg_loader import load_msg_from_file, load_srv_from_file
-
-    context = MsgContext.create_default()
-    try:
-        if spec.kind is SpecKind.TOPIC:
-            loaded = [load_msg_from_file(context, str(path), f"{package}/{spec.name}")]
-        else:
-            service = load_srv_from_file(context, str(path), f"{package}/{spec.name}")
-            loaded = [service.request, service.response]
-    except (InvalidMsgSpec, OSError, ValueError):
-        return {}
-    return {
-        part: (
-            *(MessageField(constant.type, constant.name, str(constant.val_text)) for constant in found.constants),
-            *(MessageField(kind, name) for kind, name in zip(found.types, found.names, strict=True)),
-        )
-        for part, found in zip(PARTS[spec.kind], loaded, strict=True)
-    }
 
 
 def full_type(declared: str, package: str) -> str:
@@ -164,29 +161,3 @@ def _joined(first: Node, second: Node) -> Node:
         ports=(*first.ports, *(port for port in second.ports if (port.kind, port.name) not in ports)),
         parameters=(*first.parameters, *(known for known in second.parameters if known.name not in parameters)),
     )
-
-
-@functools.cache
-def _packages() -> rospkg.RosPack:
-    return rospkg.RosPack()
-
-
-def _installed(package: str) -> Path | None:
-    try:
-        return Path(_packages().get_path(package))
-    except rospkg.ResourceNotFound:
-        return None
-
-
-def _is_installed(folder: Path, kind: SpecKind, name: str) -> bool:
-    """Whether a package's folder has the type; messages that are made of an action count, too."""
-    if (folder / EXTENSIONS[kind] / f"{name}.{EXTENSIONS[kind]}").is_file():
-        return True
-    if kind is SpecKind.ACTION:
-        return (folder / "msg" / f"{name}Action.msg").is_file() or _is_action_of(folder, name.removesuffix("Action"))
-    match = _OF_AN_ACTION.fullmatch(name)
-    return kind is SpecKind.TOPIC and match is not None and _is_action_of(folder, match[1])
-
-
-def _is_action_of(folder: Path, name: str) -> bool:
-    return (folder / "action" / f"{name}.action").is_file()

@@ -5,6 +5,9 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, field, replace
 
+MAX_SIZE = 16_000_000
+"""Bytes or characters of the largest model that is read; the largest published one has 432 thousand."""
+
 Value = bool | int | float | str | list["Value"] | dict[str, "Value"]
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import functools
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from ros_model.files import read_text
+from ros_model.language.builder import Builder, Field, split_name, text_of
 from ros_model.language.metamodel import PortKind
 from ros_model.language.packages import (
     PARTS,
@@ -21,7 +20,7 @@ from ros_model.language.packages import (
     Spec,
     SpecKind,
 )
-from ros_model.language.syntax import Builder, Field, Language, split_name, text_of
+from ros_model.language.parser import Parser
 
 if TYPE_CHECKING:
     from lark import Token
@@ -29,22 +28,13 @@ if TYPE_CHECKING:
 _TYPE_NAME = re.compile(r"(\w+)[./](?:(?:msg|srv|action)[./])?(.+)", re.DOTALL)
 
 
-def read_packages(path: str | Path) -> PackageSet:
-    """Read a `.ros` file.
-
-    Raises:
-        ModelError: the file can't be read or is not well-formed; says file:line:column, what was expected, near what.
-    """
-    return parse_packages(read_text(Path(path)), str(path))
-
-
 def parse_packages(text: str, file: str = "<text>") -> PackageSet:
-    """Read the text of a `.ros` file; `file` is its name in positions and errors.
+    """Return what the text of a `.ros` file says; `file` is its name in positions and errors.
 
     Raises:
-        ModelError: as read_packages.
+        ModelError: it is not well-formed; says file:line:column, what was expected, near what.
     """
-    return cast(PackageSet, _language().read(text, file))
+    return cast(PackageSet, _parser().parse(text, file))
 
 
 def type_name(text: str) -> str:
@@ -54,8 +44,8 @@ def type_name(text: str) -> str:
 
 
 @functools.cache
-def _language() -> Language:
-    return Language("ros.lark", "package_set", _Builder())
+def _parser() -> Parser:
+    return Parser("ros.lark", "package_set", _Builder())
 
 
 class _Builder(Builder):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from ros_model.files import read_text
+from ros_model.errors import short
+from ros_model.language.builder import Builder, Field, split_name, text_of
 from ros_model.language.metamodel import (
     Component,
     ComponentStack,
@@ -22,7 +22,7 @@ from ros_model.language.metamodel import (
     RosSystem,
     SystemParameter,
 )
-from ros_model.language.syntax import Builder, Field, Language, short, split_name, text_of
+from ros_model.language.parser import Parser
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Set
@@ -30,27 +30,18 @@ if TYPE_CHECKING:
     from lark import Token
 
 
-def read_system(path: str | Path) -> RosSystem:
-    """Read a `.rossystem` file.
-
-    Raises:
-        ModelError: the file can't be read or is not well-formed; says file:line:column, what was expected, near what.
-    """
-    return parse_system(read_text(Path(path)), str(path))
-
-
 def parse_system(text: str, file: str = "<text>") -> RosSystem:
-    """Read the text of a `.rossystem` file; `file` is its name in positions and errors.
+    """Return what the text of a `.rossystem` file says; `file` is its name in positions and errors.
 
     Raises:
-        ModelError: as read_system.
+        ModelError: it is not well-formed; says file:line:column, what was expected, near what.
     """
-    return cast(RosSystem, _language().read(text, file))
+    return cast(RosSystem, _parser().parse(text, file))
 
 
 @functools.cache
-def _language() -> Language:
-    return Language("rossystem.lark", "system", _Builder())
+def _parser() -> Parser:
+    return Parser("rossystem.lark", "system", _Builder())
 
 
 class _Builder(Builder):

@@ -7,9 +7,9 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ros_model.errors import short
 from ros_model.language.library import hint
 from ros_model.language.notation import type_text
-from ros_model.language.syntax import short
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import ParameterType, Value

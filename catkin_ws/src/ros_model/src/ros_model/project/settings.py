@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ros_model.errors import ModelError, first_of
+from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
 from ros_model.project.schema_check import Keys, dotted, load_schema, part_of, violations
-from ros_model.project.yaml_file import read_yaml
+from ros_model.project.yaml_file import parse_yaml
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
 FILE_NAME = "metacontrol.yaml"
 _SCHEMA = "metacontrol"
@@ -60,6 +60,14 @@ class Settings:
             raise self.error(f"{name} leaves the folder of the models: move the file into it", *keys)
         return found
 
+    def within(self, keys: Keys) -> Callable[..., Position]:
+        """Return what gives the position of a value within a section, from the keys inside that."""
+
+        def where(*inner: str | int) -> Position:
+            return self.at(*keys, *inner)
+
+        return where
+
     @property
     def families(self) -> tuple[tuple[Keys, dict[str, Any]], ...]:
         """The families of variants, each with the keys that lead to it."""
@@ -69,50 +77,18 @@ class Settings:
         return ((("variants",), section),)
 
 
-def locate(folder: str | Path) -> Path:
-    """Return the path of the metacontrol.yaml of a folder, or of that file itself.
-
-    Raises:
-        ModelError: the file is no YAML by its name.
-    """
-    path = Path(folder)
-    if path.is_file() and path.suffix not in {".yaml", ".yml"}:
-        raise ModelError(f"{path}: is no project: give the folder of {FILE_NAME}, or that file")
-    return path / FILE_NAME if path.is_dir() else path
-
-
-def read_settings(path: Path, sections: Sequence[str] = ()) -> Settings:
-    """Read and check a metacontrol.yaml.
+def parse_settings(text: str, path: Path, sections: Sequence[str] = ()) -> tuple[Settings, tuple[ModelError, ...]]:
+    """Return the settings that a text is, and what is wrong in them, in the order of the file.
 
     Args:
+        text: the content of a metacontrol.yaml.
         path: the file.
         sections: check only these, and let the others be absent; all of them if empty.
 
     Raises:
-        ModelError: it can't be read, or everything that is wrong in it.
+        ModelError: it is no YAML.
     """
-    settings, problems = examine(path, sections)
-    if problems:
-        raise first_of(problems)
-    return settings
-
-
-def problems_of(path: Path) -> tuple[ModelError, ...]:
-    """Return everything that is wrong in a metacontrol.yaml by itself, in the order of the file.
-
-    Raises:
-        ModelError: it can't be read.
-    """
-    return examine(path)[1]
-
-
-def examine(path: Path, sections: Sequence[str] = ()) -> tuple[Settings, tuple[ModelError, ...]]:
-    """Return the settings of a file, and what is wrong in them.
-
-    Raises:
-        ModelError: the file can't be read.
-    """
-    value, places = read_yaml(path)
+    value, places = parse_yaml(text, str(path))
     schema = load_schema(_SCHEMA)
     if sections:
         schema = part_of(schema, *sections)

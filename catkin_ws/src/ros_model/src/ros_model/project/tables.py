@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ros_model.errors import Gathered, ModelError
-from ros_model.files import read_text, safe_file_name
+from ros_model.file_names import safe_file_name
 from ros_model.language.metamodel import Position, Value
-from ros_model.project.yaml_file import read_yaml
+from ros_model.project.yaml_file import parse_yaml
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ros_model.project.schema_check import Keys
 
 NAME = "name"
+FORMATS = (".csv", ".yaml", ".yml")
+"""Extensions of files that can be tables."""
 _INTEGER = re.compile(r"[-+]?\d{1,18}")
 _DOUBLE = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?")
 _BOOLEANS = {"true": True, "True": True, "false": False, "False": False}
@@ -49,21 +51,21 @@ class Table:
         return next((row for row in self.rows if row.name == name), None)
 
 
-def read_table(path: Path) -> Table:
-    """Read a table: `.csv` with a line of columns, or `.yaml` with a list of rows or a mapping of names to rows.
+def parse_table(text: str, path: Path) -> Table:
+    """Return the table that a text is.
 
-    A cell of a CSV file is an integer, a double, `true` or `false` where it looks like one, else text.
+    A `.csv` file has a line of columns, a `.yaml` file a list of rows or a mapping of names to rows. A cell of a CSV
+    file is an integer, a double, `true` or `false` where it looks like one, else text.
+
+    Args:
+        text: the content of the file.
+        path: the file, whose extension tells the format.
 
     Raises:
         ModelError: the file is no such table, or a name stands twice or can't name a file.
     """
     wrong = Gathered()
-    if path.suffix == ".csv":
-        rows = _csv_rows(path, wrong)
-    elif path.suffix in {".yaml", ".yml"}:
-        rows = _yaml_rows(path, wrong)
-    else:
-        raise ModelError(f"{path}: is neither .csv nor .yaml: a table of variants is one of these")
+    rows = _csv_rows(text, path, wrong) if path.suffix == ".csv" else _yaml_rows(text, path, wrong)
     wrong.add(_wrong_names(rows))
     wrong.tell()
     if not rows:
@@ -90,8 +92,8 @@ def _fault(message: str, where: Position) -> ModelError:
     return ModelError(message, where, rule="table")
 
 
-def _csv_rows(path: Path, wrong: Gathered) -> list[Row]:
-    reader = csv.reader(io.StringIO(read_text(path), newline=""), strict=True)
+def _csv_rows(text: str, path: Path, wrong: Gathered) -> list[Row]:
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     rows: list[Row] = []
     csv.field_size_limit(_LARGEST_CELL)
     try:
@@ -126,8 +128,8 @@ def typed_cell(cell: str) -> Value | None:
     return float(cell) if _DOUBLE.fullmatch(cell) and abs(float(cell)) < float("inf") else cell
 
 
-def _yaml_rows(path: Path, wrong: Gathered) -> list[Row]:
-    content, places = read_yaml(path)
+def _yaml_rows(text: str, path: Path, wrong: Gathered) -> list[Row]:
+    content, places = parse_yaml(text, str(path))
     entries: list[tuple[Keys, object, object]]
     if isinstance(content, dict):
         entries = [((key,), {NAME: key, **row} if isinstance(row, dict) else row, key) for key, row in content.items()]

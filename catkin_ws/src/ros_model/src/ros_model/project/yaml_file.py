@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import yaml
 
 from ros_model.errors import ModelError
-from ros_model.files import read_text
 from ros_model.language.metamodel import Position
 from ros_model.project.schema_check import Keys
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 MAX_SIZE = 4_000_000
 """Characters of the largest file that is read."""
@@ -21,32 +17,35 @@ MAX_VALUES = 200_000
 """Values of the largest file that is read, aliases counted as often as they stand."""
 
 
-def read_yaml(path: Path) -> tuple[Any, dict[Keys, Position]]:
-    """Return what a file says, and where each value stands: of an entry of a mapping, its key.
+def parse_yaml(text: str, file: str) -> tuple[Any, dict[Keys, Position]]:
+    """Return what a text says, and where each value stands: of an entry of a mapping, its key.
+
+    Args:
+        text: YAML.
+        file: its name in positions and errors.
 
     Raises:
-        ModelError: it can't be read, is no YAML, has a key twice, or is nested or expanded too far.
+        ModelError: it is no YAML, has a key twice, or is nested or expanded too far.
     """
-    text = read_text(path)
     if len(text) > MAX_SIZE:
-        raise ModelError(f"{len(text)} characters are too many (at most {MAX_SIZE})", Position(str(path), 1, 1))
+        raise ModelError(f"{len(text)} characters are too many (at most {MAX_SIZE})", Position(file, 1, 1))
     places: dict[Keys, Position] = {}
     try:
         loader = yaml.SafeLoader(text)
         node = loader.get_single_node()
         if node is None:
             return None, {}
-        _walk(node, (), str(path), places)
+        _walk(node, (), file, places)
         return loader.construct_document(node), places
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
-        where = Position(str(path), mark.line + 1, mark.column + 1) if mark else Position(str(path), 1, 1)
+        where = Position(file, mark.line + 1, mark.column + 1) if mark else Position(file, 1, 1)
         what = getattr(error, "problem", None) or getattr(error, "reason", None) or "is no YAML"
         raise ModelError(f"{what}: correct the YAML", where) from error
     except RecursionError:
-        raise ModelError("is nested too deep: correct the YAML", Position(str(path), 1, 1)) from None
+        raise ModelError("is nested too deep: correct the YAML", Position(file, 1, 1)) from None
     except ValueError as error:  # a date or a number that can't be
-        raise ModelError(f"{error}: correct the YAML", Position(str(path), 1, 1)) from error
+        raise ModelError(f"{error}: correct the YAML", Position(file, 1, 1)) from error
 
 
 def _walk(node: yaml.Node, keys: Keys, file: str, places: dict[Keys, Position]) -> None:

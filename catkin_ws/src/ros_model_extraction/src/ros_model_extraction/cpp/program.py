@@ -24,8 +24,9 @@ from ros_model_extraction.cpp.syntax import (
     type_text,
     walk,
 )
+from ros_model_extraction.found import Remark, SourceError
+from ros_model_extraction.io.source_files import read_source
 from ros_model_extraction.python.values import Const, Hole, Text, joined
-from ros_model_extraction.source import Remark, SourceError, read_source
 
 MAX_DEPTH = 16
 MAX_VALUES = 16

@@ -10,11 +10,11 @@ from typing import Any
 from ros_model.language.metamodel import Position
 from ros_model.language.packages import Artifact, Package, PackageSet
 
+from ros_model_extraction.found import NodeSource, Remark, SourceError, unique
+from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.names import executable_name
 from ros_model_extraction.packages.catkin_package import CatkinPackage, Executable, read_package
 from ros_model_extraction.packages.message_files import read_specs
-from ros_model_extraction.python.modules import Library
-from ros_model_extraction.source import NodeSource, Remark, SourceError, unique
 
 NOT_READ = "not read"
 """How remarks begin that say that a file was not understood at all."""
@@ -98,10 +98,10 @@ def read_executable(
         SourceError: it can't be read.
     """
     if executable.is_python:
-        from ros_model_extraction.python.source import read_python_node
+        from ros_model_extraction.python.node_reader import read_python_node
 
         return read_python_node(executable.sources[0], library, package.plugins, parameters)
-    from ros_model_extraction.cpp.source import read_cpp_node
+    from ros_model_extraction.cpp.node_reader import read_cpp_node
 
     return read_cpp_node(executable.sources, package.folder, parameters)
 

@@ -13,10 +13,11 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
+from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.python import known as python_known
 from ros_model_extraction.python.callers import root_frame, skipped
 from ros_model_extraction.python.calls import MAX_VALUES, CallEvaluator, Given
-from ros_model_extraction.python.modules import Binding, Library, Module, Scope, at_end, reaching
+from ros_model_extraction.python.modules import Binding, Module, Scope, at_end, reaching
 from ros_model_extraction.python.operations import is_number, operated
 from ros_model_extraction.python.values import (
     Class,

@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import ast
-import os
-import re
-from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import rospkg
 from ros_model.language.metamodel import Position
 
-from ros_model_extraction.source import Remark, SourceError, read_source
-
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 FunctionNode = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 Comprehension = ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp
 ScopeNode = ast.Module | ast.ClassDef | FunctionNode | Comprehension
 
-_COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
-_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 _LOOPS = (ast.For, ast.AsyncFor, ast.While)
 
 
@@ -120,104 +113,6 @@ class Module:
             yield node
 
 
-class Library:
-    """Finds modules in the source of packages, and reads each once."""
-
-    def __init__(self, folders: Sequence[Path], package_folder: Path) -> None:
-        """Search these folders, then the sources of installed packages.
-
-        Args:
-            folders: where top-level modules lie.
-            package_folder: positions name files relative to it.
-        """
-        self.remarks: list[Remark] = []
-        self._folders = list(folders)
-        self._beside: Path | None = None  # the folder of the script, which Python searches first
-        self._package_folder = package_folder
-        self._modules: dict[str, Module | None] = {}
-        self._packages = rospkg.RosPack()
-
-    def script(self, path: Path) -> Module:
-        """Read an executable.
-
-        Raises:
-            SourceError: it can't be read, or is no Python.
-        """
-        module = self._read(path, "__main__", is_package=False)
-        module.is_script = True
-        self._beside = path.parent
-        return module
-
-    def module(self, name: str) -> Module | None:
-        """Return a module by its full name; None for one that has no source here, or can't be read (a remark says)."""
-        if name not in self._modules:
-            self._modules[name] = None
-            path = self._find(name) if name else None
-            if path:
-                try:
-                    self._modules[name] = self._read(path, name, path.name == "__init__.py")
-                except SourceError as error:
-                    self.remarks.append(error.remark)
-        return self._modules[name]
-
-    def has_message(self, source: str, name: str) -> bool:
-        """Tell whether an installed package defines a message or service: `std_msgs.msg`, `String`."""
-        package, _, kind = source.partition(".")
-        if kind not in ("msg", "srv"):
-            return False
-        try:
-            folder = Path(self._packages.get_path(package))
-        except rospkg.ResourceNotFound:
-            return False
-        action = re.sub(r"(Action)?(Goal|Result|Feedback)?$", "", name).removesuffix("Action")
-        files = (folder / kind / f"{name}.{kind}", folder / "action" / f"{action}.action")
-        return any(os.path.isfile(file) for file in files)
-
-    def _find(self, name: str) -> Path | None:
-        relative = Path(*name.split("."))
-        for folder in self._roots(name.partition(".")[0]):
-            for candidate in (folder / relative / "__init__.py", (folder / relative).with_suffix(".py")):
-                if os.path.isfile(candidate):  # False where the folder can't be entered
-                    return candidate
-        return None
-
-    def _roots(self, package: str) -> Iterator[Path]:
-        if self._beside:
-            yield self._beside
-        yield from self._folders
-        try:
-            yield Path(self._packages.get_path(package)) / "src"
-        except rospkg.ResourceNotFound:
-            return
-
-    def _read(self, path: Path, name: str, is_package: bool) -> Module:
-        shown = str(path)
-        for folder in (self._package_folder, self._package_folder.parent):
-            if path.is_relative_to(folder):
-                shown = str(path.relative_to(folder))
-                break
-        tree = parse(read_source(path, shown), shown)
-        module = Module(name, path, shown, tree, is_package)
-        _index(module)
-        return module
-
-
-def parse(data: bytes, shown: str) -> ast.Module:
-    """Return the syntax tree of Python source.
-
-    Raises:
-        SourceError: it is no Python.
-    """
-    try:
-        return ast.parse(data, shown)
-    except SyntaxError as error:
-        position = Position(shown, error.lineno or 1, error.offset or 1)
-        raise SourceError(Remark(position, f"not read: no Python 3: {error.msg}")) from error
-    except (ValueError, RecursionError, MemoryError) as error:
-        text = f"not read: no Python 3: {error or type(error).__name__}"
-        raise SourceError(Remark(Position(shown, 1, 1), text)) from error
-
-
 def reaching(bindings: Sequence[Binding], use: ast.AST, module: Module) -> list[Binding]:
     """Return those bindings of a name that may hold where it is used in the same scope."""
     places, loops = _places(use, module)
@@ -272,134 +167,6 @@ def _places(use: ast.AST, module: Module) -> tuple[dict[int, int], list[ast.AST]
             places[block] = index
         if isinstance(node, _LOOPS):
             loops.append(node)
-        if isinstance(node, (*_FUNCTIONS, ast.ClassDef)):
+        if isinstance(node, (*FUNCTIONS, ast.ClassDef)):
             break
     return places, loops
-
-
-# --- the index
-
-
-def _index(module: Module) -> None:
-    scope = Scope(module.tree, module, None)
-    module.scopes[module.tree] = scope
-    todo: deque[tuple[ast.AST, Scope]] = deque([(module.tree, scope)])
-    while todo:
-        node, scope = todo.popleft()
-        module.containing[node] = scope
-        scope.nodes.append(node)
-        _bind(node, scope)
-        inner = scope
-        if isinstance(node, (ast.ClassDef, *_FUNCTIONS, *_COMPREHENSIONS)):
-            inner = Scope(node, module, scope)
-            scope.inner.append(inner)
-            module.scopes[node] = inner
-            _bind_inside(node, inner)
-        outside = _outside(node)
-        for name, value in ast.iter_fields(node):
-            children = value if isinstance(value, list) else [value]
-            for index, child in enumerate(children):
-                if not isinstance(child, ast.AST):
-                    continue
-                module.parents[child] = node
-                if isinstance(child, (ast.stmt, ast.ExceptHandler, ast.match_case)):
-                    module.blocks[child] = (id(value), index)
-                if name in ("annotation", "returns"):
-                    module.annotations.add(child)
-                todo.append((child, scope if name in outside else inner))
-
-
-def _outside(node: ast.AST) -> tuple[str, ...]:
-    """Return the fields of a node whose names belong to the scope around it."""
-    if isinstance(node, ast.ClassDef):
-        return ("bases", "keywords", "decorator_list")
-    if isinstance(node, _FUNCTIONS):
-        return ("decorator_list", "args", "returns")
-    return ()
-
-
-def _bind(node: ast.AST, scope: Scope) -> None:
-    """Note what a node binds in the scope around it."""
-    if isinstance(node, (ast.Import, ast.ImportFrom)):
-        _bind_import(node, scope)
-        return
-    name = getattr(node, "name", None)
-    match node:
-        case ast.Assign():
-            for target in node.targets:
-                _bind_target(target, node, scope, "value", node.value)
-        case ast.AnnAssign():
-            _bind_target(node.target, node, scope, "value" if node.value else "opaque", node.value, node.annotation)
-        case ast.AugAssign():
-            _bind_target(node.target, node, scope, "opaque", None)
-        case ast.NamedExpr():
-            _bind_target(node.target, node, scope, "value", node.value)
-        case ast.For() | ast.AsyncFor():
-            _bind_target(node.target, node, scope, "element", node.iter)
-        case ast.withitem() if node.optional_vars:
-            _bind_target(node.optional_vars, node, scope, "opaque", None)
-        case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
-            _add(scope, Binding(node.name, node, "definition"))
-        case ast.ExceptHandler() | ast.MatchAs() | ast.MatchStar() if name:
-            _add(scope, Binding(name, node, "opaque"))
-        case ast.Global():
-            scope.global_names.update(node.names)
-        case ast.Call():
-            scope.calls.append(node)
-
-
-def _bind_import(node: ast.Import | ast.ImportFrom, scope: Scope) -> None:
-    source = scope.module.absolute(node.module or "", node.level) if isinstance(node, ast.ImportFrom) else ""
-    for alias in node.names:
-        if isinstance(node, ast.Import):
-            whole = alias.name if alias.asname else alias.name.partition(".")[0]
-            _add(scope, Binding(alias.asname or whole, node, "import", target=(whole, "")))
-        elif alias.name == "*":
-            scope.star_imports.append(source)
-        else:
-            _add(scope, Binding(alias.asname or alias.name, node, "import", target=(source, alias.name)))
-
-
-def _bind_inside(node: ast.AST, scope: Scope) -> None:
-    """Note what a node binds in the scope that it opens: parameters, the variables of a comprehension."""
-    if isinstance(node, _FUNCTIONS):
-        arguments = node.args
-        every = [*arguments.posonlyargs, *arguments.args, arguments.vararg, *arguments.kwonlyargs, arguments.kwarg]
-        for argument in every:
-            if argument:
-                _add(scope, Binding(argument.arg, argument, "parameter", annotation=argument.annotation))
-    elif isinstance(node, _COMPREHENSIONS):
-        for generator in node.generators:
-            _bind_target(generator.target, generator, scope, "element", generator.iter)
-
-
-def _bind_target(
-    target: ast.AST,
-    node: ast.AST,
-    scope: Scope,
-    how: str,
-    value: ast.expr | None,
-    annotation: ast.expr | None = None,
-    path: tuple[int, ...] = (),
-) -> None:
-    match target:
-        case ast.Name(id=name):
-            _add(scope, Binding(name, node, how, value, path, annotation))
-        case ast.Tuple(elts=elements) | ast.List(elts=elements):
-            for index, element in enumerate(elements):
-                if isinstance(element, ast.Starred):
-                    _bind_target(element.value, node, scope, "opaque", None)
-                else:
-                    _bind_target(element, node, scope, how, value, None, (*path, index))
-        case ast.Attribute(value=ast.Name(id=owner), attr=attribute):
-            # `self.name = value`: kept under a name that no variable can have.
-            _add(scope, Binding(f"{owner}.{attribute}", node, how, value, path, annotation))
-
-
-def _add(scope: Scope, binding: Binding) -> None:
-    if binding.name in scope.global_names:
-        scope = scope.module.scope
-    elif binding.how == "value" and isinstance(scope.node, _COMPREHENSIONS) and isinstance(binding.node, ast.NamedExpr):
-        while scope.parent and isinstance(scope.node, _COMPREHENSIONS):
-            scope = scope.parent
-    scope.bindings.setdefault(binding.name, []).append(binding)

@@ -27,9 +27,9 @@ from ros_model_extraction.values import UnwritableValueError, leaves, typed
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from ros_model.io.snapshot import GraphSnapshot
+    from ros_model.graph.snapshot import GraphSnapshot
 
-    from ros_model_extraction.running.live import Details
+    from ros_model_extraction.running.details import Details
 
 NO_PACKAGE = "unknown_package"
 """Package of nodes whose executable can't be traced; the artifact is then named as the node."""

@@ -18,7 +18,7 @@ from metacontrol_msgs.msg import (
     ReconfigurationResult,
 )
 from ros_model.errors import ModelError
-from ros_model.files import resolve
+from ros_model.io.files import resolve
 
 from rosgraph_manipulator.change.tactics import NoRunningNodes, TacticError, load_tactics, plan_change
 from rosgraph_manipulator.configuration.configuration_file import ConfigurationError, parse_settings

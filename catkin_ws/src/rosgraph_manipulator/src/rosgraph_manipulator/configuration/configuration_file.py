@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ros_model.errors import ModelError
-from ros_model.files import resolve
+from ros_model.io.files import resolve
 
 DEFAULT_FUNCTION = "f_navigate"  # what the published configuration files, which name no function, are about
 ARGUMENT = re.compile(r"[A-Za-z_]\w*:=.*", re.DOTALL)

@@ -20,7 +20,7 @@ import roslaunch.xmlloader
 import rospkg
 from ros_model.errors import ModelError
 from ros_model.generators.launch import launch_file
-from ros_model.language.reader import read_system
+from ros_model.io.models import read_system
 
 from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
 

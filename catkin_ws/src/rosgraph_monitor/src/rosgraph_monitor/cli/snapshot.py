@@ -8,12 +8,12 @@ import sys
 from typing import TYPE_CHECKING
 
 import rosgraph
-from ros_model.io.snapshot import SnapshotError, take_snapshot
+from ros_model.io.master import SnapshotError, take_snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from ros_model.io.snapshot import GraphSnapshot
+    from ros_model.graph.snapshot import GraphSnapshot
 
 
 def main() -> None:

@@ -29,7 +29,7 @@ from rosgraph_monitor.graph.wiring import Live, PortTypes, compare_ports
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
-    from ros_model.io.snapshot import GraphSnapshot
+    from ros_model.graph.snapshot import GraphSnapshot
     from ros_model.language.metamodel import Component, RosSystem
 
 NOT_REGISTERED = "absent", "not registered with the master"

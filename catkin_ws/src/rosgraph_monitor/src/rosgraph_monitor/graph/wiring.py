@@ -19,7 +19,7 @@ from rosgraph_monitor.graph.names import COMMON_TOPICS, in_node, is_ignored_port
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from ros_model.io.snapshot import GraphSnapshot, NodeState
+    from ros_model.graph.snapshot import GraphSnapshot, NodeState
     from ros_model.language.metamodel import Component, Connection, Port, PortPath, Reference, RosSystem
     from ros_model.language.packages import PackageSet
 

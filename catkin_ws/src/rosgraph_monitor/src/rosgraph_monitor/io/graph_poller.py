@@ -7,12 +7,13 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ros_model.io.snapshot import SnapshotError
+from ros_model.io.master import SnapshotError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ros_model.io.snapshot import GraphSnapshot, MasterClient
+    from ros_model.graph.snapshot import GraphSnapshot
+    from ros_model.io.master import MasterClient
 
     from rosgraph_monitor.health.liveness import Life
     from rosgraph_monitor.io.node_connections import Watcher

@@ -17,9 +17,10 @@ from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.master import PATIENCE
 from node_kit.ros.lifetime import Lifetime
 from ros_model.errors import ModelError
-from ros_model.files import resolve, safe_file_name
-from ros_model.io.snapshot import MasterClient
-from ros_model.language.reader import read_system
+from ros_model.file_names import safe_file_name
+from ros_model.io.files import resolve
+from ros_model.io.master import MasterClient
+from ros_model.io.models import read_system
 
 from rosgraph_monitor.evaluation import GraphMonitor
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 import rospy
-from ros_model.files import resolve
+from ros_model.io.files import resolve
 
 from rosgraph_monitor.evaluation import Patience
 from rosgraph_monitor.graph.comparison import Scope
@@ -100,8 +100,6 @@ def scope(specs: Mapping[str, TopicSpec]) -> Scope:
 def _port_types(paths: list[str]) -> PortTypes:
     if not paths:
         return {}
-    from ros_model.language.packages_reader import (
-        read_packages,  # grammars take a while to load: only where they are needed
-    )
+    from ros_model.io.models import read_packages  # grammars take a while to load: only where they are needed
 
     return port_types(read_packages(resolve(path)) for path in paths)

@@ -13,7 +13,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from node_kit.ros.lifetime import BAD_START, LONGEST_END, Lifetime
 from rich.console import Console
 from rich.live import Live
-from ros_model.io.snapshot import GraphSnapshot, MasterClient, SnapshotError
+from ros_model.graph.snapshot import GraphSnapshot
+from ros_model.io.master import MasterClient, SnapshotError
 
 from rosgraph_monitor.diagnostics.overview import Board
 

@@ -1,0 +1,100 @@
+"""What is wrong with a project that reads well: names that lead nowhere or mean two things, levels out of range."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from ros_model.errors import ModelError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from ros_model.project.project import Project
+    from ros_model.project.tables import Table
+
+
+def wrong_names(project: Project) -> Iterator[ModelError]:
+    """Yield variants of one name, and designs and components that are not there."""
+    source = project.source
+    known = [variant.name for variant in project.variants]
+    if twice := sorted({name for name in known if known.count(name) > 1}):
+        yield source.error(f"two variants bear the name {twice[0]!r}: rename one", "variants")
+    for name, function in project.settings["functions"].items():
+        for number, design in enumerate(function["designs"] if function["designs"] != "all" else ()):
+            if design not in known:
+                keys = ("functions", name, "designs", number)
+                yield source.error(f"{design!r} is none of the {len(known)} variants", *keys)
+        if isinstance(function.get("requires"), dict):
+            solving = {design.name for design in project.designs(name)}
+            for design in function["requires"]:
+                if design not in solving:
+                    keys = ("functions", name, "requires", design)
+                    yield source.error(f"{design!r} is none of the designs of {name}", *keys)
+    components = {component.name for component in project.whole_base.components} | set(project.settings["components"])
+    for parameter, choices in project.settings["requires"].items():
+        for value, component in choices.items():
+            if component not in components:
+                yield source.error(
+                    f"{component!r} is a component neither of the base nor of components: add it to one",
+                    *("requires", parameter, value),
+                )
+
+
+def wrong_levels(project: Project) -> Iterator[ModelError]:
+    """Yield expected levels of no quality attribute that is there, and those outside its range."""
+    known = project.settings["quality_attributes"]
+    for variant in project.variants:
+        for parameter in variant.parameters:
+            quality, level = parameter.name.removeprefix("qa_"), parameter.value
+            if quality == parameter.name:
+                continue
+            if quality not in known:
+                wrong = f"which is none of quality_attributes: {', '.join(sorted(known))}"
+                yield ModelError(
+                    f"{variant.name} expects a level of {quality!r}, {wrong}", parameter.position, rule="level"
+                )
+                continue
+            lowest, highest = known[quality].get("range", (-math.inf, math.inf))
+            if isinstance(level, (int, float)) and not lowest <= level <= highest:
+                yield ModelError(
+                    f"{variant.name} expects {level:g} of {quality!r}, whose range is [{lowest:g}, {highest:g}]: "
+                    "correct one of them",
+                    parameter.position,
+                    rule="level",
+                )
+
+
+def levels_of_nothing(project: Project, tables: Iterable[Table]) -> Iterator[ModelError]:
+    """Yield rows of expected levels, which families may share, that are no variant's."""
+    known = {variant.name for variant in project.variants}
+    for table in tables:
+        for row in table.rows:
+            if row.name not in known:
+                yield ModelError(
+                    f"{row.name!r} is none of the {len(known)} variants: take the row out, or add the variant",
+                    row.position,
+                    rule="table",
+                )
+
+
+def two_meanings(project: Project) -> Iterator[ModelError]:
+    """Yield names that mean two things: in the ontology they would be one."""
+    settings, seen = project.settings, dict[str, str]()
+    values = [
+        *(f"{variant.name}_{quality}" for variant in project.variants for quality in variant.expected_qas),
+        *(f"{name}_{quality}" for name, entry in settings["objectives"].items() for quality in entry.get("nfrs", {})),
+    ]
+    meanings = {
+        "a function": settings["functions"],
+        "a quality attribute": settings["quality_attributes"],
+        "an objective": settings["objectives"],
+        "a component": {*settings["components"], *(component.name for component in project.base.components)},
+        "a variant": [variant.name for variant in project.variants],
+        "an expected or required level": values,
+    }
+    for meaning, names in meanings.items():
+        for name in names:
+            if name in seen:
+                yield project.source.error(f"{name!r} names {seen[name]} and {meaning}: rename one")
+            seen[name] = meaning

@@ -1,0 +1,184 @@
+"""`rosmodel check`: what is wrong in models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ros_model.checks.packages import check_packages
+from ros_model.checks.systems import check_family, check_system, families
+from ros_model.cli import BAD_INPUT
+from ros_model.cli.reports import FORMATS
+from ros_model.errors import ModelError
+from ros_model.findings import ERROR, WARNING, Finding
+from ros_model.io.installed import InstalledPackages
+from ros_model.io.models import files_in, models_at, read_all, read_packages
+from ros_model.language.either import PACKAGES
+from ros_model.language.library import Library
+from ros_model.language.metamodel import compose
+from ros_model.language.packages import PackageSet
+from ros_model.project.settings import FILE_NAME
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from ros_model.language.metamodel import RosSystem
+    from ros_model.project.project import Project
+
+
+_UNREADABLE = ("syntax", "unreadable")  # rules that a file breaks which can't be read
+
+
+@click.command()
+@click.option(
+    "--path",
+    "folders",
+    multiple=True,
+    type=click.Path(),
+    metavar="FOLDER",
+    help="Where .ros models are that references lead to, in this folder or below; may be given several times.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(list(FORMATS)),
+    default="text",
+    show_default=True,
+    help="How findings are told: for people, for programs, as annotations of a GitHub workflow, as SARIF 2.1.0.",
+)
+@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path())
+def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
+    """Check .rossystem and .ros files, folders of them, or projects by their metacontrol.yaml or folder.
+
+    References are followed to the .ros models that are checked, stand beside the files, belong to their project, or are
+    found with --path. Message types of installed ROS packages are known. A variant is checked with its project's base.
+
+    Exit status: 0 all is well or only warnings were given, 1 something is wrong in a model, 2 a file can't be read.
+    """
+    checked = _Check(folders)
+    for file in files:
+        checked.add(Path(file))
+    findings = checked.findings()
+    if text := FORMATS[form](findings):
+        click.echo(text)
+    if any(finding.severity == ERROR and finding.rule in _UNREADABLE for finding in findings):
+        return BAD_INPUT
+    return int(any(finding.severity == ERROR for finding in findings))
+
+
+class _Check:
+    """Gathers what there is to check, then checks it by all that is known."""
+
+    def __init__(self, folders: Iterable[str]) -> None:
+        self._refused: list[Finding] = []
+        self._unknown: dict[Path, Finding] = {}  # what could not be read, though nobody asked to check it
+        self._asked: set[Path] = set()
+        self._projects: dict[Path, Project] = {}
+        self._loaded: dict[Path, Project] = {}
+        self._systems: dict[Path, RosSystem] = {}
+        self._wholes: dict[Path, RosSystem] = {}  # what a system that is a variant is part of
+        self._packages: dict[Path, PackageSet] = {}
+        self._beside: dict[Path, PackageSet] = {}
+        for folder in folders:
+            self._know(files_in(Path(folder), PACKAGES))
+
+    def add(self, path: Path) -> None:
+        """Add a file, a project or a folder of files."""
+        try:
+            if path.name == FILE_NAME or (path / FILE_NAME).is_file():
+                self._add_project(path)
+                return
+            found = models_at(path)
+        except ModelError as error:
+            self._refuse(error)
+            return
+        for file in found:
+            self._add_file(file)
+        if not path.is_dir():
+            self._know(sorted(path.parent.glob(f"*{PACKAGES}")))
+
+    def findings(self) -> list[Finding]:
+        """Return all that is wrong, file by file."""
+        known = {**self._beside, **self._packages}.values()
+        library = Library((package for packages in known for package in packages.packages), InstalledPackages())
+        found = [*self._refused]
+        found += [finding for path, finding in self._unknown.items() if path not in self._asked]
+        for packages in self._packages.values():
+            found += check_packages(packages, library)
+        for path, system in self._systems.items():
+            found += check_system(system, self._wholes.get(path), library)
+        for family in families(self._systems.values()):
+            found += check_family(family)
+        for project in self._projects.values():
+            found += _of_project(project, library)
+        return [*dict.fromkeys(found)]
+
+    def _add_project(self, path: Path) -> None:
+        project = self._load(path if path.is_dir() else path.parent)
+        self._projects[project.folder] = project
+        for file in files_in(project.folder, PACKAGES):
+            self._add_file(file)
+
+    def _add_file(self, path: Path) -> None:
+        self._asked.add(path.resolve())
+        try:
+            model = read_all(path)
+        except ModelError as error:
+            self._refuse(error)
+            return
+        if isinstance(model, PackageSet):
+            self._packages[path] = model
+            return
+        self._systems[path] = model
+        project = self._project_around(path.resolve())
+        if project is not None:
+            self._know(files_in(project.folder, PACKAGES))
+            if path.resolve() != project.folder / project.settings["base"]:
+                self._wholes[path] = compose(project.base, model)
+
+    def _project_around(self, path: Path) -> Project | None:
+        """Return the project that a model belongs to, by the folder that it is in or the one above."""
+        for folder in path.parents[:2]:
+            if (folder / FILE_NAME).is_file():
+                try:
+                    return self._load(folder)
+                except ModelError:  # it is told where the project itself is checked
+                    return None
+        return None
+
+    def _load(self, folder: Path) -> Project:
+        from ros_model.io.project import load_project
+
+        if folder not in self._loaded:
+            self._loaded[folder] = load_project(folder)
+        return self._loaded[folder]
+
+    def _know(self, paths: Iterable[Path]) -> None:
+        """Read packages that references may lead to."""
+        for path in paths:
+            if path not in self._beside and path not in self._packages:
+                try:
+                    self._beside[path] = read_packages(path)
+                except ModelError as error:
+                    self._unknown[path.resolve()] = _warning(path, error)
+
+    def _refuse(self, error: ModelError) -> None:
+        known = {str(finding) for finding in self._refused}
+        self._refused += [found for found in map(Finding.of, error.all) if str(found) not in known]
+
+
+def _warning(path: Path, error: ModelError) -> Finding:
+    """Return what is told of a file that was not asked for: its own errors would hide those of the ones that were."""
+    count = f"{len(error.all)} error{'s' * (len(error.all) != 1)}"
+    message = f"{path} can't be read: {count}; its packages are unknown: check it by itself"
+    return Finding(message, None, "unreadable", WARNING)
+
+
+def _of_project(project: Project, library: Library) -> Iterator[Finding]:
+    yield from check_system(project.whole_base, library=library)
+    for variant in project.variants:
+        # Where nothing is known of packages, the base has told so.
+        yield from check_system(variant, compose(project.base, variant), library or None)
+    yield from check_family(project.variants)

@@ -1,0 +1,58 @@
+"""`rosmodel init`: a first metacontrol.yaml for a base system."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import click
+from catkin_pkg.package import InvalidPackage, parse_package
+
+from ros_model.errors import ModelError
+from ros_model.generators import write_files
+from ros_model.io.models import read_system
+from ros_model.project.first_project import Choices, first_project
+
+_QUALITY = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+
+
+@click.command("init")
+@click.argument("base")
+@click.option("--package", metavar="NAME", help="The package of the models; default: the one that they are in.")
+@click.option("--component", metavar="NAME", help="The component that varies; default: the likeliest.")
+@click.option("--qa", "qualities", multiple=True, metavar="NAME", help="A quality attribute, beside performance.")
+def init(base: str, package: str | None, component: str | None, qualities: tuple[str, ...]) -> None:
+    """Write a first metacontrol.yaml, and its tables, beside the .rossystem file BASE.
+
+    It checks clean as it is; places marked CHANGE are guesses. Files that exist are never overwritten.
+    """
+    if package is not None and not _PACKAGE.fullmatch(package):
+        raise click.UsageError(f"--package {package!r} is no name of letters, digits, '_' and '-'")
+    for name in qualities:
+        if not _QUALITY.fullmatch(name):
+            raise click.UsageError(f"--qa {name!r} is no name of letters, digits and '_'")
+    path = Path(base)
+    if path.is_dir():
+        raise ModelError(f"{path}: is a folder: give the .rossystem file of the base system")
+    folder = path.parent
+    choices = Choices(package or _package_around(folder.resolve()), component, qualities)
+    texts = first_project(read_system(path), path.name, folder.resolve().name or ".", choices)
+    for name in texts:
+        if (folder / name).exists() or (folder / name).is_symlink():
+            raise ModelError(f"{folder / name}: is there already: move it away, or edit it")
+    for written in write_files({folder / name: text for name, text in texts.items()}, folder):
+        click.echo(f"wrote {written}")
+    click.echo(f"Change the places marked CHANGE, then: rosmodel check {folder}")
+
+
+def _package_around(folder: Path) -> str:
+    """Return the name of the package around a folder; without one, a name made of the folder's."""
+    for around in (folder, *folder.parents):
+        if (around / "package.xml").is_file():
+            try:
+                return str(parse_package(str(around)).name)
+            except InvalidPackage:
+                break
+    named = folder.parent if folder.name == "models" else folder
+    return re.sub(r"[^A-Za-z0-9_-]+|^[^A-Za-z]+", "_", named.name).strip("_") or "my_robot"

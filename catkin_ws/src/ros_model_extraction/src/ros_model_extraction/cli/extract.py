@@ -1,0 +1,79 @@
+"""`rosmodel extract`: models from source code and launch files."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+from ros_model.cli import BAD_INPUT
+from ros_model.errors import ModelError
+
+_INCOMPLETE = 1
+_LAUNCH_FILES = (".launch", ".xml", ".test")
+
+
+@click.command()
+@click.argument("path", metavar="PATH")
+@click.argument("arguments", nargs=-1, metavar="[ARG:=VALUE]...")
+@click.option("-o", "--output", default=".", metavar="FOLDER", help="Where the files go; made if it is missing.")
+def extract(path: str, arguments: tuple[str, ...], output: str) -> int:
+    """Write models of what is in PATH: a ROS package, a folder of packages, or a launch file.
+
+    A package gives PACKAGE.ros: its executables (rospy and roscpp), their interfaces and parameters, its messages.
+    A launch file (.launch, .xml, .test), read by roslaunch with the arguments ARG:=VALUE, gives NAME.rossystem and
+    NAME.ros.
+    What the source does not tell is marked so, with its place, in names and in comments at the top of the files.
+
+    Exit status: 0 all was read, 1 some source file or folder could not be read, 2 a package or launch file could not.
+    """
+    if os.path.isfile(path):  # False where that can't be looked at, which find_packages tells
+        if Path(path).suffix not in _LAUNCH_FILES or Path(path).name == "package.xml":
+            known = ", ".join(f"*{suffix}" for suffix in _LAUNCH_FILES)
+            raise ModelError(
+                f"{path}: no launch file ({known}): give one, or the folder of a ROS package, or of several"
+            )
+        return _launch_file(Path(path), arguments, output)
+    if arguments:
+        raise ModelError(f"{arguments[0]}: arguments are for a launch file, and {path} is a folder")
+    return _packages(Path(path), output)
+
+
+def _launch_file(path: Path, arguments: tuple[str, ...], output: str) -> int:
+    from ros_model_extraction.io.launch_files import read_launch_file  # imported when asked for
+    from ros_model_extraction.io.output import write_models
+
+    models = read_launch_file(path, arguments)
+    for written in write_models(models, output, models.system.name):
+        click.echo(f"wrote {written}")
+    nodes = len(models.system.components)
+    click.echo(f"{nodes} node{'s' * (nodes != 1)}, {len(models.system.connections)} connections")
+    return 0
+
+
+def _packages(path: Path, output: str) -> int:
+    from ros_model_extraction.io.output import write_package_set
+    from ros_model_extraction.packages.catkin_package import find_packages
+    from ros_model_extraction.packages.package_source import extract_package
+
+    folders, unread = find_packages(path.absolute())
+    for remark in unread:
+        click.echo(f"rosmodel: {remark.position.file}: {remark.text}", err=True)
+    status = _INCOMPLETE if unread else 0
+    for folder in folders:
+        try:
+            extracted = extract_package(folder)
+        except ModelError as error:
+            click.echo(f"rosmodel: {error}", err=True)
+            status = BAD_INPUT
+            continue
+        for remark in extracted.unread:
+            click.echo(f"rosmodel: {folder}/{remark}", err=True)
+            status = max(status, _INCOMPLETE)
+        written = write_package_set(extracted.model(), output, extracted.package.name)
+        nodes = [node for node in extracted.nodes.values() if node.is_node]
+        ports = [port for node in nodes for port in node.ports]
+        unknown = sum(not port.is_resolved or not port.type for port in ports)
+        counts = f"{len(nodes)} node{'s' * (len(nodes) != 1)}, {len(ports)} interface{'s' * (len(ports) != 1)}"
+        click.echo(f"wrote {written}: {counts}, {unknown} not fully known")
+    return status

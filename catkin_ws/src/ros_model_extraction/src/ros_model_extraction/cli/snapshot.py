@@ -1,0 +1,75 @@
+"""`rosmodel snapshot`: models of the system that runs now."""
+
+from __future__ import annotations
+
+import datetime
+import os
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import click
+from ros_model.cli.ranges import FiniteRange
+from ros_model.errors import ModelError
+
+if TYPE_CHECKING:
+    from ros_model_extraction.running.graph import Models
+
+_MASTER = "http://localhost:11311"
+_LONGEST = 3600.0  # s
+
+
+@click.command()
+@click.option("-o", "--output", default=".", metavar="FOLDER", help="Where the two files go; made if it is missing.")
+@click.option("--master", metavar="URI", help=f"Address of the ROS master; else $ROS_MASTER_URI, else {_MASTER}.")
+@click.option("--name", default="snapshot", show_default=True, help="Name of the system and of the files.")
+@click.option(
+    "--timeout",
+    type=FiniteRange(min=0, min_open=True, max=_LONGEST),
+    default=2.0,
+    show_default=True,
+    metavar="S",
+    help="Patience with the master and each node.",
+)
+@click.option("--all", "everything", is_flag=True, help="Keep what ROS itself makes: /rosout, ~get_loggers, ...")
+def snapshot(output: str, master: str | None, name: str, timeout: float, everything: bool) -> None:
+    """Write NAME.ros and NAME.rossystem of the running system.
+
+    Nodes, topics, services, actions, parameters and connections are those that the master lists. What can't be known,
+    and what is left out, is said in comments at the top of the files.
+    """
+    from ros_model_extraction.io.output import write_models  # imported when asked for
+
+    uri = _checked_address(master or os.environ.get("ROS_MASTER_URI") or _MASTER)
+    models = _models(uri, name, timeout, everything)
+    nodes = len(models.system.components)
+    for path in write_models(models, output, name):
+        click.echo(f"wrote {path}")
+    click.echo(f"{nodes} node{'s' * (nodes != 1)}, {len(models.system.connections)} connections")
+
+
+def _checked_address(uri: str) -> str:
+    try:
+        parts = urlsplit(uri)
+        is_address = parts.scheme == "http" and bool(parts.hostname) and parts.port != 0
+    except ValueError:  # a port that is none
+        is_address = False
+    if not is_address:
+        raise ModelError(f"{uri!r} is no address of a ROS master: give one like {_MASTER} with --master")
+    return uri
+
+
+def _models(uri: str, name: str, timeout: float, everything: bool) -> Models:
+    from ros_model.io.master import MasterGoneError, SnapshotError, take_snapshot
+
+    from ros_model_extraction.io.live_nodes import ask_nodes
+    from ros_model_extraction.running.graph import models_of
+
+    try:
+        graph = take_snapshot(uri, timeout)
+    except MasterGoneError as error:
+        raise ModelError(f"ROS master {uri} can't be reached: start the system, or set --master") from error
+    except SnapshotError as error:
+        raise ModelError(f"{error}: start the system, or set --master") from error
+    stamp = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    title = f"The running system of the ROS master {uri}, {stamp}. Written by rosmodel snapshot."
+    return models_of(graph, ask_nodes(graph, uri, timeout), name, [title], everything=everything)

@@ -1,0 +1,369 @@
+"""roscpp nodes from their source."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from ros_model.language.metamodel import PortKind, Position
+from tree_sitter import Node
+
+from ros_model_extraction.cpp.handles import Handles, in_namespace
+from ros_model_extraction.cpp.program import Place, Program
+from ros_model_extraction.cpp.syntax import arguments_of, parameter_types, template_arguments, text, type_text
+from ros_model_extraction.found import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
+from ros_model_extraction.python.values import Const, Text
+from ros_model_extraction.ros_api import CPP_FIXED, RECONFIGURE_SERVER
+
+Name = Const | Text
+
+_ACTIONS = {
+    "actionlib::SimpleActionServer": PortKind.ACTION_SERVER,
+    "actionlib::ActionServer": PortKind.ACTION_SERVER,
+    "actionlib::SimpleActionClient": PortKind.ACTION_CLIENT,
+    "actionlib::ActionClient": PortKind.ACTION_CLIENT,
+}
+_METHODS = ("advertise", "subscribe", "advertiseService", "serviceClient", "advertiseCamera", "subscribeCamera")
+_OPTIONS = {  # the class whose `create` makes what may be given to a method alone
+    "advertise": (PortKind.PUBLISHER, "AdvertiseOptions"),
+    "subscribe": (PortKind.SUBSCRIBER, "SubscribeOptions"),
+    "advertiseService": (PortKind.SERVICE_SERVER, "AdvertiseServiceOptions"),
+    "serviceClient": (PortKind.SERVICE_CLIENT, "ServiceClientOptions"),
+}
+_GETTERS = {"param": 2, "getParam": 1, "getParamCached": 1, "hasParam": 1}
+_FREE_GETTERS = {"ros::param::get": 1, "ros::param::getCached": 1, "ros::param::param": 2, "ros::param::has": 1}
+_TYPE = re.compile(
+    r"(?P<package>[a-z]\w*)::(?P<name>[A-Z]\w*?)_?(?:::(?:Const)?Ptr|::Request|::Response|(?:Const)?Ptr)?"
+)
+_POINTER = re.compile(r"(?:boost|std)::shared_ptr<(.*)>|ros::MessageEvent<(.*)>")
+_IMAGE = "sensor_msgs/Image"
+_CAMERA_INFO = "sensor_msgs/CameraInfo"
+
+
+def read_cpp_node(
+    sources: Sequence[Path], package_folder: Path, parameters: Callable[[str], Any] | None = None
+) -> NodeSource:
+    """Return what C++ sources make of a node.
+
+    Args:
+        sources: of the executable and of the package's libraries that it links.
+        package_folder: its package; positions name files relative to it.
+        parameters: the value of a parameter by its name as the code has it, or KeyError; without it, defaults count.
+
+    Raises:
+        SourceError: none of the sources can be read.
+    """
+    program = Program(sources, package_folder)
+    reader = _Reader(program, parameters)
+    nodes = list(program.expressions())
+    for node, place in nodes:  # first what parameters fill variables with, which names may depend on
+        if node.type == "call_expression":
+            reader.parameter(node, place)
+    for node, place in nodes:
+        reader.read(node, place)
+    remarks = unique([*program.remarks, *reader.remarks])
+    return NodeSource(reader.node_name, tuple(reader.ports), tuple(reader.parameters), remarks, reader.position)
+
+
+class _Reader:
+    """Keeps what the calls and declarations of ROS make."""
+
+    def __init__(self, program: Program, parameters: Callable[[str], Any] | None) -> None:
+        self.ports: list[FoundPort] = []
+        self.parameters: list[FoundParameter] = []
+        self.remarks: list[Remark] = []
+        self.node_name = ""
+        self.position = Position()
+        self._program = program
+        self._handles = Handles(program)
+        self._values = parameters
+
+    def read(self, node: Node, place: Place) -> None:
+        """Look at a node: a call, or the declaration of an object."""
+        if node.type == "call_expression":
+            self._call(node, place)
+        elif node.type in ("declaration", "field_declaration"):
+            self._declaration(node, place)
+        elif node.type == "new_expression":
+            self._object(type_text(node.child_by_field_name("type")), arguments_of(node), node, place)
+        elif node.type == "field_initializer" and node.named_child_count > 1:
+            name, given = node.named_children[0], node.named_children[-1]
+            kinds = {declared.type for declared in self._program.declared(text(name), place)}
+            for kind in kinds - {""}:
+                self._object(kind, list(given.named_children), node, place)
+
+    # --- parameters
+
+    def parameter(self, node: Node, place: Place) -> None:
+        """Look whether a call reads a parameter."""
+        function, arguments = node.child_by_field_name("function"), arguments_of(node)
+        if function is None or not arguments:
+            return
+        name = text(function).partition("<")[0]
+        if name in _FREE_GETTERS:
+            handles: list[Name] = [Const("")]
+            default_at, is_filling = _FREE_GETTERS[name], name != "ros::param::has"
+        elif function.type == "field_expression":
+            method = text(function.child_by_field_name("field")).partition("<")[0]
+            if method not in _GETTERS or arguments[0].type == "lambda_expression":
+                return
+            owner = function.child_by_field_name("argument")
+            handles = self._handles.of(owner, place)
+            default_at, is_filling = _GETTERS[method], method != "hasParam"
+        else:
+            return
+        default: Node | None
+        variable: Node | None
+        if len(arguments) == 2 and default_at == 2:  # the default comes second, and the value is returned
+            variable, default = None, arguments[1]
+        else:
+            default = arguments[2] if default_at == 2 and len(arguments) > 2 else None
+            variable = arguments[1] if is_filling and len(arguments) > 1 else None
+        position = place.file.position(node)
+        for namespace in handles:
+            for key, _ in self._program.texts(arguments[0], place):
+                shown = self._name("parameter", in_namespace(namespace, key), position)
+                self.parameters.append(FoundParameter(shown, _constant(default), position))
+        if variable is not None:
+            note = f"the default of the parameter {text(arguments[0])}"
+            self._program.note_fill(variable, self._given(handles, arguments[0], place) or default, place, note)
+
+    def _given(self, handles: Sequence[Name], name: Node, place: Place) -> str | None:
+        """Return the value of a parameter, where values are given and it is a text."""
+        for namespace in handles if self._values else ():
+            for key, _ in self._program.texts(name, place):
+                full = in_namespace(namespace, key)
+                if self._values and isinstance(full, Const):
+                    try:
+                        value = self._values(str(full.value))
+                    except KeyError:
+                        continue
+                    return value if isinstance(value, str) else None
+        return None
+
+    # --- interfaces
+
+    def _call(self, node: Node, place: Place) -> None:
+        function, arguments = node.child_by_field_name("function"), arguments_of(node)
+        if function is None:
+            return
+        name = text(function)
+        plain = name.partition("<")[0]
+        if plain == "ros::init" and len(arguments) > 2:
+            self._node(arguments[2], node, place)
+        elif plain == "ros::topic::waitForMessage" and arguments:
+            kind = self._template(name)
+            self._port(PortKind.SUBSCRIBER, [Const("")], arguments[0], kind, node, place)
+        elif plain in ("ros::service::call", "ros::service::createClient") and arguments:
+            kind = self._template(name) or self._of_variable(arguments[1:], place)
+            self._port(PortKind.SERVICE_CLIENT, [Const("")], arguments[0], kind, node, place)
+        elif plain.endswith(("make_shared", "make_unique")):
+            for made in template_arguments(name.replace(" ", "")):
+                self._object(made, arguments, node, place)
+        elif function.type == "field_expression" and arguments:
+            owner = function.child_by_field_name("argument")
+            method = text(function.child_by_field_name("field"))
+            if owner is not None:
+                self._method(owner, method, arguments, node, place)
+
+    def _method(self, owner: Node, method: str, arguments: list[Node], node: Node, place: Place) -> None:
+        name = method.partition("<")[0]
+        if name not in _METHODS:
+            return
+        kinds = {self._program.alias(declared.type) for declared in self._program.declared(text(owner), place)}
+        if any("ImageTransport" in kind for kind in kinds):
+            self._image(name, owner, arguments, node, place)
+            return
+        if any("message_filters::Subscriber" in kind for kind in kinds) and name == "subscribe":
+            if len(arguments) > 1:
+                types = [template_arguments(kind)[0] for kind in kinds if template_arguments(kind)]
+                handles = self._handles.of(arguments[0], place)
+                self._port(PortKind.SUBSCRIBER, handles, arguments[1], self._type(types[0]), node, place)
+            return
+        handles = self._handles.of(owner, place)
+        if (
+            name in _OPTIONS
+            and len(arguments) == 1
+            and "<" not in method
+            and self._options(name, handles, arguments[0], place)
+        ):
+            return
+        if name == "advertise":
+            self._port(PortKind.PUBLISHER, handles, arguments[0], self._template(method), node, place)
+        elif name == "serviceClient":
+            self._port(PortKind.SERVICE_CLIENT, handles, arguments[0], self._template(method), node, place)
+        elif name == "subscribe":
+            kind = self._template(method) or self._of_callback(arguments[1:], place)
+            self._port(PortKind.SUBSCRIBER, handles, arguments[0], kind, node, place)
+        elif name == "advertiseService":
+            kind = self._template(method) or self._of_callback(arguments[1:], place)
+            self._port(PortKind.SERVICE_SERVER, handles, arguments[0], kind, node, place)
+
+    def _options(self, method: str, handles: list[Name], given: Node, place: Place) -> bool:
+        """Look at a method that is given options alone; return whether what they are made with is known."""
+        kind, options = _OPTIONS[method]
+        made = [(given, place)]
+        if given.type != "call_expression":
+            made = [(d.values[0], d.place) for d in self._program.declared(text(given), place) if len(d.values) == 1]
+        is_known = False
+        for value, at in made:
+            function, arguments = value.child_by_field_name("function"), arguments_of(value)
+            name = text(function)
+            if function is not None and name.startswith(f"ros::{options}::create") and arguments:
+                type_name = self._template(name) or self._of_callback(arguments[1:], at)
+                self._port(kind, handles, arguments[0], type_name, value, at)
+                is_known = True
+        return is_known
+
+    def _image(self, name: str, owner: Node, arguments: list[Node], node: Node, place: Place) -> None:
+        """Ports of image_transport; those of its plug-ins (`image/compressed`) depend on what is installed."""
+        kind = PortKind.PUBLISHER if name.startswith("advertise") else PortKind.SUBSCRIBER
+        handles: list[Name] = []
+        for declared in self._program.declared(text(owner), place):
+            handles += self._handles.of(declared.values[0] if declared.values else owner, declared.place)
+        self._port(kind, handles, arguments[0], _IMAGE, node, place)
+        if name.endswith("Camera"):
+            for namespace in handles:
+                for topic, _ in self._program.texts(arguments[0], place):
+                    base = in_namespace(namespace, topic)
+                    if isinstance(base, Const):
+                        info = f"{str(base.value).rpartition('/')[0]}/camera_info".lstrip("/")
+                        self.ports.append(FoundPort(kind, info, _CAMERA_INFO, place.file.position(node)))
+
+    def _declaration(self, node: Node, place: Place) -> None:
+        kind = type_text(node.child_by_field_name("type"))
+        for declarator in node.children_by_field_name("declarator"):
+            name = text(declarator.child_by_field_name("declarator") or declarator).lstrip("*& ")
+            if not name or "*" in text(declarator).partition(name)[0]:
+                continue  # a pointer: what it points to is made elsewhere
+            own = [d for d in self._program.declared(name, place) if d.place.file is place.file and d.type == kind]
+            values = next((list(d.values) for d in own if d.values), [])
+            is_member = node.type == "field_declaration" and place.function is None
+            self._object(kind, values, node, place, is_member=is_member)
+
+    def _object(
+        self, type_name: str, arguments: list[Node], node: Node, place: Place, *, is_member: bool = False
+    ) -> None:
+        """Look at an object that is made: some of them are interfaces."""
+        kind = self._program.alias(type_name)
+        base = kind.partition("<")[0]
+        position = place.file.position(node)
+        if base in CPP_FIXED:
+            self._add([FoundPort(made.kind, made.name, made.type, position) for made in CPP_FIXED[base]])
+        elif base in _ACTIONS and arguments and not is_member:
+            handles, rest = self._leading_handle(arguments, place)
+            if rest:
+                self._port(_ACTIONS[base], handles, rest[0], self._template(kind), node, place)
+        elif base == "message_filters::Subscriber" and len(arguments) > 1 and not is_member:
+            handles = self._handles.of(arguments[0], place)
+            self._port(PortKind.SUBSCRIBER, handles, arguments[1], self._template(kind), node, place)
+        elif base == "dynamic_reconfigure::Server" and not (is_member and arguments):
+            handles = [Const("~")]
+            if arguments and self._handles.of(arguments[-1], place):
+                handles = self._handles.of(arguments[-1], place)
+            for namespace in handles:
+                for made in RECONFIGURE_SERVER:
+                    shown = self._name(made.kind.value, in_namespace(namespace, Const(made.name)), position)
+                    self._add([FoundPort(made.kind, shown, made.type, position)])
+
+    def _leading_handle(self, arguments: list[Node], place: Place) -> tuple[list[Name], list[Node]]:
+        """Take a node handle off the front of a constructor's arguments."""
+        first = arguments[0]
+        if first.type in ("string_literal", "concatenated_string", "binary_expression"):
+            return [Const("")], arguments
+        kinds = {declared.type for declared in self._program.declared(text(first).lstrip("*&"), place)}
+        if len(arguments) > 1 and (any("NodeHandle" in k for k in kinds) or arguments[1].type == "string_literal"):
+            return self._handles.of(first, place), arguments[1:]
+        return [Const("")], arguments
+
+    def _port(self, kind: PortKind, handles: list[Name], name: Node, type_name: str, node: Node, place: Place) -> None:
+        position = place.file.position(node)
+        for namespace in handles:
+            for value, note in self._program.texts(name, place):
+                shown = self._name(kind.value, in_namespace(namespace, value), position)
+                if note:
+                    self.remarks.append(Remark(position, f"{kind.value} {shown}: {note}"))
+                self._add([FoundPort(kind, shown, type_name, position)])
+        if not type_name:
+            self.remarks.append(Remark(position, f"{kind.value}: its type is not known: {text(node)[:60]}"))
+
+    def _add(self, ports: Sequence[FoundPort]) -> None:
+        self.ports += [port for port in ports if port not in self.ports]
+
+    def _name(self, what: str, value: Name, position: Position) -> str:
+        shown = str(value) if isinstance(value, Text) else str(value.value)
+        shown = f"~{shown[2:]}" if shown.startswith("~/") else shown
+        if isinstance(value, Const):
+            return shown
+        self.remarks.append(Remark(position, f"{what}: its name is not known: {shown}"))
+        return unresolved(shown, position)
+
+    def _node(self, name: Node, node: Node, place: Place) -> None:
+        self.position = place.file.position(node)
+        for value, _ in self._program.texts(name, place)[:1]:
+            if isinstance(value, Const):
+                self.node_name = str(value.value)
+            else:
+                self.node_name = "{}"
+                self.remarks.append(Remark(self.position, f"the node's own name is not known: {value}"))
+
+    # --- types
+
+    def _template(self, method: str) -> str:
+        given = template_arguments(method.replace(" ", ""))
+        return self._type(given[0]) if given else ""
+
+    def _type(self, name: str) -> str:
+        """Return `package/Type` of a message's class, of a pointer to one, of a service's request."""
+        name = self._program.alias(re.sub(r"\bconst\b|[\s&*]", "", name))
+        if match := _POINTER.fullmatch(name):
+            return self._type(match[1] or match[2])
+        match = _TYPE.fullmatch(name)
+        return f"{match['package']}/{match['name']}" if match else ""
+
+    def _of_variable(self, arguments: Sequence[Node], place: Place) -> str:
+        """Return the type that the first of some arguments, a variable, is declared with."""
+        declared = self._program.declared(text(arguments[0]), place) if arguments else []
+        return next((found for found in (self._type(d.type) for d in declared) if found), "")
+
+    def _of_callback(self, arguments: list[Node], place: Place) -> str:
+        """Return the type that a callback takes, from its definition."""
+        for argument in arguments:
+            for function in self._callbacks(argument, place):
+                for kind in parameter_types(function):
+                    if found := self._type(kind):
+                        return found
+        return ""
+
+    def _callbacks(self, argument: Node, place: Place) -> Iterator[Node]:
+        inner = argument.named_children[0] if argument.type == "unary_expression" else argument
+        if inner.type == "lambda_expression":
+            yield inner
+            return
+        shown = text(argument)
+        names = re.findall(r"&?\s*((?:\w+::)*\w+)", shown)
+        for name in names if argument.type == "call_expression" else names[:1]:
+            if found := self._program.function(name, place.owner):
+                yield found[0]
+
+
+def _constant(node: Node | None) -> Any:
+    """Return a literal's value, None for what is none."""
+    if node is None:
+        return None
+    shown = text(node)
+    given = arguments_of(node)
+    found: Any = None
+    if node.type == "string_literal":
+        found = shown[1:-1]
+    elif node.type in ("true", "false"):
+        found = node.type == "true"
+    elif node.type in ("number_literal", "unary_expression"):
+        with contextlib.suppress(ValueError):
+            found = float(shown.rstrip("fF")) if re.search(r"[.eE]", shown) else int(shown, 0)
+    elif node.type == "call_expression" and shown.startswith(("std::string(", "string(")) and len(given) == 1:
+        found = _constant(given[0])
+    return found

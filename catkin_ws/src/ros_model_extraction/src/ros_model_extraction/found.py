@@ -1,0 +1,126 @@
+"""What is found in source code, whatever its language: a node, its interfaces and parameters, what is not known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from ros_model.language.metamodel import PortKind, Position
+from ros_model.language.packages import Node, ParameterDeclaration, PortDeclaration
+
+from ros_model_extraction.values import UnwritableValueError, typed
+
+
+class SourceError(Exception):
+    """A file of source code can't be read; `remark` says where and why."""
+
+    def __init__(self, remark: Remark) -> None:
+        super().__init__(str(remark))
+        self.remark = remark
+
+
+@dataclass(frozen=True)
+class Remark:
+    """Something that could not be resolved, or should be known about a model, and its place in the source."""
+
+    position: Position
+    text: str
+
+    def __str__(self) -> str:
+        """Return `file:line:column: text`."""
+        return f"{self.position}: {self.text}"
+
+
+@dataclass(frozen=True)
+class FoundPort:
+    """An interface that a piece of code makes.
+
+    Attributes:
+        kind: its kind.
+        name: its name as the code gives it: relative, private (`~`) or global. What is not known of it stands as the
+            expression in braces, `{action}/goal`, and the place follows: `@src/node.py:12`.
+        type: `package/Type`, "" where it is not known.
+        position: where the code stands.
+    """
+
+    kind: PortKind
+    name: str
+    type: str
+    position: Position
+
+    @property
+    def is_resolved(self) -> bool:
+        """Whether the whole name is known."""
+        return "{" not in self.name
+
+
+@dataclass(frozen=True)
+class FoundParameter:
+    """A parameter that a piece of code reads; the name as FoundPort's; `default` is None where there is none."""
+
+    name: str
+    default: Any
+    position: Position
+
+
+@dataclass(frozen=True)
+class NodeSource:
+    """What the code of one executable makes of it. `name` is "" where it calls nothing that starts a node."""
+
+    name: str
+    ports: tuple[FoundPort, ...] = ()
+    parameters: tuple[FoundParameter, ...] = ()
+    remarks: tuple[Remark, ...] = ()
+    position: Position = field(default=Position())
+
+    @property
+    def is_node(self) -> bool:
+        """Whether it is a ROS node: it is started as one, or has interfaces."""
+        return bool(self.name or self.ports)
+
+    def declared(self) -> Node:
+        """Return the node of the metamodel: each interface and parameter once."""
+        ports: dict[tuple[PortKind, str], PortDeclaration] = {}
+        for port in self.ports:
+            known = ports.get((port.kind, port.name))
+            if known is None or (port.type and not known.type):
+                ports[port.kind, port.name] = PortDeclaration(port.name, port.kind, port.type, position=port.position)
+        parameters: dict[str, ParameterDeclaration] = {}
+        for parameter in self.parameters:
+            name = private_name(parameter.name)
+            declared = _declared(replace(parameter, name=name))
+            if name not in parameters or parameters[name].value is None:
+                parameters[name] = declared
+        order = list(PortKind)
+        by_kind = sorted(ports.values(), key=lambda port: order.index(port.kind))
+        return Node(self.name, tuple(by_kind), tuple(parameters.values()), self.position)
+
+
+def private_name(name: str) -> str:
+    """Return a parameter's name as models write it: relative to the node if it is private, else with a slash."""
+    if name.startswith("~"):
+        return name[1:].lstrip("/")
+    return name if name.startswith(("/", "{")) else f"/{name}"
+
+
+def unresolved(name: str, position: Position) -> str:
+    """Return a name with expressions in braces, and its place: unlike any other in its node."""
+    return f"{name}@{position.file}:{position.line}"
+
+
+def unique(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
+    """Return the remarks once each, by file and line."""
+    return tuple(
+        sorted(dict.fromkeys(remarks), key=lambda r: (r.position.file, r.position.line, r.position.column, r.text))
+    )
+
+
+def _declared(parameter: FoundParameter) -> ParameterDeclaration:
+    if parameter.default is None:
+        return ParameterDeclaration(parameter.name, position=parameter.position)
+    try:
+        kind, value = typed(parameter.default)
+    except UnwritableValueError:
+        return ParameterDeclaration(parameter.name, position=parameter.position)
+    return ParameterDeclaration(parameter.name, kind, value, position=parameter.position)

@@ -1,0 +1,1 @@
+"""Files, running nodes, roslaunch: all that reaches outside of the process."""

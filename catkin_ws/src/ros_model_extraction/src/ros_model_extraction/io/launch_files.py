@@ -1,0 +1,217 @@
+"""The system that a launch file starts, as roslaunch itself reads the file, with interfaces from the nodes' sources."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import rospkg
+from ros_model.errors import ModelError
+from ros_model.language.metamodel import PortKind, Reference
+
+from ros_model_extraction import ros_defaults as plumbing
+from ros_model_extraction.found import NodeSource, SourceError
+from ros_model_extraction.io.python_modules import Library
+from ros_model_extraction.io.source_files import read_xml
+from ros_model_extraction.names import executable_name, resolve, split_name
+from ros_model_extraction.packages.catkin_package import CatkinPackage, read_package
+from ros_model_extraction.packages.package_source import named, read_executable
+from ros_model_extraction.running.graph import End, Instance, Models, assemble, label_of, share_out
+
+_SPECIAL = "__"
+
+
+@dataclass(frozen=True)
+class LaunchedNode:
+    """A node as a launch file has it; names are resolved, `remaps` from full name to full name."""
+
+    name: str
+    package: str
+    type: str
+    remaps: Mapping[str, str]
+    private: Mapping[str, Any]  # parameters given as `_name:=value` among its arguments
+
+
+def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
+    """Return the models of what a launch file starts. Programs that it names in `command=` are run, as roslaunch does.
+
+    Args:
+        path: the launch file.
+        arguments: `name:=value`, as for roslaunch.
+
+    Raises:
+        ModelError: roslaunch refuses the file; says what it says.
+    """
+    nodes, parameters = load(path, arguments)
+    tree = _tree(parameters)
+    sources = _Sources()
+    instances = {}
+    lines = []
+    for node in nodes:
+        for name, value in node.private.items():
+            _put(tree, f"{node.name}/{name}", value)
+    names = [node.name for node in nodes]
+    for node in nodes:
+        source = sources.node(node, tree)
+        reference = Reference(node.package, executable_name(node.type), executable_name(split_name(node.name)[1]))
+        instance = Instance(node.name, *label_of(node.name, names), reference)
+        if source is None or not source.is_node:
+            lines.append(f"The interfaces of {node.name} are not known: {sources.problem(node)}.")
+        else:
+            instance.reference = Reference(node.package, executable_name(node.type), named(source, node.type).name)
+            instance.declared = named(source, node.type).declared()
+            instance.ends = _ends(node, source)
+            lines += [f"{node.package}/{remark}" for remark in source.remarks]
+        if executable_name(node.type) != node.type:
+            lines.append(f"The artifact {executable_name(node.type)} is the executable {node.type}.")
+        instances[node.name] = instance
+    unowned = [(key, value) for key, value in share_out(tree, instances) if not plumbing.is_roslaunch_parameter(key)]
+    given = f" with {' '.join(arguments)}" if arguments else ""
+    title = [
+        f"The system that {path.name}{given} starts. Written by rosmodel extract.",
+        "A name with braces is not known from the source: in braces stands the expression, after the @ its place.",
+    ]
+    name = re.sub(r"[^A-Za-z0-9_-]", "_", path.name.partition(".")[0]) or "launch"
+    return assemble(name, instances, unowned, [*title, *dict.fromkeys(lines)])
+
+
+def load(path: Path, arguments: Sequence[str]) -> tuple[list[LaunchedNode], dict[str, Any]]:
+    """Return the nodes of a launch file, and the parameters that it sets, by full name, as roslaunch reads it.
+
+    Raises:
+        ModelError: roslaunch refuses the file.
+    """
+    import roslaunch.config
+    import roslaunch.core
+    import roslaunch.xmlloader
+
+    read_xml(path, "a launch file")
+    for argument in arguments:
+        if ":=" not in argument:
+            raise ModelError(f"argument {argument!r} is not NAME:=VALUE")
+    try:
+        config = roslaunch.config.load_config_default(
+            [(str(path), list(arguments))], None, verbose=False, assign_machines=False
+        )
+    except (roslaunch.core.RLException, roslaunch.xmlloader.XmlParseException, rospkg.ResourceNotFound) as error:
+        raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(error).split())}") from error
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise ModelError(f"{path}: roslaunch can't read it: {type(error).__name__}: {error}") from error
+    if config.config_errors:
+        raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(config.config_errors[0]).split())}")
+    nodes = [_launched(node) for node in config.nodes]
+    return nodes, {name: parameter.value for name, parameter in config.params.items()}
+
+
+def _launched(node: Any) -> LaunchedNode:
+    full = resolve(node.name, f"{node.namespace.rstrip('/')}/_")
+    remaps = [(str(old), str(new)) for old, new in node.remap_args]
+    private = {}
+    try:
+        words = shlex.split(node.args or "")
+    except ValueError:
+        words = (node.args or "").split()
+    for word in words:
+        old, assigned, new = word.partition(":=")
+        if not assigned or old.startswith(_SPECIAL):
+            continue
+        if old.startswith("_"):
+            private[old[1:]] = _scalar(new)
+        else:
+            remaps.append((old, new))
+    resolved = {resolve(old, full): resolve(new, full) for old, new in remaps}
+    return LaunchedNode(full, node.package, node.type, resolved, private)
+
+
+class _Sources:
+    """Reads the source of launched nodes."""
+
+    def __init__(self) -> None:
+        self._packages: dict[str, CatkinPackage | str] = {}
+        self._libraries: dict[str, Library] = {}
+        self._problems: dict[str, str] = {}
+        self._installed = rospkg.RosPack()
+
+    def node(self, node: LaunchedNode, tree: Mapping[str, Any]) -> NodeSource | None:
+        """Return what the source of a node makes of it with these parameters; None where there is no source."""
+        package = self._package(node.package)
+        if isinstance(package, str):
+            self._problems[node.name] = package
+            return None
+        executable = next((e for e in package.executables if e.name == node.type), None)
+        if executable is None:
+            self._problems[node.name] = f"the source of {node.type} is not in {package.folder}"
+            return None
+        library = self._libraries.setdefault(package.name, Library([package.folder / "src"], package.folder))
+        try:
+            return read_executable(package, executable, library, lambda name: _lookup(tree, resolve(name, node.name)))
+        except SourceError as error:
+            self._problems[node.name] = str(error.remark)
+            return None
+
+    def problem(self, node: LaunchedNode) -> str:
+        """Return why a node's interfaces are not known."""
+        return self._problems.get(node.name, f"the source of {node.package}/{node.type} starts no node")
+
+    def _package(self, name: str) -> CatkinPackage | str:
+        if name not in self._packages:
+            try:
+                self._packages[name] = read_package(Path(self._installed.get_path(name)))
+            except rospkg.ResourceNotFound:
+                self._packages[name] = f"the package {name} is not installed"
+            except ModelError as error:
+                self._packages[name] = str(error)
+        return self._packages[name]
+
+
+def _ends(node: LaunchedNode, source: NodeSource) -> list[End]:
+    """Return a node's interfaces by their resolved and remapped names; unresolved names stay as they are."""
+    ends: dict[tuple[PortKind, str], End] = {}
+    for port in source.ports:
+        name = _remapped(port.kind, resolve(port.name, node.name), node.remaps) if port.is_resolved else port.name
+        ends.setdefault((port.kind, name), End(node.name, port.kind, name, port.type, port.name))
+    return [end for end in ends.values() if not plumbing.is_plumbing(end)]
+
+
+def _remapped(kind: PortKind, name: str, remaps: Mapping[str, str]) -> str:
+    if kind in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT):  # a remapping names its topics
+        return remaps.get(f"{name}/goal", f"{name}/goal").removesuffix("/goal")
+    return remaps.get(name, name)
+
+
+def _tree(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    for name, value in sorted(parameters.items()):
+        _put(tree, name, value)
+    return tree
+
+
+def _put(tree: dict[str, Any], name: str, value: Any) -> None:
+    *namespaces, last = name.strip("/").split("/")
+    for part in namespaces:
+        inner = tree.get(part)
+        tree[part] = inner if isinstance(inner, dict) else {}
+        tree = tree[part]
+    tree[last] = value
+
+
+def _lookup(tree: Any, name: str) -> Any:
+    for part in name.strip("/").split("/"):
+        if not isinstance(tree, dict):
+            raise KeyError(name)
+        tree = tree[part]
+    return tree
+
+
+def _scalar(text: str) -> Any:
+    """Return a parameter given on the command line, typed as roslaunch does it."""
+    import yaml
+
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError:
+        return text

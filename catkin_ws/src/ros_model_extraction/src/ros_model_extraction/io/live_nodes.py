@@ -1,0 +1,132 @@
+"""What the master does not know about its nodes and is asked of them: types of services, the programs they run."""
+
+from __future__ import annotations
+
+import http.client
+import io
+import os
+import socket
+import xmlrpc.client
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+from xml.parsers.expat import ExpatError
+
+import rosgraph.network
+import rospkg
+from ros_model.io.master import TimedTransport
+
+from ros_model_extraction.running.details import Details, Origin
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from ros_model.graph.snapshot import GraphSnapshot
+
+_CALLER = "/rosmodel"
+_WORKERS = 16
+_HEADER_PART = 4096
+_UNREADABLE = (OSError, http.client.HTTPException, xmlrpc.client.Error, ExpatError, ValueError, TypeError, LookupError)
+"""What an answer that is late, broken or garbage may raise."""
+
+
+def ask_nodes(snapshot: GraphSnapshot, master: str, timeout: float = 2.0) -> Details:
+    """Ask all nodes, side by side; `timeout` in wall seconds is for each part of an answer. Nothing is raised."""
+    packages = rospkg.RosPack()
+    known = set(packages.list())
+    with ThreadPoolExecutor(_WORKERS) as pool:
+        addresses = _service_addresses(master, snapshot.services, timeout)
+        types = pool.map(lambda service: (service, _service_type(service, addresses[service], timeout)), addresses)
+        pids = dict(pool.map(lambda node: (node.name, _pid(node.uri, timeout)), snapshot.nodes.values()))
+        service_types = {service: type_name for service, type_name in types if type_name}
+    origins, unknown = {}, {}
+    for node, pid in pids.items():
+        found = _origin(pid, known) if isinstance(pid, int) else pid
+        if isinstance(found, Origin):
+            origins[node] = found
+        else:
+            unknown[node] = found
+    dead = frozenset(node for node, answer in pids.items() if answer == _DEAD)
+    return Details(origins, {n: why for n, why in unknown.items() if n not in dead}, service_types, dead)
+
+
+_DEAD = "nobody listens at its address"
+
+
+def _pid(uri: str, timeout: float) -> int | str:
+    """Return the process id of a node on this host, else why there is none."""
+    try:
+        host = urlsplit(uri).hostname or ""
+        with xmlrpc.client.ServerProxy(uri, transport=TimedTransport(timeout)) as proxy:
+            answer: Any = proxy.getPid(_CALLER)
+        pid = int(answer[2])
+    except ConnectionRefusedError:
+        return _DEAD
+    except _UNREADABLE:
+        return "it does not answer"
+    return pid if rosgraph.network.is_local_address(host) else f"it runs on the host {host}"
+
+
+def _origin(pid: int, packages: set[str]) -> Origin | str:
+    """Return the executable of a process, from its command line."""
+    process = Path("/proc") / str(pid)
+    try:
+        arguments = (process / "cmdline").read_bytes().decode("utf-8", "replace").split("\0")
+        folder = (process / "cwd").resolve()
+    except OSError as error:
+        return f"its process {pid} can't be looked at ({error.strerror})"
+    return executable_of(arguments, folder, packages) or f"its program {arguments[0]!r} is in no ROS package"
+
+
+def executable_of(arguments: Sequence[str], folder: Path, packages: Iterable[str]) -> Origin | None:
+    """Return the executable that a command line runs, if it is in a ROS package.
+
+    Args:
+        arguments: the command line; an interpreter may come first, and a module that runs the executable.
+        folder: its working folder.
+        packages: names of the packages that are installed.
+    """
+    known = set(packages)
+    found: Origin | None = None
+    for number, argument in enumerate(arguments):
+        is_option = number and argument.startswith("-")
+        if not argument or is_option or ":=" in argument or (not number and Path(argument).name.startswith("python")):
+            continue
+        path = folder / argument
+        if not path.is_file():
+            break
+        package = path.parent.name if path.parent.name in known else rospkg.get_package_name(str(path))
+        origin = Origin(package, path.name) if package else None
+        if origin and os.access(path, os.X_OK):
+            return origin
+        found = found or origin
+        if origin is None:
+            break  # the program is in no package: what follows are its arguments
+    return found
+
+
+def _service_addresses(master: str, services: Iterable[str], timeout: float) -> dict[str, str]:
+    names = list(services)
+    try:
+        with xmlrpc.client.ServerProxy(master, transport=TimedTransport(timeout)) as proxy:
+            calls = xmlrpc.client.MultiCall(proxy)
+            for name in names:
+                calls.lookupService(_CALLER, name)
+            answers: list[Any] = list(iter(calls()))
+    except _UNREADABLE:
+        return {}
+    return {name: str(answer[2]) for name, answer in zip(names, answers, strict=False) if answer[0] == 1}
+
+
+def _service_type(service: str, uri: str, timeout: float) -> str:
+    """Ask the node that offers a service for its type, as rosservice does; "" where it does not answer."""
+    try:
+        address = urlsplit(uri)
+        with socket.create_connection((address.hostname, address.port), timeout) as connection:
+            question = {"probe": "1", "md5sum": "*", "callerid": _CALLER, "service": service}
+            rosgraph.network.write_ros_handshake_header(connection, question)
+            answer = rosgraph.network.read_ros_handshake_header(connection, io.BytesIO(), _HEADER_PART)
+        return str(answer.get("type", ""))
+    except (*_UNREADABLE, rosgraph.network.ROSHandshakeException):
+        return ""

@@ -1,0 +1,34 @@
+"""What the nodes of a running system tell, beside what their master lists."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The executable that a node runs: its package and the name of its file."""
+
+    package: str
+    executable: str
+
+
+@dataclass(frozen=True)
+class Details:
+    """What the nodes and their processes tell.
+
+    Attributes:
+        origins: executable of each node that could be traced.
+        unknown: node -> why its executable is not known.
+        service_types: service -> type, of those that answered.
+        dead: nodes at whose address nobody listens, though the master lists them.
+    """
+
+    origins: Mapping[str, Origin] = field(default_factory=dict)
+    unknown: Mapping[str, str] = field(default_factory=dict)
+    service_types: Mapping[str, str] = field(default_factory=dict)
+    dead: frozenset[str] = frozenset()

@@ -1,0 +1,273 @@
+"""`rosmodel generate`: what it writes and where, and what it refuses."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+from ros_model.io.models import read_system
+from ros_model.io.project import load_project
+from ros_model.language.metamodel import compose
+from roslaunch.config import load_config_default
+
+SOURCES = Path(__file__).parents[4] / "catkin_ws" / "src"
+BASE = """RosSystem { Name base
+    RosComponents (
+        ComponentInterface { name robot FromRosNode 'p.robot.robot'
+            RosPublishers { RosPublisher odom { RefPublisher 'p.robot.robot.odom' } } },
+        ComponentInterface { name guard FromRosNode 'p.guard.guard'
+            RosSubscribers { RosSubscriber odom { RefSubscriber 'p.guard.guard.odom' } } },
+        ComponentInterface { name nav FromRosNode 'p.nav.nav'
+            RosParameters { RosParameter speed { RefParameter 'p.nav.nav.speed' value 1.0 } } } )
+    TopicConnections { TopicConnection odom { From ( 'robot.odom' ) To ( 'guard.odom' ) } }
+}"""
+SETTINGS = {
+    "package": "robot",
+    "base": "base.rossystem",
+    "variants": {"component": "nav", "table": "v.yaml", "parameters": {"speed": ["speed"]}},
+    "functions": {"f": {"designs": "all"}},
+    "quality_attributes": {"q": {"direction": "lower_is_better"}},
+    "utility": "q",
+    "objectives": {"o": {"function": "f"}},
+}
+
+
+@pytest.fixture
+def models(tmp_path):
+    def write(table, base_text=BASE, folder="models", **settings):
+        path = tmp_path / folder
+        path.mkdir(exist_ok=True)
+        (path / "base.rossystem").write_text(base_text)
+        (path / "v.yaml").write_text(yaml.safe_dump(table))
+        (path / "metacontrol.yaml").write_text(yaml.safe_dump(SETTINGS | settings))
+        return path
+
+    return write
+
+
+def test_optional_component_is_no_part_of_the_base_that_the_monitor_expects(run, models, tmp_path):
+    section = {**SETTINGS["variants"], "components": {"guarded": ["guard"]}}
+    table = {"safe": {"speed": 1, "guarded": True}, "bold": {"speed": 2.5, "guarded": False}}
+    folder = models(table, variants=section)
+    assert run("generate", "all", folder, "-o", tmp_path)[0] == 0
+    monitor = yaml.safe_load((tmp_path / "config/rosgraph_monitor.yaml").read_text())
+    assert monitor["desired_rossystem"] == "package://robot/models/base.core.rossystem"
+    core = read_system(folder / "base.core.rossystem")
+    safe, bold = (read_system(folder / "variants" / f"{name}.rossystem") for name in ("safe", "bold"))
+    assert [component.name for component in compose(core, safe).components] == ["robot", "guard", "nav"]
+    assert [component.name for component in compose(core, bold).components] == ["robot", "nav"]
+    nodes = {
+        name: [
+            node.name for node in load_config_default([str(tmp_path / f"launch/variants/{name}.launch")], None).nodes
+        ]
+        for name in ("safe", "bold")
+    }
+    assert nodes == {"safe": ["guard", "nav"], "bold": ["nav"]}
+
+
+def test_generating_twice_gives_the_same_bytes(run, models, tmp_path):
+    folder = models({"a": {"speed": 1}, "b": {"speed": 0.5}})
+    for output in ("one", "two"):
+        assert run("generate", "all", folder, "-o", tmp_path / output)[0] == 0
+    one, two = (
+        {path.relative_to(root): path.read_bytes() for path in root.rglob("*") if path.is_file()}
+        for root in (tmp_path / "one", tmp_path / "two")
+    )
+    assert one == two
+    assert len(one) == 2 + 2 + 3 + 1
+
+
+def test_files_of_a_variant_that_is_gone_are_told_and_left(run, models, tmp_path):
+    assert run("generate", "all", models({"a": {"speed": 1}, "b": {"speed": 0.5}}), "-o", tmp_path)[0] == 0
+    (tmp_path / "launch/variants/mine.launch").write_text("<launch/>")
+    _, out, _ = run("generate", "all", models({"a": {"speed": 1}}), "-o", tmp_path)
+    told = [line.split()[0] for line in out.splitlines() if "delete it" in line]
+    assert told == [str(tmp_path / "models/variants/b.rossystem"), str(tmp_path / "launch/variants/b.launch")]
+    assert all(Path(path).is_file() for path in told)
+
+
+def test_hand_written_variants_are_left_alone_and_others_put_beside_them(run, models, tmp_path):
+    folder = models({}, variants=[{}, {"files": ["arm.rossystem"]}])
+    (folder / "arm.rossystem").write_text("RosSystem { Name one_arm }")
+    (folder / "variants").mkdir()
+    mine = folder / "variants" / "mine.rossystem"
+    mine.write_text("RosSystem{Name mine}")
+    assert run("generate", "variants", folder, "-o", tmp_path)[0] == 0
+    assert mine.read_text() == "RosSystem{Name mine}"
+    assert read_system(folder / "variants" / "one_arm.rossystem").name == "one_arm"
+
+
+def test_lone_system_gets_a_launch_file(run, models, tmp_path):
+    folder = models({"a": {"speed": 1}})
+    status, out, _ = run("generate", "launch", folder / "base.rossystem", "-o", tmp_path)
+    assert (status, out) == (0, f"launch: {tmp_path / 'launch/base.launch'}\n")
+    config = load_config_default([str(tmp_path / "launch/base.launch")], None)
+    assert [node.name for node in config.nodes] == ["robot", "guard", "nav"]
+
+
+def test_models_that_generated_files_would_not_find_are_refused(run, models, tmp_path):
+    folder = models({"a": {"speed": 1}}, folder="my_models")
+    status, _, err = run("generate", "all", folder, "-o", tmp_path)
+    assert status == 2
+    assert f"generated files look for the models in {tmp_path / 'models'}" in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my_models"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["launch"], "Missing 'MODELS'"),
+        (["launch", "models"], "Missing option '-o'"),
+        (["poems", "{models}", "-o", "."], "no generator 'poems': there are deployment, launch"),
+        (
+            ["deployment", "{models}/base.rossystem", "-o", "."],
+            "base.rossystem: is one system, and deployment needs a p",
+        ),
+        (["deployment", "{models}/r.ros", "-o", "."], "r.ros: is no project: give the folder of metacontrol.yaml"),
+        (["all", "{models}/none", "-o", "."], "No such file"),
+        (["launch", "{models}/v.yaml", "-o", "."], "v.yaml:1:1: package: is missing"),
+    ],
+)
+def test_wrong_arguments_are_refused(run, models, arguments, message):
+    folder = models({"a": {"speed": 1}})
+    (folder / "r.ros").touch()
+    status, _, err = run("generate", *(argument.format(models=folder) for argument in arguments))
+    assert status == 2
+    assert message in err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("'p.nav.nav'", "'../../bin.sh.x'", "base.rossystem:7:51: reference '../../bin.sh.x' is not"),
+        ("'p.nav.nav'", "'p.$(env HOME).nav'", "base.rossystem:7:9: '$(env HOME)' can't name a package or executable"),
+        ("'p.nav.nav'", "'p.bin/sh.nav'", "base.rossystem:7:9: 'bin/sh' can't name a package or executable"),
+        ("name nav", "name 'nav\" args=\"x'", "base.rossystem:7:9: 'nav\" args=\"x' is no name of ROS"),
+        ("name nav", "name '$(arg x)'", "is no name of ROS"),
+        ("name nav", "name nav NameSpace '../up'", "is no name of ROS"),
+    ],
+)
+def test_model_that_reaches_outside_or_injects_is_refused_at_its_place(run, models, tmp_path, old, new, message):
+    folder = models({}, base_text=BASE.replace(old, new), variants={"files": ["base.rossystem"]})
+    status, _, err = run("generate", "launch", folder, "-o", tmp_path / "out")
+    assert status == 2
+    assert message in err.splitlines()[0]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "line"),
+    [
+        ("base", "../other.rossystem", "metacontrol.yaml:1:1: base: ../other.rossystem leaves the folder"),
+        ("base", "/etc/passwd", "metacontrol.yaml:1:1: base: /etc/passwd leaves the folder"),
+        ("variants", {"table": "/etc/v.csv"}, "variants.table: /etc/v.csv leaves the folder"),
+        ("variants", {"files": ["../../v.rossystem"]}, "variants.files[0]: ../../v.rossystem leaves the folder"),
+        ("package", "../up", "package: is '../up', must be a name"),
+        ("base", "a\0b", "base: 'a\\x00b' is no name of a file"),
+    ],
+)
+def test_path_outside_the_models_is_refused_at_its_place(run, models, tmp_path, key, value, line):
+    folder = models({"a": {"speed": 1}}, **{key: value})
+    status, _, err = run("generate", "all", folder, "-o", tmp_path / "out")
+    assert status == 2
+    assert line in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_value_that_roslaunch_would_evaluate_is_refused_at_its_row(run, models, tmp_path):
+    folder = models({"a": {"speed": 1.0}, "b": {"speed": "$(eval 1)"}})
+    status, _, err = run("generate", "launch", folder, "-o", tmp_path / "out")
+    assert status == 2
+    assert "v.yaml:3:1: '$(eval 1)' holds '$('" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_link_that_leads_out_of_the_output_is_not_followed(run, models, tmp_path):
+    folder = models({"a": {"speed": 1}})
+    (tmp_path / "out").mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "out" / "launch").symlink_to(tmp_path / "elsewhere")
+    status, _, err = run("generate", "launch", folder, "-o", tmp_path / "out")
+    assert status == 2
+    assert "leaves the folder" in err
+    assert not any((tmp_path / "elsewhere").iterdir())
+
+
+@pytest.fixture
+def outside(tmp_path, monkeypatch):
+    """A package outside, found on ROS_PACKAGE_PATH, with a generator of this text."""
+
+    def write(text, function="poetry_by_{name}:write"):
+        name = f"p{abs(hash(tmp_path))}"
+        source = tmp_path / "outside" / "poetry"
+        source.mkdir(parents=True)
+        (source / "package.xml").write_text(
+            "<package format='2'><name>poetry</name><version>0.0.1</version><description>x</description>"
+            "<maintainer email='a@b.example'>a</maintainer><license>x</license><exec_depend>ros_model</exec_depend>"
+            f"<export><ros_model generator='poems' function='{function.format(name=name)}'/></export></package>"
+        )
+        (source / f"poetry_by_{name}.py").write_text(text)
+        monkeypatch.setenv("ROS_PACKAGE_PATH", f"{source.parent}:{SOURCES}")
+        monkeypatch.syspath_prepend(str(source))
+
+    return write
+
+
+def test_generator_from_outside_runs_with_all_others(run, models, outside, tmp_path):
+    outside(
+        "from ros_model.generators import write_file\n"
+        "def write(project, output):\n"
+        "    return [write_file(output / 'poem.txt', ' '.join(v.name for v in project.variants), output)]\n"
+    )
+    status, out, _ = run("generate", "all", models({"a": {"speed": 1}, "b": {"speed": 2}}), "-o", tmp_path)
+    assert status == 0
+    assert [line.partition(":")[0] for line in out.splitlines()] == [
+        "variants",
+        "launch",
+        "deployment",
+        "observer",
+        "poems",
+        "tomasys",
+    ]
+    assert (tmp_path / "poem.txt").read_text() == "a b"
+    assert "poems" in run("generate", "--help")[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "function", "message"),
+    [
+        ("def write(project, output):\n    return 1 / 0\n", "poetry_by_{name}:write", "fails: ZeroDivisionError"),
+        ("import nowhere_to_be_found\n", "poetry_by_{name}:write", "No module named 'nowhere_to_be_found'"),
+        ("", "poetry_by_{name}:write", "has no attribute 'write'"),
+        ("", "", "names no function"),
+        (
+            "from ros_model.generators import write_file\n"
+            "def write(project, output):\n    return [write_file(output / '..' / 'x', '', output)]\n",
+            "poetry_by_{name}:write",
+            "leaves the folder",
+        ),
+    ],
+)
+def test_broken_generator_from_outside_is_told_in_one_line(run, models, outside, tmp_path, text, function, message):
+    outside(text, function)
+    status, _, err = run("generate", "poems", models({"a": {"speed": 1}}), "-o", tmp_path / "out")
+    assert status == 2
+    assert err.count("\n") == 1
+    assert message in err
+
+
+def test_help_names_the_generators(run):
+    status, out, _ = run("generate", "--help")
+    assert status == 0
+    assert "variants, launch, deployment" in " ".join(out.split())
+
+
+def test_names_of_generators_complete(run):
+    from click.shell_completion import ShellComplete
+    from ros_model.cli.rosmodel import command
+
+    found = ShellComplete(command, {}, "rosmodel", "_ROSMODEL_COMPLETE").get_completions(["generate"], "la")
+    assert [item.value for item in found] == ["launch"]
+
+
+def test_project_of_d2_loads_unchanged_through_its_file():
+    assert load_project(SOURCES / "metacontrol_sim" / "models").base_file == "d2.rossystem"

@@ -1,0 +1,139 @@
+"""`rosmodel init`: a first metacontrol.yaml that checks clean as it is, and never takes the place of one."""
+
+import errno
+from pathlib import Path
+
+import pytest
+import yaml
+from ros_model.io.project import load_project
+
+D2 = Path(__file__).parents[4] / "catkin_ws" / "src" / "metacontrol_sim" / "models" / "d2.rossystem"
+ARM = """RosSystem { Name 'Arm-7 "x"'
+    RosComponents (
+        ComponentInterface { name cell FromRosNode 'p.cell.cell' RosPublishers { RosPublisher light { RefPublisher 'p.cell.cell.light' } } },
+        ComponentInterface { name arm NameSpace left FromRosNode 'p.arm.arm'
+            RosActionServers { RosActionServer move { RefServer 'p.arm.arm.move' } }
+            RosParameters {
+                RosParameter speed { RefParameter 'p.arm.arm.limits/speed' value 0.5 },
+                RosParameter speed { RefParameter 'p.arm.arm.other/speed' value 1 },
+                RosParameter on { RefParameter 'p.arm.arm.on' value true },
+                RosParameter id { RefParameter 'p.arm.arm.id' value '15' },
+                RosParameter tool { RefParameter 'p.arm.arm.tool' value 'a, "b"' },
+                RosParameter joints { RefParameter 'p.arm.arm.joints' value { 1, 2 } },
+                RosParameter rate { RefParameter 'p.arm.arm.rate' } } } ) }"""  # noqa: E501
+
+
+@pytest.fixture
+def base(tmp_path):
+    def write(text, name="base.rossystem"):
+        folder = tmp_path / "my_robot" / "models"
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+        return folder / name
+
+    return write
+
+
+@pytest.mark.parametrize(
+    "text", [D2.read_text(), ARM, ARM.replace("name arm", "name 'arm'").replace("left", "'/left'")]
+)
+def test_first_project_checks_clean_and_generates(run, base, text):
+    path = base(text)
+    assert run("init", path)[0] == 0
+    assert run("check", path.parent)[0] == 0
+    status, out, _ = run("generate", "all", path.parent, "-o", path.parent.parent)
+    assert status == 0
+    assert "launch: 1 file" in out
+
+
+def test_what_varies_is_what_acts_or_what_is_said(run, base):
+    assert run("init", base(D2.read_text()))[0] == 0
+    project = load_project(base(D2.read_text()).parent)
+    assert project.settings["variants"]["component"] == "move_base"
+    other = base(D2.read_text()).parent.parent / "other.rossystem"
+    other.write_text(D2.read_text())
+    assert run("init", other, "--component", "camera", "--package", "mine", "--qa", "safety", "--qa", "energy")[0] == 0
+    settings = yaml.safe_load((other.parent / "metacontrol.yaml").read_text())
+    assert (settings["variants"]["component"], settings["package"]) == ("camera", "mine")
+    assert list(settings["quality_attributes"]) == ["safety", "energy", "performance"]
+
+
+def test_table_has_the_values_of_the_base(run, base):
+    path = base(ARM)
+    assert run("init", path)[0] == 0
+    header, row = (path.parent / "variants.csv").read_text().splitlines()
+    assert header == "name,speed,other/speed,on,tool"
+    assert row == 'arm_7_x_default,0.5,1,true,"a, ""b"""'
+    (variant,) = load_project(path.parent).variants
+    (arm,) = variant.components
+    values = {parameter.key: parameter.value for parameter in arm.parameters}
+    assert values == {
+        "limits/speed": 0.5,
+        "other/speed": 1,
+        "on": True,
+        "tool": 'a, "b"',
+        "id": "15",
+        "joints": [1, 2],
+        "rate": None,
+    }
+
+
+def test_package_is_the_one_around_the_models(run, base):
+    path = base(ARM)
+    (path.parent.parent / "package.xml").write_text(
+        "<package format='2'><name>arm_models</name><version>0.1.0</version><description>x</description>"
+        "<maintainer email='a@b.example'>a</maintainer><license>x</license></package>"
+    )
+    assert run("init", path)[0] == 0
+    assert load_project(path.parent).package == "arm_models"
+
+
+def test_package_is_named_by_its_folder_without_a_package_xml(run, base):
+    path = base(ARM)
+    assert run("init", path)[0] == 0
+    assert load_project(path.parent).package == "my_robot"
+
+
+@pytest.mark.parametrize("name", ["metacontrol.yaml", "variants.csv", "qa.csv"])
+def test_nothing_is_overwritten(run, base, name):
+    path = base(ARM)
+    (path.parent / name).write_text("mine")
+    status, _, err = run("init", path)
+    assert status == 2
+    assert f"{path.parent / name}: is there already" in err
+    assert sorted(file.name for file in path.parent.iterdir()) == sorted(["base.rossystem", name])
+    assert (path.parent / name).read_text() == "mine"
+
+
+def test_folder_in_place_of_the_base_is_refused(run, tmp_path):
+    status, _, err = run("init", tmp_path)
+    assert (status, err) == (2, f"rosmodel: {tmp_path}: is a folder: give the .rossystem file of the base system\n")
+
+
+def test_file_that_can_not_be_written_is_told_by_its_own_name(run, base, monkeypatch):
+    def refuse(*_arguments, **_options):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    path = base(ARM)
+    monkeypatch.setattr(Path, "write_text", refuse)
+    status, _, err = run("init", path)
+    written = path.parent / "metacontrol.yaml"
+    assert (status, err) == (2, f"rosmodel: {written}: can't be written (Permission denied): check its folder\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "arguments", "message"),
+    [
+        ("RosSystem { Name empty }", [], "base.rossystem:1:1: has no component with a FromRosNode"),
+        (ARM, ["--component", "leg"], "'leg' is no component with a FromRosNode; there are cell, arm"),
+        (ARM, ["--package", "../up"], "--package '../up' is no name"),
+        (ARM, ["--qa", "a b"], "--qa 'a b' is no name"),
+        ("RosSystem {", [], "base.rossystem:1:12"),
+    ],
+)
+def test_what_can_not_become_a_project_is_refused(run, base, text, arguments, message):
+    path = base(text)
+    status, _, err = run("init", path, *arguments)
+    assert status == 2
+    assert message in err
+    assert [file.name for file in path.parent.iterdir()] == ["base.rossystem"]
