@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING
 from node_kit.plugins import exported
 
 from ros_model.errors import ModelError
-from ros_model.io.files import write_file, write_files
+from ros_model.io.files import write_file as write_file  # for generators of other packages
+from ros_model.io.files import write_files as write_files
 
 if TYPE_CHECKING:
     from ros_model.project.project import Project
-
-__all__ = ["Generator", "find_generators", "write_file", "write_files"]
 
 Generator = Callable[["Project", Path], list[Path]]
 
