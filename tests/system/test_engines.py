@@ -73,7 +73,7 @@ def test_interrupted_comparison_ends_its_mission(tmp_path):
     with subprocess.Popen(compare(tmp_path, "--seeds", "1"), stderr=subprocess.PIPE, text=True) as process:
         assert wait_until(lambda: process.poll() is not None or console.exists(), 60.0)
         process.send_signal(signal.SIGTERM)
-        _, said = process.communicate(timeout=60.0)
+        _, said = process.communicate(timeout=150.0)
     assert process.returncode == 130, said
     assert "interrupted" in said and "Traceback" not in said
     assert not (tmp_path / "ros_1" / "summary.json").exists()

@@ -120,7 +120,7 @@ def test_interrupted_mission_leaves_nothing_but_its_bag(tmp_path):
             time.sleep(0.1)
         assert left_behind(tmp_path)
         os.kill(process.pid, signal.SIGINT)
-        _, said = process.communicate(timeout=60.0)
+        _, said = process.communicate(timeout=150.0)
     assert process.returncode == 130, said
     assert left_behind(tmp_path) == []
     assert (tmp_path / "mission.bag").exists()

@@ -95,7 +95,7 @@ def running_d2(folder: Path) -> Iterator[str]:
     finally:
         process.send_signal(signal.SIGINT)
         try:
-            process.wait(timeout=30.0)
+            process.wait(timeout=150.0)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
@@ -123,7 +123,7 @@ def seen(tmp_path_factory):
 
 def rosmodel(*arguments: object) -> subprocess.CompletedProcess[str]:
     command = ["rosmodel", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
 def test_snapshot_checks_and_lacks_no_component_of_the_models(seen):

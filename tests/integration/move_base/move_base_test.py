@@ -27,7 +27,7 @@ from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
 
-DEADLINE_S = 20
+DEADLINE_S = 150
 HALF_ROOM = 5.0
 PERIOD = 0.02
 

@@ -16,7 +16,7 @@ import pytest
 import yaml
 from metacontrol_experiments.io.processes import free_port
 
-DEADLINE_S = 60
+DEADLINE_S = 150
 HERE = Path(__file__).resolve().parent
 INTEGRATION = HERE.parent
 PACKAGES = HERE.parents[2] / "catkin_ws" / "src"

@@ -16,7 +16,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 from visualization_msgs.msg import MarkerArray
 
-DEADLINE_S = 40.0
+DEADLINE_S = 150
 
 
 class Heard:

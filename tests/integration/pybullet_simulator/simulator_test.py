@@ -43,7 +43,7 @@ TOPICS = {
     "power_load": Float32,
 }
 
-DEADLINE_S = 30.0
+DEADLINE_S = 150
 
 
 class Latest:

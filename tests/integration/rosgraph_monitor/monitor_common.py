@@ -39,7 +39,7 @@ class Diagnostics:
     def statuses(self, name, message):
         return [status for status in self.all() if (status.name, status.message) == (name, message)]
 
-    def wait(self, what, condition, timeout=40.0):
+    def wait(self, what, condition, timeout=150.0):
         """Return arrival time and status of the first one that meets the condition since the last `forget`."""
         end = time.monotonic() + timeout
         with self._changed:
@@ -51,7 +51,7 @@ class Diagnostics:
                     seen = sorted({f"{s.name}: {s.message} {[v.value for v in s.values]}" for _, s in self._seen})
                     raise AssertionError(f"no {what} within {timeout} s; seen: {seen}")
 
-    def wait_status(self, name, message, value=None, timeout=40.0):
+    def wait_status(self, name, message, value=None, timeout=150.0):
         def fits(status):
             return (status.name, status.message) == (name, message) and (
                 value is None or value in [entry.value for entry in status.values]
@@ -106,7 +106,7 @@ class GraphTest(unittest.TestCase):
 
     def expect_order(self):
         self.seen.forget()
-        self.seen.wait_status("ROS Graph", "running OK", timeout=60.0)
+        self.seen.wait_status("ROS Graph", "running OK", timeout=150.0)
 
     def restore(self, name):
         self.start(name)

@@ -131,7 +131,7 @@ class MonitorMasterTest(unittest.TestCase):
 
     def expect_end(self, process, *words, status=0):
         """Wait until it has ended, with one line on stderr that holds these words, or none where there are none."""
-        _, stderr = process.communicate(timeout=40.0)
+        _, stderr = process.communicate(timeout=150.0)
         self.assertEqual(process.returncode, status, stderr)
         self.assertEqual(len(stderr.strip().splitlines()), bool(words), stderr)
         for word in words:
@@ -171,7 +171,7 @@ class MonitorMasterTest(unittest.TestCase):
         proxy.mode = "silent"
         wait_for(lambda: proxy.swallowed, 30.0)
         monitor.terminate()
-        monitor.communicate(timeout=40.0)
+        monitor.communicate(timeout=150.0)
         self.assertIn(monitor.returncode, (0, -signal.SIGTERM))
 
     def test_slow_master_is_no_problem_and_one_that_answers_garbage_is_told_and_forgiven(self):

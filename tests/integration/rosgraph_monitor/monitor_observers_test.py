@@ -22,7 +22,7 @@ class MonitorObserversTest(unittest.TestCase):
         rospy.init_node("monitor_observers_test")
         cls.seen = Diagnostics()
         for service in ("load_observer", "unload_observer", "active_observers", "list_observers"):
-            rospy.wait_for_service(service, timeout=60.0)
+            rospy.wait_for_service(service, timeout=150.0)
         cls.load = rospy.ServiceProxy("load_observer", LoadObserver)
         cls.unload = rospy.ServiceProxy("unload_observer", UnloadObserver)
         cls.active = rospy.ServiceProxy("active_observers", ListObservers)
@@ -37,7 +37,7 @@ class MonitorObserversTest(unittest.TestCase):
         self.assertTrue(self.load(f"monitor_observers:{name}").ok)
         self.addCleanup(self.unload, f"monitor_observers:{name}")
 
-    def wait_qa(self, observer, text="", timeout=40.0):
+    def wait_qa(self, observer, text="", timeout=150.0):
         _, status = self.seen.wait(
             f"{text or 'level'} of {observer}",
             lambda s: s.hardware_id == observer and (text in s.values[0].value if text else s.message == "QA status"),

@@ -29,7 +29,7 @@ class MonitorTest(unittest.TestCase):
         cls.configuration = rospy.Publisher(
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, queue_size=5, latch=True
         )
-        cls.seen.wait_status("ROS Graph", "running OK", timeout=60.0)
+        cls.seen.wait_status("ROS Graph", "running OK", timeout=150.0)
         cls.seen.wait_status("laser_resender", "Component status", "TRUE")
 
     @classmethod
@@ -120,7 +120,7 @@ class MonitorTest(unittest.TestCase):
         rospy.set_param("/navigation/planner/max_vel", 0.3)
         self.start("navigation")
         self.seen.forget()
-        rospy.wait_for_service("/navigation/get_loggers", timeout=40.0)
+        rospy.wait_for_service("/navigation/get_loggers", timeout=150.0)
         self.activate("slow", FunctionGrounding.STABLE)
         self.seen.wait_status("navigation", "Component status", "TRUE")
         self.assertEqual(self.seen.statuses("navigation", "Missing node"), [])

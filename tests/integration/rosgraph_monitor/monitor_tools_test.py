@@ -18,7 +18,7 @@ def run(*command, environment=None):
         env=os.environ | (environment or {}),
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
     )
 

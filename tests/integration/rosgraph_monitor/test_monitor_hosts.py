@@ -52,7 +52,7 @@ def test_node_on_another_host(other_host, tmp_path):
     }
     environment.pop("ROS_MASTER_URI", None)
     done = subprocess.run(
-        ["/usr/bin/rostest", str(FILE)], env=environment, capture_output=True, text=True, timeout=170, check=False
+        ["/usr/bin/rostest", str(FILE)], env=environment, capture_output=True, text=True, timeout=430, check=False
     )
     results = "\n".join(path.read_text() for path in (tmp_path / "test_results").rglob("*.xml"))
     assert done.returncode == 0, f"{done.stdout[-6000:]}\n{results[-6000:]}"

@@ -13,7 +13,7 @@ from mros1_reasoner.pellet.owlready import OwlreadyReasoner
 from mros1_reasoner.pellet.process import ChildLostError, NoJavaError, PelletReasoner, SteadyReasoner, make_reasoner
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
-DEADLINE_S = 20.0
+DEADLINE_S = 150.0
 
 
 def wait_for(condition):

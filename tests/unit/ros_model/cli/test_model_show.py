@@ -169,7 +169,7 @@ def complete(line, folder):
         capture_output=True,
         text=True,
         check=True,
-        timeout=60,
+        timeout=300,
     )
     return [tuple(entry.split(",", 1)) for entry in done.stdout.splitlines()]
 

@@ -73,7 +73,7 @@ def test_command_roslaunch_finds_one(workspace, on_path):
         env={**os.environ, "ROS_LOG_DIR": str(workspace.parent)},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=True,
     )
     assert found.stdout.split() == ["/move_base"]

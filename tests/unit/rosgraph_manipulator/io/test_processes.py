@@ -11,7 +11,7 @@ import pytest
 from rosgraph_manipulator.io import processes
 from rosgraph_manipulator.io.processes import MARK, Command, StartError
 
-DEADLINE_S = 30
+DEADLINE_S = 150.0
 
 
 def wait_for(condition, what):
