@@ -13,11 +13,11 @@ import pytest
 from click.testing import CliRunner
 from metacontrol_bags import messages
 from metacontrol_bags.bag import read_record
+from metacontrol_bags.decision import Decision
 from metacontrol_bags.figure import configuration_spans, draw
 from metacontrol_bags.record import (
     ComponentReport,
     ConfigurationReport,
-    DecisionReport,
     Event,
     MissionRecord,
     QualityReport,
@@ -97,7 +97,7 @@ def test_timeline_tells_changes_only():
             QualityReport(2.6, "safety", None),
             ConfigurationReport(2.7, "f_navigate", "a", "STABLE"),
             ConfigurationReport(2.8, "f_navigate", "b", "RECONFIGURING"),
-            DecisionReport(2.9, "1", "EXECUTED", "o_navigate", "component:front_laser", "a", "b"),
+            Decision("1", "EXECUTED", "o_navigate", "component:front_laser", "a", "b", stamp=2.9),
             ComponentReport(3.0, "front_laser", "RECOVERED"),
             ComponentReport(3.1, "front_laser", "TRUE"),
             Event(4.0, "MISSION_END", "r1", {"outcome": "reached", "reason": "goal reached"}),
@@ -116,7 +116,7 @@ def test_timeline_tells_changes_only():
 
 
 def test_decision_tells_analysis_and_plan():
-    report = DecisionReport(1.0, "1", "DECIDED", "o_navigate", "qa:energy", "a", "b", degraded=True)
+    report = Decision("1", "DECIDED", "o_navigate", "qa:energy", "a", "b", stamp=1.0, degraded=True)
     analysis, plan = Timeline({}).tell(report)
     assert (analysis.step, analysis.text) == ("R2", "o_navigate is violated by qa:energy")
     assert (plan.step, plan.text) == ("R3", "a -> b, degraded")

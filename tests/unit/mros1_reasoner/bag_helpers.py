@@ -8,7 +8,7 @@ import yaml
 from mros1_reasoner.loop import journal
 from mros1_reasoner.loop.journal import Entry, entry
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.planning.record import fill_message, record_of
+from mros1_reasoner.ros.messages import fill_decision
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -38,9 +38,9 @@ class Types:
     def header(self, stamp):
         return self.store.types["std_msgs/msg/Header"](seq=0, stamp=self.time(stamp), frame_id="")
 
-    def decision(self, record, stamp):
+    def decision(self, decision, stamp):
         empty = {name: None for name in self.Decision.__dataclass_fields__ if name != "header"}
-        return fill_message(self.Decision(header=self.header(stamp), **empty), record, self.time, self)
+        return fill_decision(self.Decision(header=self.header(stamp), **empty), decision, self.time, self)
 
 
 class Bag:
@@ -64,8 +64,8 @@ class Bag:
         data = self.types.store.serialize_ros1(message, kind)
         self._writer.write(self._connections[topic], round(stamp * 1e9), data)
 
-    def decision(self, record, stamp, topic="/mros1_reasoner/decision"):
-        self.write(topic, "metacontrol_msgs/msg/Decision", self.types.decision(record, stamp), stamp)
+    def decision(self, decision, stamp, topic="/mros1_reasoner/decision"):
+        self.write(topic, "metacontrol_msgs/msg/Decision", self.types.decision(decision, stamp), stamp)
 
     def journal(self, stamp, entries, first, name, parameters=None, files=None, topic="/mros1_reasoner/journal"):
         message = self.types.ReasonerJournal(
@@ -115,7 +115,7 @@ class Life:
         item = entry(now, kind, *values)
         decisions = journal.apply(self.core, item)
         self.entries += [item, *journal.decided(now, decisions)]
-        self.decisions += [(now, record_of(decision)) for decision in decisions]
+        self.decisions += [(now, decision) for decision in decisions]
 
     def live(self, until, given, start=0.0, period=0.1):
         """Take in what is given as (stamp, kind, *values), look in between, carry requests out."""

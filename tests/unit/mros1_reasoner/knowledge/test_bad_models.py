@@ -33,7 +33,7 @@ def test_design_that_requires_what_nothing_solves_is_not_chosen(load, pellet):
     core = Mape(knowledge_base, pellet, [OBJECTIVE], Settings(start_grace=0.0))
     (decision,) = core.step(0.0)
     assert decision.to_configuration == "scan_slower"
-    refused = {c.design.name: c.refused_because for c in decision.candidates}
+    refused = {c.name: c.refused_because for c in decision.candidates}
     assert refused["scan_slow"] == "requires f_fly, which no design can provide now"
 
 
@@ -53,7 +53,7 @@ def test_design_without_levels_is_told_and_not_chosen_where_there_are_limits(loa
     assert "FunctionDesign bare has no expected quality levels" in caplog.text
     pellet.load(knowledge_base.ontology)
     (decision,) = Mape(knowledge_base, pellet, [OBJECTIVE], Settings(start_grace=0.0)).step(0.0)
-    refused = {c.design.name: c.refused_because for c in decision.candidates}
+    refused = {c.name: c.refused_because for c in decision.candidates}
     assert refused["bare"] == "no energy is expected of it; no safety is expected of it"
 
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
+from metacontrol_bags.decision import DECIDED
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Design, Direction, Objective, Quality
 from mros1_reasoner.loop.levels import Levels
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning.decision import DECIDED
 from mros1_reasoner.planning.planner import Situation, difference, plan
 
 D2 = Path(__file__).parents[4] / "catkin_ws" / "src" / "metacontrol_sim" / "models" / "d2.owl"
@@ -112,7 +112,7 @@ def test_decision_tells_the_factor(mission, d2):
         f"energy was 1.6 times what was expected of {START}: 1.6 times (at most 2.5) is expected of the others"
     )
     assert text in decision.explanation
-    refused = {c.design.name: c.refused_because for c in decision.candidates}
+    refused = {c.name: c.refused_because for c in decision.candidates}
     level = 1.6 * expected_energy(d2, "f1_v2_r1")
     assert refused["f1_v2_r1"].startswith(f"energy {level:.3g} (expected, times 1.6) > 0.62")
     assert "_v1_" in decision.to_configuration

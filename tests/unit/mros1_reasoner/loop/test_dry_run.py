@@ -1,9 +1,9 @@
 """In a dry run the loop tells what it would do, once, and has nothing done."""
 
 import pytest
+from metacontrol_bags.decision import ADVISED, FAILED
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning.decision import ADVISED, FAILED
 from reasoner_helpers import OBJECTIVE
 
 

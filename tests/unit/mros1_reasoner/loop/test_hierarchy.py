@@ -2,12 +2,12 @@
 
 import pytest
 from hierarchy_helpers import D1, PICK_AND_PLACE, model
+from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.mape import Mape, MapeError
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning.decision import DECIDED, EXECUTED, FAILED
 
 
 class Robot:
@@ -128,7 +128,7 @@ def test_decision_that_climbs_names_what_failed_and_what_is_released(one_arm):
     assert decision.trigger == "component:rgbd"
     assert decision.reasons[0].rules == "compError, compErrFG, S1a, S6b"
     assert decision.releases == ("o_F1", "o_F2")
-    refused = {c.design.name: c.refused_because for c in decision.candidates}
+    refused = {c.name: c.refused_because for c in decision.candidates}
     assert refused["FD1"] == "requires F1, which no design can provide now"
 
 

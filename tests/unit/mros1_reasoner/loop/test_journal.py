@@ -1,10 +1,10 @@
 """Entries of the journal: what the loop takes in by them, and what stays of a long one."""
 
 import pytest
+from metacontrol_bags.decision import DECIDED, EXECUTED
 from mros1_reasoner.loop.journal import Entry, Journal, apply, decided, entry
 from mros1_reasoner.loop.mape import Mape, MapeError
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning.decision import DECIDED, EXECUTED
 from reasoner_helpers import OBJECTIVE
 
 

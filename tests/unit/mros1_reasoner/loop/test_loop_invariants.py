@@ -5,10 +5,10 @@ import contextlib
 from hierarchy_helpers import COMPONENTS, D1, model
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from metacontrol_bags.decision import DECIDED
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.mape import Mape, MapeError
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning.decision import DECIDED
 
 DESIGNS = {**D1, "FD3": ("F3", 0.5, ("F2",)), "FD3.0": ("F3", 0.4, ())}
 ROOTS = (Objective("o_build", "F0", {"error": 0.5}), Objective("o_look", "F3"))

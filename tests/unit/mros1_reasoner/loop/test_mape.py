@@ -3,11 +3,11 @@ import math
 from dataclasses import replace
 
 import pytest
+from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop.mape import Mape, MapeError
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning.decision import DECIDED, EXECUTED, FAILED
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
 
@@ -62,7 +62,7 @@ def test_killed_laser_takes_the_camera_design_of_highest_utility_that_keeps_the_
     assert decision.state == DECIDED
     assert decision.stamp_monitored == pytest.approx(0.9)
     assert not decision.degraded
-    refused = {c.design.name: c.refused_because for c in decision.candidates}
+    refused = {c.name: c.refused_because for c in decision.candidates}
     assert refused["scan_slower"] == "requires laser, which does not work"
     assert refused["camera_fast"] == "energy 0.7 > 0.62; safety 0.7 > 0.6"
     assert refused["camera_slower"] == ""
@@ -144,7 +144,7 @@ def test_failed_reconfiguration_is_logged_and_another_tried_after_the_back_off(c
     assert core.step(2.5) == []
     (second,) = core.step(core.due(2.5))
     assert second.to_configuration == "camera_slower"
-    refused = {c.design.name: c.refused_because for c in second.candidates}
+    refused = {c.name: c.refused_because for c in second.candidates}
     assert "could not be deployed (it did not come up)" in refused["camera_slow"]
 
 

@@ -4,11 +4,11 @@ import math
 from dataclasses import replace
 
 import pytest
+from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED, PROPOSED
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.mape import Mape, MapeError
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning.decision import DECIDED, EXECUTED, FAILED, PROPOSED
 from reasoner_helpers import DESIGNS, OBJECTIVE
 
 

@@ -18,13 +18,13 @@ def choose(*designs, objective=OBJECTIVE, utility=UTILITY, distance=difference, 
 
 
 def reasons(result):
-    return {candidate.design.name: candidate.refused_because for candidate in result.candidates}
+    return {candidate.name: candidate.refused_because for candidate in result.candidates}
 
 
 def test_highest_utility_wins():
     result = choose(design("a", use=0.5), design("b", use=0.9), design("c", use=0.7))
     assert result.choice == "b"
-    assert [c.design.name for c in result.candidates] == ["b", "c", "a"]
+    assert [c.name for c in result.candidates] == ["b", "c", "a"]
     assert [c.chosen for c in result.candidates] == [True, False, False]
     assert set(reasons(result).values()) == {""}
     assert not result.degraded
@@ -126,7 +126,7 @@ def test_each_loser_has_its_reason():
         design("now", use=0.1),
         current="now",
     )
-    assert {c.design.name: c.lost_because for c in result.candidates} == {
+    assert {c.name: c.lost_because for c in result.candidates} == {
         "best": "",
         "far": "as useful as the choice, but a bigger change",
         "less": "utility 0.5 is less than 0.9",
@@ -145,7 +145,7 @@ def test_losers_of_a_degraded_choice_say_how_much_they_violate():
 
 def test_where_nothing_can_be_deployed_the_candidates_are_ranked():
     result = choose(design("a", risk=0.9), design("b"), unrealisable={"a": ["laser"], "b": ["laser"]})
-    assert [c.design.name for c in result.candidates] == ["b", "a"]
+    assert [c.name for c in result.candidates] == ["b", "a"]
     assert all(c.lost_because for c in result.candidates)
 
 

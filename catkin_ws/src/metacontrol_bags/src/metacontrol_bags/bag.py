@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from metacontrol_bags.record import ConfigurationReport, DecisionReport, Event
+    from metacontrol_bags.decision import Decision
+    from metacontrol_bags.record import ConfigurationReport, Event
 
 TOPICS = (
     "/amcl_pose",
@@ -106,7 +107,7 @@ class _Builder:
         self._samples: dict[str, list[tuple[float, float]]] = {"safety": [], "energy": [], "contacts": []}
         self._diagnostics: list[messages.DiagnosticReport] = []
         self._configurations: list[ConfigurationReport] = []
-        self._decisions: list[DecisionReport] = []
+        self._decisions: list[Decision] = []
         self._goals: list[GoalReport] = []
         self._results: list[GoalReport] = []
         self._commands: list[float] = []

@@ -6,29 +6,34 @@ The two differ only in how they write a time, so messages are taken by their fie
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
 
+from metacontrol_bags.decision import Candidate, Cause, Decision
 from metacontrol_bags.record import (
     ComponentReport,
     ConfigurationReport,
     CostReport,
-    DecisionReport,
     Event,
     GoalReport,
     QualityReport,
 )
 from metacontrol_bags.words import DiagnosticWords
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
 DiagnosticReport = ComponentReport | QualityReport | CostReport
 
+_NANO = 1_000_000_000
 _COST_FIGURES = {DiagnosticWords.CPU_USAGE: "cpu", DiagnosticWords.MEMORY_USAGE: "memory"}
 
 
 def seconds(time: Any) -> float:
-    """A ROS time in s."""
-    if hasattr(time, "to_sec"):
-        return float(time.to_sec())
-    return float(time.sec) + float(time.nanosec) * 1e-9
+    """Return a ROS time in s."""
+    if hasattr(time, "nanosec"):
+        return float(int(time.sec) + int(time.nanosec) / _NANO)
+    return float(time.secs + time.nsecs / _NANO)
 
 
 def header_stamp(header: Any, received: float) -> float:
@@ -66,21 +71,30 @@ def configurations(message: Any, received: float) -> tuple[ConfigurationReport, 
     return tuple(ConfigurationReport(stamp, f.function, f.configuration, f.state) for f in message.functions)
 
 
-def decision(message: Any, received: float) -> DecisionReport:
-    """A metacontrol_msgs/Decision."""
-    return DecisionReport(
+def decision(message: Any, received: float) -> Decision:
+    """Return a metacontrol_msgs/Decision; what an older definition lacks is empty."""
+    return Decision(
+        id=str(message.id),
+        state=str(message.state),
+        objective=str(message.objective),
+        trigger=str(message.trigger),
+        from_configuration=str(message.from_configuration),
+        to_configuration=str(message.to_configuration),
         stamp=header_stamp(message.header, received),
-        id=message.id,
-        state=message.state,
-        objective=message.objective,
-        trigger=message.trigger,
-        from_configuration=message.from_configuration,
-        to_configuration=message.to_configuration,
         degraded=bool(message.degraded),
-        explanation=message.explanation,
+        causes=_texts(message, "causes"),
+        reasons=tuple(_cause(cause) for cause in getattr(message, "reasons", ())),
+        candidates=tuple(_candidate(candidate) for candidate in message.candidates),
+        corrections=_texts(message, "corrections"),
+        releases=_texts(message, "releases"),
+        explanation=str(message.explanation),
         stamp_monitored=seconds(message.stamp_monitored),
+        stamp_analysed=seconds(message.stamp_analysed),
         stamp_planned=seconds(message.stamp_planned),
         stamp_executed=seconds(message.stamp_executed),
+        analyse_wall_s=float(message.analyse_wall_s),
+        plan_wall_s=float(message.plan_wall_s),
+        execute_wall_s=float(message.execute_wall_s),
     )
 
 
@@ -106,3 +120,28 @@ def _numbers(pairs: Any) -> list[tuple[str, float]]:
         if math.isfinite(value):
             found.append((pair.key, value))
     return found
+
+
+def _texts(message: Any, name: str) -> tuple[str, ...]:
+    return tuple(str(text) for text in getattr(message, name, ()))
+
+
+def _cause(message: Any) -> Cause:
+    values = {item.name: getattr(message, item.name) for item in fields(Cause)}
+    return Cause(**values | {"stamp": seconds(message.stamp)})
+
+
+def _candidate(message: Any) -> Candidate:
+    return Candidate(
+        name=str(message.name),
+        expected=_levels(message.expected_qas),
+        levels=_levels(getattr(message, "levels", ())),
+        utility=float(message.utility),
+        chosen=bool(message.chosen),
+        refused_because=str(message.refused_because),
+        lost_because=str(getattr(message, "lost_because", message.refused_because)),
+    )
+
+
+def _levels(messages: Iterable[Any]) -> dict[str, float]:
+    return {str(quality.name): float(quality.value) for quality in messages}

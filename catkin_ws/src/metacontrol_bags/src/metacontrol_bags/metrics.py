@@ -23,14 +23,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import MissionRecord, Samples
-from metacontrol_bags.words import Decision, DiagnosticWords, FunctionGrounding, MissionEvent
+from metacontrol_bags.words import DiagnosticWords, FunctionGrounding, MissionEvent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from metacontrol_bags.record import DecisionReport
+    from metacontrol_bags.decision import Decision
 
 SCHEMA_VERSION = 1
 
@@ -94,8 +95,8 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
         "final_configuration": configuration_at(record, end) or told.get("initial_configuration"),
         "time_above_threshold": {name: _rounded(value) for name, value in above.items()},
         "mean_qa": {name: _rounded(value) for name, value in means.items()},
-        "reconfigurations": reconfigurations(record, Decision.EXECUTED),
-        "reconfigurations_failed": reconfigurations(record, Decision.FAILED),
+        "reconfigurations": reconfigurations(record, EXECUTED),
+        "reconfigurations_failed": reconfigurations(record, FAILED),
         "perturbations": _perturbations(record),
         "goals": {
             "sent": len(goals),
@@ -189,12 +190,12 @@ def path_length(record: MissionRecord, start: float, end: float) -> float:
 
 def reconfigurations(record: MissionRecord, state: str) -> list[dict[str, Any]]:
     """Adaptations of the mission that ended in a state (EXECUTED or FAILED), in the order of time."""
-    decided = {d.id: d for d in record.decisions if d.state == Decision.DECIDED and d.stamp >= record.start_stamp}
+    decided = {d.id: d for d in record.decisions if d.state == DECIDED and d.stamp >= record.start_stamp}
     closed = [d for d in record.decisions if d.state == state and d.id in decided and d.stamp <= record.end_stamp + 1.0]
     return [_reconfiguration(record, decided[d.id], d) for d in closed]
 
 
-def _reconfiguration(record: MissionRecord, decided: DecisionReport, closed: DecisionReport) -> dict[str, Any]:
+def _reconfiguration(record: MissionRecord, decided: Decision, closed: Decision) -> dict[str, Any]:
     caused, reported = _cause(record, decided)
     return {
         "stamp_s": _rounded(decided.stamp - record.start_stamp),
@@ -208,7 +209,7 @@ def _reconfiguration(record: MissionRecord, decided: DecisionReport, closed: Dec
     }
 
 
-def _cause(record: MissionRecord, decided: DecisionReport) -> tuple[float | None, float | None]:
+def _cause(record: MissionRecord, decided: Decision) -> tuple[float | None, float | None]:
     """When the cause of an adaptation set in, and when it was first reported; None where that is not known."""
     kind, _, name = decided.trigger.partition(":")
     if kind == "component":
@@ -218,7 +219,7 @@ def _cause(record: MissionRecord, decided: DecisionReport) -> tuple[float | None
     return None, decided.stamp_monitored or None
 
 
-def _component_cause(record: MissionRecord, name: str, decided: DecisionReport) -> tuple[float | None, float | None]:
+def _component_cause(record: MissionRecord, name: str, decided: Decision) -> tuple[float | None, float | None]:
     strikes = [
         event.stamp
         for event in record.events
@@ -236,7 +237,7 @@ def _component_cause(record: MissionRecord, name: str, decided: DecisionReport) 
     return None, _start_of_run([(r.stamp, r.status == DiagnosticWords.COMPONENT_FALSE) for r in reports])
 
 
-def _quality_cause(record: MissionRecord, name: str, decided: DecisionReport) -> tuple[float | None, float | None]:
+def _quality_cause(record: MissionRecord, name: str, decided: Decision) -> tuple[float | None, float | None]:
     limit = thresholds(record).get(name)
     if limit is None:
         return None, decided.stamp_monitored or None

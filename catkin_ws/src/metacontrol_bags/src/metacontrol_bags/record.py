@@ -15,6 +15,8 @@ from metacontrol_bags.words import MissionEvent
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from metacontrol_bags.decision import Decision
+
 Samples = tuple[tuple[float, float], ...]
 """Pairs (stamp in s, value), in the order of time."""
 
@@ -68,24 +70,6 @@ class ConfigurationReport:
 
 
 @dataclass(frozen=True)
-class DecisionReport:
-    """A `metacontrol_msgs/Decision`; `stamp` is that of the message."""
-
-    stamp: float
-    id: str
-    state: str
-    objective: str
-    trigger: str
-    from_configuration: str
-    to_configuration: str
-    degraded: bool = False
-    explanation: str = ""
-    stamp_monitored: float = 0.0
-    stamp_planned: float = 0.0
-    stamp_executed: float = 0.0
-
-
-@dataclass(frozen=True)
 class GoalReport:
     """A goal sent to move_base, or, with a status, its result."""
 
@@ -126,7 +110,7 @@ class MissionRecord:
     components: tuple[ComponentReport, ...] = ()
     observed: tuple[QualityReport, ...] = ()
     configurations: tuple[ConfigurationReport, ...] = ()
-    decisions: tuple[DecisionReport, ...] = ()
+    decisions: tuple[Decision, ...] = ()
     goals: tuple[GoalReport, ...] = ()
     results: tuple[GoalReport, ...] = ()
     costs: tuple[CostReport, ...] = ()

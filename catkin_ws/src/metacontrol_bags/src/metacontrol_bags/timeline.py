@@ -7,21 +7,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from metacontrol_bags.decision import DECIDED, EXECUTED, Decision
 from metacontrol_bags.record import (
     ComponentReport,
     ConfigurationReport,
-    DecisionReport,
     Event,
     QualityReport,
 )
-from metacontrol_bags.words import Decision, DiagnosticWords, FunctionGrounding, MissionEvent
+from metacontrol_bags.words import DiagnosticWords, FunctionGrounding, MissionEvent
 
 CALM_S = 5.0
 """A QA that was below its threshold for this long is told again when it rises above it."""
 
 _WELL_AGAIN = (DiagnosticWords.COMPONENT_RECOVERED, DiagnosticWords.COMPONENT_TRUE)
 
-Report = ComponentReport | QualityReport | DecisionReport | ConfigurationReport | Event
+Report = ComponentReport | QualityReport | Decision | ConfigurationReport | Event
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Timeline:
                 return self._component(report)
             case QualityReport():
                 return self._quality(report)
-            case DecisionReport():
+            case Decision():
                 return _decision(report)
             case ConfigurationReport():
                 return self._configuration(report)
@@ -100,16 +100,16 @@ class Timeline:
         return (Entry(report.stamp, "R4", f"{report.function}: {report.configuration} {report.state}", bad),)
 
 
-def _decision(report: DecisionReport) -> tuple[Entry, ...]:
+def _decision(report: Decision) -> tuple[Entry, ...]:
     change = f"{report.from_configuration or 'nothing'} -> {report.to_configuration or 'nothing'}"
-    if report.state == Decision.DECIDED:
+    if report.state == DECIDED:
         how = ", degraded" if report.degraded else ""
         return (
             Entry(report.stamp, "R2", f"{report.objective} is violated by {report.trigger}", True),
             Entry(report.stamp, "R3", f"{change}{how}", not report.to_configuration),
         )
-    done = "done" if report.state == Decision.EXECUTED else report.state.lower()
-    return (Entry(report.stamp, "R4", f"{change} {done}", report.state != Decision.EXECUTED),)
+    done = "done" if report.state == EXECUTED else report.state.lower()
+    return (Entry(report.stamp, "R4", f"{change} {done}", report.state != EXECUTED),)
 
 
 def _event(report: Event) -> tuple[Entry, ...]:

@@ -32,6 +32,8 @@ class FunctionGrounding:
 class Decision:
     """States of a decision."""
 
+    PROPOSED = "PROPOSED"
+    ADVISED = "ADVISED"
     DECIDED = "DECIDED"
     EXECUTED = "EXECUTED"
     FAILED = "FAILED"

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 from metacontrol_bags.bag import BagError, read_record
+from metacontrol_bags.decision import DECIDED
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S, MetricsError, summarise
 from metacontrol_bags.timeline import Timeline
-from metacontrol_msgs.msg import Decision
 
 from metacontrol_experiments.cli.calibrate import calibrate, variants
 from metacontrol_experiments.cli.compare import compare, delays
@@ -246,8 +246,8 @@ def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionR
     told = Timeline(settings.thresholds)
     display.start(outcome.state.started_s)
     record = outcome.record
-    closed = [decision for decision in record.decisions if decision.state != Decision.DECIDED]
-    decided = [decision for decision in record.decisions if decision.state == Decision.DECIDED]
+    closed = [decision for decision in record.decisions if decision.state != DECIDED]
+    decided = [decision for decision in record.decisions if decision.state == DECIDED]
     reports: list[Report] = [*record.events, *record.components, *record.observed]  # as they follow in one moment
     reports += [*decided, *record.configurations, *closed]
     for report in sorted(reports, key=lambda report: report.stamp):

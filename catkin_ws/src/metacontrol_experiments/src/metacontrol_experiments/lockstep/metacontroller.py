@@ -6,20 +6,20 @@ Detection and execution take times drawn at random, as on ROS, where messages, p
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import yaml
 from geometry_msgs.msg import TransformStamped
-from metacontrol_bags.record import ComponentReport, DecisionReport, QualityReport
+from metacontrol_bags.decision import DECIDED, Decision
+from metacontrol_bags.record import ComponentReport, QualityReport
 from metacontrol_msgs.msg import DiagnosticWords, FunctionGrounding
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.parameters import ParameterError, Parameters
 from mros1_reasoner.pellet.process import make_reasoner
-from mros1_reasoner.planning.decision import DECIDED, EXECUTED, Decision
 from pybullet_simulator.ros.messages import ODOM, OdometryWriter
 from ros_model.io.models import read_system
 from ros_model.language.metamodel import compose
@@ -98,7 +98,7 @@ class Manager:
             ManagerError: models or reasoner cannot be used.
         """
         self.configuration = configuration
-        self.decisions: list[DecisionReport] = []
+        self.decisions: list[Decision] = []
         self.observed: list[QualityReport] = []
         self.components: list[ComponentReport] = []
         self._package = package
@@ -216,7 +216,7 @@ class Manager:
                 done = decided + self._delays.draw("restart" if restarts else "parameters", self._rng)
                 self._pending = _Pending(decision, decided, done, restarts)
             else:
-                self.decisions.append(_report(decision, now))
+                self.decisions.append(replace(decision, stamp=now))
 
     def _carry_out(self, now: float) -> Change | None:
         """Begin what is decided by now, and report what is done by now."""
@@ -225,14 +225,14 @@ class Manager:
             return None
         if not pending.begun and now >= pending.decided:
             pending.begun = True
-            self.decisions.append(_report(pending.decision, now))
+            self.decisions.append(replace(pending.decision, stamp=now))
             return pending.change(FunctionGrounding.RECONFIGURING)
         if now < pending.done:
             return None
         self._pending = None
         self.configuration = pending.decision.to_configuration
         self._core.observe_active(now, self.function, self.configuration, FunctionGrounding.STABLE)
-        self.decisions.append(_report(self._core.report(now, pending.decision.id, True), now))
+        self.decisions.append(replace(self._core.report(now, pending.decision.id, True), stamp=now))
         self._follow()
         return pending.change(FunctionGrounding.STABLE)
 
@@ -249,23 +249,6 @@ def observation_sources(package: Path, configuration: str) -> tuple[str, ...]:
     navigation = read_system(package / "models" / "variants" / f"{configuration}.rossystem").component("move_base")
     parameters = navigation.parameters if navigation else ()
     return tuple(str(p.value) for p in parameters if p.key.endswith("observation_sources"))
-
-
-def _report(decision: Decision, now: float) -> DecisionReport:
-    return DecisionReport(
-        stamp=now,
-        id=decision.id,
-        state=decision.state,
-        objective=decision.objective,
-        trigger=decision.trigger,
-        from_configuration=decision.from_configuration,
-        to_configuration=decision.to_configuration,
-        degraded=decision.degraded,
-        explanation=decision.explanation,
-        stamp_monitored=decision.stamp_monitored,
-        stamp_planned=decision.stamp_planned,
-        stamp_executed=decision.stamp_executed if decision.state == EXECUTED else 0.0,
-    )
 
 
 def _static_frames(robot: Robot) -> TFMessage:

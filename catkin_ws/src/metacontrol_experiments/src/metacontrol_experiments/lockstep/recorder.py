@@ -13,10 +13,10 @@ from pybullet_simulator.physics.simulation import ENERGY_STEPS, MOTION_STEPS, SA
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from metacontrol_bags.decision import Decision
     from metacontrol_bags.record import (
         ComponentReport,
         ConfigurationReport,
-        DecisionReport,
         Event,
         GoalReport,
         OccupancyMap,
@@ -37,7 +37,7 @@ class Memory:
         self.goals: list[GoalReport] = []
         self.results: list[GoalReport] = []
         self.configurations: list[ConfigurationReport] = []
-        self.decisions: list[DecisionReport] = []
+        self.decisions: list[Decision] = []
         self.observed: list[QualityReport] = []
         self.components: list[ComponentReport] = []
         self._events: list[Event] = []

@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 import click
 import yaml
+from metacontrol_bags.decision import Decision
 from metacontrol_msgs.msg import FunctionGrounding
 from rich.console import Console
 from rich.table import Table
@@ -23,7 +24,6 @@ from mros1_reasoner.loop.journal import Entry, entry
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.parameters import ParameterError, Parameters
 from mros1_reasoner.pellet.process import make_reasoner
-from mros1_reasoner.planning.record import DecisionRecord
 from mros1_reasoner.replay.explain import render
 from mros1_reasoner.replay.recording import Recording, RecordingError, Run, read_decisions, read_recording
 from mros1_reasoner.replay.replay import Pair, Replayed, pairs, replay, usual_duration, without_journal
@@ -213,12 +213,12 @@ def _print(
         console.print(f"left out: {remark}", style="dim")
 
 
-def _change(record: DecisionRecord | None) -> str:
-    if record is None:
+def _change(decision: Decision | None) -> str:
+    if decision is None:
         return "-"
-    if not record.to_configuration:
-        return f"stays with {record.from_configuration or 'nothing'}"
-    return f"{record.from_configuration or 'nothing'} -> {record.to_configuration}"
+    if not decision.to_configuration:
+        return f"stays with {decision.from_configuration or 'nothing'}"
+    return f"{decision.from_configuration or 'nothing'} -> {decision.to_configuration}"
 
 
 def _console() -> Console:

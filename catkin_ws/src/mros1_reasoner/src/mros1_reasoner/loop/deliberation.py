@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from metacontrol_bags.decision import ADVISED, DECIDED, FAILED, Cause, Decision
+
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Design, Direction, Objective
+from mros1_reasoner.loop.causes import OPERATOR, RECOVERY, is_chance
 from mros1_reasoner.loop.state import Running, State
-from mros1_reasoner.planning.decision import ADVISED, DECIDED, FAILED, OPERATOR, RECOVERY, Cause, Decision
 from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan
 
 
@@ -59,7 +61,7 @@ class Deliberation:
             return None
         if self._state.waits(name, timing.now):
             return None
-        improves_only = all(cause.is_chance for cause in causes)
+        improves_only = all(is_chance(cause) for cause in causes)
         self._note_failure(name, timing.now)
         began = self._wall()
         level, outcome = self._choose(name, timing.now, climbs=not improves_only)
@@ -147,7 +149,7 @@ class Deliberation:
         return self._decision(name, causes, outcome, timing, words, plan_wall)
 
     def _is_news(self, running: Running, causes: list[Cause], outcome: Plan) -> bool:
-        errors = tuple(cause.trigger for cause in causes if not cause.is_chance)
+        errors = tuple(cause.trigger for cause in causes if not is_chance(cause))
         refusal = (errors, outcome.choice, outcome.degraded)
         is_news, running.refusal = refusal != running.refusal, refusal
         return is_news
@@ -177,7 +179,6 @@ class Deliberation:
             plan_wall_s=plan_wall,
             reasons=tuple(causes),
             corrections=corrections,
-            wall_began=self._wall(),
         )
 
     def _missing(self, name: str, outcome: Plan, now: float) -> list[tuple[str, Plan]]:

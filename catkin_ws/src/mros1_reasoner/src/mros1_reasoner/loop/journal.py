@@ -26,10 +26,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from metacontrol_bags.decision import DECIDED, PROPOSED, Decision
+
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.diagnostics import BindingFact, ComponentFact, Fact, LevelFact, StaleFact, TaskFact
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.planning.decision import DECIDED, PROPOSED, Decision
 
 _YES, _NO = "1", "0"
 DECIDED_KIND = "decided"

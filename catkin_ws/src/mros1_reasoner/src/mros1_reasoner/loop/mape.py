@@ -12,16 +12,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
+from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED, PROPOSED, Decision
 from metacontrol_msgs.msg import FunctionGrounding
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Reasoner
+from mros1_reasoner.loop.causes import OPERATOR
 from mros1_reasoner.loop.deliberation import Deliberation, Timing
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.loop.state import BUSY, Component, State
-from mros1_reasoner.planning.decision import DECIDED, EXECUTED, FAILED, OPERATOR, PROPOSED, Decision
 from mros1_reasoner.planning.planner import Distance, Utility, difference
 from mros1_reasoner.planning.utility import make_utility
 
@@ -71,6 +72,7 @@ class Mape:
         self._wall = wall
         self._clock = clock
         self._pending: Decision | None = None
+        self._began = 0.0  # wall time at which the pending decision was put forward
         self._paused = False
         self._seen: tuple[object, ...] | None = None
         self._analysed: Facts | None = None
@@ -233,8 +235,8 @@ class Mape:
         Raises:
             MapeError: no decision of that id waits for approval.
         """
-        decision = replace(self._proposed(decision_id), state=DECIDED, wall_began=self._wall())
-        self._state.proposal, self._pending = None, decision
+        decision = replace(self._proposed(decision_id), state=DECIDED)
+        self._state.proposal, self._pending, self._began = None, decision, self._wall()
         return decision
 
     def reject(self, decision_id: str, now: float, reason: str = "") -> Decision:
@@ -441,7 +443,7 @@ class Mape:
             state=EXECUTED if ok else FAILED,
             explanation=decision.explanation + ("" if ok else f"; failed: {message or 'no reason given'}"),
             stamp_executed=now,
-            execute_wall_s=self._wall() - decision.wall_began,
+            execute_wall_s=self._wall() - self._began,
         )
 
     # Parts
@@ -508,5 +510,5 @@ class Mape:
             return found
         if self.settings.approval:
             return [*found, replace(decision, state=PROPOSED)]
-        self._pending, self._seen = decision, None
+        self._pending, self._began, self._seen = decision, self._wall(), None
         return [*found, decision]

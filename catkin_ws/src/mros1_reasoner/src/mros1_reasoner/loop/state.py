@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from metacontrol_bags.decision import Decision
 from metacontrol_msgs.msg import FunctionGrounding
 
 from mros1_reasoner.knowledge import vocabulary as v
@@ -13,7 +14,6 @@ from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
 from mros1_reasoner.loop.levels import Levels
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning.decision import Decision
 
 BUSY = (FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING)
 

@@ -4,36 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+
+from metacontrol_bags.decision import Candidate
 
 from mros1_reasoner.knowledge.model import Design, Objective, Quality
 
 Utility = Callable[[Design], float]
 Distance = Callable[[Design, Design], float]
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A design that was considered.
-
-    Attributes:
-        design: what was considered.
-        utility: how useful it is expected to be.
-        violation: by how much its levels pass the objective's limits, as a sum of shares of the limits.
-        chosen: whether it was taken.
-        refused_because: why it can't be taken; empty for the chosen one and those that merely are less useful.
-        lost_because: why it was not taken; empty for the chosen one only.
-        levels: the levels that were compared with the limits: observed ones of the deployed design, expected and
-            corrected ones of the others.
-    """
-
-    design: Design
-    utility: float
-    violation: float
-    chosen: bool = False
-    refused_because: str = ""
-    lost_because: str = ""
-    levels: Mapping[str, float] = field(default_factory=dict, compare=False)
 
 
 @dataclass(frozen=True)
@@ -100,14 +78,14 @@ def plan(
     running = next((design for design in designs if design.name == situation.current), None)
     candidates = [_judge(objective, design, situation, utility) for design in designs]
 
-    def change(candidate: Candidate) -> float:
-        return distance(running, candidate.design) if running else 0.0
+    def change(judged: _Judged) -> float:
+        return distance(running, judged.design) if running else 0.0
 
-    def by_use(candidate: Candidate) -> tuple[float, float, str]:
-        return -candidate.utility, change(candidate), candidate.design.name
+    def by_use(judged: _Judged) -> tuple[float, float, str]:
+        return -judged.utility, change(judged), judged.design.name
 
-    def by_violation(candidate: Candidate) -> tuple[float, float, float, str]:
-        return candidate.violation, *by_use(candidate)
+    def by_violation(judged: _Judged) -> tuple[float, float, float, str]:
+        return judged.violation, *by_use(judged)
 
     fit = sorted((c for c in candidates if not c.refused_because), key=by_use)
     deployable = [c for c in candidates if situation.can_deploy(c.design.name)]
@@ -131,12 +109,11 @@ def plan(
         if not fresh:
             reason += ", and all were tried before"
     else:
-        ranked = (replace(c, lost_because=c.refused_because) for c in sorted(candidates, key=by_violation))
-        return Plan(None, False, tuple(ranked), _nothing(situation))
+        ranked = sorted(candidates, key=by_violation)
+        return Plan(None, False, tuple(c.lost(c.refused_because) for c in ranked), _nothing(situation))
     others = sorted((c for c in candidates if c is not best), key=lambda c: (bool(c.refused_because), *by_use(c)))
-    chosen = replace(best, chosen=True, refused_because="")
-    lost = (replace(c, lost_because=_loss(c, best, degraded)) for c in others)
-    return Plan(best.design.name, degraded, (chosen, *lost), reason)
+    lost = (c.lost(_loss(c, best, degraded)) for c in others)
+    return Plan(best.design.name, degraded, (best.chosen(), *lost), reason)
 
 
 def difference(first: Design, second: Design) -> float:
@@ -146,7 +123,41 @@ def difference(first: Design, second: Design) -> float:
     return components + math.dist([first.expected[q] for q in shared], [second.expected[q] for q in shared])
 
 
-def _judge(objective: Objective, design: Design, situation: Situation, utility: Utility) -> Candidate:
+@dataclass(frozen=True)
+class _Judged:
+    """A design as it compares with the others.
+
+    Attributes:
+        design: the design.
+        utility: how useful it is expected to be.
+        violation: by how much its levels pass the objective's limits, as a sum of shares of the limits.
+        refused_because: why it can't be taken; empty where it can.
+        levels: the levels that were compared with the limits.
+    """
+
+    design: Design
+    utility: float
+    violation: float
+    refused_because: str
+    levels: Mapping[str, float]
+
+    def chosen(self) -> Candidate:
+        """Return the candidate that is taken."""
+        return Candidate(self.design.name, self.design.expected, self.levels, self.utility, chosen=True)
+
+    def lost(self, because: str) -> Candidate:
+        """Return the candidate that is not taken."""
+        return Candidate(
+            self.design.name,
+            self.design.expected,
+            self.levels,
+            self.utility,
+            refused_because=self.refused_because,
+            lost_because=because,
+        )
+
+
+def _judge(objective: Objective, design: Design, situation: Situation, utility: Utility) -> _Judged:
     name = design.name
     expected = {q: level * situation.factors.get(q, 1.0) for q, level in design.expected.items()}
     is_current = name == situation.current
@@ -175,14 +186,14 @@ def _judge(objective: Objective, design: Design, situation: Situation, utility: 
         # A lucky or unlucky moment of the deployed design must not weigh more than what is expected of the others.
         lasting = kind.direction.better(level, expected.get(quality, level)) if quality in situation.factors else level
         violation += max(0.0, kind.excess(lasting, limit)) / (abs(limit) or 1.0)
-    return Candidate(design, utility(design), violation, refused_because="; ".join(reasons), levels=levels)
+    return _Judged(design, utility(design), violation, "; ".join(reasons), levels)
 
 
 def _factor(factor: float) -> str:
     return "" if factor == 1.0 else f" (expected, times {factor:.3g})"
 
 
-def _loss(candidate: Candidate, best: Candidate, degraded: bool) -> str:
+def _loss(candidate: _Judged, best: _Judged, degraded: bool) -> str:
     """Return why a candidate was not taken."""
     if candidate.refused_because:
         worse = f"; violates limits by {candidate.violation:.2g}, the choice by {best.violation:.2g}"

@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from metacontrol_bags import messages
+from metacontrol_bags.decision import Decision
 from metacontrol_bags.typestore import typestore
 from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.typesys import TypesysError
 
 from mros1_reasoner.loop.journal import Entry
-from mros1_reasoner.planning.record import DecisionRecord, read_message, seconds
 
 _JOURNAL = "mros1_reasoner/journal"
 _DECISION = "mros1_reasoner/decision"
@@ -69,23 +70,23 @@ class Recording:
 
     start: float = 0.0
     runs: list[Run] = field(default_factory=list)
-    decisions: list[tuple[float, DecisionRecord]] = field(default_factory=list)
+    decisions: list[tuple[float, Decision]] = field(default_factory=list)
     diagnostics: list[Statuses] = field(default_factory=list)
     active: list[Entry] = field(default_factory=list)
 
 
-def read_decisions(path: Path, namespace: str | None = None) -> list[DecisionRecord]:
+def read_decisions(path: Path, namespace: str | None = None) -> list[Decision]:
     """Return the decisions in a bag, each as its last message tells it.
 
     Raises:
         RecordingError: the bag can't be read, or holds several reasoners and no namespace is given.
     """
-    last: dict[str, DecisionRecord] = {}
+    last: dict[str, Decision] = {}
     with _open(path) as reader:
         topic = _topic(path, reader, _DECISION, namespace)
-        for _, _, message in _messages(path, reader, [topic] if topic else []):
-            record = read_message(message)
-            last[record.id] = record
+        for _, now, message in _messages(path, reader, [topic] if topic else []):
+            decision = messages.decision(message, now)
+            last[decision.id] = decision
     return list(last.values())
 
 
@@ -107,13 +108,13 @@ def read_recording(path: Path, namespace: str | None = None) -> Recording:
             if topic == journal:
                 _add_journal(path, recording, message)
             elif topic == decision:
-                recording.decisions.append((now, read_message(message)))
+                recording.decisions.append((now, messages.decision(message, now)))
             elif topic == active:
                 recording.active += [
                     Entry(now, "active", (f.function, f.configuration, f.state)) for f in message.functions
                 ]
             else:
-                statuses = Statuses(now, seconds(message.header.stamp), tuple(message.status))
+                statuses = Statuses(now, messages.seconds(message.header.stamp), tuple(message.status))
                 recording.diagnostics.append(statuses)
     return recording
 

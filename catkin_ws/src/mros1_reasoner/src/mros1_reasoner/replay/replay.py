@@ -12,12 +12,12 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
+from metacontrol_bags.decision import DECIDED, EXECUTED, PROPOSED, Decision
+
 from mros1_reasoner.loop import journal
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.journal import DECIDED_KIND, Entry, entry
 from mros1_reasoner.loop.mape import Mape, MapeError
-from mros1_reasoner.planning.decision import DECIDED, EXECUTED, PROPOSED, Decision
-from mros1_reasoner.planning.record import DecisionRecord, record_of
 from mros1_reasoner.replay.recording import Recording
 
 DEFAULT_DURATION = 1.0  # s of ROS time, of a reconfiguration, where the bag has none
@@ -25,6 +25,7 @@ _SAME_MOMENT = 2.0  # s of ROS time between decisions that are taken for the sam
 _OF_THE_MANIPULATOR = ("active", "result", "approve", "reject", DECIDED_KIND)
 _NOT_COMPARED = (  # what depends on when and how fast it is computed
     "id",
+    "stamp",
     "stamp_monitored",
     "reasons",
     "stamp_analysed",
@@ -46,7 +47,7 @@ class Replayed:
         remarks: entries that did not fit, in words.
     """
 
-    decisions: tuple[tuple[float, DecisionRecord], ...]
+    decisions: tuple[tuple[float, Decision], ...]
     parted: float | None
     remarks: tuple[str, ...]
 
@@ -61,8 +62,8 @@ class Pair:
     """
 
     now: float
-    recorded: DecisionRecord | None
-    replayed: DecisionRecord | None
+    recorded: Decision | None
+    replayed: Decision | None
     differences: tuple[str, ...] = ()
 
     @property
@@ -93,7 +94,7 @@ class _Replay:
     def __init__(self, core: Mape, duration: float, follow: bool) -> None:
         self._core = core
         self._duration = duration
-        self._decisions: list[tuple[float, DecisionRecord]] = []
+        self._decisions: list[tuple[float, Decision]] = []
         self._remarks: list[str] = []
         self._is_free = not follow
         self._parted: float | None = None
@@ -122,7 +123,7 @@ class _Replay:
             return []
         except TypeError as error:
             raise ValueError(f"an entry {item.kind!r} of the journal has {len(item.values)} values") from error
-        self._decisions += [(item.now, record_of(decision)) for decision in decisions]
+        self._decisions += [(item.now, decision) for decision in decisions]
         return decisions
 
     def _go_on_with(self, decisions: list[Decision]) -> None:
@@ -159,7 +160,7 @@ def _brought(entries: Sequence[Entry], index: int) -> list[tuple[str, str]]:
     return [(item.values[1], item.values[2]) for item in following] if entries[index].kind != DECIDED_KIND else []
 
 
-def usual_duration(decisions: Sequence[tuple[float, DecisionRecord]]) -> float:
+def usual_duration(decisions: Sequence[tuple[float, Decision]]) -> float:
     """Return the median duration of the reconfigurations in a bag, s of ROS time."""
     durations = [d.stamp_executed - d.stamp_planned for _, d in decisions if d.state == EXECUTED]
     return statistics.median(durations) if durations else DEFAULT_DURATION
@@ -192,7 +193,7 @@ def pairs(recording: Recording, replayed: Replayed) -> list[Pair]:
     """
     recorded = [record for _, record in first_messages(recording.decisions) if record.state != EXECUTED]
     own = [record for _, record in first_messages(replayed.decisions)]
-    beside: dict[str, DecisionRecord] = {}
+    beside: dict[str, Decision] = {}
     for alike in (("objective", "to_configuration"), ("objective", "trigger")):
         for record in recorded:
             match = next((other for other in own if _is_same(record, other, alike)), None)
@@ -207,19 +208,19 @@ def pairs(recording: Recording, replayed: Replayed) -> list[Pair]:
     return sorted(found, key=lambda pair: pair.now)
 
 
-def first_messages(decisions: Sequence[tuple[float, DecisionRecord]]) -> list[tuple[float, DecisionRecord]]:
+def first_messages(decisions: Sequence[tuple[float, Decision]]) -> list[tuple[float, Decision]]:
     """Return the first message about each decision."""
-    first: dict[str, tuple[float, DecisionRecord]] = {}
+    first: dict[str, tuple[float, Decision]] = {}
     for now, record in decisions:
         first.setdefault(record.id, (now, record))
     return list(first.values())
 
 
-def _is_same(first: DecisionRecord, second: DecisionRecord, alike: Sequence[str]) -> bool:
+def _is_same(first: Decision, second: Decision, alike: Sequence[str]) -> bool:
     are_alike = all(getattr(first, name) == getattr(second, name) for name in alike)
     return are_alike and abs(first.stamp_planned - second.stamp_planned) <= _SAME_MOMENT
 
 
-def _differences(first: DecisionRecord, second: DecisionRecord) -> tuple[str, ...]:
-    names = [item.name for item in fields(DecisionRecord) if item.name not in _NOT_COMPARED]
+def _differences(first: Decision, second: Decision) -> tuple[str, ...]:
+    names = [item.name for item in fields(Decision) if item.name not in _NOT_COMPARED]
     return tuple(name for name in names if getattr(first, name) != getattr(second, name))

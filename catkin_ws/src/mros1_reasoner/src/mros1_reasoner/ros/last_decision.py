@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import rospy
-from metacontrol_msgs.msg import Decision
+from metacontrol_bags import messages
+from metacontrol_bags.decision import Decision
+from metacontrol_msgs import msg
 
-from mros1_reasoner.planning.record import DecisionRecord, read_message
 from mros1_reasoner.replay.recording import RecordingError
 
 
-def last_decision(topic: str, wait: float) -> DecisionRecord:
+def last_decision(topic: str, wait: float) -> Decision:
     """Return the last decision that was published on a latched topic.
 
     Args:
@@ -21,7 +22,7 @@ def last_decision(topic: str, wait: float) -> DecisionRecord:
     """
     try:
         rospy.init_node("explain", anonymous=True, disable_signals=True, disable_rosout=True)
-        return read_message(rospy.wait_for_message(topic, Decision, wait))
+        return messages.decision(rospy.wait_for_message(topic, msg.Decision, wait), rospy.get_time())
     except (OSError, rospy.ROSException, rospy.exceptions.ROSInitException) as error:
         name = rospy.resolve_name(topic)
         say = f"no decision on {name} within {wait:g} s: no reasoner runs, or it has decided nothing yet"

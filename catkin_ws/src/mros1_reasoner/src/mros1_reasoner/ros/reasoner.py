@@ -15,6 +15,7 @@ from typing import TypeVar
 import rospy
 from actionlib_msgs.msg import GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray
+from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED, Decision
 from metacontrol_msgs import msg as messages
 from node_kit.ros.lifetime import Lifetime
 from ros_model.errors import ModelError
@@ -31,10 +32,9 @@ from mros1_reasoner.loop.parameters import ParameterError, Parameters
 from mros1_reasoner.loop.tasks import newest_goal
 from mros1_reasoner.loop.throttle import Throttle
 from mros1_reasoner.pellet.process import make_reasoner
-from mros1_reasoner.planning.decision import DECIDED, EXECUTED, FAILED, Decision
-from mros1_reasoner.planning.record import fill_message, record_of
 from mros1_reasoner.replay.explain import line
 from mros1_reasoner.ros.journal import JournalTopic
+from mros1_reasoner.ros.messages import fill_decision
 from mros1_reasoner.ros.requests import Requests
 from mros1_reasoner.ros.services import Services
 
@@ -271,11 +271,10 @@ class ReasonerNode:
         elif decision.state == FAILED and decision.to_configuration:
             rospy.logwarn(_LOG, f"failed: {decision.explanation} ({decision.id})")
         else:
-            (rospy.loginfo if decision.to_configuration else rospy.logwarn)(_LOG, line(record_of(decision)))
+            (rospy.loginfo if decision.to_configuration else rospy.logwarn)(_LOG, line(decision))
 
     def _publish(self, decision: Decision) -> None:
-        record = record_of(decision)
-        message = fill_message(messages.Decision(), record, rospy.Time.from_sec, messages)
+        message = fill_decision(messages.Decision(), decision, rospy.Time.from_sec, messages)
         message.header.stamp = rospy.Time.now()
         self._decisions.publish(message)
 

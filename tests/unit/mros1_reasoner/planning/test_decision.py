@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import pytest
 from bag_helpers import Types
+from metacontrol_bags import messages
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.planning.record import read_message, record_of, seconds
 from mros1_reasoner.replay.explain import line, render
 from reasoner_helpers import OBJECTIVE
 from rich.console import Console
@@ -26,7 +26,7 @@ def decide(knowledge_base, reasoner):
             else:
                 core.observe_component(tick / 10, cause, "FALSE", tick / 10)
             if decisions := core.step(tick / 10):
-                return record_of(decisions[0])
+                return decisions[0]
         raise AssertionError("no decision")
 
     return decide
@@ -34,16 +34,17 @@ def decide(knowledge_base, reasoner):
 
 def test_message_and_back(decide):
     record = decide()
-    again = read_message(Types().decision(record, 5.0))
+    again = messages.decision(Types().decision(record, 5.0), 6.0)
     assert again.reasons[0].stamp == pytest.approx(record.reasons[0].stamp)
     assert again.stamp_monitored == pytest.approx(record.stamp_monitored)
+    assert again.stamp == 5.0
     for name in ("candidates", "causes", "explanation", "degraded", "to_configuration", "state", "releases"):
         assert getattr(again, name) == getattr(record, name)
 
 
 def test_times_of_rospy_and_of_rosbags():
-    assert seconds(SimpleNamespace(secs=3, nsecs=500_000_000)) == 3.5
-    assert seconds(SimpleNamespace(sec=3, nanosec=500_000_000)) == 3.5
+    assert messages.seconds(SimpleNamespace(secs=3, nsecs=500_000_000)) == 3.5
+    assert messages.seconds(SimpleNamespace(sec=3, nanosec=500_000_000)) == 3.5
 
 
 def test_log_line_tells_what_was_violated_by_how_much_by_which_rule_and_what_was_considered(decide):

@@ -1,0 +1,56 @@
+"""Messages of what the loop decides; the classes are given, so that they may be rospy's or rosbags'."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from typing import Any
+
+from metacontrol_bags.decision import Candidate, Cause, Decision
+
+
+def fill_decision(message: Any, decision: Decision, time_of: Callable[[float], Any], types: Any) -> Any:
+    """Fill a metacontrol_msgs/Decision, but for its header, and return it.
+
+    Args:
+        message: the Decision.
+        decision: what it shall say.
+        time_of: makes a message's time of s.
+        types: has the message classes Candidate, Cause and ExpectedQA.
+    """
+    for item in fields(decision):
+        value = getattr(decision, item.name)
+        if item.name == "stamp":
+            continue
+        if item.name.startswith("stamp_"):
+            value = time_of(max(0.0, value))
+        elif item.name == "candidates":
+            value = [_candidate(candidate, types) for candidate in value]
+        elif item.name == "reasons":
+            value = [_cause(cause, time_of, types) for cause in value]
+        elif isinstance(value, tuple):
+            value = list(value)
+        setattr(message, item.name, value)
+    return message
+
+
+def _candidate(candidate: Candidate, types: Any) -> Any:
+    return types.Candidate(
+        name=candidate.name,
+        expected_qas=_levels(candidate.expected, types),
+        levels=_levels(candidate.levels, types),
+        utility=candidate.utility,
+        chosen=candidate.chosen,
+        refused_because=candidate.refused_because,
+        lost_because=candidate.lost_because,
+    )
+
+
+def _levels(levels: Mapping[str, float], types: Any) -> list[Any]:
+    return [types.ExpectedQA(name=name, value=level) for name, level in sorted(levels.items())]
+
+
+def _cause(cause: Cause, time_of: Callable[[float], Any], types: Any) -> Any:
+    return types.Cause(
+        **{item.name: getattr(cause, item.name) for item in fields(Cause)} | {"stamp": time_of(cause.stamp)}
+    )
