@@ -6,7 +6,8 @@ from pathlib import Path
 
 import yaml
 from mros1_reasoner.loop import journal
-from mros1_reasoner.loop.journal import Entry, entry
+from mros1_reasoner.loop.entries import ActiveFact, Entry, Result, Step
+from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.ros.messages import fill_decision
 from rosbags.rosbag1 import Writer
@@ -67,7 +68,9 @@ class Bag:
     def decision(self, decision, stamp, topic="/mros1_reasoner/decision"):
         self.write(topic, "metacontrol_msgs/msg/Decision", self.types.decision(decision, stamp), stamp)
 
-    def journal(self, stamp, entries, first, name, parameters=None, files=None, topic="/mros1_reasoner/journal"):
+    def journal(
+        self, stamp, entries, first, name, parameters=None, files=None, topic="/mros1_reasoner/journal", more=()
+    ):
         message = self.types.ReasonerJournal(
             header=self.types.header(stamp),
             name=name,
@@ -75,7 +78,11 @@ class Bag:
             files=list(files or ()),
             contents=list((files or {}).values()),
             first=first,
-            entries=[self.types.JournalEntry(now=e.now, kind=e.kind, values=list(e.values)) for e in entries],
+            entries=[
+                self.types.JournalEntry(now=e.now, kind=kind_of(e.content), values=list(values_of(e.content)))
+                for e in entries
+            ]
+            + list(more),
         )
         self.write(topic, "metacontrol_msgs/msg/ReasonerJournal", message, stamp)
 
@@ -111,26 +118,25 @@ class Life:
         self.entries: list[Entry] = []
         self.decisions: list[tuple[float, object]] = []
 
-    def take(self, now, kind, *values):
-        item = entry(now, kind, *values)
-        decisions = journal.apply(self.core, item)
-        self.entries += [item, *journal.decided(now, decisions)]
+    def take(self, now, content):
+        entry = Entry(now, content)
+        decisions = journal.apply(self.core, entry)
+        self.entries += [entry, *journal.brought(now, decisions)]
         self.decisions += [(now, decision) for decision in decisions]
 
     def live(self, until, given, start=0.0, period=0.1):
-        """Take in what is given as (stamp, kind, *values), look in between, carry requests out."""
-        given = sorted(given)
+        """Take in what is given as (stamp, content), look in between, carry requests out."""
+        given = sorted(given, key=lambda item: item[0])
         requested = None
         for tick in range(round((until - start) / period) + 1):
             now = start + tick * period
             while given and given[0][0] <= now:
-                _, kind, *values = given.pop(0)
-                self.take(now, kind, *values)
+                self.take(now, given.pop(0)[1])
             pending = self.core.pending
             if pending and requested is None:
                 requested = now
             elif pending and now >= requested + self.takes:
                 requested = None
-                self.take(now, "active", "f_move", pending.to_configuration, "STABLE")
-                self.take(now, "result", pending.id, True, "", True)
-            self.take(now, "step", False)
+                self.take(now, ActiveFact("f_move", pending.to_configuration, "STABLE"))
+                self.take(now, Result(pending.id, ok=True))
+            self.take(now, Step(heartbeat=False))

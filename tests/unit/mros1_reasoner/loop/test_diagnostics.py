@@ -4,14 +4,8 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mros1_reasoner.loop.diagnostics import (
-    BindingFact,
-    ComponentFact,
-    DiagnosticsReader,
-    LevelFact,
-    StaleFact,
-    TaskFact,
-)
+from mros1_reasoner.loop.diagnostics import DiagnosticsReader, newest_goal
+from mros1_reasoner.loop.entries import BindingFact, ComponentFact, LevelFact, StaleFact, TaskFact
 
 QUALITIES = ("safety", "energy")
 COMPONENTS = ("laser", "laser_resender", "front_laser")
@@ -33,11 +27,21 @@ def facts(*statuses, nodes=None):
 
 
 def test_level_with_the_grounding_that_it_names():
-    assert facts(status("QA status", ("safety", "0.250"), name="fg_x")) == [LevelFact("safety", 0.25, "fg_x", "0.250")]
+    (fact,) = facts(status("QA status", ("safety", "0.250"), name="fg_x"))
+    assert fact == LevelFact("safety", 0.25, "fg_x")
+    assert fact.text == "0.250"
 
 
 def test_stale_quality():
-    assert facts(status("QA stale", ("safety", "no scan"), level=3)) == [StaleFact("safety", "no scan")]
+    (fact,) = facts(status("QA stale", ("safety", "no scan"), level=3))
+    assert fact == StaleFact("safety")
+    assert fact.reason == "no scan"
+
+
+def test_facts_have_the_stamp_of_their_array():
+    statuses = [status("QA status", ("safety", "0.2")), status("Component status", ("laser", "FALSE"))]
+    reading = DiagnosticsReader(QUALITIES, COMPONENTS).read(statuses, 7.5)
+    assert [fact.stamp for fact in reading.facts] == [7.5, 7.5]
 
 
 @pytest.mark.parametrize("value", ["TRUE", "FALSE", "RECOVERED"])
@@ -62,8 +66,12 @@ def test_level_as_bytes_is_understood():
 
 @pytest.mark.parametrize("key", ["objetive_error", "objective_error"])
 def test_failure_of_a_task_as_the_published_observer_reports_it(key):
-    assert facts(status("QA status", (key, "True"), name="obj_error")) == [TaskFact("obj_error", True)]
-    assert facts(status("QA status", (key, "False"), name="obj_error")) == [TaskFact("obj_error", False)]
+    assert facts(status("QA status", (key, "True"), name="obj_error")) == [
+        TaskFact("obj_error", True, message="reported as a diagnostic")
+    ]
+    assert facts(status("QA status", (key, "False"), name="obj_error")) == [
+        TaskFact("obj_error", False, message="reported as a diagnostic")
+    ]
 
 
 @pytest.mark.parametrize(
@@ -177,3 +185,19 @@ def test_whatever_comes_facts_are_about_what_the_model_knows_and_finite(statuses
     for remark in reading.remarks:
         assert remark.text.isprintable()
         assert len(remark.text) < 400
+
+
+def goals(*given):
+    found = [
+        SimpleNamespace(goal_id=SimpleNamespace(stamp=stamp, id=name), status=status) for stamp, name, status in given
+    ]
+    return SimpleNamespace(status_list=found)
+
+
+def test_only_the_newest_goal_counts():
+    assert newest_goal(goals((2.0, "b", 1), (1.0, "a", 4))) == ("b", False)
+    assert newest_goal(goals((1.0, "a", 3), (2.0, "b", 4))) == ("b", True)
+
+
+def test_without_goals_nothing_is_known():
+    assert newest_goal(goals()) is None

@@ -20,7 +20,7 @@ from ros_model.errors import ModelError
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase, KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
-from mros1_reasoner.loop.journal import Entry, entry
+from mros1_reasoner.loop.entries import ActiveFact
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.parameters import ParameterError, Parameters
 from mros1_reasoner.pellet.process import make_reasoner
@@ -156,14 +156,16 @@ def _knowledge_base(parameters: Parameters, run: Run, models: Sequence[Path]) ->
         return parameters.knowledge_base(paths, [])
 
 
-def _initial(knowledge_base: KnowledgeBase, recording: Recording, configuration: str | None) -> list[Entry]:
+def _initial(
+    knowledge_base: KnowledgeBase, recording: Recording, configuration: str | None
+) -> list[tuple[float, ActiveFact]]:
     if configuration is None:
         return []
     if configuration not in knowledge_base.designs:
         known = ", ".join(knowledge_base.designs)
         raise ParameterError(f"--initial: no FunctionDesign is called {configuration!r}: known: {known}")
     function = knowledge_base.designs[configuration].function
-    return [entry(recording.start, "active", function, configuration, FunctionGrounding.STABLE)]
+    return [(recording.start, ActiveFact(function, configuration, FunctionGrounding.STABLE))]
 
 
 def _assignments(texts: Sequence[str]) -> list[tuple[str, Any]]:

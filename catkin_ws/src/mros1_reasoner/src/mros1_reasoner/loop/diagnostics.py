@@ -1,4 +1,4 @@
-"""What the statuses of a DiagnosticArray say, pure: levels of qualities, statuses of components, failures of tasks."""
+"""What the statuses of a DiagnosticArray and of an action say: levels, statuses of components, failures of tasks."""
 
 from __future__ import annotations
 
@@ -7,61 +7,19 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from actionlib_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticStatus
 from metacontrol_msgs.msg import DiagnosticWords as Words
 
 from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.loop.entries import BindingFact, ComponentFact, Fact, LevelFact, StaleFact, TaskFact, subject
 
 TASK_KEYS = ("objetive_error", "objective_error")
 """Keys with which a "QA status" says that a task failed; the published observer of /obj_error writes the first."""
+_FAILED = (GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.LOST)
 _SHOWN = 60  # characters of foreign text in a warning
 _OPEN = ("level", "binding", "task")  # facts with a foreign name
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
-
-
-@dataclass(frozen=True)
-class LevelFact:
-    """A quality has a level; `grounding` may be empty; `text` is the level as it was written."""
-
-    quality: str
-    level: float
-    grounding: str = ""
-    text: str = ""
-
-
-@dataclass(frozen=True)
-class StaleFact:
-    """A quality can't be observed at present."""
-
-    quality: str
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class ComponentFact:
-    """A component has a status."""
-
-    component: str
-    status: str
-
-
-@dataclass(frozen=True)
-class BindingFact:
-    """A binding of a grounding is in error, or no longer is."""
-
-    grounding: str
-    in_error: bool
-
-
-@dataclass(frozen=True)
-class TaskFact:
-    """The task of an objective has failed, or no longer has; where no objective is called so, that of every one."""
-
-    name: str
-    failed: bool
-
-
-Fact = LevelFact | StaleFact | ComponentFact | BindingFact | TaskFact
 
 
 @dataclass(frozen=True)
@@ -111,7 +69,7 @@ class DiagnosticsReader:
         self._qualities = frozenset(qualities)
         self._components = frozenset(components)
         self._nodes = dict(nodes or {})
-        self._readers: dict[str, Callable[[Any], Fact | Remark | None]] = {
+        self._readers: dict[str, Callable[[Any, float], Fact | Remark | None]] = {
             Words.QA_STATUS: self._quality,
             Words.QA_STALE: self._stale,
             Words.COMPONENT_STATUS: self._component,
@@ -119,14 +77,19 @@ class DiagnosticsReader:
             Words.BINDING_ERROR: self._binding,
         }
 
-    def read(self, statuses: Iterable[Any]) -> Reading:
-        """Return what statuses, objects with the fields of diagnostic_msgs/DiagnosticStatus, say."""
+    def read(self, statuses: Iterable[Any], stamp: float = 0.0) -> Reading:
+        """Return what statuses say.
+
+        Args:
+            statuses: objects with the fields of diagnostic_msgs/DiagnosticStatus.
+            stamp: of their array, s; 0 where it has none.
+        """
         facts: dict[tuple[str, ...], Fact] = {}
         remarks: dict[Remark, None] = {}
         names = 0
         for status in statuses:
             reader = self._readers.get(status.message)
-            found = reader(status) if reader else None
+            found = reader(status, stamp) if reader else None
             match found:
                 case None:
                     pass
@@ -134,19 +97,19 @@ class DiagnosticsReader:
                     if len(remarks) < self.MAX_REMARKS:
                         remarks[found] = None
                 case _:
-                    key = _key(found)
+                    key = subject(found)
                     if facts.pop(key, None) is None and key[0] in _OPEN:
                         names += 1
                     if names <= self.MAX_NAMES or key[0] not in _OPEN:
                         facts[key] = found
         return Reading(tuple(facts.values()), tuple(remarks))
 
-    def _quality(self, status: Any) -> Fact | Remark:
+    def _quality(self, status: Any, stamp: float) -> Fact | Remark:
         key, value = _first(status)
         if not key:
             return Remark(Words.QA_STATUS, f"QA status of {shown(status.name)} has no value: left out")
         if key in TASK_KEYS:
-            return _task(status.name, key, value)
+            return _task(status.name, key, value, stamp)
         if key not in self._qualities:
             return Remark("Unsupported QA", f"Unsupported QA TYPE received: {_plain(key)}")
         try:
@@ -157,9 +120,9 @@ class DiagnosticsReader:
         if not math.isfinite(level):
             say = f"QA status {shown(key)} has the level {shown(value)}, which is not finite: left out"
             return Remark(Words.QA_STATUS, say)
-        return LevelFact(key, level, status.name, _plain(value.strip()))
+        return LevelFact(key, level, status.name, stamp, _plain(value.strip()))
 
-    def _stale(self, status: Any) -> Fact | Remark:
+    def _stale(self, status: Any, _stamp: float) -> Fact | Remark:
         key, value = _first(status)
         if not key:
             return Remark(Words.QA_STALE, f"QA stale of {shown(status.name)} has no value: left out")
@@ -167,32 +130,38 @@ class DiagnosticsReader:
             return Remark("Unsupported QA", f"Unsupported QA TYPE received: {_plain(key)}")
         return StaleFact(key, _plain(value))
 
-    def _component(self, status: Any) -> Fact | Remark:
+    def _component(self, status: Any, stamp: float) -> Fact | Remark:
         key, value = _first(status)
         text = value[:_SHOWN].strip().upper()
         if not key or text not in v.COMPONENT_STATUSES:
             say = f"Component status ({shown(key)}, {shown(value)}) is left out: expected (component, "
             return Remark(Words.COMPONENT_STATUS, say + "TRUE|FALSE|RECOVERED)")
-        return self._known(key, text)
+        return self._known(key, text, stamp)
 
-    def _missing(self, status: Any) -> Fact | Remark | None:
+    def _missing(self, status: Any, stamp: float) -> Fact | Remark | None:
         if _level(status) < DiagnosticStatus.ERROR:
             return None
         node = status.name.strip("/")
-        return self._known(self._nodes.get(node, node), v.FAILED)
+        return self._known(self._nodes.get(node, node), v.FAILED, stamp)
 
-    def _known(self, name: str, status: str) -> Fact | Remark:
+    def _known(self, name: str, status: str, stamp: float) -> Fact | Remark:
         component = name if name in self._components else name.strip("/")
         if component not in self._components:  # nothing in the model requires it
             say = f"component {_plain(name)} is not in the model: its status is left out"
             return Remark("unknown component", say, is_warning=False)
-        return ComponentFact(component, status)
+        return ComponentFact(component, status, stamp)
 
     @staticmethod
-    def _binding(status: Any) -> Fact | Remark:
+    def _binding(status: Any, _stamp: float) -> Fact | Remark:
         if not status.name:
             return Remark(Words.BINDING_ERROR, "binding error without the name of a grounding: left out")
         return BindingFact(status.name, _level(status) >= DiagnosticStatus.ERROR)
+
+
+def newest_goal(statuses: Any) -> tuple[str, bool] | None:
+    """Return the newest goal's id in a GoalStatusArray, and whether it ended badly; None where there is no goal."""
+    newest = max(statuses.status_list, key=lambda status: status.goal_id.stamp, default=None)
+    return None if newest is None else (newest.goal_id.id, newest.status in _FAILED)
 
 
 def shown(text: str) -> str:
@@ -205,28 +174,13 @@ def _plain(text: str) -> str:
     return text if len(text) <= _SHOWN and text.isprintable() else shown(text)
 
 
-def _task(name: str, key: str, value: str) -> Fact | Remark:
+def _task(name: str, key: str, value: str, stamp: float) -> Fact | Remark:
     text = value[:_SHOWN].strip().lower()
     if text not in (*_TRUE, *_FALSE):
         return Remark(
             Words.QA_STATUS, f"QA status {key} has the value {shown(value)}: expected True or False: left out"
         )
-    return TaskFact(name, text in _TRUE)
-
-
-def _key(fact: Fact) -> tuple[str, ...]:
-    """Return what a fact is about: a later fact of the same thing replaces it."""
-    match fact:
-        case LevelFact():
-            return ("level", fact.quality, fact.grounding)
-        case StaleFact():
-            return ("stale", fact.quality)
-        case ComponentFact():
-            return ("component", fact.component)
-        case BindingFact():
-            return ("binding", fact.grounding)
-        case TaskFact():
-            return ("task", fact.name)
+    return TaskFact(name, text in _TRUE, stamp, "reported as a diagnostic")
 
 
 def _first(status: Any) -> tuple[str, str]:

@@ -16,7 +16,8 @@ from metacontrol_bags.typestore import typestore
 from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.typesys import TypesysError
 
-from mros1_reasoner.loop.journal import Entry
+from mros1_reasoner.loop.entries import ActiveFact, Entry
+from mros1_reasoner.loop.entry_text import read_entry
 
 _JOURNAL = "mros1_reasoner/journal"
 _DECISION = "mros1_reasoner/decision"
@@ -72,7 +73,7 @@ class Recording:
     runs: list[Run] = field(default_factory=list)
     decisions: list[tuple[float, Decision]] = field(default_factory=list)
     diagnostics: list[Statuses] = field(default_factory=list)
-    active: list[Entry] = field(default_factory=list)
+    active: list[tuple[float, ActiveFact]] = field(default_factory=list)
 
 
 def read_decisions(path: Path, namespace: str | None = None) -> list[Decision]:
@@ -110,9 +111,7 @@ def read_recording(path: Path, namespace: str | None = None) -> Recording:
             elif topic == decision:
                 recording.decisions.append((now, messages.decision(message, now)))
             elif topic == active:
-                recording.active += [
-                    Entry(now, "active", (f.function, f.configuration, f.state)) for f in message.functions
-                ]
+                recording.active += [(now, ActiveFact(f.function, f.configuration, f.state)) for f in message.functions]
             else:
                 statuses = Statuses(now, messages.seconds(message.header.stamp), tuple(message.status))
                 recording.diagnostics.append(statuses)
@@ -136,7 +135,7 @@ def _add_journal(path: Path, recording: Recording, message: Any) -> None:
     if int(message.first) > held:
         raise RecordingError(f"{path}: a part of the reasoner's journal is missing: it can't be replayed")
     fresh = message.entries[held - int(message.first) :]
-    run.entries += [Entry(float(item.now), str(item.kind), tuple(map(str, item.values))) for item in fresh]
+    run.entries += [read_entry(float(item.now), str(item.kind), tuple(map(str, item.values))) for item in fresh]
 
 
 @contextmanager

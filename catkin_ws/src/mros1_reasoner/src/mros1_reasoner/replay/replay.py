@@ -16,13 +16,14 @@ from metacontrol_bags.decision import DECIDED, EXECUTED, PROPOSED, Decision
 
 from mros1_reasoner.loop import journal
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
-from mros1_reasoner.loop.journal import DECIDED_KIND, Entry, entry
+from mros1_reasoner.loop.entries import ActiveFact, Approve, Decided, Entry, Reject, Result, Step
+from mros1_reasoner.loop.entry_text import kind_of
 from mros1_reasoner.loop.mape import Mape, MapeError
 from mros1_reasoner.replay.recording import Recording
 
 DEFAULT_DURATION = 1.0  # s of ROS time, of a reconfiguration, where the bag has none
 _SAME_MOMENT = 2.0  # s of ROS time between decisions that are taken for the same
-_OF_THE_MANIPULATOR = ("active", "result", "approve", "reject", DECIDED_KIND)
+_OF_THE_MANIPULATOR = ActiveFact | Result | Approve | Reject | Decided
 _NOT_COMPARED = (  # what depends on when and how fast it is computed
     "id",
     "stamp",
@@ -84,7 +85,6 @@ def replay(
         follow: the entries tell what was decided and how it went; otherwise the replay goes its own way from the start.
 
     Raises:
-        ValueError: an entry is no entry of a journal.
         ReasonerError: an analysis failed.
     """
     return _Replay(core, duration, follow).run(entries)
@@ -109,7 +109,7 @@ class _Replay:
                 if _targets(decisions) != _brought(entries, index):
                     self._is_free, self._parted = True, item.now
                     self._go_on_with(decisions)
-            elif self._parted is None or item.kind not in _OF_THE_MANIPULATOR:
+            elif self._parted is None or not isinstance(item.content, _OF_THE_MANIPULATOR):
                 self._advance(item.now)
                 self._now = item.now
                 self._go_on_with(self._apply(item))
@@ -119,10 +119,8 @@ class _Replay:
         try:
             decisions = journal.apply(self._core, item)
         except MapeError as error:
-            self._remarks.append(f"{item.now:.3f} s: {item.kind}: {error}")
+            self._remarks.append(f"{item.now:.3f} s: {kind_of(item.content)}: {error}")
             return []
-        except TypeError as error:
-            raise ValueError(f"an entry {item.kind!r} of the journal has {len(item.values)} values") from error
         self._decisions += [(item.now, decision) for decision in decisions]
         return decisions
 
@@ -130,7 +128,7 @@ class _Replay:
         """Approve what is proposed, and have what is decided carried out after a while."""
         for decision in decisions:
             if decision.state == PROPOSED:
-                self._go_on_with(self._apply(entry(self._now, "approve", decision.id)))
+                self._go_on_with(self._apply(Entry(self._now, Approve(decision.id))))
         pending = self._core.pending
         if pending is not None and (self._request is None or self._request[1] != pending.id):
             self._request = self._now + self._duration, pending.id
@@ -146,8 +144,8 @@ class _Replay:
             self._now = max(self._now, min(moments))
             if self._request and self._request[0] <= self._now:
                 (_, decision), self._request = self._request, None
-                self._apply(entry(self._now, "result", decision, True, "", True))
-            self._go_on_with(self._apply(entry(self._now, "step", False)))
+                self._apply(Entry(self._now, Result(decision, ok=True)))
+            self._go_on_with(self._apply(Entry(self._now, Step(heartbeat=False))))
 
 
 def _targets(decisions: Sequence[Decision]) -> list[tuple[str, str]]:
@@ -156,8 +154,14 @@ def _targets(decisions: Sequence[Decision]) -> list[tuple[str, str]]:
 
 def _brought(entries: Sequence[Entry], index: int) -> list[tuple[str, str]]:
     """Return objective and configuration of what an entry has brought then."""
-    following = itertools.takewhile(lambda item: item.kind == DECIDED_KIND, itertools.islice(entries, index + 1, None))
-    return [(item.values[1], item.values[2]) for item in following] if entries[index].kind != DECIDED_KIND else []
+    if isinstance(entries[index].content, Decided):
+        return []
+    found = []
+    for item in itertools.islice(entries, index + 1, None):
+        if not isinstance(item.content, Decided):
+            break
+        found.append((item.content.objective, item.content.configuration))
+    return found
 
 
 def usual_duration(decisions: Sequence[tuple[float, Decision]]) -> float:
@@ -166,7 +170,9 @@ def usual_duration(decisions: Sequence[tuple[float, Decision]]) -> float:
     return statistics.median(durations) if durations else DEFAULT_DURATION
 
 
-def without_journal(recording: Recording, reader: DiagnosticsReader, initial: Sequence[Entry] = ()) -> list[Entry]:
+def without_journal(
+    recording: Recording, reader: DiagnosticsReader, initial: Sequence[tuple[float, ActiveFact]] = ()
+) -> list[Entry]:
     """Make a journal, for a replay without `follow`, of the diagnostics that a bag without one holds.
 
     Args:
@@ -174,16 +180,14 @@ def without_journal(recording: Recording, reader: DiagnosticsReader, initial: Se
         reader: of its diagnostics.
         initial: what ran at its beginning; else as the bag tells.
     """
-    entries = list(initial)
-    known = {item.values[0] for item in entries}
-    for item in recording.active:
-        if item.values[0] not in known:
-            known.add(item.values[0])
-            entries.append(item)
+    first: dict[str, tuple[float, ActiveFact]] = {}
+    for now, fact in (*initial, *recording.active):
+        first.setdefault(fact.function, (now, fact))
+    entries = [Entry(now, fact) for now, fact in first.values()]
     for array in recording.diagnostics:
-        entries += [entry(array.now, *journal.of_fact(fact, array.stamp)) for fact in reader.read(array.statuses).facts]
+        entries += [Entry(array.now, fact) for fact in reader.read(array.statuses, array.stamp).facts]
     entries.sort(key=lambda item: item.now)
-    return [step for item in entries for step in (item, entry(item.now, "step", True))]
+    return [step for item in entries for step in (item, Entry(item.now, Step(heartbeat=True)))]
 
 
 def pairs(recording: Recording, replayed: Replayed) -> list[Pair]:

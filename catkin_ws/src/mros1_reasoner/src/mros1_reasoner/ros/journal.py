@@ -10,7 +10,9 @@ import rospy
 import yaml
 from metacontrol_msgs.msg import JournalEntry, ReasonerJournal
 
-from mros1_reasoner.loop.journal import Entry, Journal
+from mros1_reasoner.loop.entries import Entry
+from mros1_reasoner.loop.entry_text import kind_of, values_of
+from mros1_reasoner.loop.journal import Journal
 from mros1_reasoner.loop.parameters import Parameters
 
 
@@ -42,13 +44,13 @@ class JournalTopic:
             "mros1_reasoner/journal", ReasonerJournal, subscriber_listener=listener, queue_size=1000
         )
 
-    def append(self, item: Entry) -> None:
+    def append(self, entry: Entry) -> None:
         """Add an entry."""
         with self._lock:
-            number = self._journal.append(item)
+            number = self._journal.append(entry)
         if not self._fresh:
             self._first = number
-        self._fresh.append(item)
+        self._fresh.append(entry)
 
     def flush(self) -> None:
         """Publish the entries since the last flush."""
@@ -66,5 +68,7 @@ class JournalTopic:
     def _message(self, first: int, entries: Sequence[Entry]) -> ReasonerJournal:
         message = ReasonerJournal(name=self._name, first=first)
         message.header.stamp = rospy.Time.now()
-        message.entries = [JournalEntry(item.now, item.kind, list(item.values)) for item in entries]
+        message.entries = [
+            JournalEntry(entry.now, kind_of(entry.content), list(values_of(entry.content))) for entry in entries
+        ]
         return message

@@ -25,11 +25,12 @@ from mros1_reasoner.knowledge import vocabulary
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase, KnowledgeBaseError
 from mros1_reasoner.knowledge.model import Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
-from mros1_reasoner.loop import journal
-from mros1_reasoner.loop.diagnostics import DiagnosticsReader, LevelFact, Reading, Remark, StaleFact
+from mros1_reasoner.loop import entries, journal
+from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark, newest_goal
+from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Result, StaleFact, Step, TaskFact
+from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.mape import Mape, MapeError
 from mros1_reasoner.loop.parameters import ParameterError, Parameters
-from mros1_reasoner.loop.tasks import newest_goal
 from mros1_reasoner.loop.throttle import Throttle
 from mros1_reasoner.pellet.process import make_reasoner
 from mros1_reasoner.replay.explain import line
@@ -112,7 +113,7 @@ class ReasonerNode:
                 self._requests.look()
                 if is_heartbeat:
                     self._requests.tell_trouble()
-            self._take("step", is_heartbeat)
+            self._take(Step(is_heartbeat))
             self._journal.flush()
             until = min(heartbeat, now + _LONGEST_WAIT, self._next_look())
             with self._wake:
@@ -153,36 +154,34 @@ class ReasonerNode:
             answer.cancel()
             raise
 
-    def command(self, kind: str, *values: object) -> None:
-        """Take in what an operator asks for, in the loop's thread; kinds and values: journal.py.
+    def command(self, command: entries.Command) -> None:
+        """Take in what an operator asks for, in the loop's thread.
 
         Raises:
             MapeError, ReasonerError: it does not fit.
         """
-        self._announce(self._applied(kind, *values))
-        shown = " ".join(str(value) for value in values)
-        rospy.loginfo(_LOG, f"operator: {kind} {shown}".strip())
-        if kind == "add_objective":
-            self._tell_objective(self.core.objectives[str(values[0])])
+        self._announce(self._applied(command))
+        rospy.loginfo(_LOG, f"operator: {' '.join((kind_of(command), *values_of(command)))}".strip())
+        if isinstance(command, entries.AddObjective):
+            self._tell_objective(self.core.objectives[command.name])
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
-        reading = self._reader.read(array.status)
+        reading = self._reader.read(array.status, array.header.stamp.to_sec())
         if not reading.facts and not reading.remarks:
             return
         if len(self._waiting) > _QUEUE:
             reading = Reading(
                 remarks=(Remark("queue", "diagnostics come faster than they can be read: some are lost"),)
             )
-            self._queue(lambda: self._take_reading(reading, 0.0), at_most=_QUEUE + 1)
+            self._queue(lambda: self._take_reading(reading), at_most=_QUEUE + 1)
             return
-        stamp = array.header.stamp.to_sec()
-        self._queue(lambda: self._take_reading(reading, stamp))
+        self._queue(lambda: self._take_reading(reading))
 
     def _on_active(self, active: messages.ActiveConfiguration) -> None:
         self._queue(lambda: self._take_active(active))
 
     def _on_obj_error(self, message: Bool) -> None:
-        self._queue(lambda: self._take("task", "", message.data, 0.0, "reported on obj_error"))
+        self._queue(lambda: self._take(TaskFact("", message.data, message="reported on obj_error")))
 
     def _on_task_status(self, objective: str, action: str, statuses: GoalStatusArray) -> None:
         """Take in how the newest goal of an objective's action fares, where that is new."""
@@ -190,7 +189,7 @@ class ReasonerNode:
         if newest is None or self._goals.get(objective) == newest:
             return
         self._goals[objective] = newest
-        self._queue(lambda: self._take("task", objective, newest[1], 0.0, f"a goal of {action} was aborted"))
+        self._queue(lambda: self._take(TaskFact(objective, newest[1], message=f"a goal of {action} was aborted")))
 
     def _queue(self, work: Callable[[], object], at_most: float = math.inf) -> None:
         with self._wake:
@@ -204,31 +203,30 @@ class ReasonerNode:
         for work in works:
             work()
 
-    def _take(self, kind: str, *values: object) -> bool:
+    def _take(self, content: entries.Content) -> bool:
         """Take something in and announce what follows; say what is wrong where it does not fit."""
         try:
-            self._announce(self._applied(kind, *values))
+            self._announce(self._applied(content))
         except (MapeError, KnowledgeBaseError) as error:
-            self._warn(kind, str(error))
+            self._warn(kind_of(content), str(error))
         except ReasonerError as error:
             self._warn("analysis", f"analysis failed: {error}")
         else:
             return True
         return False
 
-    def _applied(self, kind: str, *values: object) -> list[Decision]:
-        item = journal.entry(rospy.get_time(), kind, *values)
-        decisions = journal.apply(self.core, item)
-        self._journal.append(item)
-        for brought in journal.decided(item.now, decisions):
-            self._journal.append(brought)
+    def _applied(self, content: entries.Content) -> list[Decision]:
+        entry = Entry(rospy.get_time(), content)
+        decisions = journal.apply(self.core, entry)
+        for item in (entry, *journal.brought(entry.now, decisions)):
+            self._journal.append(item)
         return decisions
 
-    def _take_reading(self, reading: Reading, stamp: float) -> None:
+    def _take_reading(self, reading: Reading) -> None:
         for remark in reading.remarks:
             self._tell_remark(remark)
         for fact in reading.facts:
-            taken = self._take(*journal.of_fact(fact, stamp))
+            taken = self._take(fact)
             if isinstance(fact, LevelFact) and taken:
                 self._tell_level(fact)
             elif isinstance(fact, StaleFact):
@@ -238,7 +236,7 @@ class ReasonerNode:
         for function in active.functions:
             if not function.configuration:
                 continue
-            taken = self._take("active", function.function, function.configuration, function.state)
+            taken = self._take(ActiveFact(function.function, function.configuration, function.state))
             if taken and function.function not in self._taken_over:
                 self._taken_over.add(function.function)
                 say = f"{function.function} runs {function.configuration} ({function.state}): taken over as it is"
@@ -260,7 +258,7 @@ class ReasonerNode:
 
     def _report(self, decision: str, ok: bool, message: str = "", *, blame: bool = True) -> None:
         """Take in how a decision went."""
-        self._take("result", decision, ok, message, blame)
+        self._take(Result(decision, ok, message, blame))
         self._queue(lambda: None)  # look at once at what happened meanwhile
 
     def _tell_decision(self, decision: Decision) -> None:

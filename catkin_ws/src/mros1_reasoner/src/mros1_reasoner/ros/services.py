@@ -13,12 +13,14 @@ from std_srvs.srv import Trigger, TriggerResponse
 
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
+from mros1_reasoner.loop import entries
 from mros1_reasoner.loop.mape import MapeError
 
 if TYPE_CHECKING:
     from mros1_reasoner.ros.reasoner import ReasonerNode
 
 _ERRORS = (MapeError, KnowledgeBaseError, ReasonerError, ValueError)
+_TRIGGERS = {"pause": entries.Pause, "resume": entries.Resume, "lock": entries.Lock, "unlock": entries.Unlock}
 _SAVED = "knowledge_base.owl"
 
 
@@ -34,28 +36,28 @@ class Services:
         """
         self._node = node
         self._save_folder = save_folder
-        for name in ("pause", "resume", "lock", "unlock"):
-            rospy.Service(f"~{name}", Trigger, lambda _, kind=name: self._trigger(kind))
-        for name in ("approve", "reject"):
-            rospy.Service(
-                f"~{name}", services.ApproveDecision, lambda request, kind=name: self._settle(kind, request.id)
-            )
+        for name, kind in _TRIGGERS.items():
+            rospy.Service(f"~{name}", Trigger, lambda _, kind=kind: self._trigger(kind()))
+        rospy.Service("~approve", services.ApproveDecision, lambda request: self._settle(entries.Approve, request.id))
+        rospy.Service("~reject", services.ApproveDecision, lambda request: self._settle(entries.Reject, request.id))
         rospy.Service("~add_objective", services.AddObjective, self._add_objective)
         rospy.Service("~remove_objective", services.RemoveObjective, self._remove_objective)
         rospy.Service("~set_nfr", services.SetNfr, self._set_nfr)
         rospy.Service("~feasible", services.Feasible, self._feasible)
         rospy.Service("~save_knowledge_base", services.SaveKnowledgeBase, self._save)
 
-    def _trigger(self, kind: str) -> TriggerResponse:
-        ok, message = self._answer(lambda: self._node.command(kind))
+    def _trigger(self, command: entries.Command) -> TriggerResponse:
+        ok, message = self._answer(lambda: self._node.command(command))
         return TriggerResponse(ok, message)
 
-    def _settle(self, kind: str, decision_id: str) -> services.ApproveDecisionResponse:
+    def _settle(
+        self, kind: type[entries.Approve | entries.Reject], decision_id: str
+    ) -> services.ApproveDecisionResponse:
         def work() -> None:
             waits = self._node.core.proposal
             if waits is None:
                 raise MapeError("no decision waits for approval")
-            self._node.command(kind, decision_id or waits.id)
+            self._node.command(kind(decision_id or waits.id))
 
         return services.ApproveDecisionResponse(*self._answer(work))
 
@@ -63,18 +65,18 @@ class Services:
         def work() -> None:
             if not request.name or not request.name.replace("_", "a").isalnum():
                 raise MapeError(f"objective {request.name!r}: use letters, digits and '_' for its name")
-            limits = [value for nfr in request.nfrs for value in (nfr.name, nfr.value)]
-            self._node.command("add_objective", request.name, request.function, *limits)
+            limits = {nfr.name: nfr.value for nfr in request.nfrs}
+            self._node.command(entries.AddObjective(request.name, request.function, limits))
 
         return services.AddObjectiveResponse(*self._answer(work))
 
     def _remove_objective(self, request: Any) -> services.RemoveObjectiveResponse:
-        work = lambda: self._node.command("remove_objective", request.name)  # noqa: E731
-        return services.RemoveObjectiveResponse(*self._answer(work))
+        command = entries.RemoveObjective(request.name)
+        return services.RemoveObjectiveResponse(*self._answer(lambda: self._node.command(command)))
 
     def _set_nfr(self, request: Any) -> services.SetNfrResponse:
-        work = lambda: self._node.command("set_nfr", request.objective, request.quality, request.value)  # noqa: E731
-        return services.SetNfrResponse(*self._answer(work))
+        command = entries.SetNfr(request.objective, request.quality, request.value)
+        return services.SetNfrResponse(*self._answer(lambda: self._node.command(command)))
 
     def _feasible(self, request: Any) -> services.FeasibleResponse:
         found: list[FunctionFeasibility] = []

@@ -1,0 +1,212 @@
+"""What the loop takes in and does, as typed entries of its journal; `entry_text` has their form in messages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+# R1: facts
+
+
+@dataclass(frozen=True)
+class LevelFact:
+    """A quality attribute has a level.
+
+    Attributes:
+        quality: name of the quality attribute.
+        level: the level.
+        grounding: what it was observed of; empty or unknown: of everything that runs.
+        stamp: of the diagnostic, s; 0 where it has none.
+        text: the level as the diagnostic has it; the journal is without it.
+    """
+
+    quality: str
+    level: float
+    grounding: str = ""
+    stamp: float = 0.0
+    text: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True)
+class StaleFact:
+    """A quality attribute can't be observed at present; the journal is without the reason."""
+
+    quality: str
+    reason: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True)
+class ComponentFact:
+    """A component has a status; the diagnostic has a stamp, s."""
+
+    component: str
+    status: str
+    stamp: float = 0.0
+
+
+@dataclass(frozen=True)
+class BindingFact:
+    """A binding of a grounding is in error, or no longer is."""
+
+    grounding: str
+    in_error: bool
+
+
+@dataclass(frozen=True)
+class TaskFact:
+    """The task of an objective has failed, or no longer has.
+
+    Attributes:
+        name: of the objective or of its function; any other name stands for the only root objective.
+        failed: whether the task has failed.
+        stamp: of the message that said so, s; 0 where it has none.
+        message: why.
+    """
+
+    name: str
+    failed: bool
+    stamp: float = 0.0
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class ActiveFact:
+    """A configuration runs for a function, in a state of metacontrol_msgs/FunctionGrounding."""
+
+    function: str
+    configuration: str
+    state: str
+
+
+Fact = LevelFact | StaleFact | ComponentFact | BindingFact | TaskFact | ActiveFact
+
+# What an operator asks for
+
+
+@dataclass(frozen=True)
+class Pause:
+    """Decide nothing."""
+
+
+@dataclass(frozen=True)
+class Resume:
+    """Decide again."""
+
+
+@dataclass(frozen=True)
+class Lock:
+    """Keep the configuration of an objective; of all objectives where none is named."""
+
+    objective: str = ""
+
+
+@dataclass(frozen=True)
+class Unlock:
+    """Take a lock back; all locks where no objective is named."""
+
+    objective: str = ""
+
+
+@dataclass(frozen=True)
+class Approve:
+    """Carry out the proposed decision of this id."""
+
+    decision: str
+
+
+@dataclass(frozen=True)
+class Reject:
+    """Do not carry out the proposed decision of this id."""
+
+    decision: str
+
+
+@dataclass(frozen=True)
+class AddObjective:
+    """Ask for a function, with a limit by quality attribute."""
+
+    name: str
+    function: str
+    limits: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class RemoveObjective:
+    """Ask for an objective's function no longer."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class SetNfr:
+    """Give an objective another limit; all objectives where none is named."""
+
+    objective: str
+    quality: str
+    limit: float
+
+
+Command = Pause | Resume | Lock | Unlock | Approve | Reject | AddObjective | RemoveObjective | SetNfr
+
+# What the loop does
+
+
+@dataclass(frozen=True)
+class Step:
+    """Reason and decide; on a heartbeat also where merely a level has changed."""
+
+    heartbeat: bool
+
+
+@dataclass(frozen=True)
+class Result:
+    """A decision was carried out, or was not.
+
+    Attributes:
+        decision: its id.
+        ok: whether it was carried out.
+        message: why not.
+        blame: whether the configuration is to blame for the failure.
+    """
+
+    decision: str
+    ok: bool
+    message: str = ""
+    blame: bool = True
+
+
+@dataclass(frozen=True)
+class Decided:
+    """What an entry has brought, written after it: the id of a decision, its objective and configuration."""
+
+    decision: str
+    objective: str
+    configuration: str
+
+
+Content = Fact | Command | Step | Result | Decided
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Something that was taken in, and the ROS time in s that the loop worked with."""
+
+    now: float
+    content: Content
+
+
+def subject(fact: Fact) -> tuple[str, ...]:
+    """Return what a fact is about: a later fact about the same takes its place."""
+    match fact:
+        case LevelFact():
+            return ("level", fact.quality, fact.grounding)
+        case StaleFact():
+            return ("stale", fact.quality)
+        case ComponentFact():
+            return ("component", fact.component)
+        case BindingFact():
+            return ("binding", fact.grounding)
+        case TaskFact():
+            return ("task", fact.name)
+        case ActiveFact():
+            return ("active", fact.function)

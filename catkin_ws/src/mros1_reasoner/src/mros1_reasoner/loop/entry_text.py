@@ -1,0 +1,105 @@
+"""Entries of the journal as text, as metacontrol_msgs/JournalEntry holds them: a kind, and the values in order.
+
+| kind | values |
+|---|---|
+| level | quality, level, grounding, stamp of the diagnostic |
+| stale | quality |
+| component | component, status, stamp of the diagnostic |
+| binding | grounding, in error |
+| task | objective or its function, failed, stamp, message; any other name stands for the only root objective |
+| active | function, configuration, state |
+| step | whether it is a heartbeat |
+| result | decision, whether it is carried out, message, whether the configuration is to blame |
+| pause, resume | |
+| lock, unlock | objective; none: all |
+| approve, reject | decision |
+| add_objective | objective, function, then quality and limit of each NFR |
+| remove_objective | objective |
+| set_nfr | objective, quality, limit |
+| decided | decision, objective, configuration: not taken in, but what a step has brought |
+
+Numbers are written so that they read back exactly; yes is 1, no is 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+from mros1_reasoner.loop import entries
+
+_YES, _NO = "1", "0"
+_KINDS: Mapping[str, type[entries.Content]] = {
+    "level": entries.LevelFact,
+    "stale": entries.StaleFact,
+    "component": entries.ComponentFact,
+    "binding": entries.BindingFact,
+    "task": entries.TaskFact,
+    "active": entries.ActiveFact,
+    "step": entries.Step,
+    "result": entries.Result,
+    "pause": entries.Pause,
+    "resume": entries.Resume,
+    "lock": entries.Lock,
+    "unlock": entries.Unlock,
+    "approve": entries.Approve,
+    "reject": entries.Reject,
+    "add_objective": entries.AddObjective,
+    "remove_objective": entries.RemoveObjective,
+    "set_nfr": entries.SetNfr,
+    "decided": entries.Decided,
+}
+_NAMES = {content: kind for kind, content in _KINDS.items()}
+_READERS: Mapping[str, Callable[[str], Any]] = {"str": str, "float": float, "bool": lambda text: text == _YES}
+
+
+def kind_of(content: entries.Content) -> str:
+    """Return the kind of an entry with this content."""
+    return _NAMES[type(content)]
+
+
+def values_of(content: entries.Content) -> tuple[str, ...]:
+    """Return the values of an entry with this content."""
+    match content:
+        case entries.Lock(objective="") | entries.Unlock(objective=""):
+            return ()
+        case entries.AddObjective(name, function, limits):
+            return (name, function, *(_text(part) for limit in limits.items() for part in limit))
+    return tuple(_text(getattr(content, name)) for name, _ in _written(type(content)))
+
+
+def read_entry(now: float, kind: str, values: Sequence[str]) -> entries.Entry:
+    """Return the entry of a kind with these values.
+
+    Raises:
+        ValueError: the kind is unknown, or a value is missing or can't be read.
+    """
+    content = _KINDS.get(kind)
+    if content is None:
+        raise ValueError(f"a journal's entry has the unknown kind {kind!r}")
+    unfit = ValueError(f"an entry {kind!r} of the journal has {len(values)} values")
+    if content is entries.AddObjective:
+        if len(values) < 2 or len(values) % 2:
+            raise unfit
+        limits = {quality: float(limit) for quality, limit in zip(values[2::2], values[3::2], strict=True)}
+        return entries.Entry(now, entries.AddObjective(values[0], values[1], limits))
+    written = _written(content)
+    is_without = not values and content in (entries.Lock, entries.Unlock)
+    if len(values) != len(written) and not is_without:
+        raise unfit
+    read: dict[str, Any] = {
+        name: _READERS[kind](value) for (name, kind), value in zip(written, values, strict=not is_without)
+    }
+    return entries.Entry(now, content(**read))
+
+
+def _written(content: type[entries.Content]) -> list[tuple[str, str]]:
+    """Return name and type of the fields that are written: those by which contents are compared."""
+    return [(item.name, str(item.type)) for item in fields(content) if item.compare]
+
+
+def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return _YES if value else _NO
+    return repr(value) if isinstance(value, float) else str(value)
