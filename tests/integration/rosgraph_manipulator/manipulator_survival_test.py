@@ -3,9 +3,11 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 import rosgraph
@@ -138,6 +140,22 @@ class SurvivalTest(PairTest):
         self.wait_for_goal(goal_id, server)
         wait_for(lambda: self.states[-1].functions[0].state == "STABLE", "a configuration is stable")
 
+    def test_launcher_that_dies_just_when_it_is_asked_is_waited_for(self):
+        """The kernel closes a dying launcher's sockets one by one: it may be found, and then refuse the request."""
+        self.launcher.end(signal.SIGKILL)
+        dying = socket.create_server(("localhost", 0))
+        found = threading.Thread(target=accept_one, args=(dying,), daemon=True)
+        found.start()
+        port = dying.getsockname()[1]
+        service = rospy.resolve_name("rosgraph_launcher/change")
+        rosgraph.Master("/dying_launcher").registerService(service, f"rosrpc://localhost:{port}", "http://localhost:1")
+        self.client.send_goal(MvpReconfigurationGoal("fast"))
+        found.join(DEADLINE_S)
+        self.assertFalse(found.is_alive(), self.manipulator.said())
+        self.restart_launcher()
+        self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
+        self.assertEqual(self.client.get_result().result, 1, self.text)
+
     def test_lost_master_ends_the_pair_in_one_line_each_and_leaves_nothing(self):
         port = free_port()
         folder = tempfile.mkdtemp()
@@ -179,6 +197,13 @@ class SurvivalTest(PairTest):
             return self.client.wait_for_result(rospy.Duration(1)) and self.client.get_result().result == -1
 
         wait_for(answers, "the manipulator answers")
+
+
+def accept_one(server):
+    """Accept a connection, then refuse all others."""
+    connection, _ = server.accept()
+    server.close()
+    connection.close()
 
 
 def answers(api):

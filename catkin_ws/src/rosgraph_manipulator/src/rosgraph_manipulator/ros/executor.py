@@ -8,10 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+import rosgraph
 import rospy
 from geometry_msgs.msg import Twist
 from metacontrol_msgs.msg import LauncherState
-from metacontrol_msgs.srv import ChangeConfiguration
+from metacontrol_msgs.srv import ChangeConfiguration, ChangeConfigurationRequest, ChangeConfigurationResponse
+from rospy.exceptions import TransportException, TransportInitError
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.tactics import Plan
@@ -26,6 +28,9 @@ POLL_PERIOD = 0.01  # s, wall
 STATE_TIMEOUT = 2.0  # s, wall, for the launcher's state to follow its answer
 DELIVERY_TIMEOUT = 5.0  # s, wall, for the new server to have the pending goal
 BROKEN = (LauncherState.RECOVERING, LauncherState.FAILED)
+
+_NOT_REACHED = (TransportInitError, rosgraph.MasterError)
+"""What rospy has caught when it raises a ServiceException and has sent no request: no registration, no connection."""
 
 
 def wait_until(condition: Callable[[], bool], timeout: float) -> bool:
@@ -238,15 +243,15 @@ class RosExecutor:
         self._new_server = self._stop_robot = False
 
     def _call(self, wanted: Configuration | None, start: tuple[str, ...]) -> None:
+        request = ChangeConfigurationRequest(
+            configuration=wanted.name if wanted else "",
+            launch_file=wanted.launch_file if wanted else "",
+            args=list(wanted.args) if wanted else [],
+            start=list(start),
+        )
         try:
-            self._change.wait_for_service(self._launcher_timeout)
-            answer = self._change(
-                configuration=wanted.name if wanted else "",
-                launch_file=wanted.launch_file if wanted else "",
-                args=list(wanted.args) if wanted else [],
-                start=list(start),
-            )
-        except (rospy.ServiceException, rospy.ROSException) as error:
+            answer = self._ask(request)
+        except (rospy.ServiceException, rospy.ROSException, TransportException) as error:
             raise DeploymentError(f"rosgraph_launcher did not do its part ({error}); is it running?") from error
         if not answer.ok:
             raise DeploymentError(answer.message)
@@ -254,6 +259,24 @@ class RosExecutor:
         self._change_number = answer.change
         with self._news:
             self._news.wait_for(lambda: self._has_done(answer.change), STATE_TIMEOUT)
+
+    def _ask(self, request: ChangeConfigurationRequest) -> ChangeConfigurationResponse:
+        """Return the launcher's answer to a request, which is made as soon as a launcher is there.
+
+        A launcher that is being killed may accept the connection by which `wait_for_service` finds it and refuse the
+        next one, because the kernel closes its sockets one after the other. A request that reached no launcher is
+        repeated. One that did is not, because a part of it may be done.
+        """
+        deadline = time.monotonic() + self._launcher_timeout
+        while True:
+            self._change.wait_for_service(max(deadline - time.monotonic(), POLL_PERIOD))
+            self._begun = time.monotonic()  # the nodes have all their time, however long this took
+            try:
+                return self._change(request)
+            except rospy.ServiceException as error:
+                if not isinstance(error.__context__, _NOT_REACHED) or time.monotonic() > deadline:
+                    raise
+                time.sleep(POLL_PERIOD)
 
     def _has_done(self, change: int) -> bool:
         """Whether the launcher's topic has come as far as its answer."""
