@@ -90,6 +90,12 @@ def test_file_that_cannot_be_used_leaves_the_running_nodes_alone(launcher, tmp_p
     assert launcher.pidfds() == before
 
 
+def test_change_that_was_planned_for_a_launcher_with_more_nodes_is_refused(launcher, tmp_path):
+    with pytest.raises(LauncherError, match="needs /a, which does not run"):
+        launcher.change("second", launch_file(tmp_path, "a", "b"), [], ["/b"])
+    assert launcher.pidfds() == {}
+
+
 def test_stop_ends_every_process(launcher, tmp_path, reports):
     launcher.change("first", launch_file(tmp_path, "a"), [], ["/a"])
     launcher.change("", "", [], [])

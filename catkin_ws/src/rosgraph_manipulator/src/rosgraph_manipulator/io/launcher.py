@@ -195,6 +195,10 @@ class Launcher:
             unknown = [name for name in start if name not in launch.system.nodes]
             if unknown:
                 raise LauncherError(f"{launch_file} starts no node {', '.join(unknown)}")
+            # The change may have been planned for a launcher that died since, and that had more nodes.
+            lacking = [name for name in launch.system.nodes if name not in (*start, *self._nodes.names)]
+            if lacking:
+                raise LauncherError(f"{launch_file} needs {', '.join(lacking)}, which does not run: start it, too")
             return launch, {name: self._commands.command(launch.system.nodes[name]) for name in start}
         except LaunchFileError as error:
             raise LauncherError(str(error)) from error
