@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import rospkg
-from metacontrol_experiments.lockstep.lockstep import SETTLE_S, Lockstep
+from metacontrol_experiments.io.lockstep_setup import set_up
+from metacontrol_experiments.lockstep.lockstep import SETTLE_S
 from metacontrol_experiments.mission.routes import read_route
 from metacontrol_experiments.mission.settings import Settings
 from support.figures import GAZEBO, entry
@@ -27,7 +28,7 @@ def run() -> list[dict[str, Any]]:
     speeds = []
     with tempfile.TemporaryDirectory(prefix="bench_") as folder:
         for _ in range(_RUNS):
-            lockstep = Lockstep(Settings(route, Path(folder), metacontrol=False))
+            lockstep = set_up(Settings(route, Path(folder), metacontrol=False))
             began = time.perf_counter()
             state = lockstep.run().state
             simulated = (state.ended_s or 0.0) - state.started_s + SETTLE_S

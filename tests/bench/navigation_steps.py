@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from unittest import mock
 
 import rospkg
-from metacontrol_experiments.lockstep.lockstep import Lockstep
+from metacontrol_experiments.io.lockstep_setup import set_up
 from metacontrol_experiments.mission.routes import read_route
 from metacontrol_experiments.mission.settings import Settings
 from move_base.control.dwa import DwaController
@@ -46,7 +46,7 @@ def run() -> list[dict[str, Any]]:
         for name, owner, method, _ in _MEASURED:
             timed = _timed(getattr(owner, method), times[name])
             patches.enter_context(mock.patch.object(owner, method, timed))
-        Lockstep(Settings(route, Path(folder), metacontrol=False, timeout_s=_SECONDS)).run()
+        set_up(Settings(route, Path(folder), metacontrol=False, timeout_s=_SECONDS)).run()
     times["global_plan"] = times["global_plan"][:_FIRST_PLANS]
     return [
         entry(name, statistics.median(times[name]), "ms", len(times[name]), LIMIT, limit)

@@ -10,8 +10,10 @@ from click.testing import CliRunner
 from metacontrol_bags.metrics import summarise
 from metacontrol_experiments.cli import main as cli
 from metacontrol_experiments.contingency.contingency import parse_contingency
+from metacontrol_experiments.io.lockstep_setup import describe_system, set_up
 from metacontrol_experiments.lockstep.frames import KEPT_S, Frames
-from metacontrol_experiments.lockstep.lockstep import Lockstep, LockstepError, navigation_parameters
+from metacontrol_experiments.lockstep.navigation import navigation_parameters
+from metacontrol_experiments.lockstep.system import LockstepError
 from metacontrol_experiments.mission.mission import Outcome
 from metacontrol_experiments.mission.routes import Pose, Route
 from metacontrol_experiments.mission.settings import Settings
@@ -26,6 +28,11 @@ FAR = Route("far", Pose(-8.0, -8.0, 0.78), Pose(5.4, 6.0, 0.0))
 def settings(tmp_path, *texts, **changes):
     usual = {"metacontrol": False, "contingencies": tuple(map(parse_contingency, texts)), "timeout_s": 60.0}
     return Settings(**({"route": WAY, "output": tmp_path} | usual | changes))
+
+
+@pytest.fixture(scope="module")
+def system():
+    return describe_system(Settings.launch_package, "metacontrol_sim_reasoner.launch")
 
 
 def test_frames_answer_as_tf_does():
@@ -51,8 +58,8 @@ def test_frames_forget_what_is_old():
 
 
 @pytest.mark.parametrize("path", sorted((PACKAGE / "models/variants").glob("*.rossystem")), ids=lambda path: path.stem)
-def test_every_variant_has_its_own_parameters(path):
-    parameters = navigation_parameters(PACKAGE, path.stem)
+def test_every_variant_has_its_own_parameters(path, system):
+    parameters = navigation_parameters(system, path.stem)
     frequency, speed, radius = ((15, 20, 25), (0.3, 0.5, 0.75), (0.5, 0.65, 0.8))
     numbers = [int(part[1]) - 1 for part in path.stem.split("_")[:3]]
     assert parameters.controller_frequency == frequency[numbers[0]]
@@ -64,20 +71,20 @@ def test_every_variant_has_its_own_parameters(path):
 
 
 def test_mission_reaches_its_goal_and_repeats_byte_for_byte(tmp_path):
-    one = Lockstep(settings(tmp_path, "clutter:2", "power:1.4@time:3"), PACKAGE).run()
+    one = set_up(settings(tmp_path, "clutter:2", "power:1.4@time:3")).run()
     assert one.state.outcome is Outcome.REACHED
     summary = summarise(one.record)
     assert summary["engine"] == "lockstep" and summary["goal_reached"] and summary["collisions"] == 0
     assert summary["control"] == {"rate_hz": 20.0, "periods_missed": 0.0}
     assert [entry["name"] for entry in summary["perturbations"]] == ["clutter:2", "power:1.4"]
     assert summary["contingency"] == {"clutter": 2, "power": 1.4, "component": None}
-    assert one.log == Lockstep(settings(tmp_path, "clutter:2", "power:1.4@time:3"), PACKAGE).run().log
-    other = Lockstep(settings(tmp_path, "clutter:2", "power:1.4@time:3", seed=2), PACKAGE).run()
+    assert one.log == set_up(settings(tmp_path, "clutter:2", "power:1.4@time:3")).run().log
+    other = set_up(settings(tmp_path, "clutter:2", "power:1.4@time:3", seed=2)).run()
     assert other.log != one.log
 
 
 def test_baseline_stands_still_when_its_laser_dies(tmp_path):
-    outcome = Lockstep(settings(tmp_path, "kill:front_laser@time:3", timeout_s=10.0), PACKAGE).run()
+    outcome = set_up(settings(tmp_path, "kill:front_laser@time:3", timeout_s=10.0)).run()
     assert outcome.state.outcome is Outcome.TIMEOUT
     late = outcome.record.poses[outcome.record.poses[:, 0] > outcome.state.started_s + 6.0, 1:]
     assert np.ptp(late, axis=0).max() < 0.01
@@ -85,19 +92,19 @@ def test_baseline_stands_still_when_its_laser_dies(tmp_path):
 
 def test_meta_controller_goes_on_with_the_camera_and_repeats_byte_for_byte(tmp_path):
     asked = settings(tmp_path, "kill:front_laser@time:2", metacontrol=True)
-    one = Lockstep(asked, PACKAGE).run()
+    one = set_up(asked).run()
     assert one.state.outcome is Outcome.REACHED
     summary = summarise(one.record)
     (change,) = [entry for entry in summary["reconfigurations"] if entry["trigger"] == "component:front_laser"]
     assert change["to"].endswith("_k") and summary["final_configuration"].endswith("_k")
     assert 0.0 < change["detect_s"] < 1.0 and 0.0 <= change["decide_s"] < 1.0 and 0.5 < change["execute_s"] < 5.0
-    assert one.log == Lockstep(asked, PACKAGE).run().log
+    assert one.log == set_up(asked).run().log
 
 
 def test_energy_over_its_limit_is_answered_without_a_stop(tmp_path):
     changes = {"route": FAR, "initial_configuration": "f3_v3_r1", "timeout_s": 12.0}
     asked = settings(tmp_path, "power:2.5@time:1", metacontrol=True, **changes)
-    record = Lockstep(asked, PACKAGE).run().record
+    record = set_up(asked).run().record
     change = next(entry for entry in summarise(record)["reconfigurations"] if entry["trigger"] == "qa:energy")
     assert change["execute_s"] < 1.0
     began = record.start_stamp + change["stamp_s"]
@@ -106,13 +113,13 @@ def test_energy_over_its_limit_is_answered_without_a_stop(tmp_path):
 
 
 def test_frozen_laser_that_thaws_is_waited_for(tmp_path):
-    outcome = Lockstep(settings(tmp_path, "freeze:front_laser@time:2", "thaw:front_laser@time:6"), PACKAGE).run()
+    outcome = set_up(settings(tmp_path, "freeze:front_laser@time:2", "thaw:front_laser@time:6")).run()
     assert outcome.state.outcome is Outcome.REACHED
 
 
 def test_laser_that_repeats_itself_is_not_believed_until_it_thaws(tmp_path):
     strikes = ("repeat:front_laser@time:2", "thaw:front_laser@time:8")
-    outcome = Lockstep(settings(tmp_path, *strikes), PACKAGE).run()
+    outcome = set_up(settings(tmp_path, *strikes)).run()
     assert outcome.state.outcome is Outcome.REACHED
     seconds = outcome.record.poses[:, 0] - outcome.state.started_s
     standing = outcome.record.poses[(seconds > 4.0) & (seconds < 8.0), 1:]
@@ -120,14 +127,14 @@ def test_laser_that_repeats_itself_is_not_believed_until_it_thaws(tmp_path):
 
 
 def test_laser_whose_stamps_jump_still_leads_to_the_goal(tmp_path):
-    outcome = Lockstep(settings(tmp_path, "jump:front_laser@time:2"), PACKAGE).run()
+    outcome = set_up(settings(tmp_path, "jump:front_laser@time:2")).run()
     assert outcome.state.outcome is Outcome.REACHED
     assert summarise(outcome.record)["collisions"] == 0
 
 
 def test_camera_variant_drives(tmp_path):
     camera = settings(tmp_path, initial_configuration="f2_v1_r3_k")
-    assert Lockstep(camera, PACKAGE).run().state.outcome is Outcome.REACHED
+    assert set_up(camera).run().state.outcome is Outcome.REACHED
 
 
 @pytest.mark.parametrize(
@@ -139,7 +146,7 @@ def test_camera_variant_drives(tmp_path):
 )
 def test_what_lockstep_cannot_do_is_refused(tmp_path, changes, said):
     with pytest.raises(LockstepError, match=said):
-        Lockstep(replace(settings(tmp_path), **changes), PACKAGE)
+        set_up(replace(settings(tmp_path), **changes))
 
 
 def test_command_leaves_log_summary_and_figure(tmp_path):

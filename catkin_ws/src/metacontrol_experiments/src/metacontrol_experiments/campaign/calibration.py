@@ -150,10 +150,8 @@ def drive(jobs: Sequence[Job], routes: Path, commit: str, processes: int) -> Ite
 
 
 def _drive(job: Job, routes: Path, commit: str) -> Run:
-    from metacontrol_experiments.lockstep.lockstep import (
-        Lockstep,
-        LockstepError,
-    )  # PyBullet and navigation take a while to import
+    from metacontrol_experiments.io.lockstep_setup import set_up  # PyBullet and navigation take a while to import
+    from metacontrol_experiments.lockstep.system import LockstepError
 
     asked = Settings(
         route=read_route(routes, job.route),
@@ -164,7 +162,7 @@ def _drive(job: Job, routes: Path, commit: str) -> Run:
         commit=commit,
     )
     try:
-        record = Lockstep(asked).run().record
+        record = set_up(asked).run().record
     except (LockstepError, MissionError) as error:
         raise CalibrationError(f"{job}: {error}") from error
     summary = summarise(record)

@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 
 from metacontrol_experiments.cli.display import refusing, tell
-from metacontrol_experiments.io.package import simulation_package
 from metacontrol_experiments.lockstep.delays import KINDS, DelayError, delays_of, write_delays
+from metacontrol_experiments.mission.settings import Settings
 from metacontrol_experiments.ros.runner import RunError
 
 
@@ -64,15 +64,12 @@ def delays(summaries: tuple[Path, ...], output: Path) -> None:
     parameters.
     """
     from metacontrol_experiments.campaign.comparison import ComparisonError, read_summary
-    from metacontrol_experiments.lockstep.metacontroller import (
-        observation_sources,  # the reasoner takes a while to import
-    )
+    from metacontrol_experiments.io.lockstep_setup import restarts_between  # the reasoner takes a while to import
+    from metacontrol_experiments.lockstep.system import LockstepError
 
-    with refusing(DelayError, RunError, ComparisonError):
-        package = simulation_package()
-        known = (path.stem for path in (package / "models" / "variants").glob("*.rossystem"))
-        sources = {name: observation_sources(package, name) for name in known}
-        found = [delay for path in summaries for delay in delays_of(read_summary(path), sources)]
+    with refusing(DelayError, LockstepError, ComparisonError):
+        restarts = restarts_between(Settings.launch_package, "metacontrol_sim_reasoner.launch")
+        found = [delay for path in summaries for delay in delays_of(read_summary(path), restarts)]
         lacking = [kind for kind in KINDS if kind not in {delay[0] for delay in found}]
         if lacking:
             raise DelayError(f"no sample of {', '.join(lacking)} in {len(summaries)} summaries: give more of them")

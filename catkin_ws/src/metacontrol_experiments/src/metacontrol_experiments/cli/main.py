@@ -233,12 +233,13 @@ def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionR
     Raises:
         RunError: it cannot be run in lockstep.
     """
-    from metacontrol_experiments.lockstep.lockstep import Lockstep, LockstepError  # PyBullet takes a while to import
+    from metacontrol_experiments.io.lockstep_setup import set_up  # PyBullet takes a while to import
     from metacontrol_experiments.lockstep.recorder import with_wall_time
+    from metacontrol_experiments.lockstep.system import LockstepError
 
     began = time.monotonic()
     try:
-        outcome = Lockstep(settings).run()
+        outcome = set_up(settings).run()
     except (LockstepError, MissionError) as error:
         raise RunError(str(error)) from error
     settings.output.mkdir(parents=True, exist_ok=True)

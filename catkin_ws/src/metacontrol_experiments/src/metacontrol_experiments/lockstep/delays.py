@@ -15,7 +15,7 @@ import numpy as np
 import rospkg
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
 KINDS = ("detect", "decide", "restart", "parameters")
 """From the kill of a node to its diagnostic; from there to the decision; from there to the end of a reconfiguration
@@ -58,21 +58,20 @@ def read_delays(path: Path | None = None) -> Delays:
     return Delays(samples)
 
 
-def delays_of(summary: Mapping[str, Any], sources: Mapping[str, object]) -> Iterator[tuple[str, float]]:
+def delays_of(summary: Mapping[str, Any], restarts: Callable[[str, str], bool]) -> Iterator[tuple[str, float]]:
     """Yield the delays that a mission's summary tells.
 
     Only failures of components tell of detection and decision: those of a level wait for the level to persist.
 
     Args:
         summary: of a mission on ROS at real-time factor 1.
-        sources: configuration -> what it navigates by; a change of that is a restart.
+        restarts: tells whether the way from one configuration to another restarts nodes.
     """
     for change in summary["reconfigurations"]:
         if change["trigger"].startswith("component:"):
             yield from ((kind, change[f"{kind}_s"]) for kind in ("detect", "decide") if change[f"{kind}_s"] is not None)
         if change["execute_s"] is not None:
-            same = sources.get(change["from"]) == sources.get(change["to"])
-            yield ("parameters" if same else "restart"), change["execute_s"]
+            yield ("restart" if restarts(change["from"], change["to"]) else "parameters"), change["execute_s"]
 
 
 def write_delays(path: Path, found: Iterable[tuple[str, float]]) -> None:

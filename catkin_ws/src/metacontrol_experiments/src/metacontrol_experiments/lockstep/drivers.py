@@ -1,4 +1,4 @@
-"""The drivers of front laser and camera in lockstep, and what can be wrong with them."""
+"""The sensors' drivers in lockstep, and what can be wrong with them. Which of them runs, the base model says."""
 
 from __future__ import annotations
 
@@ -8,31 +8,53 @@ import numpy as np
 from pybullet_simulator.robot.faults import Fault, Outlet
 from pybullet_simulator.robot.sensors import DepthProjector, measure_depth, measure_ranges
 from pybullet_simulator.ros.sensor_messages import laser_scan, point_cloud
+from ros_model.language.metamodel import PortKind
+from sensor_msgs.msg import LaserScan, PointCloud2
 
 from metacontrol_experiments.contingency.contingency import Kind
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from pybullet_simulator.physics.simulation import Simulation
+    from ros_model.language.metamodel import RosSystem
 
 LASER_NOISE, DEPTH_NOISE = 0.01, 0.001
 """Defaults of the driver nodes."""
 
 
 class Drivers:
-    """The front laser's and the camera's driver; one that does not run is silent."""
+    """The drivers that the base model has; one that does not run is silent.
 
-    TOPICS = {"front/scan": "front_laser", "camera/depth/points": "camera"}
-    COMPONENTS = tuple(TOPICS.values())
+    Attributes:
+        topics: class of the messages by the topic of each driver.
+        components: names of the drivers' components.
+    """
 
-    def __init__(self, simulation: Simulation, seed: int) -> None:
+    def __init__(self, simulation: Simulation, base: RosSystem, seed: int) -> None:
         """Start all, with the random numbers that the nodes have."""
         self._simulation = simulation
         self._laser_rng = np.random.default_rng([seed, 3])
         self._camera_rng = np.random.default_rng([seed, 8])
         camera = simulation.robot.camera
         self._projector = DepthProjector(camera.width, camera.height, camera.field_of_view)
+        made: dict[str, tuple[type, Callable[[Any], Any]]] = {  # by executable
+            "front_laser": (LaserScan, self._scan),
+            "camera": (PointCloud2, self._cloud),
+        }
+        self.topics: dict[str, type] = {}
+        self._sources: dict[str, tuple[str, Callable[[Any], Any]]] = {}  # topic -> component and how it measures
+        for component in base.components:
+            executable = component.executable
+            if executable is None or executable.node not in made:
+                continue
+            message_class, measure = made[executable.node]
+            for topic in (port.name.strip("/") for port in component.ports if port.kind is PortKind.PUBLISHER):
+                self.topics[topic] = message_class
+                self._sources[topic] = component.graph_name, measure
+        self.components = tuple(component for component, _ in self._sources.values())
         self._silent: dict[str, Kind] = {}  # component -> what made it so
-        self._outlets = {component: Outlet() for component in self.COMPONENTS}
+        self._outlets = {component: Outlet() for component in self.components}
 
     def strike(self, kind: Kind, component: str) -> None:
         """Let something happen to a driver; only what was frozen thaws."""
@@ -47,11 +69,8 @@ class Drivers:
 
     def message(self, topic: str, stamp: Any) -> Any | None:
         """Return a driver's message, a ROS one so that navigation takes it as on ROS; None where it is silent."""
-        component = self.TOPICS[topic]
-        if component in self._silent:
-            return None
-        measured = self._scan(stamp) if component == "front_laser" else self._cloud(stamp)
-        return self._outlets[component].pass_on(measured)
+        component, measure = self._sources[topic]
+        return None if component in self._silent else self._outlets[component].pass_on(measure(stamp))
 
     def _scan(self, stamp: Any) -> Any:
         laser = self._simulation.robot.front_laser

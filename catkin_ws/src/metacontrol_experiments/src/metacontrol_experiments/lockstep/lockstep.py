@@ -1,49 +1,47 @@
 """Lockstep: simulation, drivers, navigation, observers, reasoner and mission stepped together in one process, no ROS.
 
 Deterministic: the same settings give the same log, byte for byte. What differs from ROS: messages take no time, nothing
-ever waits for a processor, and detection and reconfiguration take times drawn at random (`lockstep_manager`).
+ever waits for a processor, and detection and reconfiguration take times drawn at random (`metacontroller`).
+`io.lockstep_setup` reads the files and puts the parts together.
 """
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cv2
-import rospkg
-import yaml
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import ConfigurationReport, Event, GoalReport, MissionRecord, OccupancyMap
 from metacontrol_msgs.msg import FunctionGrounding, MissionEvent
 from move_base import geometry
 from move_base.costmap.sensors import cloud_observation, scan_observation
 from move_base.costmap.static_map import StaticMap
-from move_base.navigation.navigator import Navigator
 from move_base.navigation.navigator import Outcome as GoalOutcome
-from move_base.parameters.parameters import MoveBaseParameters, read_parameters
-from pybullet_simulator.physics.simulation import LOCALISATION_STEPS, MOTION_STEPS, STEP, Simulation, SimulationError
-from pybullet_simulator.physics.simulation import Settings as SimulationSettings
-from pybullet_simulator.robot.motion_sensors import REAL
+from pybullet_simulator.physics.simulation import LOCALISATION_STEPS, MOTION_STEPS, STEP
 from pybullet_simulator.ros.grid_messages import occupancy_grid
 from pybullet_simulator.ros.messages import stamp
-from pybullet_simulator.world.world import WorldError, rasterise
-from pybullet_simulator.world.world_file import read_world
 from robot_formulas.geometry import Pose
-from ros_model.io.models import read_system
+from sensor_msgs.msg import LaserScan
 
 from metacontrol_experiments.contingency.contingency import Kind, StrikeError
-from metacontrol_experiments.lockstep.drivers import Drivers
 from metacontrol_experiments.lockstep.frames import Frames
-from metacontrol_experiments.lockstep.metacontroller import Manager, ManagerError
-from metacontrol_experiments.lockstep.recorder import Memory
+from metacontrol_experiments.lockstep.navigation import navigation_parameters, start_navigator
+from metacontrol_experiments.lockstep.recorder import Recorder
 from metacontrol_experiments.lockstep.striker import Striker, check
+from metacontrol_experiments.lockstep.system import LockstepError
 from metacontrol_experiments.mission import mission
 from metacontrol_experiments.mission.mission import Strike
 
 if TYPE_CHECKING:
+    from move_base.navigation.navigator import Navigator
+    from pybullet_simulator.physics.simulation import Simulation
+    from pybullet_simulator.world.grid import Grid
+
     from metacontrol_experiments.contingency.contingency import Contingency
+    from metacontrol_experiments.lockstep.drivers import Drivers
+    from metacontrol_experiments.lockstep.metacontroller import Change, Metacontroller
+    from metacontrol_experiments.lockstep.system import System
     from metacontrol_experiments.mission import routes
     from metacontrol_experiments.mission.mission import State
     from metacontrol_experiments.mission.settings import Settings
@@ -55,10 +53,6 @@ SETTLE_S = 2.0
 
 _GOAL_ID = "lockstep-1"
 _OCCUPIED = 50
-
-
-class LockstepError(RuntimeError):
-    """The mission cannot be run in lockstep; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -76,45 +70,58 @@ class Outcome:
     log: str
 
 
+@dataclass(frozen=True)
+class Robot:
+    """The simulated robot in its world.
+
+    Attributes:
+        simulation: of robot and world.
+        grid: the world's map.
+        drivers: of the sensors.
+    """
+
+    simulation: Simulation
+    grid: Grid
+    drivers: Drivers
+
+
 class Lockstep:
     """One mission, stepped."""
 
-    def __init__(self, settings: Settings, simulation_package: Path | None = None) -> None:
-        """Build world, robot and navigation.
+    def __init__(self, settings: Settings, robot: Robot, system: System, metacontroller: Metacontroller | None) -> None:
+        """Start navigation.
+
+        Args:
+            settings: the mission.
+            robot: at the start of the route.
+            system: what runs beside the robot.
+            metacontroller: None for the baseline.
 
         Raises:
-            LockstepError: something of it is not there in lockstep, or cannot be used.
+            LockstepError: a contingency cannot happen in lockstep, or the initial configuration cannot run.
         """
-        package = simulation_package or Path(rospkg.RosPack().get_path("metacontrol_sim"))
         self._settings = settings
         self._plan = settings.plan
-        way = _pose(settings.route.start), _pose(settings.route.goal)
         try:
             for contingency in self._plan.contingencies:
-                check(contingency)
-            world = read_world(settings.world or package / "worlds" / "factory.yaml")
-            self._grid = rasterise(world)
-            self._simulation = Simulation(world, SimulationSettings(way[0], settings.seed, REAL))
-        except (StrikeError, WorldError, SimulationError) as error:
+                check(contingency, robot.drivers.components)
+        except StrikeError as error:
             raise LockstepError(str(error)) from error
+        self._grid = robot.grid
+        self._simulation = robot.simulation
+        self._drivers = robot.drivers
+        self._system = system
+        self._metacontroller = metacontroller
         self._frames = Frames(self._simulation.robot)
-        self._drivers = Drivers(self._simulation, settings.seed)
+        way = _pose(settings.route.start), _pose(settings.route.goal)
         self._striker = Striker(self._simulation, self._drivers, self._grid, way)
-        self._package = package
-        self._parameters = navigation_parameters(package, settings.initial_configuration)
-        self._navigator: Navigator | None = self._new_navigator()
-        self._manager = None
-        if settings.metacontrol:
-            robot, configuration = self._simulation.robot, settings.initial_configuration
-            try:
-                self._manager = Manager(package, robot, configuration, settings.thresholds, settings.seed)
-            except ManagerError as error:
-                self._simulation.close()
-                raise LockstepError(str(error)) from error
+        self._map = _static_map(self._grid)
+        self._parameters = navigation_parameters(system, settings.initial_configuration)
+        self._navigator: Navigator | None = start_navigator(self._parameters, self._map)
         self._steps = 0
         self._next_tick = 0.0
         self._state: State | None = None
-        self._memory = Memory()
+        self._recorder = Recorder()
 
     def run(self) -> Outcome:
         """Run the mission to its end.
@@ -132,14 +139,17 @@ class Lockstep:
                 self._step()
             self._end()
         finally:
-            self._simulation.close()
-            if self._manager is not None:
-                self._manager.close()
-        if self._manager is not None:
-            self._memory.decisions, self._memory.observed = self._manager.decisions, self._manager.observed
-            self._memory.components = self._manager.components
-        record = self._memory.record(self._map(), self._striker.obstacles)
-        return Outcome(self._mission, record, "\n".join(self._memory.lines) + "\n")
+            self.close()
+        if self._metacontroller is not None:
+            self._recorder.take_from(self._metacontroller)
+        record = self._recorder.record(self._drawn_map(), self._striker.obstacles)
+        return Outcome(self._mission, record, "\n".join(self._recorder.lines) + "\n")
+
+    def close(self) -> None:
+        """End simulation and reasoner."""
+        self._simulation.close()
+        if self._metacontroller is not None:
+            self._metacontroller.close()
 
     @property
     def _mission(self) -> State:
@@ -165,20 +175,21 @@ class Lockstep:
             "engine": "lockstep",
             "controller_hz": repr(self._parameters.controller_frequency),
         }
-        self._memory.event(Event(now, MissionEvent.MISSION_START, self._settings.route.name, told))
+        self._recorder.event(Event(now, MissionEvent.MISSION_START, self._settings.route.name, told))
         for name, values in struck:
-            self._memory.event(Event(now, MissionEvent.PERTURBATION, name, {"share": "0.0000"} | values))
+            self._recorder.event(Event(now, MissionEvent.PERTURBATION, name, {"share": "0.0000"} | values))
         self._set_goal(now)
-        self._memory.goals.append(GoalReport(now, _GOAL_ID))
-        self._memory.configurations.append(
-            ConfigurationReport(now, "f_navigate", self._settings.initial_configuration, FunctionGrounding.STABLE)
+        self._recorder.goals.append(GoalReport(now, _GOAL_ID))
+        initial = self._settings.initial_configuration
+        self._recorder.configurations.append(
+            ConfigurationReport(now, self._system.function(initial), initial, FunctionGrounding.STABLE)
         )
 
     def _end(self) -> None:
         state = self._mission
         told = {"outcome": state.outcome.value if state.outcome else "unknown", "reason": state.reason}
         now = state.ended_s if state.ended_s is not None else self._simulation.time
-        self._memory.event(Event(now, MissionEvent.MISSION_END, self._settings.route.name, told))
+        self._recorder.event(Event(now, MissionEvent.MISSION_END, self._settings.route.name, told))
 
     def _step(self) -> None:
         """Advance everything by 10 ms: the world, what senses it, what drives through it, and the mission."""
@@ -194,58 +205,54 @@ class Lockstep:
             self._next_tick = max(self._next_tick, now - STEP) + 1.0 / self._parameters.controller_frequency
             self._navigate(now)
         self._manage(now)
-        self._memory.sample(simulation, self._steps, started=self._state is not None)
+        self._recorder.sample(simulation, self._steps, started=self._state is not None)
         if self._state is not None:
             self._follow(now)
 
     def _sense(self, now: float) -> None:
         """Let the drivers measure that somebody listens to, and hand it on."""
-        sources = {source.topic: source for source in self._navigator.sources} if self._navigator else {}
-        heard = self._manager.wanted_topics if self._manager else set()
-        for topic in Drivers.TOPICS:
+        sources = {source.topic.strip("/"): source for source in self._navigator.sources} if self._navigator else {}
+        heard = self._metacontroller.wanted_topics if self._metacontroller else set()
+        for topic, kind in self._drivers.topics.items():
             if topic not in sources and topic not in heard:
                 continue
             message = self._drivers.message(topic, _stamp(now))
             if message is None:
                 continue
-            if self._manager is not None:
-                self._manager.hear(topic, message, now)
+            if self._metacontroller is not None:
+                self._metacontroller.receive(topic, message, now)
             if self._navigator is not None and topic in sources:
-                convert = scan_observation if sources[topic].data_type == "LaserScan" else cloud_observation
+                convert = scan_observation if kind is LaserScan else cloud_observation
                 self._navigator.observe(convert(message, sources[topic]), now)
 
     def _manage(self, now: float) -> None:
         """Let the meta-controller do its part, and deploy what it has decided."""
-        if self._manager is None or self._state is None:
+        if self._metacontroller is None:
             return
-        try:
-            change = self._manager.step(now, self._steps, self._simulation, _stamp(now))
-        except ManagerError as error:
-            raise LockstepError(str(error)) from error
-        if change is None:
+        time = _stamp(now)
+        self._metacontroller.listen(self._simulation, self._steps, now, time)
+        if self._state is None:
             return
+        change = self._metacontroller.step(now, self._steps, time)
+        if change is not None:
+            self._deploy(change, now)
+
+    def _deploy(self, change: Change, now: float) -> None:
+        """Let a change happen to navigation."""
         name, state = change.configuration, change.state
-        self._memory.configurations.append(ConfigurationReport(now, self._manager.function, name, state))
-        self._memory.lines.append(f"{now:.2f} {name} {state}")
+        self._recorder.configurations.append(ConfigurationReport(now, self._system.function(name), name, state))
+        self._recorder.lines.append(f"{now:.2f} {name} {state}")
         self._state, _ = mission.on_configuration(self._mission, now, state == FunctionGrounding.STABLE)
         if state != FunctionGrounding.STABLE:
             if change.restarts:
                 self._navigator = None  # its process is stopped first
             return
-        self._parameters = navigation_parameters(self._package, name)
+        self._parameters = navigation_parameters(self._system, name)
         if self._navigator is None:
-            self._navigator = self._new_navigator()
+            self._navigator = start_navigator(self._parameters, self._map)
             self._set_goal(now)
         else:
             self._navigator.reconfigure(self._parameters)
-
-    def _new_navigator(self) -> Navigator:
-        navigator = Navigator(self._parameters)
-        message = occupancy_grid(self._grid, _stamp(0.0))
-        info = message.info
-        origin = (self._grid.origin_x, self._grid.origin_y, self._grid.origin_yaw)
-        navigator.set_map(StaticMap.create(message.data, info.width, info.height, info.resolution, origin), "map")
-        return navigator
 
     def _set_goal(self, now: float) -> None:
         goal = self._settings.route.goal
@@ -261,10 +268,10 @@ class Lockstep:
         if result.velocity is not None:
             command = result.velocity
             self._simulation.command(command.x, command.y, command.yaw)
-            self._memory.commands.append(now)
+            self._recorder.commands.append(now)
         if result.outcome is not None and self._state is not None:
             status = GoalStatus.SUCCEEDED if result.outcome is GoalOutcome.SUCCEEDED else GoalStatus.ABORTED
-            self._memory.results.append(GoalReport(now, _GOAL_ID, status.value, result.text))
+            self._recorder.results.append(GoalReport(now, _GOAL_ID, status.value, result.text))
             self._state, _ = mission.on_goal_result(self._state, now, status, result.text)
 
     def _follow(self, now: float) -> None:
@@ -288,7 +295,7 @@ class Lockstep:
                     self._state = mission.abort(self._mission, self._simulation.time, reason)
                     return
                 event = Event(self._simulation.time, MissionEvent.PERTURBATION, contingency.event, share | values)
-                self._memory.event(event)
+                self._recorder.event(event)
 
     def _strike(self, contingency: Contingency) -> dict[str, str]:
         """Let a contingency happen now; return what is worth telling of it.
@@ -298,35 +305,21 @@ class Lockstep:
         """
         values = self._striker.strike(contingency)
         kind = contingency.kind
-        if self._manager is not None and kind.hits_component and not kind.spoils_data:
-            self._manager.component_changed(self._simulation.time, contingency.target, kind is Kind.THAW)
+        if self._metacontroller is not None and kind.hits_component and not kind.spoils_data:
+            self._metacontroller.component_changed(self._simulation.time, contingency.target, kind is Kind.THAW)
         return values
 
-    def _map(self) -> OccupancyMap:
+    def _drawn_map(self) -> OccupancyMap:
         grid = self._grid
         return OccupancyMap(grid.resolution, grid.origin_x, grid.origin_y, grid.cells >= _OCCUPIED)
 
 
-def navigation_parameters(package: Path, configuration: str) -> MoveBaseParameters:
-    """Return the parameters of a variant over those that all share, as the launch files load them.
-
-    Raises:
-        LockstepError: the variant has no move_base.
-    """
-    tree = yaml.safe_load((package / "config" / "move_base.yaml").read_text(encoding="utf-8"))
-    component = read_system(package / "models" / "variants" / f"{configuration}.rossystem").component("move_base")
-    if component is None:
-        raise LockstepError(f"{configuration} has no component move_base, which lockstep needs")
-    tree = json.loads(json.dumps(tree))  # what the file's anchors share is no longer one object
-    for parameter in component.parameters:
-        if parameter.value is None:
-            continue
-        *folders, name = parameter.key.split("/")
-        branch = tree
-        for folder in folders:
-            branch = branch.setdefault(folder, {})
-        branch[name] = parameter.value
-    return read_parameters(tree)
+def _static_map(grid: Grid) -> StaticMap:
+    """Return the map as navigation receives it on the topic map."""
+    message = occupancy_grid(grid, _stamp(0.0))
+    info = message.info
+    origin = (grid.origin_x, grid.origin_y, grid.origin_yaw)
+    return StaticMap.create(message.data, info.width, info.height, info.resolution, origin)
 
 
 def _pose(pose: routes.Pose) -> Pose:

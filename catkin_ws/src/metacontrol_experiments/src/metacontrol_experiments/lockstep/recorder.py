@@ -24,11 +24,13 @@ if TYPE_CHECKING:
     )
     from pybullet_simulator.physics.simulation import Simulation
 
+    from metacontrol_experiments.lockstep.metacontroller import Metacontroller
+
 LOG_STEPS = 10
 """Steps between two lines of the log: 0.1 s."""
 
 
-class Memory:
+class Recorder:
     """Collects what a bag would hold."""
 
     def __init__(self) -> None:
@@ -45,6 +47,11 @@ class Memory:
         self._safety: list[tuple[float, float]] = []
         self._energy: list[tuple[float, float]] = []
         self._contacts: list[tuple[float, float]] = []
+
+    def take_from(self, metacontroller: Metacontroller) -> None:
+        """Keep what the meta-controller has said."""
+        self.decisions, self.observed = metacontroller.decisions, metacontroller.observed
+        self.components = metacontroller.components
 
     def event(self, event: Event) -> None:
         """Keep an event."""

@@ -10,13 +10,15 @@ from pybullet_simulator.world.world import Box
 from robot_formulas.geometry import Pose
 
 from metacontrol_experiments.contingency.contingency import Kind, StrikeError
-from metacontrol_experiments.lockstep.drivers import Drivers
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from pybullet_simulator.physics.simulation import Simulation
     from pybullet_simulator.world.grid import Grid
 
     from metacontrol_experiments.contingency.contingency import Contingency
+    from metacontrol_experiments.lockstep.drivers import Drivers
 
 
 class Striker:
@@ -69,12 +71,15 @@ class Striker:
         return {"places": " ".join(f"{place.x:.3f},{place.y:.3f}" for place in places)}
 
 
-def check(contingency: Contingency) -> None:
+def check(contingency: Contingency, components: Collection[str]) -> None:
     """Refuse a component that does not run in lockstep.
 
+    Args:
+        contingency: what is to happen.
+        components: those that run.
+
     Raises:
-        StrikeError: it is one.
+        StrikeError: it hits another one.
     """
-    known = Drivers.COMPONENTS
-    if contingency.kind.hits_component and contingency.target not in known:
-        raise StrikeError(f"{contingency}: in lockstep there are only the components {' and '.join(known)}")
+    if contingency.kind.hits_component and contingency.target not in components:
+        raise StrikeError(f"{contingency}: in lockstep there are only the components {' and '.join(components)}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S
 
@@ -54,6 +54,9 @@ class Settings:
     port: int | None = None
     commit: str = "unknown"
 
+    launch_package: ClassVar[str] = "metacontrol_sim"
+    """Has the launch files of the whole system."""
+
     @property
     def plan(self) -> Plan:
         """The mission's core."""
@@ -64,9 +67,14 @@ class Settings:
             timeout_s=self.timeout_s,
         )
 
-    def launch_command(self, port: int) -> list[str]:
-        """The roslaunch command of the whole system, with a master on this port."""
-        file = "metacontrol_sim_reasoner.launch" if self.metacontrol else "MVP_metacontrol_world.launch"
+    @property
+    def launch_file(self) -> str:
+        """Name of the launch file of the whole system, in `launch_package`."""
+        return "metacontrol_sim_reasoner.launch" if self.metacontrol else "MVP_metacontrol_world.launch"
+
+    @property
+    def launch_arguments(self) -> list[str]:
+        """Arguments of the launch file, each NAME:=VALUE."""
         start = self.route.start
         arguments = {
             "gui": _boolean(self.gui),
@@ -82,8 +90,11 @@ class Settings:
             arguments["world"] = str(self.world.resolve())
         if self.metacontrol:
             arguments |= {f"nfr_{name}": repr(level) for name, level in self.thresholds.items()}
-        pairs = [f"{name}:={value}" for name, value in arguments.items()]
-        return ["roslaunch", "-p", str(port), "metacontrol_sim", file, *pairs]
+        return [f"{name}:={value}" for name, value in arguments.items()]
+
+    def launch_command(self, port: int) -> list[str]:
+        """Return the roslaunch command of the whole system, with a master on this port."""
+        return ["roslaunch", "-p", str(port), self.launch_package, self.launch_file, *self.launch_arguments]
 
     def describe(self) -> dict[str, str]:
         """The values of the event MISSION_START, from which the bag alone tells what was run."""

@@ -1,0 +1,187 @@
+"""Setting up a mission in lockstep: launch file, models and world are read, and the reasoner's process is started."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import rospkg
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBaseError
+from mros1_reasoner.knowledge.reasoner import ReasonerError
+from mros1_reasoner.loop.diagnostics import DiagnosticsReader
+from mros1_reasoner.loop.mape import Mape
+from mros1_reasoner.loop.parameters import ParameterError, Parameters
+from mros1_reasoner.pellet.process import make_reasoner
+from pybullet_simulator.physics.simulation import Settings as SimulationSettings
+from pybullet_simulator.physics.simulation import Simulation, SimulationError
+from pybullet_simulator.robot.motion_sensors import REAL
+from pybullet_simulator.world.world import WorldError, rasterise
+from pybullet_simulator.world.world_file import read_world
+from robot_formulas.geometry import Pose
+from ros_model.errors import ModelError
+from ros_model.io.files import resolve
+from ros_model.io.models import read_system
+from rosgraph_manipulator.change.tactics import TacticError, load_tactics
+from rosgraph_manipulator.configuration.configuration_file import ConfigurationError, parse_settings
+from rosgraph_manipulator.io.launch_files import LaunchFileError, read_launch_file
+from rosgraph_monitor.observers import plugins
+
+from metacontrol_experiments.lockstep.delays import DelayError, read_delays
+from metacontrol_experiments.lockstep.drivers import Drivers
+from metacontrol_experiments.lockstep.lockstep import Lockstep, Robot
+from metacontrol_experiments.lockstep.metacontroller import Cores, Metacontroller
+from metacontrol_experiments.lockstep.observation import Observers
+from metacontrol_experiments.lockstep.reconfiguration import plan_change, restarts
+from metacontrol_experiments.lockstep.system import LockstepError, System, private_parameters
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from ros_model.language.metamodel import RosSystem
+    from rosgraph_manipulator.configuration.description import SystemDescription
+    from rosgraph_monitor.observer import Observer
+
+    from metacontrol_experiments.mission.settings import Settings
+
+_MONITOR = ("rosgraph_monitor", "monitor")
+_REASONER = ("mros1_reasoner", "reasoner")
+_MANIPULATOR = ("rosgraph_manipulator", "rosgraph_manipulator")
+"""Package and executable of the nodes whose parameters are used."""
+
+_UNUSABLE = (
+    ConfigurationError,
+    DelayError,
+    KnowledgeBaseError,
+    LaunchFileError,
+    ModelError,
+    ParameterError,
+    ReasonerError,
+    SimulationError,
+    TacticError,
+    WorldError,
+    plugins.PluginError,
+    rospkg.ResourceNotFound,
+)
+
+
+def set_up(settings: Settings) -> Lockstep:
+    """Return a mission, ready to run; its end also ends the processes that were started for it.
+
+    Raises:
+        LockstepError: something is not there in lockstep, or cannot be used; the message names it.
+    """
+    with ExitStack() as failing:
+        try:
+            system = describe_system(settings.launch_package, settings.launch_file, settings.launch_arguments)
+            robot = _robot(settings, system.base)
+            failing.callback(robot.simulation.close)
+            metacontroller = None
+            if settings.metacontrol:
+                cores = _cores(system.launched, robot.drivers)
+                failing.callback(cores.reasoner.close)
+                delays = read_delays()
+                metacontroller = Metacontroller(system, cores, delays, settings.initial_configuration, settings.seed)
+            lockstep = Lockstep(settings, robot, system, metacontroller)
+        except _UNUSABLE as error:
+            raise LockstepError(str(error)) from error
+        failing.pop_all()
+    return lockstep
+
+
+def describe_system(package: str, launch_file: str, arguments: Sequence[str] = ()) -> System:
+    """Return what the launch file of a whole system and the models that it names say.
+
+    Args:
+        package: has the file in its folder launch.
+        launch_file: name of the file.
+        arguments: of the file, each NAME:=VALUE.
+
+    Raises:
+        LockstepError: a file cannot be used.
+    """
+    try:
+        folder = Path(rospkg.RosPack().get_path(package)) / "launch"
+        launched = read_launch_file(folder / launch_file, arguments).system
+        manipulator = parse_settings(private_parameters(launched, *_MANIPULATOR))
+        monitor = private_parameters(launched, *_MONITOR)
+        base = read_system(resolve(monitor["desired_rossystem"]))
+        models = resolve(monitor["variants"])
+    except KeyError as error:
+        raise LockstepError(f"{'/'.join(_MONITOR)} has no parameter {error}: generate its configuration") from error
+    except _UNUSABLE as error:
+        raise LockstepError(str(error)) from error
+
+    @cache
+    def describe(configuration: str) -> SystemDescription:
+        known = manipulator.configurations.get(configuration)
+        if known is None:
+            raise LockstepError(
+                f"no configuration {configuration!r}; there are {', '.join(manipulator.configurations)}"
+            )
+        try:
+            return read_launch_file(known.launch_file, known.args).system
+        except LaunchFileError as error:
+            raise LockstepError(str(error)) from error
+
+    return System(
+        launched,
+        manipulator.configurations,
+        base,
+        describe,
+        lambda configuration: read_system(models / f"{configuration}.rossystem"),
+    )
+
+
+def restarts_between(package: str, launch_file: str) -> Callable[[str, str], bool]:
+    """Return a function that tells whether a change between two configurations of a system restarts nodes.
+
+    Raises:
+        LockstepError: a file cannot be used.
+    """
+    system = describe_system(package, launch_file)
+    try:
+        tactics = load_tactics()
+    except TacticError as error:
+        raise LockstepError(str(error)) from error
+    return cache(lambda running, wanted: restarts(plan_change(system, running, wanted, tactics)))
+
+
+def _robot(settings: Settings, base: RosSystem) -> Robot:
+    """Return the robot at the start of the route."""
+    world = read_world(settings.world or Path(rospkg.RosPack().get_path("metacontrol_sim")) / "worlds" / "factory.yaml")
+    start = settings.route.start
+    simulation = Simulation(world, SimulationSettings(Pose(start.x, start.y, start.yaw), settings.seed, REAL))
+    return Robot(simulation, rasterise(world), Drivers(simulation, base, settings.seed))
+
+
+def _cores(launched: SystemDescription, drivers: Drivers) -> Cores:
+    """Return what decides in the meta-controller's nodes, with the parameters of these nodes."""
+    observers = Observers(_observers(private_parameters(launched, *_MONITOR)), drivers.topics)
+    tactics = load_tactics()
+    parameters = Parameters(private_parameters(launched, *_REASONER))
+    knowledge = parameters.knowledge_base()
+    objectives, behaviour = parameters.objectives(knowledge), parameters.settings(knowledge)
+    reader = DiagnosticsReader(knowledge.qualities, knowledge.components, parameters.nodes)
+    reasoner = make_reasoner()
+    try:
+        reasoner.load(knowledge.ontology)
+        loop = Mape(knowledge, reasoner, objectives, behaviour, wall=lambda: 0.0, name="lockstep")
+    except BaseException:
+        reasoner.close()
+        raise
+    return Cores(observers, reader, loop, reasoner, parameters.period, tactics)
+
+
+def _observers(monitor: dict[str, Any]) -> list[Observer]:
+    """Return the observers that the monitor's parameters name, made and configured as its node does."""
+    made = []
+    for name in monitor.get("observers", []):
+        observer = plugins.make(name)
+        try:
+            observer.configure(monitor.get(observer.name, {}))
+        except ValueError as error:
+            raise LockstepError(str(error)) from error
+        made.append(observer)
+    return made
