@@ -26,8 +26,9 @@ from metacontrol_bags.timeline import Timeline
 from metacontrol_experiments.cli import main as cli
 from metacontrol_experiments.io.commit import current_commit
 from metacontrol_experiments.io.processes import ProcessTree, wait_until
-from metacontrol_experiments.mission.routes import Pose, RouteError, read_route
+from metacontrol_experiments.mission.routes import RouteError, read_route
 from metacontrol_experiments.mission.settings import Settings
+from robot_formulas.geometry import Pose
 
 HASH = "0123456789abcdef0123456789abcdef01234567"
 

@@ -11,9 +11,9 @@ import yaml
 from move_base.costmap.grid import Geometry
 from move_base.costmap.sensors import Observation
 from move_base.costmap.static_map import StaticMap
-from move_base.geometry import Pose, Velocity, planar_matrix
 from move_base.navigation.navigator import Navigator
 from move_base.parameters.parameters import read_parameters
+from robot_formulas.geometry import Pose, Velocity
 
 CONFIG = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim/config/move_base.yaml"
 RESOLUTION = 0.05
@@ -97,7 +97,7 @@ class Simulation:
         self.velocity = Velocity()
         self.time = 100.0
         self.acceleration = acceleration
-        self.map_to_odom = planar_matrix(Pose(*odom))
+        self.map_to_odom = Pose(*odom).matrix()
         self.silent_from = math.inf
         self.history = {round(self.time / SUBSTEP): self.pose}
         self.navigator = Navigator(read_parameters(tree or base_tree()))
@@ -126,9 +126,9 @@ class Simulation:
         in_map = {
             "map": np.eye(4),
             "odom": self.map_to_odom,
-            "base_link": planar_matrix(pose),
-            "front_laser": planar_matrix(pose.compose(LASER), 0.2),
-            "camera_link": planar_matrix(pose.compose(CAMERA), 0.4),
+            "base_link": pose.matrix(),
+            "front_laser": (pose @ LASER).matrix(0.2),
+            "camera_link": (pose @ CAMERA).matrix(0.4),
         }
         if target not in in_map or source not in in_map:
             return None
@@ -155,7 +155,7 @@ class Simulation:
             mount, frame = (CAMERA, "camera_link") if camera else (LASER, "front_laser")
             angles = np.radians(np.linspace(-30, 30, 160) if camera else np.linspace(-135, 135, 361))
             reach = 8.0 if camera else 10.0
-            ranges = self.cast(self.pose.compose(mount), angles, reach)
+            ranges = self.cast(self.pose @ mount, angles, reach)
             hits = ranges <= reach
             ranges = np.where(hits, ranges, source.raytrace_range)
             points = np.stack([ranges * np.cos(angles), ranges * np.sin(angles), 0.0 * ranges], axis=1)
@@ -176,7 +176,7 @@ class Simulation:
                 v.yaw + min(max(command.yaw - v.yaw, -4 * step), 4 * step),
             )
             v = self.velocity
-            self.pose = self.pose.compose(Pose(v.x * SUBSTEP, v.y * SUBSTEP, v.yaw * SUBSTEP))
+            self.pose = self.pose @ Pose(v.x * SUBSTEP, v.y * SUBSTEP, v.yaw * SUBSTEP)
             self.time += SUBSTEP
             self.history[round(self.time / SUBSTEP)] = self.pose
 

@@ -20,8 +20,9 @@ from metacontrol_experiments.contingency.contingency import (
     strikes_due,
     with_seed,
 )
-from metacontrol_experiments.mission.routes import Pose, Route
+from metacontrol_experiments.mission.routes import Route
 from metacontrol_experiments.mission.settings import Settings
+from robot_formulas.geometry import Pose
 
 MODELS = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_sim/models/metacontrol.yaml"
 

@@ -15,10 +15,10 @@ from metacontrol_experiments.lockstep.frames import KEPT_S, Frames
 from metacontrol_experiments.lockstep.navigation import navigation_parameters
 from metacontrol_experiments.lockstep.system import LockstepError
 from metacontrol_experiments.mission.mission import Outcome
-from metacontrol_experiments.mission.routes import Pose, Route
+from metacontrol_experiments.mission.routes import Route
 from metacontrol_experiments.mission.settings import Settings
 from pybullet_simulator.robot.robot import Robot
-from robot_formulas.geometry import Pose as SimPose
+from robot_formulas.geometry import Pose
 
 PACKAGE = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_sim"
 WAY = Route("short", Pose(-8.0, -8.0, 0.78), Pose(-5.0, -5.6, 0.0))
@@ -38,8 +38,8 @@ def system():
 def test_frames_answer_as_tf_does():
     frames = Frames(Robot())
     assert frames.lookup("map", "base_link", None) is None and frames.newest("map", "odom") is None
-    frames.add(1.0, SimPose(1.0, 0.0, 0.0), SimPose(0.0, 2.0, math.pi / 2))
-    frames.add(1.02, SimPose(1.0, 0.0, 0.0), SimPose(0.0, 3.0, math.pi / 2))
+    frames.add(1.0, Pose(1.0, 0.0, 0.0), Pose(0.0, 2.0, math.pi / 2))
+    frames.add(1.02, Pose(1.0, 0.0, 0.0), Pose(0.0, 3.0, math.pi / 2))
     assert frames.lookup("map", "base_link", 1.0)[:2, 3] == pytest.approx([1.0, 2.0])
     assert frames.lookup("map", "front_laser", None)[:3, 3] == pytest.approx([1.0, 3.393, 0.18])
     assert frames.lookup("odom", "map", 1.0)[:2, 3] == pytest.approx([-1.0, 0.0])
@@ -52,7 +52,7 @@ def test_frames_answer_as_tf_does():
 def test_frames_forget_what_is_old():
     frames = Frames(Robot())
     for tick in range(int(3 * KEPT_S * 10)):
-        frames.add(tick / 10, SimPose(0.0, 0.0, 0.0), SimPose(0.0, 0.0, 0.0))
+        frames.add(tick / 10, Pose(0.0, 0.0, 0.0), Pose(0.0, 0.0, 0.0))
     assert frames.lookup("map", "odom", 0.1) is None
     assert frames.lookup("map", "odom", 3 * KEPT_S - 5.0) is not None
 

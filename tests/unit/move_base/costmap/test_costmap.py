@@ -8,10 +8,8 @@ from move_base.costmap.costmap import Costmap
 from move_base.costmap.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, occupancy_values
 from move_base.costmap.sensors import Observation
 from move_base.costmap.static_map import MapError, StaticMap
-from move_base.geometry import Pose, planar_matrix
 from move_base.parameters.parameters import read_parameters
-
-ORIGIN = Pose(0.0, 0.0, 0.0)
+from robot_formulas.geometry import ORIGIN, Pose
 
 
 @pytest.fixture
@@ -42,7 +40,7 @@ def at(snapshot, x, y):
 
 
 def sensor(x=0.0, y=0.0, yaw=0.0, z=0.2):
-    return planar_matrix(Pose(x, y, yaw), z)
+    return Pose(x, y, yaw).matrix(z)
 
 
 def test_costs_follow_the_published_function(local):

@@ -8,9 +8,9 @@ import pytest
 from move_base.control.dwa import DwaController
 from move_base.control.oscillation import OscillationFlags
 from move_base.costmap.grid import LETHAL
-from move_base.geometry import Pose, Velocity, planar_matrix
 from move_base.navigation.navigator import Outcome
 from move_base.parameters.parameters import read_parameters
+from robot_formulas.geometry import Pose, Velocity
 
 RACK = (0.0, -1.5, 0.8, 6.0, 0.0)
 
@@ -335,7 +335,7 @@ def test_robot_that_hardly_moves_oscillates(simulate, walls, tree):
 def test_localisation_that_jumps_is_followed_by_a_new_plan(simulate, walls):
     simulation = simulate([*walls(), RACK], start=(-3.0, -3.0, 0.0))
     drive(simulation, (3.0, -3.0, 0.0), until=lambda s: s.pose.y > -1.0)
-    simulation.map_to_odom = planar_matrix(Pose(0.9, 0.3, 0.1))
+    simulation.map_to_odom = Pose(0.9, 0.3, 0.1).matrix()
     simulation.pose = Pose(simulation.pose.x - 0.5, simulation.pose.y, simulation.pose.yaw)  # where it says to be now
     log = simulation.run(60.0)
     assert log.outcome is Outcome.SUCCEEDED

@@ -7,12 +7,11 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from move_base.geometry import Pose, planar_matrix
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from pybullet_simulator.robot.robot import Robot
-    from robot_formulas import geometry
+    from robot_formulas.geometry import Pose
 
 KEPT_S = 10.0
 """s; tf2's own default."""
@@ -27,13 +26,13 @@ class Frames:
     def __init__(self, robot: Robot) -> None:
         """Take the robot's sensor frames."""
         mounts = (robot.front_laser.mount, robot.rear_laser.mount, robot.camera.mount)
-        self._mounts = {mount.frame: planar_matrix(Pose(mount.x, mount.y, mount.yaw), mount.z) for mount in mounts}
+        self._mounts = {mount.frame: mount.pose.matrix(mount.z) for mount in mounts}
         self._stamps: list[float] = []
         self._poses: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
 
-    def add(self, stamp: float, map_to_odom: geometry.Pose, odometry: geometry.Pose) -> None:
+    def add(self, stamp: float, map_to_odom: Pose, odometry: Pose) -> None:
         """Take where odom lies in map, and base_link in odom, at a time (s, later than the last)."""
-        placed = tuple(planar_matrix(Pose(pose.x, pose.y, pose.yaw)) for pose in (map_to_odom, odometry))
+        placed = tuple(pose.matrix() for pose in (map_to_odom, odometry))
         self._stamps.append(stamp)
         self._poses.append((placed[0], placed[1]))
         if stamp - self._stamps[0] > 2.0 * KEPT_S:  # now and then, not at each: that would cost more

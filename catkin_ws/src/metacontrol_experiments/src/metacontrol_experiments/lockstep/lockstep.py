@@ -14,14 +14,13 @@ import cv2
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import ConfigurationReport, Event, GoalReport, MissionRecord, OccupancyMap
 from metacontrol_msgs.msg import FunctionGrounding, MissionEvent
-from move_base import geometry
 from move_base.costmap.sensors import cloud_observation, scan_observation
 from move_base.costmap.static_map import StaticMap
 from move_base.navigation.navigator import Outcome as GoalOutcome
 from pybullet_simulator.physics.simulation import LOCALISATION_STEPS, MOTION_STEPS, STEP
 from pybullet_simulator.ros.grid_messages import occupancy_grid
 from pybullet_simulator.ros.messages import stamp
-from robot_formulas.geometry import Pose
+from robot_formulas.geometry import Velocity
 from sensor_msgs.msg import LaserScan
 
 from metacontrol_experiments.contingency.contingency import Kind, StrikeError
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
     from metacontrol_experiments.lockstep.drivers import Drivers
     from metacontrol_experiments.lockstep.metacontroller import Change, Metacontroller
     from metacontrol_experiments.lockstep.system import System
-    from metacontrol_experiments.mission import routes
     from metacontrol_experiments.mission.mission import State
     from metacontrol_experiments.mission.settings import Settings
 
@@ -113,7 +111,7 @@ class Lockstep:
         self._system = system
         self._metacontroller = metacontroller
         self._frames = Frames(self._simulation.robot)
-        way = _pose(settings.route.start), _pose(settings.route.goal)
+        way = settings.route.start, settings.route.goal
         self._striker = Striker(self._simulation, self._drivers, self._grid, way)
         self._map = _static_map(self._grid)
         self._parameters = navigation_parameters(system, settings.initial_configuration)
@@ -257,13 +255,13 @@ class Lockstep:
     def _set_goal(self, now: float) -> None:
         goal = self._settings.route.goal
         if self._navigator is not None:
-            self._navigator.set_goal(geometry.Pose(goal.x, goal.y, goal.yaw), now)
+            self._navigator.set_goal(goal, now)
 
     def _navigate(self, now: float) -> None:
         if self._navigator is None:
             return
         odometry = self._simulation.odometry
-        velocity = geometry.Velocity(*odometry.velocity[:2], odometry.turn_rate)
+        velocity = Velocity(*odometry.velocity[:2], odometry.turn_rate)
         result = self._navigator.step(now, self._frames, velocity)
         if result.velocity is not None:
             command = result.velocity
@@ -320,10 +318,6 @@ def _static_map(grid: Grid) -> StaticMap:
     info = message.info
     origin = (grid.origin_x, grid.origin_y, grid.origin_yaw)
     return StaticMap.create(message.data, info.width, info.height, info.resolution, origin)
-
-
-def _pose(pose: routes.Pose) -> Pose:
-    return Pose(pose.x, pose.y, pose.yaw)
 
 
 def _stamp(now: float) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from pybullet_simulator.physics.simulation import ENERGY_STEPS, LOCALISATION_STEPS, MOTION_STEPS
 from pybullet_simulator.ros.messages import BASE, ODOM, OdometryWriter, battery_state, localised_pose
+from robot_formulas.geometry import quaternion_of
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
@@ -75,6 +75,6 @@ def static_frames(robot: Robot) -> TFMessage:
         transform.header.frame_id = BASE
         place, turn = transform.transform.translation, transform.transform.rotation
         place.x, place.y, place.z = mount.x, mount.y, mount.z
-        turn.z, turn.w = math.sin(mount.yaw / 2.0), math.cos(mount.yaw / 2.0)
+        turn.z, turn.w = quaternion_of(mount.yaw)
         transforms.append(transform)
     return TFMessage(transforms)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import yaml
+from robot_formulas.geometry import Pose
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -14,15 +15,6 @@ if TYPE_CHECKING:
 
 class RouteError(ValueError):
     """A route that does not exist or is not well-formed."""
-
-
-@dataclass(frozen=True)
-class Pose:
-    """A pose in the map frame: m, m, rad."""
-
-    x: float
-    y: float
-    yaw: float = 0.0
 
 
 @dataclass(frozen=True)

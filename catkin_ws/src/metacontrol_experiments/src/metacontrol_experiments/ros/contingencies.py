@@ -18,7 +18,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from metacontrol_msgs.msg import MissionEvent
 from move_base_msgs.msg import MoveBaseActionGoal
 from node_kit.ros.lifetime import Lifetime
-from robot_formulas.geometry import Pose
+from robot_formulas.geometry import Pose, yaw_of
 
 from metacontrol_experiments.contingency.components import ComponentError, node_of, read_components
 from metacontrol_experiments.contingency.contingency import (
@@ -72,7 +72,7 @@ class ContingencyNode:
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         position, turn = message.pose.pose.position, message.pose.pose.orientation
-        pose = Pose(position.x, position.y, 2.0 * math.atan2(turn.z, turn.w))
+        pose = Pose(position.x, position.y, yaw_of(turn.z, turn.w))
         if all(map(math.isfinite, (pose.x, pose.y, pose.yaw))):
             with self._lock:
                 self._pose = pose

@@ -21,7 +21,7 @@ from metacontrol_bags.timeline import Timeline
 from metacontrol_msgs.msg import ActiveConfiguration, Decision, FunctionGrounding, MissionEvent
 from move_base_msgs.msg import MoveBaseActionGoal, MoveBaseActionResult
 from node_kit.io.inbox import Inbox
-from robot_formulas.geometry import Pose
+from robot_formulas.geometry import Pose, quaternion_of
 
 from metacontrol_experiments.contingency.contingency import StrikeError
 from metacontrol_experiments.io.processes import wait_until
@@ -239,8 +239,7 @@ class MissionNode:
 
     def _way(self) -> tuple[Pose, Pose]:
         """The route's ends; not where the robot is now, which differs a little from run to run."""
-        start, goal = self._settings.route.start, self._settings.route.goal
-        return Pose(start.x, start.y, start.yaw), Pose(goal.x, goal.y, goal.yaw)
+        return self._settings.route.start, self._settings.route.goal
 
     def _strike_at_start(self) -> list[tuple[str, dict[str, str]]]:
         """Lets happen what is there before the goal is sent; returns the events' names and values.
@@ -262,7 +261,7 @@ class MissionNode:
         target = goal.goal.target_pose
         target.header.frame_id, target.header.stamp = "map", now
         target.pose.position.x, target.pose.position.y = pose.x, pose.y
-        target.pose.orientation.z, target.pose.orientation.w = math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)
+        target.pose.orientation.z, target.pose.orientation.w = quaternion_of(pose.yaw)
         return goal
 
     def _publish_event(self, stamp: rospy.Time, kind: str, name: str, values: dict[str, str]) -> None:

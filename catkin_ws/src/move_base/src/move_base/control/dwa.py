@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from robot_formulas.geometry import Pose, Velocity, inscribed_radius, wrap
 
 from move_base.control.oscillation import OscillationFlags
 from move_base.control.rollout import Footprint, Rollout, Trajectory, roll_out
 from move_base.costmap.grid import INSCRIBED
-from move_base.geometry import Pose, Velocity, inscribed_radius, wrap_angle
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -102,7 +102,7 @@ class DwaController:
         horizon = min(p.sim_time, max(MIN_HORIZON, 2.0 * to_goal / p.max_vel_x))
         scene = _Scene(path, snapshot, self._shape_for(robot, snapshot))
         best = self._back_off(robot, scene)
-        error = abs(wrap_angle(_direction_of(path) - robot.yaw))
+        error = abs(wrap(_direction_of(path) - robot.yaw))
         if best is None and error > self._align_angle(velocity, scene):
             best = self._best(self._turn_samples(velocity), robot, horizon, scene)
         if best is None:

@@ -8,8 +8,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from move_base.geometry import Pose, Velocity
+    from robot_formulas.geometry import Pose, Velocity
 
 TURN, STRAFE = 2, 1
 """Columns of a velocity (x, y, yaw)."""

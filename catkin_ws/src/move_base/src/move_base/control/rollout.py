@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from move_base.geometry import Pose, Velocity, inscribed_radius
+from robot_formulas.geometry import Pose, Velocity, inscribed_radius
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

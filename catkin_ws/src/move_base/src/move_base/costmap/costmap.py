@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+from robot_formulas.geometry import ORIGIN, Pose, inscribed_radius
 
 from move_base.costmap.grid import FREE, LETHAL, Geometry
 from move_base.costmap.inflation import Inflation
 from move_base.costmap.static_map import bounding_geometry, resample
-from move_base.geometry import Pose, inscribed_radius
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -113,7 +113,7 @@ class Costmap:
             self._observe(observation, transform)
         if self._clears_footprint:
             self._fill(robot.apply(self._footprint), FREE)
-        return self._combine(map_pose or Pose(0.0, 0.0, 0.0))
+        return self._combine(map_pose or ORIGIN)
 
     def clear(self, robot: Pose | None = None, keep_radius: float = 0.0) -> None:
         """Forgets the obstacles seen, except in a square of half-width `keep_radius` (m) around the robot."""

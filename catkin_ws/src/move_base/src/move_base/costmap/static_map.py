@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+from robot_formulas.geometry import ORIGIN, Pose
 
 from move_base.costmap.grid import FREE, LETHAL, UNKNOWN, Geometry
-from move_base.geometry import Pose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,11 +76,11 @@ def resample(static: StaticMap, layer: Layer, target: Geometry, map_pose: Pose) 
     costs = np.where(static.occupancy >= layer.lethal_cost_threshold, LETHAL, FREE).astype(np.uint8)
     costs[static.occupancy < 0] = outside
     source = static.geometry
-    identity = map_pose == Pose(0.0, 0.0, 0.0) and static.yaw == 0.0
+    identity = map_pose == ORIGIN and static.yaw == 0.0
     if identity and source == target:
         return costs
     # cell index of the target -> metres -> map -> the map's own grid -> cell index
-    to_source = Pose(source.origin_x, source.origin_y, static.yaw).inverse().compose(map_pose.inverse())
+    to_source = Pose(source.origin_x, source.origin_y, static.yaw).inverse() @ map_pose.inverse()
     cos, sin = math.cos(to_source.yaw), math.sin(to_source.yaw)
     ratio = target.resolution / source.resolution
     corner = to_source.apply(

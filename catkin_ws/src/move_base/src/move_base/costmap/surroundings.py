@@ -9,8 +9,9 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
+from robot_formulas.geometry import ORIGIN, Pose
+
 from move_base.costmap.costmap import Costmap, Snapshot
-from move_base.geometry import Pose
 
 if TYPE_CHECKING:
     import numpy as np
@@ -204,6 +205,6 @@ class Surroundings:
     def _map_pose(self, area: Area, frames: Transformer) -> Pose | None:
         """Pose of the map's frame in the area's frame."""
         if not self._map_frame or self._map_frame == area.parameters.global_frame:
-            return Pose(0.0, 0.0, 0.0)
+            return ORIGIN
         matrix = frames.lookup(area.parameters.global_frame, self._map_frame, None)
         return None if matrix is None else Pose.from_matrix(matrix)

@@ -15,10 +15,11 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING
 
+from robot_formulas.geometry import STOP, Pose, Velocity, wrap
+
 from move_base.control.dwa import DwaController
 from move_base.costmap.grid import LETHAL
 from move_base.costmap.surroundings import Surroundings
-from move_base.geometry import STOP, Pose, Velocity, wrap_angle
 from move_base.navigation.recovery import Recovery
 from move_base.planning.followed_plan import FollowedPlan
 from move_base.planning.global_planner import Plan, PlanningError, make_plan
@@ -278,7 +279,7 @@ class Navigator:
 
     def _turn_to_goal(self, now: float, robot: Pose, local_robot: Pose) -> Result:
         assert self.goal is not None  # noqa: S101
-        error = wrap_angle(self.goal.yaw - robot.yaw)
+        error = wrap(self.goal.yaw - robot.yaw)
         if abs(error) <= self.parameters.controller.yaw_goal_tolerance:
             return self._end(robot, Outcome.SUCCEEDED, "Goal reached.")
         snapshot = self._local.snapshot

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from move_base.geometry import Pose, wrap_angle
+from robot_formulas.geometry import Pose, wrap
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,7 +55,7 @@ class Recovery:
 
     def left_to_turn(self, now: float, robot: Pose) -> float:
         """Returns what is left of a full turn, rad; 0 when it is complete or took too long."""
-        self._turned += wrap_angle(robot.yaw - self._yaw)
+        self._turned += wrap(robot.yaw - self._yaw)
         self._yaw = robot.yaw
         left = 2.0 * math.pi - self._turned
         return left if left > TURN_TOLERANCE and now - self._since < PATIENCE else 0.0

@@ -12,9 +12,9 @@ from move_base.planning.global_planner import PATH_SPACING, Plan, path_cost
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+    from robot_formulas.geometry import Pose
 
     from move_base.costmap.costmap import Snapshot
-    from move_base.geometry import Pose
 
 LOOKAHEAD = 3.0
 """Length of the plan that the controller is given, m: twice what 0.75 m/s covers in a sim_time of 2 s."""

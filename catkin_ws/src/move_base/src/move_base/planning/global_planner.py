@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 import pyastar2d
+from robot_formulas.geometry import Pose
 
 from move_base.costmap.grid import INSCRIBED, LETHAL, UNKNOWN
-from move_base.geometry import Pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

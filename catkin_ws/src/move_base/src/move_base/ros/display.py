@@ -9,8 +9,8 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import PolygonStamped
 from nav_msgs.msg import OccupancyGrid, Path
+from robot_formulas.geometry import Pose
 
-from move_base.geometry import Pose
 from move_base.ros.messages import occupancy_grid, path_of, polygon_of
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ import rospy
 from actionlib.goal_id_generator import GoalIDGenerator
 from geometry_msgs.msg import PoseStamped
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedback, MoveBaseResult
+from robot_formulas.geometry import Pose
 
-from move_base.geometry import Pose
 from move_base.navigation.navigator import Outcome
 from move_base.navigation.takeover import TakeoverError, decode_parameter
 from move_base.ros.messages import goal_problem, matrix_of, pose_stamped
@@ -175,7 +175,7 @@ class GoalServer:
                     self._cancel(True)
                     handle.set_aborted(MoveBaseResult(), reason)
                 return
-            goal = Pose.from_matrix(matrix).compose(goal)
+            goal = Pose.from_matrix(matrix) @ goal
         self._waiting, self._active = None, handle
         self._begin(goal, now)
         self._current_goal.publish(pose_stamped(goal, self._global_frame, rospy.Time.now()))

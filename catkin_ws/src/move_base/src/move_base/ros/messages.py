@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from geometry_msgs.msg import Point32, PolygonStamped, PoseStamped, Quaternion, Twist
 from nav_msgs.msg import OccupancyGrid, Path
+from robot_formulas.geometry import quaternion_of, transform_of
 
 from move_base.costmap.grid import occupancy_values
 
 if TYPE_CHECKING:
     import genpy
+    import numpy as np
     from numpy.typing import NDArray
+    from robot_formulas.geometry import Pose, Velocity
 
     from move_base.costmap.costmap import Snapshot
-    from move_base.geometry import Pose, Velocity
 
 FARTHEST = 1e6
 """Coordinates beyond this (m) are a mistake: it is farther than anything drives."""
@@ -38,14 +39,7 @@ def goal_problem(target: PoseStamped) -> str:
 
 def matrix_of(position: Any, q: Quaternion) -> NDArray[np.float64]:
     """Returns the homogeneous 4 x 4 transform of a position and a unit quaternion."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = (
-        (1 - 2 * (q.y * q.y + q.z * q.z), 2 * (q.x * q.y - q.z * q.w), 2 * (q.x * q.z + q.y * q.w)),
-        (2 * (q.x * q.y + q.z * q.w), 1 - 2 * (q.x * q.x + q.z * q.z), 2 * (q.y * q.z - q.x * q.w)),
-        (2 * (q.x * q.z - q.y * q.w), 2 * (q.y * q.z + q.x * q.w), 1 - 2 * (q.x * q.x + q.y * q.y)),
-    )
-    matrix[:3, 3] = position.x, position.y, position.z
-    return matrix
+    return transform_of((position.x, position.y, position.z), (q.x, q.y, q.z, q.w))
 
 
 def twist_of(velocity: Velocity) -> Twist:
@@ -61,7 +55,7 @@ def pose_stamped(pose: Pose, frame: str, stamp: genpy.Time) -> PoseStamped:
     stamped.header.stamp = stamp
     stamped.header.frame_id = frame
     stamped.pose.position.x, stamped.pose.position.y = pose.x, pose.y
-    stamped.pose.orientation = Quaternion(0.0, 0.0, math.sin(0.5 * pose.yaw), math.cos(0.5 * pose.yaw))
+    stamped.pose.orientation = Quaternion(0.0, 0.0, *quaternion_of(pose.yaw))
     return stamped
 
 
@@ -73,7 +67,7 @@ def path_of(points: NDArray[np.float64], headings: NDArray[np.float64], frame: s
     for (x, y), yaw in zip(points.tolist(), headings.tolist(), strict=True):
         stamped = PoseStamped(header=path.header)
         stamped.pose.position.x, stamped.pose.position.y = x, y
-        stamped.pose.orientation = Quaternion(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
+        stamped.pose.orientation = Quaternion(0.0, 0.0, *quaternion_of(yaw))
         path.poses.append(stamped)
     return path
 

@@ -14,13 +14,13 @@ from geometry_msgs.msg import PoseStamped, Twist
 from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.srv import GetPlan, GetPlanResponse
 from node_kit.ros.lifetime import Lifetime
+from robot_formulas.geometry import STOP, Pose, Velocity
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_srvs.srv import Empty, EmptyResponse
 
 from move_base.costmap.sensors import SensorError, cloud_observation, scan_observation
 from move_base.costmap.static_map import MapError, StaticMap
-from move_base.geometry import STOP, Pose, Velocity
 from move_base.navigation.navigator import Navigator
 from move_base.parameters.parameters import read_parameters
 from move_base.parameters.reconfiguration import changed, present_values, servers

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pybullet
-from robot_formulas.geometry import Pose, wrap
+from robot_formulas.geometry import Pose, quaternion_of, wrap, yaw_of
 
 from pybullet_simulator.robot.robot_file import JOINTS, planar_urdf, robot_file
 from pybullet_simulator.world.walking import HEIGHT, RADIUS
@@ -127,7 +127,7 @@ class Physics:
 
     def depth_image(self, camera: DepthCamera, base: Pose) -> NDArray[np.float32]:
         """Return a camera's image from a pose of base_link: (height, width), m along the optical axis, inf beyond."""
-        eye = base @ Pose(camera.mount.x, camera.mount.y, camera.mount.yaw)
+        eye = base @ camera.mount.pose
         ahead = (eye.x + math.cos(eye.yaw), eye.y + math.sin(eye.yaw), camera.mount.z)
         vertical = 2.0 * math.degrees(math.atan(camera.height / 2.0 / camera.focal_length))
         near, far = camera.range_min, camera.range_max
@@ -168,7 +168,7 @@ class Physics:
     def place(self, body: int) -> Pose:
         """Return where a body stands."""
         (x, y, _), (_, _, z, w) = pybullet.getBasePositionAndOrientation(body, physicsClientId=self.client)
-        return Pose(x, y, wrap(2.0 * math.atan2(z, w)))
+        return Pose(x, y, yaw_of(z, w))
 
     def remove(self, body: int) -> None:
         """Take a body away."""
@@ -190,7 +190,7 @@ class Physics:
             pybullet.createCollisionShape(kind, physicsClientId=self.client, **shape),
             pybullet.createVisualShape(kind, rgbaColor=colour, physicsClientId=self.client, **visual),
             (pose.x, pose.y, height / 2.0),
-            (0.0, 0.0, math.sin(pose.yaw / 2.0), math.cos(pose.yaw / 2.0)),
+            (0.0, 0.0, *quaternion_of(pose.yaw)),
             physicsClientId=self.client,
         )
         pybullet.setCollisionFilterGroupMask(body, -1, _WORLD_GROUP, _EVERYTHING, physicsClientId=self.client)

@@ -225,7 +225,7 @@ class Simulation:
 
     def scan(self, laser: Laser) -> NDArray[np.float32]:
         """Return the true ranges of one of the robot's lasers: (rays,) in m, inf where nothing is hit."""
-        mount = self.pose @ Pose(laser.mount.x, laser.mount.y, laser.mount.yaw)
+        mount = self.pose @ laser.mount.pose
         distances = self.physics.sweep(mount, laser.mount.z, self._rays[laser.mount.frame] + mount.yaw, laser.range_max)
         return distances.astype(np.float32)
 

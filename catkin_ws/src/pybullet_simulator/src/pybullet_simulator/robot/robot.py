@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+from robot_formulas.geometry import Pose
 
 from pybullet_simulator.world.world import Box
-
-if TYPE_CHECKING:
-    from robot_formulas.geometry import Pose
 
 
 @dataclass(frozen=True)
@@ -21,6 +19,11 @@ class Mount:
     y: float
     z: float
     yaw: float = 0.0
+
+    @property
+    def pose(self) -> Pose:
+        """Its pose in the plane of base_link."""
+        return Pose(self.x, self.y, self.yaw)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from nav_msgs.msg import OccupancyGrid
+from robot_formulas.geometry import quaternion_of, yaw_of
 
 from pybullet_simulator.world.grid import Grid
 
@@ -27,7 +28,7 @@ def occupancy_grid(grid: Grid, now: genpy.Time) -> OccupancyGrid:
     message.info.height, message.info.width = grid.cells.shape
     message.info.origin.position.x, message.info.origin.position.y = grid.origin_x, grid.origin_y
     orientation = message.info.origin.orientation
-    orientation.z, orientation.w = math.sin(grid.origin_yaw / 2.0), math.cos(grid.origin_yaw / 2.0)
+    orientation.z, orientation.w = quaternion_of(grid.origin_yaw)
     message.data = grid.cells.ravel().tolist()
     return message
 
@@ -39,7 +40,7 @@ def read_grid(message: OccupancyGrid) -> Grid:
         GridMessageError: its size is not that of its data, or its place is not finite.
     """
     info, origin = message.info, message.info.origin
-    yaw = 2.0 * math.atan2(origin.orientation.z, origin.orientation.w)
+    yaw = yaw_of(origin.orientation.z, origin.orientation.w)
     if not all(map(math.isfinite, (info.resolution, origin.position.x, origin.position.y, yaw))) or (
         info.resolution <= 0.0 or len(message.data) != info.width * info.height or not message.data
     ):

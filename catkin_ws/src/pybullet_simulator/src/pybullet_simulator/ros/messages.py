@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import genpy
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
+from robot_formulas.geometry import quaternion_of
 from robot_formulas.power import BATTERY_CAPACITY_WH
 from sensor_msgs.msg import BatteryState, Imu
 from tf2_msgs.msg import TFMessage
@@ -78,7 +79,7 @@ class ImuWriter:
         """Return the message for the last sample."""
         message = self._message
         message.header.stamp = now
-        message.orientation.z, message.orientation.w = _half_angle(simulation.odometry.filtered.yaw)
+        message.orientation.z, message.orientation.w = quaternion_of(simulation.odometry.filtered.yaw)
         message.angular_velocity.z = simulation.odometry.turn_rate
         message.linear_acceleration.x, message.linear_acceleration.y = simulation.acceleration
         return message
@@ -96,7 +97,7 @@ class TransformWriter:
         for transform, pose in zip(self._message.transforms, (map_to_odom, odometry), strict=True):
             transform.header.stamp = now
             transform.transform.translation.x, transform.transform.translation.y = pose.x, pose.y
-            transform.transform.rotation.z, transform.transform.rotation.w = _half_angle(pose.yaw)
+            transform.transform.rotation.z, transform.transform.rotation.w = quaternion_of(pose.yaw)
         return self._message
 
 
@@ -147,12 +148,7 @@ def obstacle_markers(shown: Iterable[Shown], now: genpy.Time) -> MarkerArray:
 
 def _set_pose(target: geometry_msgs.msg.Pose, pose: Pose) -> None:
     target.position.x, target.position.y = pose.x, pose.y
-    target.orientation.z, target.orientation.w = _half_angle(pose.yaw)
-
-
-def _half_angle(yaw: float) -> tuple[float, float]:
-    """Return z and w of the quaternion of a yaw."""
-    return math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+    target.orientation.z, target.orientation.w = quaternion_of(pose.yaw)
 
 
 def _transform(frame: str, child: str) -> TransformStamped:

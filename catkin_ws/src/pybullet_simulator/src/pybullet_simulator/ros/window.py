@@ -111,7 +111,7 @@ class WindowView:
             return simulation.pose @ simulation.odometry.filtered.inverse()
         mounts = {part.mount.frame: part.mount for part in (robot.front_laser, robot.rear_laser, robot.camera)}
         mount = mounts.get(name.lstrip("/"))
-        return simulation.pose @ Pose(mount.x, mount.y, mount.yaw) if mount else simulation.pose
+        return simulation.pose @ mount.pose if mount else simulation.pose
 
     def _scan(self, scan: LaserScan) -> Points:
         ranges = np.asarray(scan.ranges, dtype=float)

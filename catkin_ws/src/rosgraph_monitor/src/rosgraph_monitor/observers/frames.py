@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from robot_formulas.geometry import transform_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,12 +49,4 @@ def rotation_translation(
     norm = math.sqrt(sum(q * q for q in quaternion))
     if not (math.isfinite(norm) and norm > 1e-6 and all(map(math.isfinite, translation))):
         return None
-    x, y, z, w = (q / norm for q in quaternion)
-    matrix = np.eye(4)
-    matrix[:3, :3] = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-    )
-    matrix[:3, 3] = translation
-    return matrix
+    return transform_of(translation, [q / norm for q in quaternion])
