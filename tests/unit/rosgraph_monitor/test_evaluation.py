@@ -2,11 +2,11 @@
 
 from ros_model.graph.snapshot import GraphSnapshot, NodeState, build_snapshot
 from ros_model.language.metamodel import Component, Port, PortKind, RosSystem
-from rosgraph_monitor.evaluation import GraphMonitor, Patience
+from rosgraph_monitor.evaluation import GraphEvaluator, Patience
 from rosgraph_monitor.graph.desired import Desired
 from rosgraph_monitor.health.components import NodeCondition
 from rosgraph_monitor.health.liveness import Life
-from rosgraph_monitor.health.topics import TopicSpec, Verdict
+from rosgraph_monitor.health.topics import TopicSpec, TopicVerdict
 
 LASER = "/front_laser"
 SYSTEM = RosSystem("base", components=(Component("front_laser"), Component("move_base")))
@@ -22,7 +22,7 @@ def lives(**life):
 
 
 def monitor(**settings):
-    return GraphMonitor({"front_laser": "laser_resender"}, patience=Patience(5.0, 1.0, 1.0), **settings)
+    return GraphEvaluator({"front_laser": "laser_resender"}, patience=Patience(5.0, 1.0, 1.0), **settings)
 
 
 def said(statuses):
@@ -134,7 +134,7 @@ LISTENER = RosSystem(
 
 
 def test_difference_in_interfaces_must_last_and_nodes_may_start():
-    watched = GraphMonitor({}, patience=Patience(5.0, 1.0, 1.0))
+    watched = GraphEvaluator({}, patience=Patience(5.0, 1.0, 1.0))
     live = build_snapshot([[], [["/scan", ["/move_base"]]], []], [], {}, {"/move_base": "http://host/move_base"})
     alive = lives(move_base=Life.ALIVE)
 
@@ -145,35 +145,35 @@ def test_difference_in_interfaces_must_last_and_nodes_may_start():
 
 
 SCAN = TopicSpec("front/scan", max_age=1.0)
-SILENT = Verdict(SCAN, "Silent topic", "last message 3.0 s ago", "max_age 1", "3.00")
+SILENT = TopicVerdict(SCAN, "Silent topic", "last message 3.0 s ago", "max_age 1", "3.00")
 PUBLISHED = build_snapshot([[["/front/scan", [LASER]]], [], []], [], {}, {LASER: f"http://host{LASER}"})
 
 
 def test_silent_topic_fails_the_component_of_its_publisher_at_once():
     watched = monitor()
     alone = Desired(RosSystem("base", components=(Component("front_laser"),)))
-    watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.0, topics=[Verdict(SCAN)])
+    watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.0, topics=[TopicVerdict(SCAN)])
     told = said(watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.1, topics=[SILENT]))
     assert ("laser_resender", "Component status", "FALSE") in told
     assert ("front/scan", "Silent topic", "last message 3.0 s ago") in told
     assert not any(message == "running OK" for _, message, _ in told)
-    back = said(watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.2, topics=[Verdict(SCAN)]))
+    back = said(watched.evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), alone, 0.2, topics=[TopicVerdict(SCAN)]))
     assert ("laser_resender", "Component status", "RECOVERED") in back
 
 
 def test_topic_stands_for_its_component_without_a_model():
-    watched = GraphMonitor({})
+    watched = GraphEvaluator({})
     spec = TopicSpec("front/scan", max_age=1.0, component="laser")
-    unknown = Verdict(spec, heard=False)
+    unknown = TopicVerdict(spec, heard=False)
     assert said(watched.evaluate(graph(), {}, Desired(None), 0.0, topics=[unknown])) == set()
-    silent = Verdict(spec, "Silent topic", "none")
+    silent = TopicVerdict(spec, "Silent topic", "none")
     told = said(watched.evaluate(graph(), {}, Desired(None), 1.0, topics=[silent]))
     assert told == {("laser", "Component status", "FALSE"), ("front/scan", "Silent topic", "none")}
 
 
 def test_publisher_without_a_mapping_is_a_component_of_its_own_name():
     told = said(
-        GraphMonitor({}).evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), Desired(None), 0.0, topics=[SILENT])
+        GraphEvaluator({}).evaluate(PUBLISHED, lives(front_laser=Life.ALIVE), Desired(None), 0.0, topics=[SILENT])
     )
     assert ("front_laser", "Component status", "FALSE") in told
 

@@ -1,7 +1,7 @@
 """What metacontrol.yaml may say of components and topics, and what the monitor takes, are the same."""
 
 from ros_model.project.schema_check import load_schema, part_of, violations
-from rosgraph_monitor.health.components import parse_mapping
+from rosgraph_monitor.health.components import parse_components
 from rosgraph_monitor.health.topics import parse_topics
 
 SETTINGS = {
@@ -17,7 +17,7 @@ SETTINGS = {
 def test_settings_pass_the_schema_and_the_monitor():
     schema = part_of(load_schema("metacontrol"), "components", "topics")
     assert [str(violation) for violation in violations(SETTINGS, schema)] == []
-    components = parse_mapping(SETTINGS["components"])
+    components = parse_components(SETTINGS["components"])
     assert set(components.topics) == {"front/scan", "camera/depth/points"}
     assert components.batteries[0].component == "battery"
     assert parse_topics(SETTINGS["topics"])["odom"].max_age == 0.5

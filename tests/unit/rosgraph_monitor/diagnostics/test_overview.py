@@ -6,23 +6,23 @@ from rich.console import Console
 from ros_model.graph.snapshot import build_snapshot
 from rosgraph_monitor.cli.snapshot import lines
 from rosgraph_monitor.diagnostics.aggregator_names import unique_name
-from rosgraph_monitor.diagnostics.overview import Board, thresholds
+from rosgraph_monitor.diagnostics.overview import Overview, thresholds
 
 
 def status(name, message, *values, level=0):
     return DiagnosticStatus(level, name, message, "", [KeyValue(key, value) for key, value in values])
 
 
-def shown(board, now, nodes=("/laser",), parameters=None):
+def shown(overview, now, nodes=("/laser",), parameters=None):
     console = Console(width=160)
     with console.capture() as capture:
-        console.print(board.render(nodes, parameters or {}, now))
+        console.print(overview.render(nodes, parameters or {}, now))
     return capture.get()
 
 
 def test_board_shows_nodes_qualities_with_thresholds_and_findings():
-    board = Board()
-    board.take(
+    overview = Overview()
+    overview.take(
         [
             status("laser", "Component status", ("laser", "TRUE")),
             status("laser", "CPU Usage", ("laser", "12.50")),
@@ -31,22 +31,22 @@ def test_board_shows_nodes_qualities_with_thresholds_and_findings():
         ],
         10.0,
     )
-    text = shown(board, 11.0, parameters={"reasoner": {"nfr_safety": 0.6}})
+    text = shown(overview, 11.0, parameters={"reasoner": {"nfr_safety": 0.6}})
     for expected in ("laser", "TRUE", "12.50", "safety", "0.25", "0.6", "Missing node", "dead: gone"):
         assert expected in text
 
 
 def test_finding_that_is_not_repeated_is_over():
-    board = Board()
-    board.take([status("camera", "Missing node", ("reason", "dead"), level=2)], 10.0)
-    assert "Missing node" in shown(board, 12.0)
-    assert "Missing node" not in shown(board, 14.0)
+    overview = Overview()
+    overview.take([status("camera", "Missing node", ("reason", "dead"), level=2)], 10.0)
+    assert "Missing node" in shown(overview, 12.0)
+    assert "Missing node" not in shown(overview, 14.0)
 
 
 def test_markup_in_names_is_shown_as_it_is():
-    board = Board()
-    board.take([status("[red]x", "Odd [/]", ("k", "[bold]"), level=77)], 0.0)
-    assert "[red]x" in shown(board, 0.0, nodes=("/[/nope]",))
+    overview = Overview()
+    overview.take([status("[red]x", "Odd [/]", ("k", "[bold]"), level=77)], 0.0)
+    assert "[red]x" in shown(overview, 0.0, nodes=("/[/nope]",))
 
 
 def test_thresholds_are_found_wherever_they_stand():

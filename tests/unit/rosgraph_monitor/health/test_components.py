@@ -10,7 +10,7 @@ from rosgraph_monitor.health.components import (
     ComponentTracker,
     NodeCondition,
     component_statuses,
-    parse_mapping,
+    parse_components,
 )
 from rosgraph_monitor.health.topics import DEFAULT_MAX_AGE
 
@@ -75,12 +75,12 @@ def test_node_that_is_not_expected_any_more_is_forgotten():
 
 
 def test_node_maps_to_its_component():
-    tracker = ComponentTracker(parse_mapping({"laser_resender": {"node": "/laser"}}).of_node)
+    tracker = ComponentTracker(parse_components({"laser_resender": {"node": "/laser"}}).of_node)
     assert tracker.update({"laser": ALIVE}, 0.0) == [("laser_resender", TRUE)]
 
 
 def test_topic_stands_for_a_component():
-    found = parse_mapping(
+    found = parse_components(
         {"laser": {"topic": "/front/scan"}, "camera": {"node": "cam", "topic": "depth", "min_rate": 5}}
     )
     assert found.topics["front/scan"].max_age == DEFAULT_MAX_AGE
@@ -89,7 +89,7 @@ def test_topic_stands_for_a_component():
 
 
 def test_battery_below_a_limit_fails_until_it_is_above_another():
-    (battery,) = parse_mapping({"battery": {"topic": "battery_state", "below": 0.2, "above": 0.3}}).batteries
+    (battery,) = parse_components({"battery": {"topic": "battery_state", "below": 0.2, "above": 0.3}}).batteries
     charges = (0.5, 0.19, 0.25, 0.31)
     states = [failed := False]
     for charge in charges:
@@ -122,7 +122,7 @@ def test_node_that_runs_but_does_not_work_fails_without_grace_or_patience():
 )
 def test_mapping_of_another_shape_is_refused(value):
     with pytest.raises(ValueError, match="components"):
-        parse_mapping(value)
+        parse_components(value)
 
 
 def test_published_form():

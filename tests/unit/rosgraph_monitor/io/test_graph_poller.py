@@ -6,7 +6,7 @@ import pytest
 from ros_model.graph.snapshot import GraphSnapshot, NodeState
 from ros_model.io.master import SnapshotError
 from rosgraph_monitor.health.liveness import Life
-from rosgraph_monitor.io.graph_poller import Looker
+from rosgraph_monitor.io.graph_poller import GraphPoller
 
 GRAPH = GraphSnapshot(nodes={name: NodeState(name, f"http://host{name}") for name in ("/laser", "/monitor")})
 DEADLINE = 30.0
@@ -28,7 +28,7 @@ class Master:
         self.closed = True
 
 
-class Watcher:
+class Connections:
     def __init__(self):
         self.watched = {}
         self.known = {("/laser", "http://host/laser"): Life.ALIVE}
@@ -42,45 +42,45 @@ class Watcher:
 
 class Stand:
     def __init__(self, period):
-        self.master, self.watcher, self.looks = Master(), Watcher(), queue.Queue()
-        self.looker = Looker(self.master, self.watcher, period, "/monitor", lambda: self.looks.put(True))
+        self.master, self.connections, self.polls = Master(), Connections(), queue.Queue()
+        self.poller = GraphPoller(self.master, self.connections, period, "/monitor", lambda: self.polls.put(True))
 
     def answer(self, *answers):
         for answer in answers:
             self.master.answers.put(answer)
         for _ in answers:
-            self.looks.get(timeout=DEADLINE)
+            self.polls.get(timeout=DEADLINE)
 
 
 @pytest.fixture
 def stand(request):
     made = Stand(getattr(request, "param", 0.01))
-    made.looker.start()
+    made.poller.start()
     yield made
     made.master.answers.put(SnapshotError("the test is over"))
-    made.looker.close()
+    made.poller.close()
 
 
-def test_look_has_what_was_known_and_tells_the_watcher_whom_to_watch(stand):
+def test_poll_has_what_was_known_and_tells_whom_to_watch(stand):
     stand.answer(GRAPH)
-    assert stand.looker.latest.snapshot is GRAPH
-    assert stand.looker.latest.lives == stand.watcher.known
-    assert stand.watcher.watched == {"/laser": "http://host/laser"}
+    assert stand.poller.latest.snapshot is GRAPH
+    assert stand.poller.latest.lives == stand.connections.known
+    assert stand.connections.watched == {"/laser": "http://host/laser"}
 
 
-def test_look_that_fails_leaves_the_latest_and_the_next_one_counts_again(stand):
+def test_poll_that_fails_leaves_the_latest_and_the_next_one_counts_again(stand):
     stand.answer(GRAPH)
     stand.master.answers.put(SnapshotError("no answer"))
     later = GraphSnapshot()
     stand.answer(later)
-    assert stand.looker.latest.snapshot is later
-    assert stand.looker.count == 2
+    assert stand.poller.latest.snapshot is later
+    assert stand.poller.count == 2
 
 
 @pytest.mark.parametrize("stand", [HOURLY], indirect=True)
 def test_look_on_request_does_not_wait_until_one_is_due(stand):
     stand.answer(GRAPH)
-    stand.looker.request()
+    stand.poller.request()
     stand.answer(GRAPH)
-    assert stand.looker.count == 2
-    stand.looker.request()
+    assert stand.poller.count == 2
+    stand.poller.request()

@@ -8,7 +8,7 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 from rosgraph_monitor.health.liveness import Life, Timing
-from rosgraph_monitor.io.node_connections import Watcher
+from rosgraph_monitor.io.node_connections import NodeConnections
 
 TIMING = Timing(probe_period=0.05, probe_deadline=20.0, connect_deadline=20.0, retry_period=0.05)
 HASTY = Timing(probe_period=0.05, probe_deadline=0.3, connect_deadline=0.3, retry_period=0.05)
@@ -75,7 +75,7 @@ def node(handler=KeepAlive, pid=4711):
 @pytest.fixture
 def watcher(request):
     changed = threading.Event()
-    watcher = Watcher(changed.set, getattr(request, "param", TIMING))
+    watcher = NodeConnections(changed.set, getattr(request, "param", TIMING))
     watcher.changed = changed
     watcher.start()
     yield watcher

@@ -13,7 +13,7 @@ from rosgraph_monitor.graph.findings import Finding, MissingNode, PortFinding, c
 from rosgraph_monitor.graph.names import instance, relative, resolved
 from rosgraph_monitor.health.components import ComponentTracker, NodeCondition, component_statuses
 from rosgraph_monitor.health.liveness import Life
-from rosgraph_monitor.health.topics import Verdict, verdict_statuses
+from rosgraph_monitor.health.topics import TopicVerdict, verdict_statuses
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -52,7 +52,7 @@ class _Told:
     ports_since: dict[PortFinding, float] = field(default_factory=dict)
 
 
-class GraphMonitor:
+class GraphEvaluator:
     """Judges the graph, evaluation after evaluation."""
 
     def __init__(
@@ -84,7 +84,7 @@ class GraphMonitor:
         desired: Desired,
         now: float,
         *,
-        topics: Sequence[Verdict] = (),
+        topics: Sequence[TopicVerdict] = (),
         others: Mapping[str, NodeCondition] | None = None,
     ) -> list[Status]:
         """Judge the graph.
@@ -209,7 +209,7 @@ class GraphMonitor:
         conditions: dict[str, NodeCondition],
         snapshot: GraphSnapshot,
         life: Mapping[str, Life],
-        topics: Sequence[Verdict],
+        topics: Sequence[TopicVerdict],
     ) -> None:
         """Let what is wrong with topics count for the components that they stand for, or else for their publishers."""
         for verdict in topics:

@@ -1,6 +1,11 @@
 """Checks plain data against a JSON schema: every violation, in words for people.
 
 It knows the keywords that the schemas of this package use. `title` says what a value must be, for the messages.
+
+The library jsonschema (4.26, MIT) was measured in its place: the check of the demonstrator's metacontrol.yaml in a new
+process takes 0.20 s of CPU with it and 0.10 s with this, of 0.97 s for all of `rosmodel check` (medians of 10 runs). It
+brings five more packages, one of them compiled, and each of its errors would still have to be put into words here: the
+branch of an `anyOf` that was meant, keys that are no text, numbers that are not finite.
 """
 
 from __future__ import annotations

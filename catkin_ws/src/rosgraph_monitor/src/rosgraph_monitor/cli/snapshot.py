@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from typing import TYPE_CHECKING
 
+import click
 import rosgraph
 from ros_model.io.master import SnapshotError, take_snapshot
 
@@ -16,23 +16,23 @@ if TYPE_CHECKING:
     from ros_model.graph.snapshot import GraphSnapshot
 
 
-def main() -> None:
-    """Print a snapshot; exit with status 2 and one line where there is none to be had."""
-    parser = argparse.ArgumentParser(prog="snapshot", description="What runs, as the ROS master lists it.")
-    parser.add_argument("--json", action="store_true", help="everything, with types and parameters, as JSON")
-    parser.add_argument(
-        "--timeout", type=float, default=5.0, metavar="S", help="patience with the master (%(default)s)"
-    )
-    options = parser.parse_args()
+@click.command("snapshot")
+@click.option("--json", "as_json", is_flag=True, help="Everything, with types and parameters, as JSON.")
+@click.option(
+    "--timeout", type=float, default=5.0, show_default=True, metavar="S", help="How long to wait for the master."
+)
+def main(as_json: bool, timeout: float) -> None:
+    """Print what runs, as the ROS master lists it; exit with status 2 and one line if the master can't be asked."""
     try:
-        snapshot = take_snapshot(rosgraph.get_master_uri(), options.timeout)
+        snapshot = take_snapshot(rosgraph.get_master_uri(), timeout)
     except SnapshotError as error:
-        sys.stderr.write(f"snapshot: {error}: start roscore or set ROS_MASTER_URI\n")
+        click.echo(f"snapshot: {error}: start roscore or set ROS_MASTER_URI", err=True)
         sys.exit(2)
-    if options.json:
-        sys.stdout.write(json.dumps(snapshot.as_dict(), indent=1, default=str) + "\n")
+    if as_json:
+        click.echo(json.dumps(snapshot.as_dict(), indent=1, default=str))
     else:
-        sys.stdout.writelines(f"{line}\n" for line in lines(snapshot))
+        for line in lines(snapshot):
+            click.echo(line)
 
 
 def lines(snapshot: GraphSnapshot) -> Iterator[str]:

@@ -29,7 +29,7 @@ class _Row:
 
 
 @dataclass
-class Board:
+class Overview:
     """The present state, by name."""
 
     components: dict[str, _Row] = field(default_factory=dict)

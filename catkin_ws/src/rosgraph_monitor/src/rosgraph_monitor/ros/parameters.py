@@ -12,7 +12,7 @@ from rosgraph_monitor.evaluation import Patience
 from rosgraph_monitor.graph.comparison import Scope
 from rosgraph_monitor.graph.names import IGNORED_NODES, IGNORED_PORTS
 from rosgraph_monitor.graph.wiring import PortTypes, port_types
-from rosgraph_monitor.health.components import ComponentMap, parse_mapping
+from rosgraph_monitor.health.components import ComponentMap, parse_components
 from rosgraph_monitor.health.liveness import Timing
 from rosgraph_monitor.health.topics import TopicSpec, parse_topics
 
@@ -51,7 +51,7 @@ def names(name: str, default: list[str]) -> list[str]:
 def components() -> ComponentMap:
     """Return what stands for components."""
     try:
-        return parse_mapping(rospy.get_param("~components", {}))
+        return parse_components(rospy.get_param("~components", {}))
     except ValueError as error:
         raise ParameterError(f"parameter {rospy.resolve_name('~components')}: {error}") from error
 

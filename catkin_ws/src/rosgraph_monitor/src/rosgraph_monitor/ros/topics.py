@@ -16,7 +16,7 @@ from sensor_msgs.msg import BatteryState
 
 from rosgraph_monitor.health.battery import BatterySpec, charge_of, has_failed
 from rosgraph_monitor.health.components import NodeCondition
-from rosgraph_monitor.health.topics import TopicHealth, Verdict
+from rosgraph_monitor.health.topics import TopicHealth, TopicVerdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Mapping
@@ -84,7 +84,7 @@ class TopicListener:
                 name, rospy.AnyMsg, self._receive, name, buff_size=_LARGEST_MESSAGE, tcp_nodelay=True
             )
 
-    def judge(self, excused: Collection[str] = ()) -> list[Verdict]:
+    def judge(self, excused: Collection[str] = ()) -> list[TopicVerdict]:
         """Return a verdict on each topic."""
         with self._lock:
             return self._health.judge(rospy.get_time(), time.monotonic(), excused)
