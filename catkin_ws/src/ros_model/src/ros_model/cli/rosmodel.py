@@ -26,8 +26,10 @@ _COMMANDS = {
     "variants": "ros_model.cli.variants:variants",
 }
 """Command -> where it is. A command's module is imported when it is run, so that the others' imports cost nothing."""
+_OFFERED = {"extract": "ros_model_extraction", "snapshot": "ros_model_extraction"}
+"""Command -> the package of this project that adds it, to be named where it is not there."""
 _PLUGINS = "ros_model"
-"""Packages add a command by `<export><ros_model command="NAME" function="MODULE:FUNCTION"/></export>`."""
+"""Tag of what packages export: `<export><ros_model command="NAME" function="MODULE:FUNCTION"/></export>`."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -57,6 +59,10 @@ class _Commands(click.Group):
 
     def get_command(self, _context: click.Context, name: str) -> click.Command | None:
         where = _COMMANDS.get(name) or _added_commands().get(name)
+        if where is None and name in _OFFERED:
+            raise ModelError(
+                f"no command {name!r}: package {_OFFERED[name]} offers it: build it and source the workspace"
+            )
         if where is None:
             return None
         module, _, function = where.partition(":")
