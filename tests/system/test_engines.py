@@ -36,14 +36,37 @@ def placed(summary: dict[str, Any]) -> list[list[float]]:
 
 
 def driven(summary: dict[str, Any]) -> float:
-    """Seconds without those of reconfigurations, which take wall time on ROS."""
-    return summary["duration_s"] - sum(change["execute_s"] for change in summary["reconfigurations"])
+    """Return the seconds without those of reconfigurations, which take wall time on ROS."""
+    delays = ("detect_s", "decide_s", "execute_s")
+    return summary["duration_s"] - sum(change[name] or 0.0 for change in summary["reconfigurations"] for name in delays)
+
+
+def spent_energy(summary: dict[str, Any]) -> float:
+    """Return the energy level times the seconds for which it held, summed over the mission.
+
+    The mean over time does not compare the engines: on ROS, the robot stands still for as long as the machine takes to
+    reconfigure it, at a level near 0. On a loaded machine this halved the mean, with the same energy for the way.
+    """
+    return summary["mean_qa"]["energy"] * summary["duration_s"]
 
 
 def test_both_engines_tell_the_same_story_over_seeds(tmp_path):
+    """Compare what does not depend on how fast the machine is, with room for what a loaded machine does to the drive.
+
+    The missions run at real-time factor 1: at 2, a machine with five times the work that it has cores for missed 69 %
+    of the commands, and at 1 it missed 7 %.
+
+    The energy: `power_load` and `energy_level` make the level (1.3 v + 0.1 a + 0.04 rate - 0.2) / 4.8; a, the largest
+    vibration of a second, is about 27 v. The 6 m of the way take 4.0 * 6 / 4.8 = 5.0 level seconds at any speed, and
+    17 s of commands at 20 Hz take 0.6 / 4.8 * 17 = 2.1. A loaded machine changes only the second part. A share m of
+    commands that are missed takes 0.8 / 4.8 * 17 / 7.1 = 40 % of m away. A second of standing still under commands adds
+    0.125, or 2 %; one more stop adds a second of driving at most, 0.37 or 5 %. The bound, relative to ROS, allows for
+    20 % less energy there than in lockstep, which is half of the commands missed, and for 33 % more, which is 6 more
+    stops. Chance is far below: the engines differ by 1.0 +- 1.0 % on an idle machine (docs/engines.md).
+    """
     (tmp_path / "routes.yaml").write_text(ROUTE)
     page = tmp_path / "engines.md"
-    options = ("--routes", str(tmp_path / "routes.yaml"), *MISSION, "--real-time-factor", "2")
+    options = ("--routes", str(tmp_path / "routes.yaml"), *MISSION)
     command = compare(tmp_path, "--seeds", str(SEEDS), "--output", str(page), *options)
     done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
     assert done.returncode == 0, done.stderr
@@ -62,7 +85,7 @@ def test_both_engines_tell_the_same_story_over_seeds(tmp_path):
     for figure, share in (
         (lambda s: s["path_length_m"], 0.15),
         (driven, 0.4),
-        (lambda s: s["mean_qa"]["energy"], 0.25),
+        (spent_energy, 0.25),
     ):
         means = [statistics.fmean(map(figure, engine)) for engine in (ros, lockstep)]
         assert means[1] == pytest.approx(means[0], rel=share), report
