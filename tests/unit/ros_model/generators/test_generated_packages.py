@@ -11,7 +11,7 @@ from catkin_pkg.packages import find_packages
 from ros_model.cli.rosmodel import main
 from ros_model.io.models import read_system
 from ros_model.io.project import load_project
-from rosgraph_manipulator.configuration.configuration_file import parse_settings
+from rosgraph_manipulator.io.configuration_file import options_from
 from roslaunch.config import load_config_default
 from roslaunch.rlutil import resolve_launch_arguments
 
@@ -80,11 +80,11 @@ def test_command_roslaunch_finds_one(workspace, on_path):
 
 
 def test_manipulator_takes_the_published_commands(workspace, names, on_path):
-    settings = parse_settings(
+    options = options_from(
         yaml.safe_load((workspace / "metacontrol_sim" / "config" / "rosgraph_manipulator.yaml").read_text())
     )
-    assert sorted(settings.configurations) == sorted(names)
-    for name, configuration in settings.configurations.items():
+    assert sorted(options.configurations) == sorted(names)
+    for name, configuration in options.configurations.items():
         assert Path(configuration.launch_file).name == f"{name}.launch"
         assert configuration.function == "f_navigate"
 

@@ -3,9 +3,9 @@
 import itertools
 
 import pytest
-from rosgraph_manipulator.change.deployment import CancelledError, DeploymentError, Result, Stopwatch, deploy
+from rosgraph_manipulator.change.deployment import CancelledError, DeploymentError, Result, Stopwatch, deploy, durations
 from rosgraph_manipulator.change.tactics import ChangeProcesses, Plan, SetParameters
-from rosgraph_manipulator.configuration.configuration_file import Configuration
+from rosgraph_manipulator.configuration.configurations import Configuration
 
 OLD = Configuration("old", "f", "old.launch")
 NEW = Configuration("new", "f", "new.launch")
@@ -140,3 +140,9 @@ def test_stopwatch_adds_up_phases_in_order():
             pass
     assert watch.phases == {"stop": 1.5, "start": 2.0}
     assert list(watch.phases) == ["stop", "start"]
+
+
+def test_launchers_phases_stand_for_the_change_that_went_well():
+    phases, launcher = {"plan": 0.1, "change": 1.0, "ready": 0.2}, {"stop": 0.4, "start": 0.6}
+    assert list(durations(phases, launcher, True)) == ["plan", "stop", "start", "ready"]
+    assert durations(phases, launcher, False) == phases

@@ -53,6 +53,12 @@ def test_node_that_neither_ran_nor_is_started_does_not_belong_to_the_configurati
     assert nodes.report().nodes == ("/a", "/b")
 
 
+def test_change_that_starts_unknown_nodes_or_relies_on_nodes_that_do_not_run_is_refused(nodes):
+    assert nodes.refusal(system("/a", "/c"), ["/c"]) == ""
+    assert nodes.refusal(system("/a"), ["/c"]) == "starts no node /c"
+    assert nodes.refusal(system("/a", "/c"), []) == "needs /c, which does not run: start it, too"
+
+
 def test_change_is_told_while_it_is_under_way(nodes):
     nodes.begin_change(system("/c"), ["/c"])
     assert (nodes.report().configuration, nodes.report().state) == ("first", CHANGING)

@@ -24,7 +24,8 @@ from ros_model.errors import ModelError
 from ros_model.io.files import resolve
 from ros_model.io.models import read_system
 from rosgraph_manipulator.change.tactics import TacticError, load_tactics
-from rosgraph_manipulator.configuration.configuration_file import ConfigurationError, parse_settings
+from rosgraph_manipulator.configuration.configurations import ConfigurationError
+from rosgraph_manipulator.io.configuration_file import options_from
 from rosgraph_manipulator.io.launch_files import LaunchFileError, read_launch_file
 from rosgraph_monitor.observers import plugins
 
@@ -104,7 +105,7 @@ def describe_system(package: str, launch_file: str, arguments: Sequence[str] = (
     try:
         folder = Path(rospkg.RosPack().get_path(package)) / "launch"
         launched = read_launch_file(folder / launch_file, arguments).system
-        manipulator = parse_settings(private_parameters(launched, *_MANIPULATOR))
+        manipulator = options_from(private_parameters(launched, *_MANIPULATOR))
         monitor = private_parameters(launched, *_MONITOR)
         base = read_system(resolve(monitor["desired_rossystem"]))
         models = resolve(monitor["variants"])

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from ros_model.language.metamodel import RosSystem
-    from rosgraph_manipulator.configuration.configuration_file import Configuration
+    from rosgraph_manipulator.configuration.configurations import Configuration
     from rosgraph_manipulator.configuration.description import SystemDescription
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -11,7 +11,7 @@ from typing import Protocol
 from metacontrol_msgs.msg import ReconfigurationResult
 
 from rosgraph_manipulator.change.tactics import Plan, SetParameters, StepExecutor
-from rosgraph_manipulator.configuration.configuration_file import Configuration
+from rosgraph_manipulator.configuration.configurations import Configuration
 
 
 class Result(enum.IntEnum):
@@ -89,6 +89,14 @@ class Stopwatch:
             yield
         finally:
             self.phases[name] += self.clock() - began
+
+
+def durations(phases: Mapping[str, float], launcher_phases: Mapping[str, float], ok: bool) -> dict[str, float]:
+    """Return the durations of a change's phases; the launcher's own take the place of `change` where all went well."""
+    found: dict[str, float] = {}
+    for name, duration in phases.items():
+        found.update(launcher_phases if ok and name == "change" else {name: duration})
+    return found
 
 
 def deploy(

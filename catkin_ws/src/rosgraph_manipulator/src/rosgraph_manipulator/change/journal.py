@@ -1,27 +1,29 @@
-"""What a manipulator leaves for the one that comes after it: what was deployed, and what was under way.
+"""The journal that a manipulator leaves for the next one: which configuration was deployed, which change was under way.
 
-It stands on the parameter server with a heartbeat, so that nothing of another day comes back to life.
+It is a parameter with a heartbeat, so that the next manipulator can tell a recent journal from an old one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 MAX_AGE = 30.0
-"""Seconds after its last heartbeat at which a journal is history: a respawned manipulator is back within 2, on a
-computer that is overloaded within 15."""
+"""Seconds after its last heartbeat at which a journal is too old to be used. A respawned manipulator is back within
+2 s, on an overloaded computer within 15 s."""
+
+HEARTBEAT_PERIOD = 2.0  # s, wall
 
 
 @dataclass(frozen=True)
 class Journal:
-    """Where a manipulator stands.
+    """What a manipulator has deployed, and what it is doing.
 
     Attributes:
-        configuration: the last good one; empty: none.
-        wanted: the one that is being deployed; empty: no change is under way.
-        alive: wall time of the last sign of life, s since the epoch.
+        configuration: the last good configuration; empty: there is none.
+        wanted: the configuration that is being deployed; empty: no change is under way.
+        alive: wall time of the last heartbeat, s since the epoch.
         ended: whether the manipulator has ended by itself.
     """
 
@@ -30,8 +32,31 @@ class Journal:
     alive: float = 0.0
     ended: bool = False
 
+    def noted(self, configuration: str, now: float, wanted: str | None = None, ended: bool = False) -> Journal:
+        """Return the journal as it is at `now`; one that has ended does not change any more.
+
+        Args:
+            configuration: the last good configuration; empty: there is none.
+            now: wall time, s since the epoch.
+            wanted: the configuration that is being deployed; empty: none is; None: as before.
+            ended: whether the manipulator ends by itself.
+        """
+        if self.ended:
+            return self
+        return replace(
+            self,
+            configuration=configuration,
+            wanted=self.wanted if wanted is None else wanted,
+            alive=now,
+            ended=ended,
+        )
+
+    def needs_heartbeat(self, now: float) -> bool:
+        """Tell whether the last heartbeat is so old that another one is due."""
+        return now - self.alive > HEARTBEAT_PERIOD
+
     def as_parameter(self) -> dict[str, Any]:
-        """Return the form in which it stands on the parameter server."""
+        """Return the value of the parameter."""
         return {
             "configuration": self.configuration,
             "wanted": self.wanted,
@@ -41,7 +66,7 @@ class Journal:
 
 
 def parse_journal(value: object) -> Journal:
-    """Read the parameter; an empty journal where it has another form."""
+    """Read the parameter; return an empty journal where it has another form."""
     if not isinstance(value, Mapping):
         return Journal()
     texts = [value.get(key) for key in ("configuration", "wanted")]
@@ -56,10 +81,10 @@ class Resumption:
     """How a manipulator begins.
 
     Attributes:
-        deploy: the configuration to deploy; empty: none, what runs is taken over or nothing is to run.
-        running: the configuration that runs as it should; empty: none.
-        last_good: where to go back to should `deploy` fail; empty: nowhere.
-        keep_goal: whether the pending goal that was left is taken over.
+        deploy: the configuration to deploy; empty: none.
+        running: the configuration that runs already and is left as it is; empty: none.
+        last_good: the configuration to restore if `deploy` fails; empty: none.
+        keep_goal: whether the pending goal that an earlier manipulator left is kept.
     """
 
     deploy: str = ""
@@ -72,15 +97,15 @@ def resume(journal: Journal, launched: str, failed: bool, initial: str, now: flo
     """Decide how to begin.
 
     Args:
-        journal: what the last manipulator left.
-        launched: the configuration whose processes the launcher has; empty: none.
-        failed: whether the launcher has given it up.
-        initial: what the operator wants at a start; empty: nothing.
+        journal: the journal of the last manipulator.
+        launched: the configuration that the launcher runs; empty: none.
+        failed: whether the launcher has given that configuration up.
+        initial: the configuration to begin with where nothing is left to resume; empty: none.
         now: wall time, s since the epoch.
     """
     fresh = 0.0 <= now - journal.alive <= MAX_AGE
     if launched and not failed:
-        if fresh and journal.wanted:  # it was killed in the middle of a change, which is finished now
+        if fresh and journal.wanted:  # it was killed during a change: finish that
             return Resumption(deploy=journal.wanted, last_good=journal.configuration, keep_goal=True)
         return Resumption(running=launched, keep_goal=fresh)
     if fresh and not journal.ended and (journal.wanted or journal.configuration):  # manipulator and launcher died

@@ -21,10 +21,10 @@ from ros_model.errors import ModelError
 from ros_model.io.files import resolve
 
 from rosgraph_manipulator.change.tactics import NoRunningNodes, TacticError, load_tactics, plan_change
-from rosgraph_manipulator.configuration.configuration_file import ConfigurationError, parse_settings
+from rosgraph_manipulator.configuration.configurations import KEYS, ConfigurationError
 from rosgraph_manipulator.configuration.description import SystemDescription, compare
+from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.launch_files import LaunchFileError, read_launch_file, read_model
-from rosgraph_manipulator.ros.manipulator import KEYS, read_file
 from rosgraph_manipulator.ros.reconfigure_client import ReconfigureClient
 
 FIND_TIMEOUT = 5.0  # s, wall, to find the manipulator
@@ -91,14 +91,14 @@ def _system(name: str, config: str | None, online: bool) -> SystemDescription:
     if name.endswith(".launch"):
         return read_launch_file(resolve(name)).system
     if config is not None:
-        settings = parse_settings(read_file(config))
+        options = options_from(read_file(config))
     elif online:
-        settings = parse_settings({key: rospy.get_param(f"{NODE}/{key}", rospy.get_param(key, None)) for key in KEYS})
+        options = options_from({key: rospy.get_param(f"{NODE}/{key}", rospy.get_param(key, None)) for key in KEYS})
     else:
         raise CommandError(f"{name}: no ROS master knows the configurations: start the manipulator or give --config")
-    configuration = settings.configurations.get(name)
+    configuration = options.configurations.get(name)
     if configuration is None:
-        raise CommandError(f"unknown configuration '{name}'; known are: {', '.join(sorted(settings.configurations))}")
+        raise CommandError(f"unknown configuration '{name}'; known are: {', '.join(sorted(options.configurations))}")
     return read_launch_file(configuration.launch_file, configuration.args).system
 
 

@@ -192,13 +192,9 @@ class Launcher:
     def _look_up(self, launch_file: str, args: list[str], start: list[str]) -> tuple[LaunchFile, dict[str, Command]]:
         try:
             launch = read_launch_file(launch_file, args)
-            unknown = [name for name in start if name not in launch.system.nodes]
-            if unknown:
-                raise LauncherError(f"{launch_file} starts no node {', '.join(unknown)}")
-            # The change may have been planned for a launcher that died since, and that had more nodes.
-            lacking = [name for name in launch.system.nodes if name not in (*start, *self._nodes.names)]
-            if lacking:
-                raise LauncherError(f"{launch_file} needs {', '.join(lacking)}, which does not run: start it, too")
+            reason = self._nodes.refusal(launch.system, start)
+            if reason:
+                raise LauncherError(f"{launch_file} {reason}")
             return launch, {name: self._commands.command(launch.system.nodes[name]) for name in start}
         except LaunchFileError as error:
             raise LauncherError(str(error)) from error

@@ -100,6 +100,17 @@ class ManagedNodes:
         """Count a change that was asked for."""
         self._changes += 1
 
+    def refusal(self, system: SystemDescription, start: Collection[str]) -> str:
+        """Return why a change can't be made; empty where it can.
+
+        A change may have been planned for a launcher that died since and that had more nodes.
+        """
+        unknown = [name for name in start if name not in system.nodes]
+        if unknown:
+            return f"starts no node {', '.join(unknown)}"
+        lacking = [name for name in system.nodes if name not in start and name not in self._nodes]
+        return f"needs {', '.join(lacking)}, which does not run: start it, too" if lacking else ""
+
     def begin_change(self, system: SystemDescription, start: Collection[str]) -> list[str]:
         """Begin a change, and return the running nodes that must end.
 

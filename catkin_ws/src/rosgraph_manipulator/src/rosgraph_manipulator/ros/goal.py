@@ -20,7 +20,7 @@ import roslib.message
 import rospy
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 
-from rosgraph_manipulator.configuration.configuration_file import ConfigurationError
+from rosgraph_manipulator.configuration.configurations import ConfigurationError
 from rosgraph_manipulator.goals.goal_keeper import GoalKeeper
 
 QUEUE = 10

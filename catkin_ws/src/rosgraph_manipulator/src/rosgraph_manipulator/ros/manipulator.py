@@ -7,52 +7,57 @@ import queue
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import actionlib
 import rospy
-import yaml
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import (
-    ActiveConfiguration,
     FunctionGrounding,
     LauncherState,
     MvpReconfigurationAction,
     MvpReconfigurationResult,
-    Phase,
 )
 from node_kit.io.master_watch import MasterWatch
 from node_kit.ros.lifetime import Lifetime
 
-from rosgraph_manipulator.change.deployment import CancelledError, DeploymentError, Outcome, Result, Stopwatch, deploy
+from rosgraph_manipulator.change.deployment import (
+    CancelledError,
+    DeploymentError,
+    Outcome,
+    Result,
+    Stopwatch,
+    deploy,
+    durations,
+)
 from rosgraph_manipulator.change.journal import Journal, Resumption, parse_journal, resume
+from rosgraph_manipulator.change.reactions import DeployedConfigurations, Reaction
 from rosgraph_manipulator.change.request_queue import Policy, RequestQueue
 from rosgraph_manipulator.change.tactics import Plan, Tactic, TacticError, load_tactics, plan_change
-from rosgraph_manipulator.configuration.configuration_file import (
+from rosgraph_manipulator.configuration.configurations import (
+    KEYS,
     Configuration,
     ConfigurationError,
-    Settings,
-    parse_settings,
+    ManipulatorOptions,
 )
 from rosgraph_manipulator.configuration.parameters import SettingError, choice, number
+from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.master import MasterError, set_parameters
+from rosgraph_manipulator.launching.report import FAILED
+from rosgraph_manipulator.ros.announcer import Announcer
 from rosgraph_manipulator.ros.executor import RosExecutor
 from rosgraph_manipulator.ros.goal import PendingGoal
+from rosgraph_manipulator.ros.launcher_client import report_from
 
-KEYS = ("configurations", "kill_nodes", "save_action", "goal_msg_type", "reconfiguration_action_name")
-HEARTBEAT_PERIOD = 2.0  # s, wall
-ACQUAINTANCE_DELAY = 2.0  # s, wall, after a change: nodes may offer dynamic_reconfigure later than all else
+ASK_DELAY = 2.0  # s, wall, after a change: nodes may offer dynamic_reconfigure later than all else
 
 
 class Manipulator:
-    """The action server, and what is known to run; one thread carries out everything, one thing after the other."""
+    """The action server. One thread carries out everything, one thing after the other."""
 
-    def __init__(self, settings: Settings, tactics: Mapping[str, Tactic], initial: str) -> None:
+    def __init__(self, options: ManipulatorOptions, tactics: Mapping[str, Tactic], initial: str) -> None:
         get = rospy.get_param
-        self._settings = settings
+        self._options = options
         self._tactics = tactics
-        self._probation = number("~probation", get("~probation", 5.0), low=0.0)  # s, wall
         policy = choice("~concurrency", get("~concurrency", Policy.WAIT.value), [policy.value for policy in Policy])
         # No SimpleQueue: Python 3.11's waits for ever when a signal comes while it waits for a time.
         self._work: queue.Queue[Callable[[], None]] = queue.Queue()
@@ -60,20 +65,13 @@ class Manipulator:
         self._handles: dict[str, actionlib.ServerGoalHandle] = {}
         self._lock = threading.Lock()  # requests, handles, interruption
         self._interruption: CancelledError | None = None
-        self._running: Configuration | None = None
-        self._last_good: Configuration | None = None
-        self._previous: Configuration | None = None  # what the present one has replaced
-        self._recovering = False
-        self._deployed_at = -self._probation  # time.monotonic()
+        self._deployments = DeployedConfigurations(number("~probation", get("~probation", 5.0), low=0.0))
         self._journal = Journal()
         self._journal_lock = threading.Lock()
-        self._active = rospy.Publisher(
-            "rosgraph_manipulator/active_configuration", ActiveConfiguration, queue_size=10, latch=True
-        )
-        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        self._announcer = Announcer()
         self._resumption = self._find_resumption(initial, number("~launcher_timeout", get("~launcher_timeout", 10.0)))
         self._server = actionlib.ActionServer(
-            settings.reconfiguration_action_name,
+            options.reconfiguration_action_name,
             MvpReconfigurationAction,
             self._on_goal,
             self._on_cancel,
@@ -89,44 +87,42 @@ class Manipulator:
         except rospy.ROSException:
             state = LauncherState()
             rospy.logwarn("rosgraph_launcher is not there; start it beside this node: nothing can be deployed without")
-        known = self._settings.configurations
-        launched = state.configuration if state.configuration in known else ""
-        failed = state.state == LauncherState.FAILED
-        resumption = resume(journal, launched, failed, initial, time.time())
+        report = report_from(state)
+        launched = report.configuration if report.configuration in self._options.configurations else ""
+        resumption = resume(journal, launched, report.state == FAILED, initial, time.time())
         goal = None
-        if self._settings.save_action:
+        if self._options.save_action:
             goal = PendingGoal(
-                self._settings.save_action,
-                str(self._settings.action_type),
+                self._options.save_action,
+                str(self._options.action_type),
                 adopt=resumption.keep_goal,
                 changing=bool(resumption.deploy),
             )
         self._executor = RosExecutor(
-            self._settings,
+            self._options,
             goal,
             ready_timeout=number("~ready_timeout", get("~ready_timeout", 15.0), low=0.1),
             settle_time=number("~settle_time", get("~settle_time", 0.5), low=0.0),
             launcher_timeout=launcher_timeout,
-            on_state=lambda _state: self._work.put(self._follow_launcher),
+            on_report=lambda: self._work.put(self._follow_launcher),
         )
         self._executor.check = self._check
-        self._executor.launcher = self._executor.launcher or state
+        self._executor.suppose(report)
         return resumption
 
     # -- life -----------------------------------------------------------------------------------------------------
 
     def run(self, watch: MasterWatch) -> None:
-        """Take over what runs, else deploy; then serve requests until the node ends, or the master that is watched."""
-        known = self._settings.configurations
+        """Resume or deploy a configuration, then serve requests until the node or the watched master ends."""
+        known = self._options.configurations
         running = known.get(self._resumption.running)
         wanted = known.get(self._resumption.deploy)
-        self._last_good = known.get(self._resumption.last_good)
+        self._deployments.resume(running, known.get(self._resumption.last_good))
         watch.heartbeat = self._heartbeat
         rospy.on_shutdown(lambda: self._note(ended=True))
         if running:
-            self._running = self._last_good = running
             self._note()
-            self._announce(running, FunctionGrounding.STABLE)
+            self._announcer.announce(running, FunctionGrounding.STABLE)
             rospy.loginfo("took over the running configuration %s", running.name)
         elif wanted:
             self._deploy(wanted)
@@ -139,30 +135,26 @@ class Manipulator:
             work()
 
     def _heartbeat(self) -> None:
-        if time.time() - self._journal.alive > HEARTBEAT_PERIOD:
+        if self._journal.needs_heartbeat(time.time()):
             self._note()
 
     def _note(self, wanted: str | None = None, ended: bool = False) -> None:
         """Write the journal."""
+        last_good = self._deployments.last_good
         with self._journal_lock:
-            if self._journal.ended:
-                return  # the last word
-            self._journal = replace(
-                self._journal,
-                configuration=self._last_good.name if self._last_good else "",
-                wanted=self._journal.wanted if wanted is None else wanted,
-                alive=time.time(),
-                ended=ended,
-            )
+            noted = self._journal.noted(last_good.name if last_good else "", time.time(), wanted, ended)
+            if noted is self._journal:
+                return
+            self._journal = noted
             with contextlib.suppress(MasterError):  # without a master there is nobody to read it
-                set_parameters({rospy.resolve_name("~journal"): self._journal.as_parameter()})
+                set_parameters({rospy.resolve_name("~journal"): noted.as_parameter()})
 
     # -- requests -------------------------------------------------------------------------------------------------
 
     def _on_goal(self, handle: actionlib.ServerGoalHandle) -> None:
         name = handle.get_goal().desired_configuration_name
-        if name not in self._settings.configurations:
-            message = f"unknown configuration '{name}'; known are: {', '.join(sorted(self._settings.configurations))}"
+        if name not in self._options.configurations:
+            message = f"unknown configuration '{name}'; known are: {', '.join(sorted(self._options.configurations))}"
             rospy.logerr("%s", message)
             handle.set_accepted()
             handle.set_aborted(MvpReconfigurationResult(Result.UNKNOWN), message)
@@ -202,7 +194,7 @@ class Manipulator:
         if handle is None:
             return
         try:
-            outcome = self._deploy(self._settings.configurations[handle.get_goal().desired_configuration_name])
+            outcome = self._deploy(self._options.configurations[handle.get_goal().desired_configuration_name])
         finally:
             with self._lock:
                 self._requests.finish()
@@ -225,16 +217,16 @@ class Manipulator:
     def _deploy(self, wanted: Configuration) -> Outcome:
         watch = Stopwatch(time.monotonic)
         began = time.monotonic()
-        last_good = self._last_good if self._last_good != wanted else None
-        self._announce(wanted, FunctionGrounding.RECONFIGURING)
+        self._announcer.announce(wanted, FunctionGrounding.RECONFIGURING)
         self._note(wanted=wanted.name)
         try:
             with watch.phase("plan"):
                 found = self._plans(wanted)
-            outcome = deploy(self._executor, wanted, found, last_good or self._running, watch)
+            outcome = deploy(self._executor, wanted, found, self._deployments.fallback(wanted), watch)
         except (DeploymentError, rospy.ROSException, OSError) as error:
-            outcome = self._untouched(wanted, " ".join(str(error).split()))
-        self._take(wanted, outcome, watch, began)
+            outcome = self._deployments.refused(wanted, " ".join(str(error).split()))
+        phases = durations(watch.phases, self._executor.launcher_phases, outcome.result is Result.OK)
+        self._finish(wanted, outcome, {**phases, "total": time.monotonic() - began})
         return outcome
 
     def _plans(self, wanted: Configuration) -> list[Plan]:
@@ -244,114 +236,71 @@ class Manipulator:
             rospy.logwarn("%s", problem)
         return found
 
-    def _untouched(self, wanted: Configuration, reason: str) -> Outcome:
-        """What becomes of a request that failed before anything was touched."""
-        if self._running is None:
-            return Outcome(Result.GENERAL_ERROR, None, f"{wanted.name}: {reason}")
-        return Outcome(Result.FAILED, self._running, f"{wanted.name}: {reason}; {self._running.name} runs on")
-
-    def _take(self, wanted: Configuration, outcome: Outcome, watch: Stopwatch, began: float) -> None:
-        """Take in how a change ended, and tell it."""
-        phases = watch.phases
-        if "change" in phases and outcome.result is Result.OK:
-            phases = {}
-            for name, duration in watch.phases.items():
-                phases.update(self._executor.launcher_phases if name == "change" else {name: duration})
-        phases["total"] = time.monotonic() - began
-        self._running, self._recovering = outcome.running, False
+    def _finish(self, wanted: Configuration, outcome: Outcome, phases: Mapping[str, float]) -> None:
+        """Note how a change ended, and tell it."""
+        self._deployments.finished(outcome, time.monotonic())
         if outcome.running:
-            replaced = self._last_good if outcome.result is Result.OK and self._last_good != outcome.running else None
-            self._previous, self._last_good = replaced, outcome.running
-            self._deployed_at = time.monotonic()
-            self._announce(outcome.running, FunctionGrounding.STABLE, outcome, phases)
-            acquaintance = threading.Timer(ACQUAINTANCE_DELAY, self._executor.get_to_know)
-            acquaintance.daemon = True
-            acquaintance.start()
+            self._announcer.announce(outcome.running, FunctionGrounding.STABLE, outcome, phases)
+            ask = threading.Timer(ASK_DELAY, self._executor.ask_for_adjustable)
+            ask.daemon = True
+            ask.start()
         elif outcome.result is Result.GENERAL_ERROR:
             self._executor.stop_robot()
-            self._announce(wanted, FunctionGrounding.FAILED, outcome, phases)
+            self._announcer.announce(wanted, FunctionGrounding.FAILED, outcome, phases)
         self._note(wanted="")
-        durations = ", ".join(f"{name} {duration:.3f}" for name, duration in phases.items())
         log = rospy.loginfo if outcome.result is Result.OK else rospy.logerr
-        log("%s (s: %s)", outcome.message, durations)
-        self._diagnose(outcome.result is Result.OK, outcome.message, wanted.name)
+        log("%s (s: %s)", outcome.message, ", ".join(f"{name} {duration:.3f}" for name, duration in phases.items()))
+        self._announcer.diagnose(outcome.result is Result.OK, outcome.message, wanted)
 
     # -- the launcher's part --------------------------------------------------------------------------------------
 
     def _follow_launcher(self) -> None:
-        """See whether what runs is what should run; the launcher has said something new."""
-        state, running = self._executor.launcher, self._running
-        if state is None or running is None or state.state == LauncherState.CHANGING:
+        """React to the launcher's last report."""
+        report, running, previous = self._executor.report, self._deployments.running, self._deployments.previous
+        reaction = self._deployments.react(report, time.monotonic())
+        if report is None or running is None:
             return
-        if state.configuration != running.name:
-            rospy.logwarn("rosgraph_launcher runs %s: deploying %s", state.configuration or "nothing", running.name)
-            self._running = None
+        if reaction is Reaction.DEPLOY_AGAIN:
+            rospy.logwarn("rosgraph_launcher runs %s: deploying %s", report.configuration or "nothing", running.name)
+            self._deployments.lost()
             self._deploy(running)
-        elif state.state == LauncherState.FAILED:
-            self._give_up(running, state.message)
-        elif state.state == LauncherState.RECOVERING and not self._recovering:
-            self._recover(running, state.message)
-        elif state.state == LauncherState.STABLE and self._recovering:
+        elif reaction is Reaction.GIVE_UP:
+            self._give_up(running, report.message)
+        elif reaction is Reaction.GO_BACK and previous is not None:
+            rospy.logerr("%s soon after the change: %s: going back to %s", running.name, report.message, previous.name)
+            self._announcer.diagnose(False, f"{running.name}: {report.message}; {previous.name} is restored", running)
+            self._deployments.failed()
+            self._deploy(previous)
+        elif reaction is Reaction.BEGIN_RECOVERY:
+            self._begin_recovery(running, report.message)
+        elif reaction is Reaction.END_RECOVERY:
             self._end_recovery(running)
 
-    def _recover(self, running: Configuration, reason: str) -> None:
-        previous = self._previous
-        if previous is not None and time.monotonic() - self._deployed_at < self._probation:
-            rospy.logerr("%s soon after the change: %s: going back to %s", running.name, reason, previous.name)
-            self._diagnose(False, f"{running.name}: {reason}; {previous.name} is restored", running.name)
-            self._running = self._last_good = None
-            self._deploy(previous)
-            return
-        self._recovering = True
-        self._executor.node_died()
-        self._announce(running, FunctionGrounding.RECOVERING, Outcome(Result.OK, running, reason))
-        self._diagnose(False, reason, running.name)
+    def _begin_recovery(self, running: Configuration, reason: str) -> None:
+        self._deployments.begin_recovery()
+        self._executor.begin_recovery()
+        self._announcer.announce(running, FunctionGrounding.RECOVERING, Outcome(Result.OK, running, reason))
+        self._announcer.diagnose(False, reason, running)
 
     def _end_recovery(self, running: Configuration) -> None:
         try:
-            self._executor.recovered()
+            self._executor.end_recovery()
         except DeploymentError as error:
             rospy.logwarn("%s", error)
-            return  # the launcher will say how it goes on
-        self._recovering = False
-        self._announce(running, FunctionGrounding.STABLE, Outcome(Result.OK, running, "recovered", "recovery"))
-        self._diagnose(True, "recovered", running.name)
+            return  # the launcher's next report tells how it goes on
+        self._deployments.end_recovery()
+        outcome = Outcome(Result.OK, running, "recovered", "recovery")
+        self._announcer.announce(running, FunctionGrounding.STABLE, outcome)
+        self._announcer.diagnose(True, outcome.message, running)
 
     def _give_up(self, running: Configuration, reason: str) -> None:
-        self._running = self._last_good = None
-        self._recovering = False
+        self._deployments.failed()
         self._executor.stop_robot()
         self._note(wanted="")
         rospy.logerr("%s has failed: %s", running.name, reason)
-        self._announce(running, FunctionGrounding.FAILED, Outcome(Result.GENERAL_ERROR, None, reason))
-        self._diagnose(False, reason, running.name)
-
-    # -- what is told ---------------------------------------------------------------------------------------------
-
-    def _announce(
-        self,
-        configuration: Configuration,
-        state: str,
-        outcome: Outcome | None = None,
-        phases: Mapping[str, float] | None = None,
-    ) -> None:
-        message = ActiveConfiguration(functions=[FunctionGrounding(configuration.function, configuration.name, state)])
-        message.header.stamp = rospy.Time.now()
-        if outcome:
-            message.tactic, message.message = outcome.tactic, outcome.message
-            message.phases = [Phase(*phase) for phase in (phases or {}).items()]
-        self._active.publish(message)
-
-    def _diagnose(self, ok: bool, message: str, configuration: str) -> None:
-        status = DiagnosticStatus(
-            level=DiagnosticStatus.OK if ok else DiagnosticStatus.ERROR,
-            name="rosgraph_manipulator",
-            message=message,
-            values=[KeyValue("configuration", configuration)],
-        )
-        array = DiagnosticArray(status=[status])
-        array.header.stamp = rospy.Time.now()
-        self._diagnostics.publish(array)
+        outcome = Outcome(Result.GENERAL_ERROR, None, reason)
+        self._announcer.announce(running, FunctionGrounding.FAILED, outcome)
+        self._announcer.diagnose(False, reason, running)
 
 
 def read_parameters(arguments: list[str]) -> dict[str, Any]:
@@ -370,32 +319,14 @@ def read_parameters(arguments: list[str]) -> dict[str, Any]:
     return {key: rospy.get_param(f"~{key}", rospy.get_param(key, None)) for key in KEYS}
 
 
-def read_file(name: str) -> dict[str, Any]:
-    """Return the keys of a configuration file.
-
-    Raises:
-        ConfigurationError: it can't be read.
-    """
-    try:
-        with open(name, encoding="utf-8") as file:
-            content = yaml.safe_load(file)
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"{name}: cannot be read: {error}") from error
-    except yaml.YAMLError as error:
-        raise ConfigurationError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
-    if not isinstance(content, dict):
-        raise ConfigurationError(f"{name}: expected keys such as 'configurations', found none")
-    return content
-
-
 def main() -> None:
     """Run the node; exit status 2 when its configuration cannot be used."""
     with Lifetime("rosgraph_manipulator", ConfigurationError, SettingError, TacticError) as life:
         life.start()
-        settings = parse_settings(read_parameters(rospy.myargv()[1:]))
+        options = options_from(read_parameters(rospy.myargv()[1:]))
         initial = str(rospy.get_param("~initial_configuration", ""))
-        if initial and initial not in settings.configurations:
-            known = ", ".join(sorted(settings.configurations))
+        if initial and initial not in options.configurations:
+            known = ", ".join(sorted(options.configurations))
             raise ConfigurationError(f"parameter '~initial_configuration' is '{initial}'; known are: {known}")
-        manipulator = Manipulator(settings, load_tactics(), initial)
+        manipulator = Manipulator(options, load_tactics(), initial)
         manipulator.run(life.watch)

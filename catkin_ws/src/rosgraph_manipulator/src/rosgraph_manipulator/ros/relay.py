@@ -11,7 +11,7 @@ import rospy
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
 from node_kit.ros.lifetime import Lifetime
 
-from rosgraph_manipulator.configuration.configuration_file import ConfigurationError, action_type
+from rosgraph_manipulator.configuration.configurations import ConfigurationError, action_type
 from rosgraph_manipulator.goals.relay import Ending, Link
 
 PERIOD = 0.05  # s, wall, between two looks at whether goals can be sent

@@ -1,8 +1,8 @@
 """The manipulator's configuration file, in both forms."""
 
 import pytest
-from rosgraph_manipulator.configuration.configuration_file import ConfigurationError, parse_settings
-from rosgraph_manipulator.ros.manipulator import read_file
+from rosgraph_manipulator.configuration.configurations import ConfigurationError
+from rosgraph_manipulator.io.configuration_file import options_from, read_file
 
 
 @pytest.fixture
@@ -13,23 +13,21 @@ def launch_file(tmp_path):
 
 
 def test_own_form_names_function_launch_file_and_arguments(launch_file):
-    settings = parse_settings(
-        {"configurations": {"a": {"function": "f", "launch": str(launch_file), "args": ["x:=1"]}}}
-    )
-    configuration = settings.configurations["a"]
+    options = options_from({"configurations": {"a": {"function": "f", "launch": str(launch_file), "args": ["x:=1"]}}})
+    configuration = options.configurations["a"]
     assert (configuration.function, configuration.launch_file, configuration.args) == ("f", str(launch_file), ("x:=1",))
 
 
 def test_published_command_is_parsed_into_package_file_and_arguments():
     command = "roslaunch rosgraph_manipulator manipulator.launch config:=/a"
-    settings = parse_settings({"configurations": {"a": {"command": command}}})
-    configuration = settings.configurations["a"]
+    options = options_from({"configurations": {"a": {"command": command}}})
+    configuration = options.configurations["a"]
     assert configuration.launch_file.endswith("rosgraph_manipulator/launch/manipulator.launch")
     assert configuration.args == ("config:=/a",)
 
 
 def test_published_action_type_is_understood(launch_file):
-    settings = parse_settings(
+    options = options_from(
         {
             "configurations": {"a": {"launch": str(launch_file)}},
             "save_action": "/move_base",
@@ -37,9 +35,9 @@ def test_published_action_type_is_understood(launch_file):
             "kill_nodes": ["/move_base"],
         }
     )
-    assert settings.save_action == "move_base"
-    assert settings.action_type == "move_base_msgs/MoveBaseAction"
-    assert settings.reconfiguration_action_name == "rosgraph_manipulator_action_server"
+    assert options.save_action == "move_base"
+    assert options.action_type == "move_base_msgs/MoveBaseAction"
+    assert options.reconfiguration_action_name == "rosgraph_manipulator_action_server"
 
 
 @pytest.mark.parametrize(
@@ -57,13 +55,13 @@ def test_published_action_type_is_understood(launch_file):
 )
 def test_unusable_configuration_is_refused_and_named(parameters, named):
     with pytest.raises(ConfigurationError, match=named):
-        parse_settings(parameters)
+        options_from(parameters)
 
 
 @pytest.mark.parametrize("bad", [{"kill_nodes": "move_base"}, {"save_action": "m", "goal_msg_type": "os.system"}])
 def test_unusable_parameter_is_refused(launch_file, bad):
     with pytest.raises(ConfigurationError, match=next(reversed(bad))):
-        parse_settings({"configurations": {"a": {"launch": str(launch_file)}}, **bad})
+        options_from({"configurations": {"a": {"launch": str(launch_file)}}, **bad})
 
 
 PUBLISHED = """
@@ -82,13 +80,13 @@ reconfiguration_action_name: 'rosgraph_manipulator_action_server'
 def test_published_file_loads_unchanged(tmp_path):
     path = tmp_path / "configurations.yaml"
     path.write_text(PUBLISHED)
-    settings = parse_settings(read_file(str(path)))
-    assert list(settings.configurations) == ["f_one", "f_two"]
+    options = options_from(read_file(str(path)))
+    assert list(options.configurations) == ["f_one", "f_two"]
     # as roslaunch does, a file is found anywhere in its package
-    assert settings.configurations["f_one"].launch_file.endswith("metacontrol_sim/launch/variants/f1_v1_r1.launch")
-    assert settings.configurations["f_two"].args == ("config:=/some/file.yaml",)
-    assert settings.kill_nodes == ("/move_base",)
-    assert (settings.save_action, settings.action_type) == ("move_base", "move_base_msgs/MoveBaseAction")
+    assert options.configurations["f_one"].launch_file.endswith("metacontrol_sim/launch/variants/f1_v1_r1.launch")
+    assert options.configurations["f_two"].args == ("config:=/some/file.yaml",)
+    assert options.kill_nodes == ("/move_base",)
+    assert (options.save_action, options.action_type) == ("move_base", "move_base_msgs/MoveBaseAction")
 
 
 @pytest.mark.parametrize(
@@ -104,6 +102,6 @@ def test_file_that_is_no_configuration_is_refused(tmp_path, text, words):
 
 def test_topics_to_wait_for_are_names(launch_file):
     entry = {"launch": str(launch_file), "topics": ["plan"]}
-    assert parse_settings({"configurations": {"a": entry}}).configurations["a"].topics == ("plan",)
+    assert options_from({"configurations": {"a": entry}}).configurations["a"].topics == ("plan",)
     with pytest.raises(ConfigurationError, match="topics"):
-        parse_settings({"configurations": {"a": {**entry, "topics": "plan"}}})
+        options_from({"configurations": {"a": {**entry, "topics": "plan"}}})

@@ -1,18 +1,21 @@
-"""The manipulator's configuration file: which launch file deploys which configuration."""
+"""The manipulator's parameters: which launch file deploys which configuration, and which action's goal is kept."""
 
 from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ros_model.errors import ModelError
-from ros_model.io.files import resolve
-
-DEFAULT_FUNCTION = "f_navigate"  # what the published configuration files, which name no function, are about
+DEFAULT_FUNCTION = "f_navigate"  # the published configuration files name no function: they are for navigation
 ARGUMENT = re.compile(r"[A-Za-z_]\w*:=.*", re.DOTALL)
+KEYS = ("configurations", "kill_nodes", "save_action", "goal_msg_type", "reconfiguration_action_name")
+"""The parameters that `parse_options` reads."""
+
+FindLaunchFile = Callable[[str, bool], str]
+"""Finds a launch file by its path or `package://` address. The second argument tells whether it may be anywhere in its
+package. Raises ConfigurationError."""
 
 
 class ConfigurationError(Exception):
@@ -21,9 +24,14 @@ class ConfigurationError(Exception):
 
 @dataclass(frozen=True)
 class Configuration:
-    """One way to deploy a function: a launch file with its arguments (`NAME:=VALUE`).
+    """One way to deploy a function.
 
-    It counts as ready only when its nodes publish the topics.
+    Attributes:
+        name: its name, as requests use it.
+        function: the function that it provides.
+        launch_file: path of the launch file that starts its nodes.
+        args: arguments of the launch file, `NAME:=VALUE`.
+        topics: topics that its nodes must publish before it is ready.
     """
 
     name: str
@@ -34,23 +42,32 @@ class Configuration:
 
 
 @dataclass(frozen=True)
-class Settings:
-    """What the manipulator is told once, at its start."""
+class ManipulatorOptions:
+    """What the manipulator is told once, at its start.
+
+    Attributes:
+        configurations: by name.
+        kill_nodes: nodes to end before a start, even those that the launcher did not start.
+        save_action: the action whose pending goal is kept; None: no goal is kept.
+        action_type: type of that action, e.g. `move_base_msgs/MoveBaseAction`.
+        reconfiguration_action_name: the action that takes requests.
+    """
 
     configurations: Mapping[str, Configuration]
     kill_nodes: tuple[str, ...] = ()
     save_action: str | None = None
-    action_type: str | None = None  # e.g. move_base_msgs/MoveBaseAction
+    action_type: str | None = None
     reconfiguration_action_name: str = "rosgraph_manipulator_action_server"
 
 
-def parse_settings(parameters: Mapping[str, Any]) -> Settings:
-    """Check the parameters, in the published form or in ours, and resolve the launch files.
+def parse_options(parameters: Mapping[str, Any], find_launch_file: FindLaunchFile) -> ManipulatorOptions:
+    """Check the parameters, in the published form or in ours.
 
     Args:
         parameters: keys configurations, kill_nodes, save_action, goal_msg_type, reconfiguration_action_name. A
             configuration is `{launch: FILE or package://PKG/FILE, args: [...], function: NAME, topics: [...]}` or the
             published `{command: roslaunch PKG FILE [ARG:=VALUE ...]}`.
+        find_launch_file: finds the launch file that a configuration names.
 
     Raises:
         ConfigurationError: a key is missing or has a value that cannot be used.
@@ -67,18 +84,20 @@ def parse_settings(parameters: Mapping[str, Any]) -> Settings:
     save_action = parameters.get("save_action") or None
     if save_action is not None and not isinstance(save_action, str):
         raise ConfigurationError("parameter 'save_action' must be the name of an action, e.g. move_base")
-    return Settings(
-        configurations={str(name): _configuration(str(name), entry) for name, entry in entries.items()},
+    return ManipulatorOptions(
+        configurations={
+            str(name): _configuration(str(name), entry, find_launch_file) for name, entry in entries.items()
+        },
         kill_nodes=tuple(kill_nodes),
         save_action=save_action.strip("/") if save_action else None,
         action_type=action_type(parameters.get("goal_msg_type"), "goal_msg_type") if save_action else None,
         reconfiguration_action_name=str(
-            parameters.get("reconfiguration_action_name") or Settings.reconfiguration_action_name
+            parameters.get("reconfiguration_action_name") or ManipulatorOptions.reconfiguration_action_name
         ),
     )
 
 
-def _configuration(name: str, entry: object) -> Configuration:
+def _configuration(name: str, entry: object, find_launch_file: FindLaunchFile) -> Configuration:
     where = f"configurations/{name}"
     if not isinstance(entry, Mapping):
         raise ConfigurationError(f"{where}: expected 'launch: FILE' or 'command: roslaunch PKG FILE', got {entry!r}")
@@ -96,14 +115,10 @@ def _configuration(name: str, entry: object) -> Configuration:
     if not isinstance(topics, list) or not all(isinstance(topic, str) and topic for topic in topics):
         raise ConfigurationError(f"{where}: 'topics' must be a list of names")
     try:
-        launch_file = resolve(uri)
-    except ModelError as error:
+        launch_file = find_launch_file(uri, "command" in entry)  # a command names a file anywhere in its package
+    except ConfigurationError as error:
         raise ConfigurationError(f"{where}: {error}") from error
-    if not launch_file.is_file() and "command" in entry:  # roslaunch finds a file anywhere in its package
-        launch_file = next(iter(sorted(launch_file.parents[1].rglob(launch_file.name))), launch_file)
-    if not launch_file.is_file():
-        raise ConfigurationError(f"{where}: there is no launch file {launch_file}: correct the name, or generate it")
-    return Configuration(name, function, str(launch_file), tuple(args), tuple(topics))
+    return Configuration(name, function, launch_file, tuple(args), tuple(topics))
 
 
 def _parse_command(where: str, command: str) -> tuple[str, list[str]]:

@@ -1,0 +1,107 @@
+"""What to do about a report of the launcher, and which configuration is restored when another one fails.
+
+Times are arguments, in seconds of one clock that never goes back.
+"""
+
+from __future__ import annotations
+
+import enum
+
+from rosgraph_manipulator.change.deployment import Outcome, Result
+from rosgraph_manipulator.configuration.configurations import Configuration
+from rosgraph_manipulator.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
+
+
+class Reaction(enum.Enum):
+    """What the manipulator does about a report of the launcher."""
+
+    NONE = "none"
+    DEPLOY_AGAIN = "deploy again"  # the launcher runs something else: another launcher has started
+    GO_BACK = "go back"  # a node died soon after the change: restore what ran before
+    BEGIN_RECOVERY = "begin recovery"  # a node died, and the launcher starts it again
+    END_RECOVERY = "end recovery"  # the launcher has started all dead nodes again
+    GIVE_UP = "give up"  # the launcher has stopped the configuration
+
+
+class DeployedConfigurations:
+    """The configuration that runs, and those before it."""
+
+    def __init__(self, probation: float) -> None:
+        """Begin with nothing deployed.
+
+        Args:
+            probation: the time after a change in which the death of a node takes the change back, s.
+        """
+        self._probation = probation
+        self._running: Configuration | None = None
+        self._last_good: Configuration | None = None
+        self._previous: Configuration | None = None  # what the running one has replaced
+        self._recovering = False
+        self._deployed_at = float("-inf")
+
+    @property
+    def running(self) -> Configuration | None:
+        """The configuration that runs; None: none does."""
+        return self._running
+
+    @property
+    def last_good(self) -> Configuration | None:
+        """The last configuration that came up; None: there is none to go back to."""
+        return self._last_good
+
+    @property
+    def previous(self) -> Configuration | None:
+        """The configuration that the running one has replaced; None: there was none."""
+        return self._previous
+
+    def resume(self, running: Configuration | None, last_good: Configuration | None) -> None:
+        """Begin with what an earlier manipulator has left."""
+        self._running, self._last_good = running, running or last_good
+
+    def fallback(self, wanted: Configuration) -> Configuration | None:
+        """Return the configuration to restore where the wanted one does not come up; None: there is none."""
+        return self._last_good if self._last_good and self._last_good != wanted else self._running
+
+    def refused(self, wanted: Configuration, reason: str) -> Outcome:
+        """Return the outcome of a request that failed before anything was touched."""
+        if self._running is None:
+            return Outcome(Result.GENERAL_ERROR, None, f"{wanted.name}: {reason}")
+        return Outcome(Result.FAILED, self._running, f"{wanted.name}: {reason}; {self._running.name} runs on")
+
+    def finished(self, outcome: Outcome, now: float) -> None:
+        """Note how a change ended."""
+        self._running, self._recovering = outcome.running, False
+        if outcome.running:
+            replaces = outcome.result is Result.OK and self._last_good != outcome.running
+            self._previous = self._last_good if replaces else None
+            self._last_good, self._deployed_at = outcome.running, now
+
+    def react(self, report: LauncherReport | None, now: float) -> Reaction:
+        """Return what to do about a report of the launcher."""
+        if report is None or self._running is None or report.state == CHANGING:
+            return Reaction.NONE
+        if report.configuration != self._running.name:
+            return Reaction.DEPLOY_AGAIN
+        if report.state == FAILED:
+            return Reaction.GIVE_UP
+        if report.state == RECOVERING and not self._recovering:
+            on_probation = self._previous is not None and now - self._deployed_at < self._probation
+            return Reaction.GO_BACK if on_probation else Reaction.BEGIN_RECOVERY
+        return Reaction.END_RECOVERY if report.state == STABLE and self._recovering else Reaction.NONE
+
+    def lost(self) -> None:
+        """Note that the running configuration runs no more, though it was the last good one."""
+        self._running = None
+
+    def failed(self) -> None:
+        """Note that the running configuration has failed: it is not restored."""
+        self._running = self._last_good = None
+        self._recovering = False
+
+    def begin_recovery(self) -> None:
+        """Note that the launcher starts dead nodes again."""
+        self._recovering = True
+
+    def end_recovery(self) -> None:
+        """Note that all nodes run again."""
+        self._recovering = False

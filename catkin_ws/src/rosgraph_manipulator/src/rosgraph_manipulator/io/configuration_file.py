@@ -1,0 +1,60 @@
+"""Reads the manipulator's configuration file, and finds the launch files that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+from ros_model.errors import ModelError
+from ros_model.io.files import resolve
+
+from rosgraph_manipulator.configuration.configurations import ConfigurationError, ManipulatorOptions, parse_options
+
+
+def options_from(parameters: Mapping[str, Any]) -> ManipulatorOptions:
+    """Check the manipulator's parameters, and find the launch files that they name.
+
+    Raises:
+        ConfigurationError: a key is missing or has a value that cannot be used.
+    """
+    return parse_options(parameters, find_launch_file)
+
+
+def find_launch_file(uri: str, anywhere: bool) -> str:
+    """Return the path of a launch file.
+
+    Args:
+        uri: its path or `package://PKG/PATH`.
+        anywhere: where it is not there, search its whole package, as roslaunch does.
+
+    Raises:
+        ConfigurationError: there is no such file.
+    """
+    try:
+        path = resolve(uri)
+    except ModelError as error:
+        raise ConfigurationError(str(error)) from error
+    if not path.is_file() and anywhere:
+        path = next(iter(sorted(path.parents[1].rglob(path.name))), path)
+    if not path.is_file():
+        raise ConfigurationError(f"there is no launch file {path}: correct the name, or generate it")
+    return str(path)
+
+
+def read_file(name: str) -> dict[str, Any]:
+    """Return the keys of a configuration file.
+
+    Raises:
+        ConfigurationError: it can't be read.
+    """
+    try:
+        with open(name, encoding="utf-8") as file:
+            content = yaml.safe_load(file)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"{name}: cannot be read: {error}") from error
+    except yaml.YAMLError as error:
+        raise ConfigurationError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
+    if not isinstance(content, dict):
+        raise ConfigurationError(f"{name}: expected keys such as 'configurations', found none")
+    return content

@@ -1,0 +1,105 @@
+"""Which configuration is restored, and what follows from a report of the launcher."""
+
+import pytest
+from rosgraph_manipulator.change.deployment import Outcome, Result
+from rosgraph_manipulator.change.reactions import DeployedConfigurations, Reaction
+from rosgraph_manipulator.configuration.configurations import Configuration
+from rosgraph_manipulator.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
+
+A, B = Configuration("a", "f", "a.launch"), Configuration("b", "f", "b.launch")
+PROBATION = 5.0
+
+
+def deployed(*configurations, now=0.0):
+    deployments = DeployedConfigurations(PROBATION)
+    for configuration in configurations:
+        deployments.finished(Outcome(Result.OK, configuration, ""), now)
+    return deployments
+
+
+def report(configuration, state):
+    return LauncherReport(configuration.name if configuration else "", state=state)
+
+
+def test_configuration_that_ran_is_restored_when_the_next_one_does_not_come_up():
+    assert deployed(A).fallback(B) == A
+    assert DeployedConfigurations(PROBATION).fallback(A) is None
+
+
+def test_restored_configuration_is_the_last_good_one_and_has_replaced_none():
+    deployments = deployed(A)
+    deployments.finished(Outcome(Result.FAILED, A, "b died"), 1.0)
+    assert (deployments.running, deployments.last_good, deployments.previous) == (A, A, None)
+
+
+def test_superseded_request_leaves_the_last_good_one_to_restore():
+    deployments = deployed(A)
+    deployments.finished(Outcome(Result.FAILED, None, "given up", cancelled=True), 1.0)
+    assert deployments.running is None
+    assert deployments.fallback(B) == A
+
+
+def test_request_that_fails_early_leaves_what_runs():
+    outcome = deployed(A).refused(B, "no such file")
+    assert (outcome.result, outcome.running, outcome.message) == (Result.FAILED, A, "b: no such file; a runs on")
+    assert DeployedConfigurations(PROBATION).refused(B, "no such file").result is Result.GENERAL_ERROR
+
+
+def test_what_an_earlier_manipulator_left_goes_on():
+    deployments = DeployedConfigurations(PROBATION)
+    deployments.resume(A, None)
+    assert (deployments.running, deployments.last_good) == (A, A)
+    deployments = DeployedConfigurations(PROBATION)
+    deployments.resume(None, A)
+    assert deployments.fallback(B) == A
+
+
+@pytest.mark.parametrize(
+    ("reported", "reaction"),
+    [
+        (None, Reaction.NONE),
+        (report(A, STABLE), Reaction.NONE),
+        (report(B, CHANGING), Reaction.NONE),
+        (report(B, STABLE), Reaction.DEPLOY_AGAIN),
+        (report(None, STABLE), Reaction.DEPLOY_AGAIN),
+        (report(A, RECOVERING), Reaction.BEGIN_RECOVERY),
+        (report(A, FAILED), Reaction.GIVE_UP),
+    ],
+)
+def test_report_tells_what_to_do(reported, reaction):
+    assert deployed(A).react(reported, 1.0) is reaction
+
+
+@pytest.mark.parametrize("state", [STABLE, RECOVERING, FAILED])
+def test_where_nothing_is_to_run_nothing_follows_from_a_report(state):
+    assert DeployedConfigurations(PROBATION).react(report(A, state), 1.0) is Reaction.NONE
+
+
+@pytest.mark.parametrize(("now", "reaction"), [(4.9, Reaction.GO_BACK), (5.1, Reaction.BEGIN_RECOVERY)])
+def test_death_during_the_probation_takes_the_change_back(now, reaction):
+    assert deployed(A, B).react(report(B, RECOVERING), now) is reaction
+
+
+def test_first_configuration_has_no_probation():
+    assert deployed(A).react(report(A, RECOVERING), 0.1) is Reaction.BEGIN_RECOVERY
+
+
+def test_configuration_that_is_deployed_again_keeps_none_to_go_back_to():
+    assert deployed(A, B, B).react(report(B, RECOVERING), 0.1) is Reaction.BEGIN_RECOVERY
+
+
+def test_recovery_ends_once_all_nodes_run_again():
+    deployments = deployed(A)
+    deployments.begin_recovery()
+    assert deployments.react(report(A, RECOVERING), 1.0) is Reaction.NONE
+    assert deployments.react(report(A, STABLE), 1.0) is Reaction.END_RECOVERY
+    deployments.end_recovery()
+    assert deployments.react(report(A, STABLE), 1.0) is Reaction.NONE
+
+
+def test_failed_configuration_is_not_restored_but_a_lost_one_is():
+    deployments = deployed(A)
+    deployments.lost()
+    assert deployments.fallback(B) == A
+    deployments.failed()
+    assert deployments.fallback(B) is None
