@@ -1,1 +1,1 @@
-"""The commands `plan`, `request` and `status`."""
+"""Commands: `rosrun rosgraph_manipulator plan|request|status`."""

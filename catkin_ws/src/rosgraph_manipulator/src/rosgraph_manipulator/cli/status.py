@@ -1,0 +1,32 @@
+"""`rosrun rosgraph_manipulator status`: what runs, and how the last change went."""
+
+from __future__ import annotations
+
+import click
+
+from rosgraph_manipulator.cli.invocation import HELP, print_last_change, run
+from rosgraph_manipulator.ros import client
+
+
+@click.command(context_settings=HELP)
+def status() -> None:
+    """Print what runs, and how the last change went."""
+    client.join_or_refuse("status")
+    active, launcher = client.active_configuration(), client.launcher_state()
+    if active is None and launcher is None:
+        raise client.ClientError("neither manipulator nor launcher answers: start manipulator.launch")
+    if active is not None:
+        for grounding in active.functions:
+            click.echo(f"{grounding.function}: {grounding.configuration} {grounding.state}")
+        print_last_change(active)
+    if launcher is not None:
+        click.echo(f"processes: {launcher.configuration or 'none'} {launcher.state}")
+        for node in launcher.nodes:
+            click.echo(f"  {node}{' (dead)' if node in launcher.dead else ''}")
+        if launcher.message:
+            click.echo(f"  {launcher.message}")
+
+
+def main() -> None:
+    """Run the command."""
+    run(status)

@@ -1,0 +1,105 @@
+"""Client of manipulator and launcher: what the commands read from them, and the request that they send."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import actionlib
+import rosgraph
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from metacontrol_msgs.msg import (
+    ActiveConfiguration,
+    LauncherState,
+    MvpReconfigurationAction,
+    MvpReconfigurationGoal,
+)
+
+from rosgraph_manipulator.configuration.configurations import KEYS
+
+FIND_TIMEOUT = 5.0  # s, wall, to find the manipulator
+NODE = "rosgraph_manipulator"
+
+
+class ClientError(Exception):
+    """Manipulator or master can't be reached; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """How a request ended.
+
+    Attributes:
+        deployed: whether the configuration runs.
+        result: code of metacontrol_msgs/MvpReconfiguration; None: the action ended without one.
+        text: why, in one line.
+    """
+
+    deployed: bool
+    result: int | None
+    text: str
+
+
+def join(name: str) -> bool:
+    """Become an anonymous node; return False where there is no master."""
+    if not rosgraph.is_master_online():
+        return False
+    rospy.init_node(name, anonymous=True, disable_signals=True)
+    return True
+
+
+def join_or_refuse(name: str) -> None:
+    """Become an anonymous node.
+
+    Raises:
+        ClientError: there is no master.
+    """
+    if not join(name):
+        raise ClientError(f"no ROS master at {rosgraph.get_master_uri()}: start roscore or set ROS_MASTER_URI")
+
+
+def manipulator_parameters() -> dict[str, Any]:
+    """Return the running manipulator's parameters; None stands for those that are not set."""
+    return {key: rospy.get_param(f"{NODE}/{key}", rospy.get_param(key, None)) for key in KEYS}
+
+
+def request(configuration: str) -> Answer:
+    """Ask the manipulator for a configuration, and wait for the result; Ctrl-C takes the request back.
+
+    Raises:
+        ClientError: no manipulator answers.
+    """
+    action = rospy.get_param(f"{NODE}/reconfiguration_action_name", "rosgraph_manipulator_action_server")
+    client = actionlib.SimpleActionClient(action, MvpReconfigurationAction)
+    if not client.wait_for_server(rospy.Duration.from_sec(FIND_TIMEOUT)):
+        raise ClientError(f"no manipulator answers at {rospy.resolve_name(action)}: start rosgraph_manipulator")
+    client.send_goal(MvpReconfigurationGoal(configuration))
+    try:
+        client.wait_for_result()
+    except KeyboardInterrupt:
+        client.cancel_goal()
+        client.wait_for_result()
+    result = client.get_result()
+    return Answer(
+        deployed=client.get_state() == GoalStatus.SUCCEEDED,
+        result=result.result if result is not None else None,
+        text=client.get_goal_status_text(),
+    )
+
+
+def active_configuration() -> ActiveConfiguration | None:
+    """Return what the manipulator has deployed; None where it does not say."""
+    return _latest(f"{NODE}/active_configuration", ActiveConfiguration)
+
+
+def launcher_state() -> LauncherState | None:
+    """Return what the launcher runs; None where it does not say."""
+    return _latest("rosgraph_launcher/state", LauncherState)
+
+
+def _latest(topic: str, kind: Any) -> Any:
+    try:
+        return rospy.wait_for_message(topic, kind, FIND_TIMEOUT)
+    except rospy.ROSException:
+        return None

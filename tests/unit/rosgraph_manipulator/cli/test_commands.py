@@ -1,0 +1,87 @@
+"""The commands where no master runs: arguments, output, exit status."""
+
+import socket
+
+import pytest
+from rosgraph_manipulator.cli import plan, request, status
+
+NODE = '<node name="{}" pkg="move_base" type="move_base"/>'
+
+
+@pytest.fixture(autouse=True)
+def _no_master(monkeypatch):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    def call(command, *words):
+        monkeypatch.setattr("sys.argv", [command.__name__, *words])
+        with pytest.raises(SystemExit) as end:
+            command.main()
+        output = capsys.readouterr()
+        return end.value.code, output.out, output.err
+
+    return call
+
+
+@pytest.fixture
+def launch_files(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.launch").write_text(f"<launch>{NODE.format(name)}</launch>")
+    return str(tmp_path / "a.launch"), str(tmp_path / "b.launch")
+
+
+def test_plan_prints_each_way(run, launch_files):
+    code, output, _ = run(plan, *launch_files)
+    assert code == 0
+    assert output == "restart\n  1. stop /a; start /b; store the configuration's parameters\n"
+
+
+@pytest.mark.parametrize("remapping", ["__ns:=/robot", "__name:=x", "a:=b", "_rate:=1"])
+def test_remapping_arguments_are_left_to_ros(run, launch_files, remapping):
+    assert run(plan, remapping, *launch_files)[0] == 0
+
+
+def test_empty_text_stands_for_nothing(run, launch_files):
+    code, output, _ = run(plan, "", launch_files[0])
+    assert (code, output.splitlines()[0]) == (0, "replace")
+
+
+def test_configurations_can_come_from_a_file(run, launch_files, tmp_path):
+    path = tmp_path / "c.yaml"
+    path.write_text(f"configurations: {{a: {{launch: {launch_files[0]}}}, b: {{launch: {launch_files[1]}}}}}")
+    assert run(plan, "a", "b", "--config", str(path))[1].startswith("restart\n")
+    code, _, error = run(plan, "a", "c", "--config", str(path))
+    assert (code, error) == (2, "unknown configuration 'c'; known are: a, b\n")
+
+
+@pytest.mark.parametrize(
+    ("command", "words", "told"),
+    [
+        (plan, ("a", "b"), "a: no ROS master knows the configurations: start the manipulator or give --config\n"),
+        (plan, ("/no/such.launch", ""), "/no/such.launch"),
+        (request, ("a",), "no ROS master at http://127.0.0.1:"),
+        (status, (), "no ROS master at http://127.0.0.1:"),
+    ],
+)
+def test_refusal_is_one_line_and_status_2(run, command, words, told):
+    code, output, error = run(command, *words)
+    assert (code, output) == (2, "")
+    assert told in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(("command", "words"), [(plan, ("a",)), (request, ()), (status, ("a",)), (plan, ("--x",))])
+def test_wrong_arguments_end_with_status_2(run, command, words):
+    assert run(command, *words)[0] == 2
+
+
+@pytest.mark.parametrize("option", ["-h", "--help"])
+@pytest.mark.parametrize("command", [plan, request, status])
+def test_help_is_there(run, command, option):
+    code, output, _ = run(command, option)
+    assert code == 0
+    assert output.startswith("Usage: ")
