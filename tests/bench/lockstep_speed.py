@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import rospkg
+from metacontrol_experiments.io.input_files import read_route
 from metacontrol_experiments.io.lockstep_setup import set_up
 from metacontrol_experiments.lockstep.lockstep import SETTLE_S
-from metacontrol_experiments.mission.routes import read_route
 from metacontrol_experiments.mission.settings import Settings
 from support.figures import GAZEBO, entry
 

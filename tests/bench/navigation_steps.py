@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 from unittest import mock
 
 import rospkg
+from metacontrol_experiments.io.input_files import read_route
 from metacontrol_experiments.io.lockstep_setup import set_up
-from metacontrol_experiments.mission.routes import read_route
 from metacontrol_experiments.mission.settings import Settings
 from move_base.control.dwa import DwaController
 from move_base.costmap.costmap import Costmap

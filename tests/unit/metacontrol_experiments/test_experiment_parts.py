@@ -25,8 +25,9 @@ from metacontrol_bags.record import (
 from metacontrol_bags.timeline import Timeline
 from metacontrol_experiments.cli import main as cli
 from metacontrol_experiments.io.commit import current_commit
+from metacontrol_experiments.io.input_files import read_route
 from metacontrol_experiments.io.processes import ProcessTree, wait_until
-from metacontrol_experiments.mission.routes import RouteError, read_route
+from metacontrol_experiments.mission.routes import RouteError
 from metacontrol_experiments.mission.settings import Settings
 from robot_formulas.geometry import Pose
 

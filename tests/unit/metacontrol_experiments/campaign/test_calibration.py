@@ -10,6 +10,7 @@ from metacontrol_bags.metrics import quantile
 from metacontrol_experiments.campaign import calibration, variant_table
 from metacontrol_experiments.campaign.calibration import CalibrationError, Job, Run
 from metacontrol_experiments.cli.main import metacontrol
+from metacontrol_experiments.io import calibration_runs, tables
 
 SHORT = "short: {start: [-8, -8, 0.78], goal: [-6, -6.5, 0]}\n"
 
@@ -41,20 +42,20 @@ def a_family():
 def test_file_of_runs_is_resumed_where_it_was_cut_off(tmp_path):
     path = tmp_path / "runs.csv"
     one, two = a_run(), a_run(seed=2)
-    assert list(calibration.append_runs(path, [one])) == [one]
+    assert list(tables.append_runs(path, [one])) == [one]
     whole = path.read_text()
     path.write_text(whole + "f1_v1_r1,r1,2,rea")
-    assert calibration.read_runs(path) == [one]
-    list(calibration.append_runs(path, [two]))
-    assert calibration.read_runs(path) == [one, two]
+    assert tables.read_runs(path) == [one]
+    list(tables.append_runs(path, [two]))
+    assert tables.read_runs(path) == [one, two]
     assert path.read_text().startswith(whole)
 
 
 def test_runs_are_written_as_they_come(tmp_path):
     path = tmp_path / "runs.csv"
-    coming = calibration.append_runs(path, iter([a_run(), a_run(seed=2)]))
+    coming = tables.append_runs(path, iter([a_run(), a_run(seed=2)]))
     next(coming)
-    assert calibration.read_runs(path) == [a_run()]
+    assert tables.read_runs(path) == [a_run()]
 
 
 @pytest.mark.parametrize(("text", "said"), [("a,b\n1,2\n", "its columns are not"), (None, "line 2 is no run")])
@@ -63,7 +64,7 @@ def test_file_that_holds_no_runs_is_refused(tmp_path, text, said):
     names = [field.name for field in dataclasses.fields(Run)]
     path.write_text(text or ",".join(names) + "\n" + ",".join("x" * len(names)) + "\n")
     with pytest.raises(CalibrationError, match=said):
-        calibration.read_runs(path)
+        tables.read_runs(path)
 
 
 def test_missing_missions_are_those_that_other_variants_drove():
@@ -150,6 +151,6 @@ def test_processes_side_by_side_drive_the_same_missions(tmp_path):
     routes = Path(tmp_path / "routes.yaml")
     routes.write_text(SHORT)
     jobs = [Job(variant, "short", 1) for variant in ("f1_v3_r1", "f2_v2_r2")]
-    alone = list(calibration.drive(jobs, routes, "abc", 1))
+    alone = list(calibration_runs.drive(jobs, routes, "abc", 1))
     assert [run.reached for run in alone] == [True, True]
-    assert alone == list(calibration.drive(jobs, routes, "abc", 2))
+    assert alone == list(calibration_runs.drive(jobs, routes, "abc", 2))

@@ -8,8 +8,10 @@ from click.testing import CliRunner
 from metacontrol_experiments.campaign import comparison
 from metacontrol_experiments.campaign.comparison import Pair
 from metacontrol_experiments.cli.main import metacontrol
-from metacontrol_experiments.lockstep.delays import KINDS, DelayError, Delays, delays_of, read_delays, write_delays
-from metacontrol_experiments.ros.runner import RunError
+from metacontrol_experiments.io import comparison_runs
+from metacontrol_experiments.io.processes import RunError
+from metacontrol_experiments.io.tables import read_delays, write_delays
+from metacontrol_experiments.lockstep.delays import KINDS, DelayError, Delays, delays_of
 
 
 def change(trigger="component:front_laser", to="f2_v1_r3_k", **times):
@@ -75,7 +77,7 @@ def asked(monkeypatch):
         output.mkdir(parents=True)
         (output / "summary.json").write_text(json.dumps(a_summary()))
 
-    monkeypatch.setattr(comparison, "drive", drive)
+    monkeypatch.setattr(comparison_runs, "drive", drive)
     return asked
 
 
@@ -126,15 +128,15 @@ def test_mission_that_breaks_is_told(tmp_path, monkeypatch):
     broken = tmp_path / "broken"
     broken.write_text("#!/bin/sh\necho 'ImportError: no such module' >&2\nexit 1\n")
     broken.chmod(0o755)
-    monkeypatch.setattr(comparison.sys, "executable", str(broken))
+    monkeypatch.setattr(comparison_runs.sys, "executable", str(broken))
     with pytest.raises(RunError, match="ended with status 1: ImportError: no such module"):
-        comparison.drive("lockstep", 1, tmp_path / "out", ())
+        comparison_runs.drive("lockstep", 1, tmp_path / "out", ())
 
 
 def test_lockstep_alone_leaves_the_summary_that_is_compared(tmp_path):
     (tmp_path / "routes.yaml").write_text("short: {start: [-8, -8, 0.78], goal: [-6, -6.5, 0]}\n")
     options = ["--routes", str(tmp_path / "routes.yaml"), "--route", "short", "--no-metacontrol", "--failure", "none"]
-    comparison.drive("lockstep", 1, tmp_path / "out", options)
+    comparison_runs.drive("lockstep", 1, tmp_path / "out", options)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["engine"] == "lockstep" and summary["goal_reached"]
 

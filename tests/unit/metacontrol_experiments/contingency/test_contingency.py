@@ -6,20 +6,24 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
-from metacontrol_experiments.cli import main as cli
-from metacontrol_experiments.contingency.components import ComponentError, node_of, read_components
+from metacontrol_experiments.cli import run as cli
+from metacontrol_experiments.cli.main import metacontrol
 from metacontrol_experiments.contingency.contingency import (
     AT_START,
-    DEFAULT_SHARE,
     Contingency,
-    ContingencyError,
     Kind,
     Moment,
-    parse_contingency,
-    read_contingencies,
-    strikes_due,
+    contingencies_due,
     with_seed,
 )
+from metacontrol_experiments.contingency.parsing import (
+    DEFAULT_SHARE,
+    ComponentError,
+    ContingencyError,
+    node_of,
+    parse_contingency,
+)
+from metacontrol_experiments.io.input_files import read_components, read_contingencies
 from metacontrol_experiments.mission.routes import Route
 from metacontrol_experiments.mission.settings import Settings
 from robot_formulas.geometry import Pose
@@ -120,12 +124,12 @@ def test_missing_timeline_is_refused(tmp_path):
 @given(st.floats(0, 1), st.floats(0, 300), st.floats(-10, 10), st.floats(-10, 10))
 def test_what_has_struck_is_never_due_again(share, elapsed, x, y):
     plan = tuple(map(parse_contingency, ("kill:a@share:0.5", "power:2@time:100", "light:0@place:0,0,5")))
-    due = strikes_due(plan, frozenset(), share, elapsed, x, y)
+    due = contingencies_due(plan, frozenset(), share, elapsed, x, y)
     assert (
         set(due) == {index for index, met in enumerate((share >= 0.5, elapsed >= 100, x * x + y * y <= 25)) if met}
         or pytest.approx(25.0) == x * x + y * y
     )
-    assert strikes_due(plan, frozenset(due), share, elapsed, x, y) == ()
+    assert contingencies_due(plan, frozenset(due), share, elapsed, x, y) == ()
 
 
 def test_mission_gives_its_seed_to_clutter_without_one():
@@ -171,7 +175,7 @@ def settings_of(monkeypatch, *arguments):
         raise cli.RunError("enough")
 
     monkeypatch.setattr(cli, "run_mission", stop)
-    result = CliRunner().invoke(cli.metacontrol, ["run", "--output", "out", *arguments])
+    result = CliRunner().invoke(metacontrol, ["run", "--output", "out", *arguments])
     assert result.output.strip() == "metacontrol: enough"
     return made[0]
 

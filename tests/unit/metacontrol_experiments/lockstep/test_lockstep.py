@@ -9,10 +9,10 @@ import pytest
 from click.testing import CliRunner
 from metacontrol_bags.metrics import summarise
 from metacontrol_experiments.cli import main as cli
-from metacontrol_experiments.contingency.contingency import parse_contingency
+from metacontrol_experiments.contingency.parsing import parse_contingency
 from metacontrol_experiments.io.lockstep_setup import describe_system, set_up
 from metacontrol_experiments.lockstep.frames import KEPT_S, Frames
-from metacontrol_experiments.lockstep.navigation import navigation_parameters
+from metacontrol_experiments.lockstep.reconfiguration import navigation_parameters
 from metacontrol_experiments.lockstep.system import LockstepError
 from metacontrol_experiments.mission.mission import Outcome
 from metacontrol_experiments.mission.routes import Route

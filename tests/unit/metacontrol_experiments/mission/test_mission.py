@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_experiments.contingency.contingency import Contingency, Kind, Moment
 from metacontrol_experiments.mission import mission
-from metacontrol_experiments.mission.mission import Action, MissionError, Outcome, Plan, Strike
+from metacontrol_experiments.mission.mission import Action, Inject, MissionError, Outcome, Plan
 
 KILL = Contingency(Kind.KILL, Moment(share=0.4), target="front_laser")
 PLAN = Plan(goal_x=10.0, goal_y=0.0, contingencies=(KILL,))
@@ -24,7 +24,7 @@ def test_perturbation_strikes_once_when_its_share_is_done(driving):
     state, actions = mission.on_pose(PLAN, driving, 101.0, 3.9, 0.0)
     assert actions == () and state.share == pytest.approx(0.39)
     state, actions = mission.on_pose(PLAN, state, 102.0, 4.1, 0.0)
-    assert actions == (Strike(0),)
+    assert actions == (Inject(0),)
     assert mission.on_pose(PLAN, state, 103.0, 4.2, 0.0)[1] == ()
     back, _ = mission.on_pose(PLAN, state, 104.0, 1.0, 0.0)
     assert mission.on_pose(PLAN, back, 105.0, 5.0, 0.0)[1] == ()
@@ -39,10 +39,10 @@ def test_contingencies_strike_at_their_time_and_place_and_not_again_at_the_start
     state, actions = mission.on_pose(plan, state, 100.1, 0.1, 0.0)
     assert actions == ()
     state, actions = mission.on_pose(plan, state, 105.0, 3.0, 1.2)
-    assert actions == (Strike(2),)
+    assert actions == (Inject(2),)
     state, _ = mission.on_goal_status(state, 119.0, GoalStatus.ACTIVE)
     state, actions = mission.on_time(plan, state, 120.0)
-    assert actions == (Strike(1),)
+    assert actions == (Inject(1),)
     assert mission.on_time(plan, state, 121.0)[1] == ()
 
 
@@ -133,6 +133,6 @@ def test_whatever_the_way_the_perturbation_strikes_at_most_once(way):
     strikes = 0
     for x, y in way:
         state, actions = mission.on_pose(PLAN, state, 1.0, x, y)
-        strikes += actions.count(Strike(0))
+        strikes += actions.count(Inject(0))
         assert state.share >= 0.0
     assert strikes == (1 if any(PLAN.distance(x, y) <= 6.0 for x, y in way) else 0)

@@ -1,1 +1,1 @@
-"""Many missions: calibration of variants, comparison of engines, tables of them."""
+"""Results of many missions: levels of variants, comparison of engines, tables. Pure."""

@@ -1,32 +1,18 @@
-"""The same missions on ROS and in lockstep, and how their figures differ."""
+"""Compare the figures of the same missions on ROS and in lockstep."""
 
 from __future__ import annotations
 
-import json
 import math
-import shlex
-import signal
 import statistics
-import subprocess
-import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from metacontrol_bags.intervals import Interval, interval
 
-from metacontrol_experiments.ros.runner import RunError, signals_as_interrupts
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
 
 ENGINES = ("ros", "lockstep")
-
-SUMMARY = "summary.json"
-
-
-class ComparisonError(RuntimeError):
-    """Missions cannot be compared; the message names file and remedy."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +25,7 @@ class Pair:
 
 
 def _delay(name: str) -> Callable[[Mapping[str, Any]], float | None]:
-    """Mean over a mission's reconfigurations."""
+    """Return the figure that is the mean of a delay over a mission's reconfigurations."""
 
     def of(summary: Mapping[str, Any]) -> float | None:
         known = [change[name] for change in summary["reconfigurations"] if change[name] is not None]
@@ -64,64 +50,6 @@ FIGURES: dict[str, Callable[[Mapping[str, Any]], float | None]] = {
     "control periods missed": lambda summary: summary["control"]["periods_missed"],
 }
 """What is compared: title, and how it is found in a summary."""
-
-
-def claim(folder: Path, options: Sequence[str]) -> None:
-    """Take a folder for the missions of these options, and remember that.
-
-    Raises:
-        ComparisonError: it holds those of others.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    path, asked = folder / "options.txt", shlex.join(options) + "\n"
-    held = path.read_text(encoding="utf-8") if path.exists() else asked
-    if held != asked:
-        said = held.strip() or "without options"
-        raise ComparisonError(f"{folder} holds other missions ({said}): name another folder by --runs, or delete it")
-    path.write_text(asked, encoding="utf-8")
-
-
-def read_summary(path: Path) -> dict[str, Any]:
-    """Read a mission's summary.
-
-    Raises:
-        ComparisonError: it is none.
-    """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ComparisonError(f"{path}: is no JSON ({error}); run its mission again") from error
-    if not isinstance(content, dict) or "reconfigurations" not in content:
-        raise ComparisonError(f"{path}: is no summary of a mission; run one")
-    return content
-
-
-def drive(engine: str, seed: int, output: Path, arguments: Sequence[str]) -> None:
-    """Run a mission in a process of its own; its summary is in `output` then.
-
-    Raises:
-        RunError: it could not be run.
-        KeyboardInterrupt: it was interrupted, and has ended.
-    """
-    command = [sys.executable, "-m", "metacontrol_experiments.cli.main", "run", "--quiet", *arguments]
-    command += ["--engine", engine, "--seed", str(seed), "--output", str(output)]
-    with (
-        signals_as_interrupts(),
-        # In a session of its own, so that it is interrupted once, from here, and has the time to end what it started.
-        subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process,
-    ):
-        try:
-            _, said = process.communicate()
-        except KeyboardInterrupt:
-            process.send_signal(signal.SIGINT)
-            process.communicate()
-            raise
-    # Status 1 is a mission that did not reach its goal, or a program that broke.
-    if process.returncode not in (0, 1) or not (output / SUMMARY).exists():
-        last = (said.strip().splitlines() or ["it said nothing"])[-1]
-        raise RunError(
-            f"metacontrol run --engine {engine} --seed {seed} ended with status {process.returncode}: {last}"
-        )
 
 
 @dataclass(frozen=True)
@@ -150,7 +78,7 @@ class Row:
 
 
 def rows(pairs: Sequence[Pair]) -> list[Row]:
-    """The figures that both engines tell, each of the seeds for which both do."""
+    """Return the figures that both engines have, each over the seeds for which both have it."""
     made = []
     for title, of in FIGURES.items():
         found = [(of(pair.ros), of(pair.lockstep)) for pair in pairs]
@@ -162,7 +90,7 @@ def rows(pairs: Sequence[Pair]) -> list[Row]:
 
 
 def markdown(pairs: Sequence[Pair]) -> str:
-    """What was run, a table of all figures with 95 % confidence intervals over seeds, and what follows."""
+    """Return a page: what was run, all figures with 95 % confidence intervals over seeds, and what follows."""
     compared = rows(pairs)
     parts = (_missions(pairs), "\n".join(_table(compared)), _conclusion(pairs, compared), "\n".join(_changes(pairs)))
     return "\n\n".join(parts) + "\n"
@@ -193,7 +121,7 @@ def _table(compared: Sequence[Row]) -> Iterator[str]:
 
 
 def _conclusion(pairs: Sequence[Pair], compared: Sequence[Row]) -> str:
-    """What follows, in words."""
+    """Return what follows, in words."""
     same = sum(_chosen(pair.ros) == _chosen(pair.lockstep) for pair in pairs)
     told = f"Both engines deployed the same configurations in the same order with {same} of {len(pairs)} seeds."
     if len(pairs) < 2:
@@ -205,7 +133,7 @@ def _conclusion(pairs: Sequence[Pair], compared: Sequence[Row]) -> str:
 
 
 def _changes(pairs: Sequence[Pair]) -> Iterator[str]:
-    """The configurations of each mission."""
+    """Yield a line with the configurations of each mission."""
     yield "Configurations, with the time of each change in s:"
     yield ""
     for pair in pairs:

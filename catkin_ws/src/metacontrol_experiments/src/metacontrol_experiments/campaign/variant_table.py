@@ -1,4 +1,4 @@
-"""What a calibration says, as Markdown: a table of all variants, and whether speed, safety and energy hang together.
+"""The results of a calibration as Markdown: a table of all variants, and how speed, safety and energy are related.
 
 Every figure is a mean over routes for each seed, then over seeds, with Student's 95 % confidence interval over seeds.
 """
@@ -55,7 +55,7 @@ CLAIMS = (
 
 
 def markdown(runs: Sequence[Run]) -> str:
-    """The tables, with what they are made of."""
+    """Return the tables, with what they are made of."""
     seeds, routes = sorted({run.seed for run in runs}), sorted({run.route for run in runs})
     commits = sorted({run.commit[:12] for run in runs})
     parts = [
@@ -102,19 +102,19 @@ def _comparisons(runs: Sequence[Run]) -> Iterable[str]:
 
 
 def by_seed(runs: Sequence[Run], figure: Figure) -> dict[int, float]:
-    """Mean over routes for each seed."""
+    """Return the mean over routes for each seed."""
     seeds = sorted({run.seed for run in runs})
     return {seed: statistics.fmean(figure.of(run) for run in runs if run.seed == seed) for seed in seeds}
 
 
 def difference(runs: Sequence[Run], figure: Figure, low: str, high: str) -> Interval:
-    """What a variant has more than another, paired by seeds."""
+    """Return by how much a figure of one variant is above that of another, paired by seeds."""
     one, other = (by_seed([run for run in runs if run.variant == name], figure) for name in (low, high))
     return interval([other[seed] - one[seed] for seed in sorted(one.keys() & other.keys())])
 
 
 def neighbours(variants: Iterable[str], part: str) -> list[tuple[str, str]]:
-    """Pairs of variants that differ by one step of one part of their names (f, v or r) and in nothing else."""
+    """Return pairs of variants that differ by one step of one part of their names (f, v or r) and in nothing else."""
     known = {match.groups(): name for name in variants if (match := _NAME.fullmatch(name))}
     place = "fvr".index(part)
     pairs = []

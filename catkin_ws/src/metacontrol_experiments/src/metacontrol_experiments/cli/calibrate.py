@@ -1,4 +1,4 @@
-"""The commands `metacontrol calibrate` and `metacontrol variants`."""
+"""The command `metacontrol calibrate`."""
 
 from __future__ import annotations
 
@@ -8,27 +8,20 @@ from typing import TYPE_CHECKING
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from metacontrol_experiments.campaign.calibration import (
-    CalibrationError,
-    append_runs,
-    drive,
-    missing_runs,
-    plan,
-    read_runs,
-    write_levels,
-)
+from metacontrol_experiments.campaign.calibration import CalibrationError, missing_runs, plan
 from metacontrol_experiments.cli.display import CONSOLE, refusing, tell
+from metacontrol_experiments.io.calibration_runs import drive
 from metacontrol_experiments.io.commit import current_commit
-from metacontrol_experiments.io.package import simulation_package
-from metacontrol_experiments.mission.routes import RouteError, read_route, route_names
-from metacontrol_experiments.ros.runner import RunError
+from metacontrol_experiments.io.input_files import PackageError, read_route, route_names, simulation_package
+from metacontrol_experiments.io.tables import append_runs, read_runs, write_levels
+from metacontrol_experiments.mission.routes import RouteError
 
 if TYPE_CHECKING:
     from metacontrol_experiments.campaign.calibration import Run
 
 RUNS = Path("results/calibration/runs.csv")
 
-_runs_option = click.option(
+runs_option = click.option(
     "--runs", type=click.Path(dir_okay=False, path_type=Path), default=RUNS, show_default=True, help="File of runs."
 )
 
@@ -38,7 +31,7 @@ _runs_option = click.option(
 @click.option("--route", "routes", multiple=True, help="Only this one; any number of times.  [default: all]")
 @click.option("--variant", "variants", multiple=True, help="Only this one; any number of times.  [default: all]")
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Missions driven side by side.")
-@_runs_option
+@runs_option
 @click.option(
     "--levels",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -50,7 +43,7 @@ def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tu
     A line is added to the file of runs for each mission; what is in it already is not driven again. Then run
     `rosmodel generate all` to take the levels into variants and ontology.
     """
-    with refusing(CalibrationError, RouteError, RunError):
+    with refusing(CalibrationError, RouteError, PackageError):
         package = simulation_package()
         known = sorted(path.stem for path in (package / "models" / "variants").glob("*.rossystem"))
         file = package / "worlds" / "routes.yaml"
@@ -75,25 +68,6 @@ def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tu
         target = levels or package / "models" / "qa.csv"
         write_levels(target, done)
     tell(f"measured levels are in {target}; now: rosmodel generate all")
-
-
-@click.command()
-@_runs_option
-@click.option("--output", type=click.Path(dir_okay=False, path_type=Path), help="Write to a file instead.")
-def variants(runs: Path, output: Path | None) -> None:
-    """Print tables of a calibration's runs as Markdown, with 95 % confidence intervals over seeds."""
-    from metacontrol_experiments.campaign.variant_table import markdown  # scipy takes a while to import
-
-    with refusing(CalibrationError):
-        done = read_runs(runs)
-        if not done:
-            raise CalibrationError(f"{runs}: no runs; metacontrol calibrate makes some")
-        text = markdown(done)
-        if output:
-            text = f"# Variants\n\nMade by `metacontrol variants --output {output}`.\n\n{text}"
-            output.write_text(text, encoding="utf-8")
-            return
-    click.echo(text, nl=False)
 
 
 def _chosen(option: str, asked: tuple[str, ...], known: list[str]) -> list[str]:

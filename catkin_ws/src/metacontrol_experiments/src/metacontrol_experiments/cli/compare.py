@@ -1,4 +1,4 @@
-"""The commands `metacontrol compare` and `metacontrol delays`."""
+"""The command `metacontrol compare`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from pathlib import Path
 
 import click
 
-from metacontrol_experiments.cli.display import refusing, tell
-from metacontrol_experiments.lockstep.delays import KINDS, DelayError, delays_of, write_delays
-from metacontrol_experiments.mission.settings import Settings
-from metacontrol_experiments.ros.runner import RunError
+from metacontrol_experiments.cli.display import refusing
+from metacontrol_experiments.io import comparison_runs
+from metacontrol_experiments.io.comparison_runs import ComparisonError
+from metacontrol_experiments.io.processes import RunError
+from metacontrol_experiments.mission.settings import SUMMARY_NAME
 
 
 @click.command(context_settings={"ignore_unknown_options": True})
@@ -32,16 +33,16 @@ def compare(seeds: int, runs: Path, output: Path | None, options: tuple[str, ...
     """
     from metacontrol_experiments.campaign import comparison  # scipy takes a while to import
 
-    with refusing(comparison.ComparisonError, RunError):
-        comparison.claim(runs, options)
+    with refusing(ComparisonError, RunError):
+        comparison_runs.claim(runs, options)
         pairs = []
         for seed in range(1, seeds + 1):
             found = []
             for engine in comparison.ENGINES:
                 folder = runs / f"{engine}_{seed}"
-                if not (folder / comparison.SUMMARY).exists():
-                    comparison.drive(engine, seed, folder, options)
-                summary = comparison.read_summary(folder / comparison.SUMMARY)
+                if not (folder / SUMMARY_NAME).exists():
+                    comparison_runs.drive(engine, seed, folder, options)
+                summary = comparison_runs.read_summary(folder / SUMMARY_NAME)
                 click.echo(f"seed {seed}, {engine}: {summary['outcome']} after {summary['duration_s']:.1f} s", err=True)
                 found.append(summary)
             pairs.append(comparison.Pair(seed, *found))
@@ -52,27 +53,3 @@ def compare(seeds: int, runs: Path, output: Path | None, options: tuple[str, ...
             output.write_text(f"# Lockstep beside ROS\n\nMade by `{asked}`.\n\n{text}", encoding="utf-8")
             return
     click.echo(text, nl=False)
-
-
-@click.command()
-@click.argument("summaries", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--output", type=click.Path(dir_okay=False, path_type=Path), required=True, help="The CSV file to write.")
-def delays(summaries: tuple[Path, ...], output: Path) -> None:
-    """Collect how long detection, decision and reconfiguration took, for lockstep to draw from.
-
-    SUMMARIES are those of missions on ROS at real-time factor 1, with failures of components and with changes of
-    parameters.
-    """
-    from metacontrol_experiments.campaign.comparison import ComparisonError, read_summary
-    from metacontrol_experiments.io.lockstep_setup import restarts_between  # the reasoner takes a while to import
-    from metacontrol_experiments.lockstep.system import LockstepError
-
-    with refusing(DelayError, LockstepError, ComparisonError):
-        restarts = restarts_between(Settings.launch_package, "metacontrol_sim_reasoner.launch")
-        found = [delay for path in summaries for delay in delays_of(read_summary(path), restarts)]
-        lacking = [kind for kind in KINDS if kind not in {delay[0] for delay in found}]
-        if lacking:
-            raise DelayError(f"no sample of {', '.join(lacking)} in {len(summaries)} summaries: give more of them")
-        write_delays(output, found)
-    counts = ", ".join(f"{sum(delay[0] == kind for delay in found)} of {kind}" for kind in KINDS)
-    tell(f"{output}: {counts}")

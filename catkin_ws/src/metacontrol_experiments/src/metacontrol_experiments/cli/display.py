@@ -1,4 +1,4 @@
-"""What a person sees: notes and refusals of any command; of a mission the way, the timeline, a table at the end."""
+"""What commands show on the terminal: notes and errors; of a mission its progress, timeline and closing tables."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _STYLES = {"R1": "yellow", "R2": "cyan", "R3": "cyan", "R4": "green", "!": "bold
 
 
 def tell(text: str, style: str = "") -> None:
-    """Shows a line."""
+    """Show a line."""
     CONSOLE.print(Text(text, style), soft_wrap=True)
 
 
 @contextmanager
 def refusing(*kinds: type[Exception]) -> Iterator[None]:
-    """Ends a command with one line: where such an error, or one of the file system, comes up, or on Ctrl-C."""
+    """End a command with one line where such an error, an error of the file system, or Ctrl-C ends the body."""
     refused: tuple[type[Exception], ...] = (*kinds, OSError)
     try:
         yield
@@ -50,7 +50,7 @@ class Display:
     """A mission: with a live bar on a terminal, else plain lines; silent if quiet."""
 
     def __init__(self, quiet: bool = False) -> None:
-        """Shows nothing yet."""
+        """Prepare a bar if there is a terminal."""
         self._quiet = quiet
         self._bar: Progress | None = None
         self._start = 0.0
@@ -66,7 +66,7 @@ class Display:
             self._task = self._bar.add_task("starting", total=1.0)
 
     def __enter__(self) -> Display:
-        """Shows the bar."""
+        """Show the bar."""
         if self._bar:
             self._bar.start()
         return self
@@ -74,21 +74,21 @@ class Display:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Takes the bar away."""
+        """Remove the bar."""
         if self._bar:
             self._bar.stop()
 
     def say(self, text: str) -> None:
-        """A line of its own."""
+        """Show a line."""
         if not self._quiet:
             tell(text)
 
     def start(self, stamp: float) -> None:
-        """The mission starts: from here on, times count from this stamp."""
+        """Count times from this stamp on: the mission starts."""
         self._start = stamp
 
     def entry(self, entry: Entry) -> None:
-        """A line of the timeline."""
+        """Show a line of the timeline."""
         line = Text(f"{entry.stamp - self._start:7.2f} s  ")
         line.append(f"{entry.step:<2}", _STYLES.get(entry.step, ""))
         line.append("  " + entry.text, "red" if entry.bad else "")
@@ -105,7 +105,7 @@ class Display:
             self.say(f"{stamp - self._start:7.2f} s  ..  {self._tenth * 10} % of the way")
 
     def summary(self, summary: dict[str, Any]) -> None:
-        """The closing tables."""
+        """Show the closing tables."""
         if not self._quiet:
             CONSOLE.print(_figures(summary))
             if summary["reconfigurations"]:

@@ -1,51 +1,16 @@
-"""The command `metacontrol`: run a mission, summarise a bag, draw it."""
+"""The command `metacontrol`: a group with a module for each of its commands."""
 
 from __future__ import annotations
 
-import json
-import math
-import time
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
 import click
-from metacontrol_bags.bag import BagError, read_record
-from metacontrol_bags.decision import DECIDED
-from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S, MetricsError, summarise
-from metacontrol_bags.timeline import Timeline
 
-from metacontrol_experiments.cli.calibrate import calibrate, variants
-from metacontrol_experiments.cli.compare import compare, delays
-from metacontrol_experiments.cli.display import Display, refusing
-from metacontrol_experiments.contingency.components import ComponentError, node_of, read_components
-from metacontrol_experiments.contingency.contingency import (
-    DEFAULT_SHARE,
-    Contingency,
-    ContingencyError,
-    Kind,
-    Moment,
-    parse_contingency,
-    read_contingencies,
-)
-from metacontrol_experiments.io.commit import current_commit
-from metacontrol_experiments.io.package import simulation_package
-from metacontrol_experiments.mission.mission import MissionError, Outcome
-from metacontrol_experiments.mission.routes import RouteError, read_route
-from metacontrol_experiments.mission.settings import Settings
-from metacontrol_experiments.ros.runner import BAG_NAME, RunError, run_mission
-
-if TYPE_CHECKING:
-    from metacontrol_bags.record import MissionRecord
-    from metacontrol_bags.timeline import Report
-
-    from metacontrol_experiments.mission.mission import State
-
-SUMMARY_NAME = "summary.json"
-FIGURE_NAME = "mission.png"
-LOG_NAME = "mission.log"
-
-_FAILED = 1
-"""Exit status of a mission that did not reach its goal."""
+from metacontrol_experiments.cli.calibrate import calibrate
+from metacontrol_experiments.cli.compare import compare
+from metacontrol_experiments.cli.delays import delays
+from metacontrol_experiments.cli.figure import figure
+from metacontrol_experiments.cli.run import run
+from metacontrol_experiments.cli.summary import summary
+from metacontrol_experiments.cli.variants import variants
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -53,240 +18,13 @@ def metacontrol() -> None:
     """Missions of a robot that adapts, and what their bags tell."""
 
 
-for _command in (calibrate, variants, compare, delays):
+for _command in (run, summary, figure, calibrate, variants, compare, delays):
     metacontrol.add_command(_command)
 
 
-class _Number(click.FloatRange):
-    """A finite number within a range."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        number = super().convert(value, param, ctx)
-        if not math.isfinite(number):
-            self.fail(f"{value!r} is not a finite number.", param, ctx)
-        return float(number)
-
-
-@metacontrol.command()
-@click.option(
-    "--engine",
-    type=click.Choice(["ros", "lockstep"]),
-    default="ros",
-    show_default=True,
-    help="lockstep: in one process without ROS, as fast as it can, the same bytes for a seed.",
-)
-@click.option("--no-metacontrol", is_flag=True, help="The baseline: everything but the reasoner.")
-@click.option(
-    "--seed", type=click.IntRange(0), default=1, show_default=True, help="Of everything random in the simulation."
-)
-@click.option("--route", default="r1", show_default=True, help="One of the routes.")
-@click.option(
-    "--initial-configuration",
-    default=Settings.initial_configuration,
-    show_default=True,
-    help="The variant deployed first.",
-)
-@click.option(
-    "--failure", help="Component whose node is killed, or none.  [default: front_laser, without other contingencies]"
-)
-@click.option(
-    "--failure-at",
-    type=_Number(0, 1),
-    default=DEFAULT_SHARE,
-    show_default=True,
-    help="Share of the way done at which --failure and --power-factor strike.",
-)
-@click.option(
-    "--power-factor", type=_Number(0), default=1.0, show_default=True, help="Of the power load, from then on."
-)
-@click.option(
-    "--contingency",
-    "contingencies",
-    multiple=True,
-    metavar="KIND:WHAT[@WHEN]",
-    help="What goes wrong, any number of times: kill:, stop:, freeze:, thaw:, repeat: or jump:COMPONENT, power:FACTOR, "
-    "clutter:NUMBER, light:0..1; at share:0..1 of the way, time:SECONDS or place:X,Y. Clutter is there from the start.",
-)
-@click.option("--timeline", type=click.Path(path_type=Path), help="YAML file of contingencies.")
-@click.option(
-    "--world", type=click.Path(path_type=Path), help="World file, or a map's YAML file.  [default: the factory]"
-)
-@click.option("--routes", type=click.Path(path_type=Path), help="YAML file of routes.  [default: the factory's]")
-@click.option(
-    "--real-time-factor",
-    type=_Number(0),
-    default=1.0,
-    show_default=True,
-    help="Simulated per wall second; 0: as fast as it can.",
-)
-@click.option(
-    "--timeout", type=_Number(0, min_open=True), default=TIMEOUT_S, show_default=True, help="Simulated seconds."
-)
-@click.option(
-    "--nfr-safety", type=_Number(0, 1), default=DEFAULT_THRESHOLDS["safety"], show_default=True, help="Required level."
-)
-@click.option(
-    "--nfr-energy", type=_Number(0, 1), default=DEFAULT_THRESHOLDS["energy"], show_default=True, help="Required level."
-)
-@click.option(
-    "--output", type=click.Path(file_okay=False, path_type=Path), default=Path("results/mission"), show_default=True
-)
-@click.option("--port", type=click.IntRange(1, 65535), help="Of the run's own ROS master; a free one by default.")
-@click.option("--gui", is_flag=True, help="Show the simulator's window.")
-@click.option("--rviz", is_flag=True, help="Show RViz.")
-@click.option("--quiet", is_flag=True, help="Say nothing but errors.")
-def run(quiet: bool, output: Path, engine: str, **options: Any) -> None:
-    """Run a mission and leave its bag, summary and figure in a folder.
-
-    Exit status: 0 the goal was reached, 1 it was not, 2 bad input or a system that did not start, 130 interrupted.
-    """
-    with refusing(RunError, RouteError, ContingencyError, ComponentError, BagError, MetricsError):
-        settings = _settings(output, options)
-        for name in (SUMMARY_NAME, FIGURE_NAME):  # those of an earlier run
-            (output / name).unlink(missing_ok=True)
-        with Display(quiet) as display:
-            if engine == "lockstep":
-                if options["gui"] or options["rviz"]:
-                    raise RunError("--engine lockstep has no window; leave --gui and --rviz out")
-                state, record = _run_lockstep(settings, display)
-            else:
-                state = run_mission(settings, display)
-                record = read_record(output / BAG_NAME)
-        summary = summarise(record)
-        _write_summary(summary, output / SUMMARY_NAME)
-        _draw(record, output / FIGURE_NAME)
-    display.summary(summary)
-    for name in (LOG_NAME if engine == "lockstep" else BAG_NAME, SUMMARY_NAME, FIGURE_NAME):
-        display.say(str(output / name))
-    raise click.exceptions.Exit(0 if state.outcome is Outcome.REACHED else _FAILED)
-
-
-@metacontrol.command("summary")
-@click.argument("bag", type=click.Path(path_type=Path))
-@click.option("--output", type=click.Path(dir_okay=False, path_type=Path), help="Write to a file instead.")
-def summary_command(bag: Path, output: Path | None) -> None:
-    """Print the summary of a mission's BAG as JSON."""
-    with refusing(BagError, MetricsError):
-        summary = summarise(read_record(bag))
-        if output:
-            _write_summary(summary, output)
-        else:
-            click.echo(json.dumps(summary, indent=2))
-
-
-@metacontrol.command("figure")
-@click.argument("bag", type=click.Path(path_type=Path))
-@click.option("--output", type=click.Path(dir_okay=False, path_type=Path), help="Beside the bag by default.")
-def figure_command(bag: Path, output: Path | None) -> None:
-    """Draw the map, the path and the quality series of a mission's BAG."""
-    target = output or bag.with_name(FIGURE_NAME)
-    with refusing(BagError, MetricsError):
-        _draw(read_record(bag), target)
-    click.echo(target)
-
-
 def main() -> None:
-    """Runs the command."""
+    """Run the command."""
     metacontrol(prog_name="metacontrol")
-
-
-def _settings(output: Path, options: dict[str, Any]) -> Settings:
-    """The mission that the options ask for.
-
-    Raises:
-        RunError: metacontrol_sim is missing, or has no such configuration, or there is no such world.
-        RouteError: there is no such route.
-        ContingencyError, ComponentError: what is to go wrong makes no sense.
-    """
-    simulation = simulation_package()
-    name = options["initial_configuration"]
-    variants = sorted(path.stem for path in (simulation / "launch" / "variants").glob("*.launch"))
-    if name not in variants:
-        known = ", ".join(variants) or "none generated yet"
-        raise RunError(f"--initial-configuration: no configuration {name!r}; there are {known}")
-    components = read_components(simulation / "models" / "metacontrol.yaml")
-    world = options["world"]
-    if world is not None and not world.is_file():
-        raise RunError(f"--world: {world} is no file; give the path of a world file or of a map's YAML file")
-    return Settings(
-        route=read_route(options["routes"] or simulation / "worlds" / "routes.yaml", options["route"]),
-        output=output,
-        metacontrol=not options["no_metacontrol"],
-        seed=options["seed"],
-        initial_configuration=name,
-        contingencies=_contingencies(options, components),
-        components=components,
-        world=world,
-        real_time_factor=options["real_time_factor"],
-        timeout_s=options["timeout"],
-        thresholds={"safety": options["nfr_safety"], "energy": options["nfr_energy"]},
-        gui=options["gui"],
-        rviz=options["rviz"],
-        port=options["port"],
-        commit=current_commit(),
-    )
-
-
-def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionRecord]:
-    """Runs a mission in lockstep and leaves its log.
-
-    Raises:
-        RunError: it cannot be run in lockstep.
-    """
-    from metacontrol_experiments.io.lockstep_setup import set_up  # PyBullet takes a while to import
-    from metacontrol_experiments.lockstep.recorder import with_wall_time
-    from metacontrol_experiments.lockstep.system import LockstepError
-
-    began = time.monotonic()
-    try:
-        outcome = set_up(settings).run()
-    except (LockstepError, MissionError) as error:
-        raise RunError(str(error)) from error
-    settings.output.mkdir(parents=True, exist_ok=True)
-    (settings.output / LOG_NAME).write_text(outcome.log, encoding="utf-8")
-    told = Timeline(settings.thresholds)
-    display.start(outcome.state.started_s)
-    record = outcome.record
-    closed = [decision for decision in record.decisions if decision.state != DECIDED]
-    decided = [decision for decision in record.decisions if decision.state == DECIDED]
-    reports: list[Report] = [*record.events, *record.components, *record.observed]  # as they follow in one moment
-    reports += [*decided, *record.configurations, *closed]
-    for report in sorted(reports, key=lambda report: report.stamp):
-        for entry in told.tell(report):
-            display.entry(entry)
-    return outcome.state, with_wall_time(record, time.monotonic() - began)
-
-
-def _contingencies(options: dict[str, Any], components: dict[str, str]) -> tuple[Contingency, ...]:
-    """The contingencies of all options that ask for some.
-
-    Raises:
-        ContingencyError: one of them makes no sense.
-        ComponentError: one hits a component that nobody knows.
-    """
-    listed = read_contingencies(options["timeline"]) if options["timeline"] else ()
-    given = (*listed, *map(parse_contingency, options["contingencies"]))
-    failure = options["failure"] or ("none" if given else "front_laser")
-    when = Moment(share=options["failure_at"])
-    short: list[Contingency] = []
-    if failure != "none":
-        short.append(Contingency(Kind.KILL, when, target=failure))
-    if options["power_factor"] != 1.0:
-        short.append(Contingency(Kind.POWER, when, value=options["power_factor"]))
-    for contingency in (*given, *short):
-        if contingency.kind.hits_component:
-            node_of(contingency.target, components)
-    return (*given, *short)
-
-
-def _write_summary(summary: dict[str, Any], path: Path) -> None:
-    path.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-
-
-def _draw(record: Any, path: Path) -> None:
-    from metacontrol_bags.figure import draw  # matplotlib takes a while to import
-
-    draw(record, path)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Which commit of the code runs, without needing git."""
+"""Find out which commit of the code runs, without git."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _HASH = re.compile(r"[0-9a-f]{40}|[0-9a-f]{64}")
 
 
 def current_commit(start: Path | None = None) -> str:
-    """The commit: the environment variable MROS_COMMIT, else the repository around `start`, else "unknown"."""
+    """Return the commit: the environment variable MROS_COMMIT, else the repository around `start`, else "unknown"."""
     given = os.environ.get("MROS_COMMIT", "").strip()
     if given:
         return given
@@ -25,7 +25,7 @@ def current_commit(start: Path | None = None) -> str:
 
 
 def _head(git: Path) -> str | None:
-    """The commit that HEAD names; `git` is the folder, or in a work tree the file that names the folder."""
+    """Return the commit that HEAD names; `git` is the folder, or in a work tree the file that names the folder."""
     if git.is_file():
         git = (git.parent / git.read_text(encoding="utf-8").removeprefix("gitdir:").strip()).resolve()
     head = (git / "HEAD").read_text(encoding="utf-8").strip()

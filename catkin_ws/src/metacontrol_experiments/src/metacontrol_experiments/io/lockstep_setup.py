@@ -19,7 +19,6 @@ from pybullet_simulator.physics.simulation import Simulation, SimulationError
 from pybullet_simulator.robot.motion_sensors import REAL
 from pybullet_simulator.world.world import WorldError, rasterise
 from pybullet_simulator.world.world_file import read_world
-from robot_formulas.geometry import Pose
 from ros_model.errors import ModelError
 from ros_model.io.files import resolve
 from ros_model.io.models import read_system
@@ -29,7 +28,9 @@ from rosgraph_manipulator.io.configuration_file import options_from
 from rosgraph_manipulator.io.launch_files import LaunchFileError, read_launch_file
 from rosgraph_monitor.observers import plugins
 
-from metacontrol_experiments.lockstep.delays import DelayError, read_delays
+from metacontrol_experiments.io.input_files import PackageError, simulation_package
+from metacontrol_experiments.io.tables import read_delays
+from metacontrol_experiments.lockstep.delays import DelayError
 from metacontrol_experiments.lockstep.drivers import Drivers
 from metacontrol_experiments.lockstep.lockstep import Lockstep, Robot
 from metacontrol_experiments.lockstep.metacontroller import Cores, Metacontroller
@@ -57,6 +58,7 @@ _UNUSABLE = (
     KnowledgeBaseError,
     LaunchFileError,
     ModelError,
+    PackageError,
     ParameterError,
     ReasonerError,
     SimulationError,
@@ -151,9 +153,8 @@ def restarts_between(package: str, launch_file: str) -> Callable[[str, str], boo
 
 def _robot(settings: Settings, base: RosSystem) -> Robot:
     """Return the robot at the start of the route."""
-    world = read_world(settings.world or Path(rospkg.RosPack().get_path("metacontrol_sim")) / "worlds" / "factory.yaml")
-    start = settings.route.start
-    simulation = Simulation(world, SimulationSettings(Pose(start.x, start.y, start.yaw), settings.seed, REAL))
+    world = read_world(settings.world or simulation_package() / "worlds" / "factory.yaml")
+    simulation = Simulation(world, SimulationSettings(settings.route.start, settings.seed, REAL))
     return Robot(simulation, rasterise(world), Drivers(simulation, base, settings.seed))
 
 

@@ -1,4 +1,4 @@
-"""The processes of one run: started apart from the terminal, found again wherever they went, ended without remains.
+"""The processes of one run: start them apart from the terminal, find all their descendants, end them all.
 
 Every process gets a mark in its environment, which its descendants inherit: roslaunch puts each node in a session of
 its own, and a node whose parent died belongs to nobody, but both still carry the mark.
@@ -14,12 +14,13 @@ import socket
 import subprocess
 import time
 import uuid
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import psutil
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
 MARK = "METACONTROL_RUN"
@@ -30,15 +31,19 @@ _WITH_SIGINT = ("env", "--default-signal=INT")
 """A background job of a shell script has SIGINT ignored, which its children would inherit; they are ended by it."""
 
 
+class RunError(RuntimeError):
+    """The mission could not be started; the message names the log."""
+
+
 def free_port() -> int:
-    """A TCP port that nobody listens on now."""
+    """Return a TCP port that nobody listens on now."""
     with socket.socket() as probe:
         probe.bind(("", 0))
         return int(probe.getsockname()[1])
 
 
 def is_free(port: int) -> bool:
-    """Whether nobody listens on a TCP port of this machine."""
+    """Tell whether nobody listens on a TCP port of this machine."""
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -49,7 +54,7 @@ def is_free(port: int) -> bool:
 
 
 def wait_until(condition: Callable[[], bool], deadline_s: float) -> bool:
-    """Whether a condition came true within so many wall seconds."""
+    """Wait, and tell whether a condition came true within so many wall seconds."""
     end = time.monotonic() + deadline_s
     while not condition():
         if time.monotonic() > end:
@@ -62,12 +67,12 @@ class ProcessTree:
     """Processes of one run with all their descendants."""
 
     def __init__(self, environment: dict[str, str]) -> None:
-        """Takes what the environment of every process has beside that of this process."""
+        """Take the variables that every process gets beside the environment of this process."""
         self.environment = {**environment, MARK: uuid.uuid4().hex}
         self._started: list[subprocess.Popen[bytes]] = []
 
     def start(self, command: Sequence[str], log: Path) -> subprocess.Popen[bytes]:
-        """Starts a command in a session of its own, so that Ctrl-C does not reach it; its output goes to a file.
+        """Start a command in a session of its own, so that Ctrl-C does not reach it; its output goes to a file.
 
         Raises:
             OSError: there is no such command, or the log cannot be opened.
@@ -87,7 +92,7 @@ class ProcessTree:
         return process
 
     def owns(self, pid: int) -> bool:
-        """Whether a process belongs to this run and still runs."""
+        """Tell whether a process belongs to this run and still runs."""
         try:
             process = psutil.Process(pid)
             marked = process.environ().get(MARK) == self.environment[MARK]
@@ -96,11 +101,11 @@ class ProcessTree:
             return False
 
     def alive(self) -> list[psutil.Process]:
-        """Processes of this run that still run."""
+        """Return the processes of this run that still run."""
         return [process for process in psutil.process_iter() if self.owns(process.pid)]
 
     def stop(self, process: subprocess.Popen[bytes], grace_s: float) -> bool:
-        """Asks a process to end by SIGINT and waits; whether it did in time."""
+        """Ask a process to end by SIGINT, wait, and tell whether it ended in time."""
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
         try:
@@ -110,7 +115,7 @@ class ProcessTree:
         return True
 
     def close(self, grace_s: float = 12.0) -> None:
-        """Ends whatever still runs, latest first, by SIGINT, SIGTERM, SIGKILL."""
+        """End whatever still runs, latest first, by SIGINT, SIGTERM, SIGKILL."""
         for started in reversed(self._started):
             self.stop(started, grace_s)
         for number in (signal.SIGTERM, signal.SIGKILL):
@@ -123,3 +128,18 @@ class ProcessTree:
                 break
         for started in self._started:
             started.poll()
+
+
+@contextmanager
+def signals_as_interrupts() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP end the body as Ctrl-C does."""
+
+    def interrupt(_number: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    former = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)

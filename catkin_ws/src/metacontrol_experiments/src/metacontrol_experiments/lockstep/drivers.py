@@ -56,7 +56,7 @@ class Drivers:
         self._silent: dict[str, Kind] = {}  # component -> what made it so
         self._outlets = {component: Outlet() for component in self.components}
 
-    def strike(self, kind: Kind, component: str) -> None:
+    def inject(self, kind: Kind, component: str) -> None:
         """Let something happen to a driver; only what was frozen thaws."""
         if kind.spoils_data:
             self._outlets[component].fault = Fault(kind.value)

@@ -1,4 +1,4 @@
-"""Lockstep: simulation, drivers, navigation, observers, reasoner and mission stepped together in one process, no ROS.
+"""Lockstep: simulation, drivers, navigation, observers, reasoner and mission stepped together, without ROS.
 
 Deterministic: the same settings give the same log, byte for byte. What differs from ROS: messages take no time, nothing
 ever waits for a processor, and detection and reconfiguration take times drawn at random (`metacontroller`).
@@ -14,26 +14,21 @@ import cv2
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import ConfigurationReport, Event, GoalReport, MissionRecord, OccupancyMap
 from metacontrol_msgs.msg import FunctionGrounding, MissionEvent
-from move_base.costmap.sensors import cloud_observation, scan_observation
-from move_base.costmap.static_map import StaticMap
 from move_base.navigation.navigator import Outcome as GoalOutcome
-from pybullet_simulator.physics.simulation import LOCALISATION_STEPS, MOTION_STEPS, STEP
-from pybullet_simulator.ros.grid_messages import occupancy_grid
+from pybullet_simulator.physics.simulation import LOCALISATION_STEPS, MOTION_STEPS
 from pybullet_simulator.ros.messages import stamp
-from robot_formulas.geometry import Velocity
-from sensor_msgs.msg import LaserScan
 
-from metacontrol_experiments.contingency.contingency import Kind, StrikeError
+from metacontrol_experiments.contingency.contingency import InjectionError, Kind
+from metacontrol_experiments.lockstep.fault_injection import FaultInjector, check
 from metacontrol_experiments.lockstep.frames import Frames
-from metacontrol_experiments.lockstep.navigation import navigation_parameters, start_navigator
+from metacontrol_experiments.lockstep.navigation import Navigation
+from metacontrol_experiments.lockstep.reconfiguration import navigation_parameters
 from metacontrol_experiments.lockstep.recorder import Recorder
-from metacontrol_experiments.lockstep.striker import Striker, check
 from metacontrol_experiments.lockstep.system import LockstepError
 from metacontrol_experiments.mission import mission
-from metacontrol_experiments.mission.mission import Strike
+from metacontrol_experiments.mission.mission import Inject
 
 if TYPE_CHECKING:
-    from move_base.navigation.navigator import Navigator
     from pybullet_simulator.physics.simulation import Simulation
     from pybullet_simulator.world.grid import Grid
 
@@ -103,7 +98,7 @@ class Lockstep:
         try:
             for contingency in self._plan.contingencies:
                 check(contingency, robot.drivers.components)
-        except StrikeError as error:
+        except InjectionError as error:
             raise LockstepError(str(error)) from error
         self._grid = robot.grid
         self._simulation = robot.simulation
@@ -112,12 +107,9 @@ class Lockstep:
         self._metacontroller = metacontroller
         self._frames = Frames(self._simulation.robot)
         way = settings.route.start, settings.route.goal
-        self._striker = Striker(self._simulation, self._drivers, self._grid, way)
-        self._map = _static_map(self._grid)
-        self._parameters = navigation_parameters(system, settings.initial_configuration)
-        self._navigator: Navigator | None = start_navigator(self._parameters, self._map)
+        self._injector = FaultInjector(self._simulation, self._drivers, self._grid, way)
+        self._navigation = Navigation(navigation_parameters(system, settings.initial_configuration), robot.grid)
         self._steps = 0
-        self._next_tick = 0.0
         self._state: State | None = None
         self._recorder = Recorder()
 
@@ -140,7 +132,7 @@ class Lockstep:
             self.close()
         if self._metacontroller is not None:
             self._recorder.take_from(self._metacontroller)
-        record = self._recorder.record(self._drawn_map(), self._striker.obstacles)
+        record = self._recorder.record(self._drawn_map(), self._injector.obstacles)
         return Outcome(self._mission, record, "\n".join(self._recorder.lines) + "\n")
 
     def close(self) -> None:
@@ -156,7 +148,7 @@ class Lockstep:
         return self._state
 
     def _begin(self) -> None:
-        """Let clutter lie there, then send the goal.
+        """Inject the contingencies of the start, then send the goal.
 
         Raises:
             LockstepError: something of the start cannot happen.
@@ -164,19 +156,19 @@ class Lockstep:
         """
         due = [entry for entry in self._plan.contingencies if entry.when.at_start]
         try:
-            struck = [(entry.event, self._strike(entry)) for entry in due]
-        except StrikeError as error:
+            injected = [(entry.event, self._inject(entry)) for entry in due]
+        except InjectionError as error:
             raise LockstepError(str(error)) from error
         now, pose = self._simulation.time, self._simulation.localised
         self._state = mission.start(self._plan, now, pose.x, pose.y)
         told = self._settings.describe() | {
             "engine": "lockstep",
-            "controller_hz": repr(self._parameters.controller_frequency),
+            "controller_hz": repr(self._navigation.parameters.controller_frequency),
         }
         self._recorder.event(Event(now, MissionEvent.MISSION_START, self._settings.route.name, told))
-        for name, values in struck:
+        for name, values in injected:
             self._recorder.event(Event(now, MissionEvent.PERTURBATION, name, {"share": "0.0000"} | values))
-        self._set_goal(now)
+        self._navigation.set_goal(self._settings.route.goal, now)
         self._recorder.goals.append(GoalReport(now, _GOAL_ID))
         initial = self._settings.initial_configuration
         self._recorder.configurations.append(
@@ -199,29 +191,24 @@ class Lockstep:
             self._frames.add(now, simulation.map_to_odom, simulation.odometry.filtered)
         if self._steps % SENSOR_STEPS == 0:
             self._sense(now)
-        if now >= self._next_tick - 1e-9:
-            self._next_tick = max(self._next_tick, now - STEP) + 1.0 / self._parameters.controller_frequency
-            self._navigate(now)
+        self._navigate(now)
         self._manage(now)
         self._recorder.sample(simulation, self._steps, started=self._state is not None)
         if self._state is not None:
             self._follow(now)
 
     def _sense(self, now: float) -> None:
-        """Let the drivers measure that somebody listens to, and hand it on."""
-        sources = {source.topic.strip("/"): source for source in self._navigator.sources} if self._navigator else {}
-        heard = self._metacontroller.wanted_topics if self._metacontroller else set()
-        for topic, kind in self._drivers.topics.items():
-            if topic not in sources and topic not in heard:
-                continue
-            message = self._drivers.message(topic, _stamp(now))
+        """Let those drivers measure that somebody listens to, and hand their messages on."""
+        heard = self._navigation.topics
+        if self._metacontroller is not None:
+            heard |= self._metacontroller.wanted_topics
+        for topic in self._drivers.topics:
+            message = self._drivers.message(topic, _stamp(now)) if topic in heard else None
             if message is None:
                 continue
             if self._metacontroller is not None:
                 self._metacontroller.receive(topic, message, now)
-            if self._navigator is not None and topic in sources:
-                convert = scan_observation if kind is LaserScan else cloud_observation
-                self._navigator.observe(convert(message, sources[topic]), now)
+            self._navigation.receive(topic, message, now)
 
     def _manage(self, now: float) -> None:
         """Let the meta-controller do its part, and deploy what it has decided."""
@@ -243,26 +230,15 @@ class Lockstep:
         self._state, _ = mission.on_configuration(self._mission, now, state == FunctionGrounding.STABLE)
         if state != FunctionGrounding.STABLE:
             if change.restarts:
-                self._navigator = None  # its process is stopped first
+                self._navigation.stop()
             return
-        self._parameters = navigation_parameters(self._system, name)
-        if self._navigator is None:
-            self._navigator = start_navigator(self._parameters, self._map)
-            self._set_goal(now)
-        else:
-            self._navigator.reconfigure(self._parameters)
-
-    def _set_goal(self, now: float) -> None:
-        goal = self._settings.route.goal
-        if self._navigator is not None:
-            self._navigator.set_goal(goal, now)
+        self._navigation.deploy(navigation_parameters(self._system, name), self._settings.route.goal, now)
 
     def _navigate(self, now: float) -> None:
-        if self._navigator is None:
+        """Let navigation drive the robot."""
+        result = self._navigation.step(now, self._frames, self._simulation.odometry)
+        if result is None:
             return
-        odometry = self._simulation.odometry
-        velocity = Velocity(*odometry.velocity[:2], odometry.turn_rate)
-        result = self._navigator.step(now, self._frames, velocity)
         if result.velocity is not None:
             command = result.velocity
             self._simulation.command(command.x, command.y, command.yaw)
@@ -283,25 +259,25 @@ class Lockstep:
     def _take(self, step: mission.Step) -> None:
         self._state, actions = step
         for action in actions:
-            if isinstance(action, Strike):
+            if isinstance(action, Inject):
                 contingency = self._plan.contingencies[action.index]
                 share = {"share": f"{self._mission.share:.4f}"}
                 try:
-                    values = self._strike(contingency)
-                except StrikeError as error:
+                    values = self._inject(contingency)
+                except InjectionError as error:
                     reason = f"a contingency could not strike: {error}"
                     self._state = mission.abort(self._mission, self._simulation.time, reason)
                     return
                 event = Event(self._simulation.time, MissionEvent.PERTURBATION, contingency.event, share | values)
                 self._recorder.event(event)
 
-    def _strike(self, contingency: Contingency) -> dict[str, str]:
+    def _inject(self, contingency: Contingency) -> dict[str, str]:
         """Let a contingency happen now; return what is worth telling of it.
 
         Raises:
-            StrikeError: it cannot.
+            InjectionError: it cannot.
         """
-        values = self._striker.strike(contingency)
+        values = self._injector.inject(contingency)
         kind = contingency.kind
         if self._metacontroller is not None and kind.hits_component and not kind.spoils_data:
             self._metacontroller.component_changed(self._simulation.time, contingency.target, kind is Kind.THAW)
@@ -310,14 +286,6 @@ class Lockstep:
     def _drawn_map(self) -> OccupancyMap:
         grid = self._grid
         return OccupancyMap(grid.resolution, grid.origin_x, grid.origin_y, grid.cells >= _OCCUPIED)
-
-
-def _static_map(grid: Grid) -> StaticMap:
-    """Return the map as navigation receives it on the topic map."""
-    message = occupancy_grid(grid, _stamp(0.0))
-    info = message.info
-    origin = (grid.origin_x, grid.origin_y, grid.origin_yaw)
-    return StaticMap.create(message.data, info.width, info.height, info.resolution, origin)
 
 
 def _stamp(now: float) -> Any:

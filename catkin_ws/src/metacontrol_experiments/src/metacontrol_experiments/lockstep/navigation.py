@@ -1,94 +1,98 @@
-"""Navigation in lockstep: the parameters of a configuration's node of move_base, and what it takes while it runs."""
+"""Navigation's node in lockstep: the navigator, which is started, stopped and reconfigured as its process on ROS."""
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from move_base.costmap.sensors import cloud_observation, scan_observation
+from move_base.costmap.static_map import StaticMap
 from move_base.navigation.navigator import Navigator
-from move_base.parameters.parameters import MoveBaseParameters, ParameterError, read_parameters
-from move_base.parameters.reconfiguration import servers
-from rosgraph_manipulator.change.tactics import Adjustable
-
-from metacontrol_experiments.lockstep.system import LockstepError, parameter_tree
+from pybullet_simulator.physics.simulation import STEP
+from pybullet_simulator.ros.grid_messages import occupancy_grid
+from pybullet_simulator.ros.messages import stamp
+from robot_formulas.geometry import Velocity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from move_base.navigation.navigator import Result
+    from move_base.parameters.parameters import MoveBaseParameters
+    from pybullet_simulator.robot.motion_sensors import Odometry
+    from pybullet_simulator.world.grid import Grid
+    from robot_formulas.geometry import Pose
 
-    from move_base.costmap.static_map import StaticMap
-    from rosgraph_manipulator.configuration.description import NodeDescription
+    from metacontrol_experiments.lockstep.frames import Frames
 
-    from metacontrol_experiments.lockstep.system import System
-
-_EXECUTABLE = ("move_base", "move_base")
-"""Package and executable of the only node of a configuration that lockstep can run."""
 _MAP_FRAME = "map"
 
 
-def navigation_node(system: System, configuration: str) -> NodeDescription:
-    """Return the node that a configuration starts.
+class Navigation:
+    """The navigator while the node runs, and its control rate.
 
-    Raises:
-        LockstepError: it does not start one node of move_base and no other.
+    Attributes:
+        parameters: those in force; a stopped node starts with them.
     """
-    nodes = list(system.describe(configuration).nodes.values())
-    if [(node.package, node.executable) for node in nodes] != [_EXECUTABLE]:
-        started = ", ".join(f"{node.name} ({node.package}/{node.executable})" for node in nodes)
-        raise LockstepError(
-            f"configuration {configuration} starts {started}: lockstep runs one node of move_base; use --engine ros"
-        )
-    return nodes[0]
 
+    def __init__(self, parameters: MoveBaseParameters, grid: Grid) -> None:
+        """Start the node, without a goal.
 
-def navigation_parameters(system: System, configuration: str) -> MoveBaseParameters:
-    """Return the parameters that navigation finds at its start: those of the configuration over the shared ones.
+        Args:
+            parameters: of the initial configuration.
+            grid: the map, which it receives at each start.
+        """
+        self.parameters = parameters
+        self._map = _static_map(grid)
+        self._navigator: Navigator | None = None
+        self._next_tick = 0.0
+        self._start()
 
-    Raises:
-        LockstepError: the configuration's node is not navigation, or a parameter has a wrong value.
-    """
-    node = navigation_node(system, configuration)
-    tree = system.shared_parameters(node.name)
-    _merge(tree, parameter_tree(node.parameters))
-    try:
-        return read_parameters(tree)
-    except ParameterError as error:
-        raise LockstepError(f"configuration {configuration}: {error}") from error
+    @property
+    def topics(self) -> set[str]:
+        """Topics of the sensors that it listens to, without a leading slash."""
+        return {source.topic.strip("/") for source in self._navigator.sources} if self._navigator else set()
 
+    def stop(self) -> None:
+        """Stop the node: its goal and its costmaps are gone."""
+        self._navigator = None
 
-class RunningNavigation:
-    """What navigation takes by dynamic_reconfigure while a configuration runs: what its servers offer on ROS."""
-
-    def __init__(self, system: System, configuration: str) -> None:
-        self._system = system
-        self._configuration = configuration
-
-    def adjustable(self, node: str) -> Mapping[str, Adjustable]:
-        """Return the parameters of a node by their name relative to the node's; none for any other node."""
-        if node != navigation_node(self._system, self._configuration).name:
-            return {}
-        found = {}
-        for server in servers(navigation_parameters(self._system, self._configuration)):
-            definition = importlib.import_module(f"move_base.cfg.{server.definition}Config")
-            namespace = f"{node}/{server.namespace}".rstrip("/")
-            for name in definition.defaults:
-                limits = (definition.min[name], definition.max[name])
-                taken = Adjustable(namespace, name, definition.type[name], *limits)
-                found[f"{server.namespace}/{name}".lstrip("/")] = taken
-        return found
-
-
-def start_navigator(parameters: MoveBaseParameters, static_map: StaticMap) -> Navigator:
-    """Return the navigator of a node that has just started and has received the map."""
-    navigator = Navigator(parameters)
-    navigator.set_map(static_map, _MAP_FRAME)
-    return navigator
-
-
-def _merge(tree: dict[str, object], other: Mapping[str, object]) -> None:
-    """Set the values of another tree in a tree."""
-    for name, value in other.items():
-        branch = tree.get(name)
-        if isinstance(branch, dict) and isinstance(value, dict):
-            _merge(branch, value)
+    def deploy(self, parameters: MoveBaseParameters, goal: Pose, now: float) -> None:
+        """Let parameters take effect: a stopped node starts and takes the goal over, a running one is reconfigured."""
+        self.parameters = parameters
+        if self._navigator is None:
+            self._start()
+            self.set_goal(goal, now)
         else:
-            tree[name] = value
+            self._navigator.reconfigure(parameters)
+
+    def set_goal(self, goal: Pose, now: float) -> None:
+        """Drive to a goal, a pose in the map frame, from now on."""
+        if self._navigator is not None:
+            self._navigator.set_goal(goal, now)
+
+    def receive(self, topic: str, message: Any, now: float) -> None:
+        """Take a sensor's message, if the node runs and listens to its topic."""
+        for source in self._navigator.sources if self._navigator else ():
+            if self._navigator is not None and source.topic.strip("/") == topic:
+                convert = scan_observation if source.data_type == "LaserScan" else cloud_observation
+                self._navigator.observe(convert(message, source), now)
+                return
+
+    def step(self, now: float, frames: Frames, odometry: Odometry) -> Result | None:
+        """Return what the navigator decides; None between two periods of control, or while the node is stopped."""
+        if now < self._next_tick - 1e-9:
+            return None
+        self._next_tick = max(self._next_tick, now - STEP) + 1.0 / self.parameters.controller_frequency
+        if self._navigator is None:
+            return None
+        velocity = Velocity(*odometry.velocity[:2], odometry.turn_rate)
+        return self._navigator.step(now, frames, velocity)
+
+    def _start(self) -> None:
+        self._navigator = Navigator(self.parameters)
+        self._navigator.set_map(self._map, _MAP_FRAME)
+
+
+def _static_map(grid: Grid) -> StaticMap:
+    """Return the map as navigation receives it on its topic."""
+    message = occupancy_grid(grid, stamp(0))
+    info = message.info
+    origin = (grid.origin_x, grid.origin_y, grid.origin_yaw)
+    return StaticMap.create(message.data, info.width, info.height, info.resolution, origin)

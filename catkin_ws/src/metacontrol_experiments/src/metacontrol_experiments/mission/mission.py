@@ -1,7 +1,7 @@
-"""A mission as a state machine: when the perturbation strikes, how far the robot is, when and why the mission is over.
+"""A mission as a state machine: how far the robot is, which contingencies are due, when and why the mission is over.
 
-Nothing here knows ROS or a clock: poses, goal states and times are handed in, and every step returns the next state and
-what is to be done now. Times are in simulated seconds, positions in metres in the map frame.
+The caller hands in poses, goal states and times. Every function returns the next state and what is to be done now.
+Times are in simulated seconds, positions in metres in the map frame.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ from enum import Enum
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.metrics import TIMEOUT_S
 
-from metacontrol_experiments.contingency.contingency import Contingency, strikes_due
+from metacontrol_experiments.contingency.contingency import Contingency, contingencies_due
 
 ACKNOWLEDGE_S = 5.0
-"""A goal that no status message lists after this time is sent again, under the same id."""
+"""Seconds after which a goal that no status message lists is sent again, under the same id."""
 
 LOST_S = 10.0
-"""A goal that was listed and no longer is, is given up after this time without a reconfiguration."""
+"""Seconds without a reconfiguration after which a goal that is no longer listed is given up."""
 
 SETTLE_S = 3.0
-"""After a reconfiguration, the time in which a goal that had ended badly during it may be taken up again."""
+"""Seconds after a reconfiguration in which a restarted server may take a goal up again that had ended badly."""
 
 MIN_DISTANCE_M = 0.5
-"""A goal nearer than this is no mission: the share of the way done means nothing."""
+"""A nearer goal makes no mission: the share of the way done would mean nothing."""
 
 
 class MissionError(ValueError):
@@ -42,15 +42,15 @@ class Outcome(Enum):
 
 
 class Action(Enum):
-    """What the shell has to do now."""
+    """What the caller has to do now."""
 
     RESEND_GOAL = "resend_goal"
     CANCEL_GOAL = "cancel_goal"
 
 
 @dataclass(frozen=True)
-class Strike:
-    """The shell has to let one of the plan's contingencies strike now."""
+class Inject:
+    """The caller has to let one of the plan's contingencies happen now."""
 
     index: int
 
@@ -86,7 +86,7 @@ class State:
         distance_m: distance to the goal now.
         x: position of the robot, m in the map frame.
         y: position of the robot, m in the map frame.
-        struck: indices of the contingencies that have struck.
+        injected: indices of the contingencies that have injected.
         stable: whether the manipulator reports every function as STABLE.
         stable_since_s: since when; the start of the mission if it always was.
         asked_s: when the goal was last sent.
@@ -102,7 +102,7 @@ class State:
     distance_m: float
     x: float
     y: float
-    struck: frozenset[int] = frozenset()
+    injected: frozenset[int] = frozenset()
     stable: bool = True
     stable_since_s: float = 0.0
     asked_s: float = 0.0
@@ -123,12 +123,12 @@ class State:
         return self.outcome is not None
 
 
-Step = tuple[State, tuple[Action | Strike, ...]]
+Step = tuple[State, tuple[Action | Inject, ...]]
 """The next state and what to do now."""
 
 
 def start(plan: Plan, now_s: float, x: float, y: float) -> State:
-    """The state of a mission whose goal is sent now; the contingencies of the start have struck already.
+    """Return the state of a mission whose goal is sent now; the contingencies of the start have happened already.
 
     Args:
         plan: what the mission is to do.
@@ -153,21 +153,21 @@ def start(plan: Plan, now_s: float, x: float, y: float) -> State:
         distance_m=distance,
         x=x,
         y=y,
-        struck=frozenset(index for index, entry in enumerate(plan.contingencies) if entry.when.at_start),
+        injected=frozenset(index for index, entry in enumerate(plan.contingencies) if entry.when.at_start),
         stable_since_s=now_s,
         asked_s=now_s,
     )
 
 
 def on_pose(plan: Plan, state: State, now_s: float, x: float, y: float) -> Step:
-    """A new position of the robot (m, map frame); contingencies strike once their share or place is reached."""
+    """Take in a position of the robot (m, map frame): contingencies happen once their share or place is reached."""
     if state.over or not (math.isfinite(x) and math.isfinite(y)):
         return state, ()
-    return _strike(plan, replace(state, distance_m=plan.distance(x, y), x=x, y=y), now_s)
+    return _inject(plan, replace(state, distance_m=plan.distance(x, y), x=x, y=y), now_s)
 
 
 def on_goal_status(state: State, now_s: float, status: GoalStatus | None) -> Step:
-    """A status message of the action server.
+    """Take in a status message of the action server.
 
     Args:
         state: the mission so far.
@@ -180,9 +180,9 @@ def on_goal_status(state: State, now_s: float, status: GoalStatus | None) -> Ste
 
 
 def on_goal_result(state: State, now_s: float, status: GoalStatus, text: str) -> Step:
-    """The server's result for our goal.
+    """Take in the server's result for our goal.
 
-    A bad end while the system is being reconfigured is kept back: a restarted server may take the same goal up again.
+    A bad end during a reconfiguration does not count yet: a restarted server may take the same goal up again.
     """
     if state.over:
         return state, ()
@@ -194,20 +194,20 @@ def on_goal_result(state: State, now_s: float, status: GoalStatus, text: str) ->
 
 
 def on_configuration(state: State, now_s: float, stable: bool) -> Step:
-    """The manipulator's report: whether every function is STABLE."""
+    """Take in whether the manipulator reports every function as STABLE."""
     if state.over or stable == state.stable:
         return state, ()
     return replace(state, stable=stable, stable_since_s=now_s), ()
 
 
 def on_time(plan: Plan, state: State, now_s: float) -> Step:
-    """Simulated time has gone on: time-out, contingencies, goals that were never accepted or got lost."""
+    """Take in the simulated time: see to the time-out, contingencies, goals that were never accepted or got lost."""
     if state.over:
         return state, ()
     if now_s - state.started_s > plan.timeout_s:
         reason = f"goal not reached within {plan.timeout_s:g} s, {state.distance_m:.1f} m were left"
         return _end(state, now_s, Outcome.TIMEOUT, reason, (Action.CANCEL_GOAL,))
-    state, strikes = _strike(plan, state, now_s)
+    state, strikes = _inject(plan, state, now_s)
     if state.stable:
         state, actions = _follow_goal(state, now_s)
         return state, (*strikes, *actions)
@@ -215,25 +215,25 @@ def on_time(plan: Plan, state: State, now_s: float) -> Step:
 
 
 def interrupt(state: State, now_s: float, reason: str) -> State:
-    """The mission was broken off from outside."""
+    """End a mission that was interrupted from outside."""
     return state if state.over else _end(state, now_s, Outcome.INTERRUPTED, reason)[0]
 
 
 def abort(state: State, now_s: float, reason: str) -> State:
-    """The mission cannot go on, for instance because the simulator is gone."""
+    """End a mission that cannot go on, for instance because the simulator is gone."""
     return state if state.over else _end(state, now_s, Outcome.ABORTED, reason)[0]
 
 
-def _strike(plan: Plan, state: State, now_s: float) -> Step:
-    """Lets the contingencies strike whose moment has come."""
-    due = strikes_due(plan.contingencies, state.struck, state.share, now_s - state.started_s, state.x, state.y)
+def _inject(plan: Plan, state: State, now_s: float) -> Step:
+    """Let the contingencies happen that are due."""
+    due = contingencies_due(plan.contingencies, state.injected, state.share, now_s - state.started_s, state.x, state.y)
     if not due:
         return state, ()
-    return replace(state, struck=state.struck | set(due)), tuple(Strike(index) for index in due)
+    return replace(state, injected=state.injected | set(due)), tuple(Inject(index) for index in due)
 
 
 def _follow_goal(state: State, now_s: float) -> Step:
-    """Looks after a goal that the server does not list, while nothing is being reconfigured."""
+    """Handle a goal that the server does not list, while nothing is being reconfigured."""
     if state.bad_end is not None:
         if now_s - state.stable_since_s > SETTLE_S:
             return _end(state, now_s, Outcome.ABORTED, _bad_end_reason(*state.bad_end))

@@ -1,16 +1,12 @@
-"""Routes of a world: named pairs of a start pose and a goal pose, read from a YAML file."""
+"""Routes of a world: named pairs of a start pose and a goal pose."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import yaml
 from robot_formulas.geometry import Pose
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class RouteError(ValueError):
@@ -26,41 +22,38 @@ class Route:
     goal: Pose
 
 
-def read_route(path: Path, name: str) -> Route:
-    """Reads one route.
+def parse_route(content: Any, name: str, where: str) -> Route:
+    """Return one route.
+
+    Args:
+        content: of a YAML file of routes.
+        name: of the route.
+        where: the file, for messages.
 
     Raises:
-        RouteError: the file cannot be read, has no such route, or the route lacks a valid start or goal.
+        RouteError: there is no such route, or it lacks a valid start or goal.
     """
-    routes = _read(path)
+    routes = _entries(content)
     if name not in routes:
-        raise RouteError(f"{path}: no route {name!r}; there are {', '.join(map(str, routes)) or 'none'}")
+        raise RouteError(f"{where}: no route {name!r}; there are {', '.join(map(str, routes)) or 'none'}")
     entry = routes[name]
     if not isinstance(entry, dict):
-        raise RouteError(f"{path}: route {name!r} needs a start and a goal")
-    return Route(name, *(_pose(entry.get(end), f"{path}: route {name!r}, {end}") for end in ("start", "goal")))
+        raise RouteError(f"{where}: route {name!r} needs a start and a goal")
+    return Route(name, *(_pose(entry.get(end), f"{where}: route {name!r}, {end}") for end in ("start", "goal")))
 
 
-def route_names(path: Path) -> list[str]:
-    """Names of the routes of a file, in its order.
-
-    Raises:
-        RouteError: the file cannot be read.
-    """
-    return [str(name) for name in _read(path)]
+def parse_route_names(content: Any) -> list[str]:
+    """Return the names of the routes of a YAML file's content, in its order."""
+    return [str(name) for name in _entries(content)]
 
 
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise RouteError(f"{path}: cannot be read as YAML: {' '.join(str(error).split())}") from error
+def _entries(content: Any) -> dict[str, Any]:
     routes = content.get("routes", content) if isinstance(content, dict) else {}
     return routes if isinstance(routes, dict) else {}
 
 
 def _pose(value: Any, where: str) -> Pose:
-    """A pose given as [x, y], [x, y, yaw] or {x:, y:, yaw:}."""
+    """Return a pose given as [x, y], [x, y, yaw] or {x:, y:, yaw:}."""
     if isinstance(value, dict):
         value = [value.get("x"), value.get("y"), value.get("yaw", 0.0)]
     numbers = value if isinstance(value, list) and len(value) in (2, 3) else []

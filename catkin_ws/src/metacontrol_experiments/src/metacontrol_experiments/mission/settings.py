@@ -1,4 +1,4 @@
-"""What a mission is run with."""
+"""The settings of a mission."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from metacontrol_experiments.mission.routes import Route
+
+BAG_NAME, SUMMARY_NAME, FIGURE_NAME, LOG_NAME = "mission.bag", "summary.json", "mission.png", "mission.log"
+"""Files that a mission leaves in its folder: a bag on ROS, a log in lockstep."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,7 @@ class Settings:
         return ["roslaunch", "-p", str(port), self.launch_package, self.launch_file, *self.launch_arguments]
 
     def describe(self) -> dict[str, str]:
-        """The values of the event MISSION_START, from which the bag alone tells what was run."""
+        """Return the values of the event MISSION_START, by which the bag alone tells what was run."""
         goal = self.route.goal
         broken = [entry for entry in self.contingencies if entry.kind.breaks_component]
         power = [entry.value for entry in self.contingencies if entry.kind is Kind.POWER]

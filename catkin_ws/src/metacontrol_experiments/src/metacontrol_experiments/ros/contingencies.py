@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import psutil
-import rospkg
 import rospy
 from diagnostic_msgs.msg import KeyValue
 from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -20,16 +19,10 @@ from move_base_msgs.msg import MoveBaseActionGoal
 from node_kit.ros.lifetime import Lifetime
 from robot_formulas.geometry import Pose, yaw_of
 
-from metacontrol_experiments.contingency.components import ComponentError, node_of, read_components
-from metacontrol_experiments.contingency.contingency import (
-    ContingencyError,
-    StrikeError,
-    parse_contingency,
-    read_contingencies,
-    strikes_due,
-    with_seed,
-)
-from metacontrol_experiments.ros.striker import Striker, serve
+from metacontrol_experiments.contingency.contingency import InjectionError, contingencies_due, with_seed
+from metacontrol_experiments.contingency.parsing import ComponentError, ContingencyError, node_of, parse_contingency
+from metacontrol_experiments.io.input_files import PackageError, read_components, read_contingencies, simulation_package
+from metacontrol_experiments.ros.fault_injection import FaultInjector, serve
 
 if TYPE_CHECKING:
     from metacontrol_experiments.contingency.contingency import Contingency
@@ -50,20 +43,20 @@ class ContingencyNode:
         seed = rospy.get_param("~seed", 0)
         if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
             raise ContingencyError(f"parameter ~seed is {seed!r}; give a whole number, 0 or more")
-        models = Path(rospkg.RosPack().get_path("metacontrol_sim")) / "models" / "metacontrol.yaml"
+        models = simulation_package() / "models" / "metacontrol.yaml"
         components = read_components(Path(rospy.get_param("~components", str(models))))
         self._plan = with_seed(_timeline(), seed)
         for contingency in self._plan:
             if contingency.kind.hits_component:
                 node_of(contingency.target, components)
-        self._striker = Striker(components, psutil.pid_exists)
-        self._struck: frozenset[int] = frozenset()
+        self._injector = FaultInjector(components, psutil.pid_exists)
+        self._injected: frozenset[int] = frozenset()
         self._pose: Pose | None = None
         self._goal: Pose | None = None
         self._began: tuple[float, float] | None = None  # time and distance to the goal when it was sent
         self._lock = threading.RLock()
         self._events = rospy.Publisher("mission/event", MissionEvent, queue_size=10)
-        self._service = serve(self._strike, seed)
+        self._service = serve(self._inject, seed)
         self._inputs = (
             rospy.Subscriber("amcl_pose", PoseWithCovarianceStamped, self._on_pose),
             rospy.Subscriber("move_base/goal", MoveBaseActionGoal, self._on_goal),
@@ -90,11 +83,11 @@ class ContingencyNode:
         """Let what is due strike."""
         with self._lock:
             due = self._due()
-            self._struck |= set(due)
+            self._injected |= set(due)
         for index in due:
             try:
-                self._strike(self._plan[index])
-            except StrikeError as error:
+                self._inject(self._plan[index])
+            except InjectionError as error:
                 rospy.logerr(f"contingency failed: {error}")
 
     def _due(self) -> tuple[int, ...]:
@@ -102,17 +95,17 @@ class ContingencyNode:
         if pose is None:
             return ()
         if goal is None:  # no way yet: what is there from the start
-            return tuple(i for i, entry in enumerate(self._plan) if entry.when.at_start and i not in self._struck)
+            return tuple(i for i, entry in enumerate(self._plan) if entry.when.at_start and i not in self._injected)
         left = math.dist((pose.x, pose.y), (goal.x, goal.y))
         if self._began is None:
             self._began = (now, max(left, 1e-6))
         began, whole = self._began
-        return strikes_due(self._plan, self._struck, max(0.0, 1.0 - left / whole), now - began, pose.x, pose.y)
+        return contingencies_due(self._plan, self._injected, max(0.0, 1.0 - left / whole), now - began, pose.x, pose.y)
 
-    def _strike(self, contingency: Contingency) -> None:
+    def _inject(self, contingency: Contingency) -> None:
         pose = self._pose
         way = None if pose is None else (pose, self._goal or pose)
-        values = self._striker.strike(contingency, way)
+        values = self._injector.inject(contingency, way)
         message = MissionEvent(kind=MissionEvent.PERTURBATION, name=contingency.event)
         message.header.stamp = rospy.Time.now()
         message.values = [KeyValue(key, value) for key, value in values.items()]
@@ -131,7 +124,7 @@ def _timeline() -> tuple[Contingency, ...]:
 
 def main() -> None:
     """Run the node; exit status 2 when the timeline cannot be used."""
-    with Lifetime("mission_contingencies", ContingencyError, ComponentError) as life:
+    with Lifetime("mission_contingencies", ContingencyError, ComponentError, PackageError) as life:
         life.start()
         ContingencyNode()
         rospy.spin()

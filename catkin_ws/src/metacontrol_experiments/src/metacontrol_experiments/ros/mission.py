@@ -1,6 +1,6 @@
-"""The ROS shell of a mission: waits for the system, sends the goal, strikes, and says on `mission/event` what it did.
+"""The ROS shell of a mission: it waits for the system, sends the goal, injects contingencies, and publishes events.
 
-Callbacks only queue what they got; one thread, the caller's, feeds the state machine.
+Callbacks only queue what they get; one thread, the caller's, feeds the state machine.
 """
 
 from __future__ import annotations
@@ -11,24 +11,26 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import rospy
-from actionlib_msgs.msg import GoalID, GoalStatusArray
+from actionlib_msgs.msg import GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from metacontrol_bags import messages
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import CostReport, Event, QualityReport
 from metacontrol_bags.timeline import Timeline
-from metacontrol_msgs.msg import ActiveConfiguration, Decision, FunctionGrounding, MissionEvent
-from move_base_msgs.msg import MoveBaseActionGoal, MoveBaseActionResult
+from metacontrol_msgs.msg import ActiveConfiguration, Decision, MissionEvent
+from move_base_msgs.msg import MoveBaseActionResult
 from node_kit.io.inbox import Inbox
-from robot_formulas.geometry import Pose, quaternion_of
+from robot_formulas.geometry import Pose
 
-from metacontrol_experiments.contingency.contingency import StrikeError
+from metacontrol_experiments.contingency.contingency import InjectionError
 from metacontrol_experiments.io.processes import wait_until
 from metacontrol_experiments.mission import mission
-from metacontrol_experiments.mission.mission import Action, Strike
+from metacontrol_experiments.mission.mission import Action, Inject
+from metacontrol_experiments.mission.readiness import Readiness
+from metacontrol_experiments.ros.fault_injection import FaultInjector, serve
+from metacontrol_experiments.ros.goal import MissionGoal
 from metacontrol_experiments.ros.startup import DECISION_TOPIC, StartError, Startup
-from metacontrol_experiments.ros.striker import Striker, serve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,8 +42,6 @@ if TYPE_CHECKING:
     from metacontrol_experiments.io.processes import ProcessTree
     from metacontrol_experiments.mission.mission import State
     from metacontrol_experiments.mission.settings import Settings
-
-MANIPULATOR_TOPIC = "rosgraph_manipulator/active_configuration"
 
 STANDSTILL_S = 20.0
 """A clock that does not move for so many wall seconds means that the simulator is gone."""
@@ -57,11 +57,11 @@ class MissionNode:
     """The node /mission: one mission, from a system that is starting to the event MISSION_END."""
 
     def __init__(self, settings: Settings, tree: ProcessTree, display: Display, check: Callable[[], None]) -> None:
-        """Joins the graph.
+        """Join the graph.
 
         Args:
             settings: the mission.
-            tree: the processes of this run; only these may be struck.
+            tree: the processes of this run; only these may be signalled.
             display: where the timeline is shown.
             check: raises an error when the launched system has ended.
 
@@ -75,75 +75,64 @@ class MissionNode:
         self._state: State | None = None
         self._timeline = Timeline(settings.thresholds)
         self._inbox = Inbox()
+        self._readiness = Readiness()
         self._position: tuple[float, float] | None = None
-        self._stable = False
-        self._failed: str | None = None
-        self._server_seen = False
-        self._observed: set[str] = set()  # quality attributes of which a level came in
-        self._graph_seen = False  # by the monitor
-        self._goal: MoveBaseActionGoal | None = None
         self._began_wall = time.monotonic()
         self._startup = Startup(self._attend)
         self._startup.wait_for_master()
         rospy.init_node("mission", disable_signals=True)
-        self._striker = Striker(settings.components, tree.owns)
+        self._injector = FaultInjector(settings.components, tree.owns)
         self._service = serve(self._on_request, settings.seed)
         self._events = rospy.Publisher("mission/event", MissionEvent, queue_size=10)
-        self._goals = rospy.Publisher("move_base/goal", MoveBaseActionGoal, queue_size=5)
-        self._cancels = rospy.Publisher("move_base/cancel", GoalID, queue_size=5)
+        self._goal = MissionGoal()
         self._subscribe("amcl_pose", PoseWithCovarianceStamped, self._on_pose)
-        self._subscribe(MANIPULATOR_TOPIC, ActiveConfiguration, self._on_configuration)
+        self._subscribe("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)
         self._subscribe("move_base/status", GoalStatusArray, self._on_status)
         self._subscribe("move_base/result", MoveBaseActionResult, self._on_result)
         self._subscribe(DECISION_TOPIC, Decision, self._on_decision)
         self._subscribe("/diagnostics", DiagnosticArray, self._on_diagnostics)
 
     def wait_ready(self) -> None:
-        """Waits until the whole system is up.
+        """Wait until the whole system is up.
 
         Raises:
             StartError: it is not, in time; or the manipulator gave up.
         """
-        wait = self._startup.wait
-        wait(lambda: rospy.get_time() > 0, "/clock, from the simulator")
-        wait(lambda: self._position is not None, "the robot's pose on amcl_pose")
-        wait(lambda: self._stable, f"a STABLE configuration on {MANIPULATOR_TOPIC}")
-        wait(lambda: self._server_seen and self._goals.get_num_connections() > 0, "the action server of move_base")
-        wait(lambda: self._graph_seen, "the monitor's first look at the graph, on /diagnostics")
-        for quality in self._settings.thresholds:
-            heard = partial(self._observed.__contains__, quality)
-            wait(heard, f"a level of {quality} on /diagnostics, from its observer")
+        self._startup.wait(lambda: rospy.get_time() > 0, "/clock, from the simulator")
+        for condition, what in self._readiness.conditions(self._settings.thresholds):
+            self._startup.wait(condition, what)
+        self._startup.wait(lambda: self._goal.is_heard, "the action server of move_base")
         if self._settings.metacontrol:
             self._startup.wait_for_reasoner()
 
     def wait_recorded(self, recorder: str) -> None:
-        """Waits until the node `recorder` has subscribed to everything that is to be recorded.
+        """Wait until the node `recorder` has subscribed to everything that is to be recorded.
 
         Raises:
             StartError: it has not, in time.
         """
-        self._startup.wait_for_recorder(recorder, self._events, self._goals)
+        self._startup.wait_for_recorder(recorder, self._events, self._goal.publisher)
 
     def drive(self) -> State:
-        """Sends the goal and sees the mission through; returns its last state.
+        """Send the goal, follow the mission to its end, and return its last state.
 
         Raises:
             mission.MissionError: the goal is no goal from here.
-            KeyboardInterrupt: after the mission's end was told.
+            KeyboardInterrupt: after the end of the mission was published.
         """
         self._begin()
         try:
             self._loop()
         except KeyboardInterrupt:
             self._state = mission.interrupt(self._mission, rospy.get_time(), "interrupted")
-            self._cancels.publish(self._goal_id)
+            self._goal.cancel()
             self._end()
             raise
         self._end()
         return self._mission
 
     def close(self) -> None:
-        """Leaves the graph."""
+        """Leave the graph."""
         rospy.signal_shutdown("the mission is over")
 
     @property
@@ -152,40 +141,34 @@ class MissionNode:
             raise RuntimeError("the mission has not started")
         return self._state
 
-    @property
-    def _goal_id(self) -> GoalID:
-        if self._goal is None:
-            raise RuntimeError("the mission has not started")
-        return self._goal.goal_id
-
     def _attend(self) -> None:
-        """Does what is to be done while the system starts.
+        """Do what is due while the system starts.
 
         Raises:
             StartError: it will not come up.
         """
         self._check()
         self._inbox.drain()
-        if self._failed:
-            raise StartError(self._failed)
+        if self._readiness.failed:
+            raise StartError(self._readiness.failed)
 
     # The mission
 
     def _begin(self) -> None:
         if self._position is None:
             raise RuntimeError("the robot's pose is not known yet")
-        struck = self._strike_at_start()
+        injected = self._inject_at_start()
         now = rospy.Time.now()
         self._state = mission.start(self._plan, now.to_sec(), *self._position)
-        self._goal = self._make_goal(now)
+        self._goal.make(self._settings.route.goal, now)
         self._began_wall = time.monotonic()
         self._display.start(now.to_sec())
-        values = self._settings.describe() | {"goal_id": self._goal.goal_id.id}
+        values = self._settings.describe() | {"goal_id": self._goal.id}
         values["controller_hz"] = str(rospy.get_param("move_base/controller_frequency", 0.0))
         self._publish_event(now, MissionEvent.MISSION_START, self._settings.route.name, values)
-        for name, told in struck:
+        for name, told in injected:
             self._publish_event(now, MissionEvent.PERTURBATION, name, {"share": "0.0000"} | told)
-        self._goals.publish(self._goal)
+        self._goal.send()
 
     def _loop(self) -> None:
         clock, moved = rospy.get_time(), time.monotonic()
@@ -218,51 +201,40 @@ class MissionNode:
     def _take(self, step: mission.Step) -> None:
         self._state, actions = step
         for action in actions:
-            if isinstance(action, Strike):
-                self._strike(action.index)
+            if isinstance(action, Inject):
+                self._inject(action.index)
             elif action is Action.RESEND_GOAL:
-                self._goals.publish(self._goal)
+                self._goal.send()
             elif action is Action.CANCEL_GOAL:
-                self._cancels.publish(self._goal_id)
+                self._goal.cancel()
 
-    def _strike(self, index: int) -> None:
-        """Lets a contingency of the plan happen; without it the mission is not the one asked for, and ends."""
+    def _inject(self, index: int) -> None:
+        """Inject a contingency of the plan; where that fails, the mission is not the one asked for, and ends."""
         try:
-            self._strike_now(self._plan.contingencies[index])
-        except StrikeError as error:
+            self._inject_now(self._plan.contingencies[index])
+        except InjectionError as error:
             self._state = mission.abort(self._mission, rospy.get_time(), f"a contingency could not strike: {error}")
 
-    def _strike_now(self, contingency: Contingency) -> None:
-        values = self._striker.strike(contingency, self._way())
+    def _inject_now(self, contingency: Contingency) -> None:
+        values = self._injector.inject(contingency, self._way())
         share = {"share": f"{self._state.share if self._state else 0.0:.4f}"}
         self._publish_event(rospy.Time.now(), MissionEvent.PERTURBATION, contingency.event, share | values)
 
     def _way(self) -> tuple[Pose, Pose]:
-        """The route's ends; not where the robot is now, which differs a little from run to run."""
+        """Return the ends of the route; where the robot is now differs a little from run to run."""
         return self._settings.route.start, self._settings.route.goal
 
-    def _strike_at_start(self) -> list[tuple[str, dict[str, str]]]:
-        """Lets happen what is there before the goal is sent; returns the events' names and values.
+    def _inject_at_start(self) -> list[tuple[str, dict[str, str]]]:
+        """Inject the contingencies of the start, and return names and values of their events.
 
         Raises:
             StartError: something could not happen.
         """
         due = [entry for entry in self._plan.contingencies if entry.when.at_start]
         try:
-            return [(entry.event, self._striker.strike(entry, self._way())) for entry in due]
-        except StrikeError as error:
+            return [(entry.event, self._injector.inject(entry, self._way())) for entry in due]
+        except InjectionError as error:
             raise StartError(f"a contingency could not strike: {error}") from error
-
-    def _make_goal(self, now: rospy.Time) -> MoveBaseActionGoal:
-        pose = self._settings.route.goal
-        goal = MoveBaseActionGoal()
-        goal.header.stamp = now
-        goal.goal_id = GoalID(stamp=now, id=f"{rospy.get_name()}-1-{now.to_sec():.3f}")
-        target = goal.goal.target_pose
-        target.header.frame_id, target.header.stamp = "map", now
-        target.pose.position.x, target.pose.position.y = pose.x, pose.y
-        target.pose.orientation.z, target.pose.orientation.w = quaternion_of(pose.yaw)
-        return goal
 
     def _publish_event(self, stamp: rospy.Time, kind: str, name: str, values: dict[str, str]) -> None:
         message = MissionEvent(kind=kind, name=name, values=[KeyValue(key, value) for key, value in values.items()])
@@ -271,7 +243,7 @@ class MissionNode:
         self._tell(Event(stamp.to_sec(), kind, name, values))
 
     def _tell(self, report: Report) -> None:
-        """Shows what is new in a report, once the mission runs; before, it is only taken note of."""
+        """Show what is new in a report; before the mission runs, only take note of it."""
         entries = self._timeline.tell(report)
         if self._state is not None:
             for entry in entries:
@@ -283,15 +255,15 @@ class MissionNode:
         rospy.Subscriber(topic, kind, lambda message: self._inbox.put(partial(handler, message)))
 
     def _on_request(self, contingency: Contingency) -> None:
-        """A call of the service.
+        """Answer a call of the service.
 
         Raises:
-            StrikeError: it could not happen.
+            InjectionError: it could not happen.
         """
         try:
-            self._inbox.call(partial(self._strike_now, contingency), _REQUEST_S)
+            self._inbox.call(partial(self._inject_now, contingency), _REQUEST_S)
         except TimeoutError as error:
-            raise StrikeError(f"the mission did not answer within {_REQUEST_S:g} s") from error
+            raise InjectionError(f"the mission did not answer within {_REQUEST_S:g} s") from error
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         position = message.pose.pose.position
@@ -299,6 +271,7 @@ class MissionNode:
             rospy.logwarn_throttle(5.0, "mission: a pose on amcl_pose is not finite; left out")
             return
         self._position = (position.x, position.y)
+        self._readiness.located = True
         if self._state is not None:
             self._take(mission.on_pose(self._plan, self._mission, rospy.get_time(), *self._position))
             if not self._mission.over:
@@ -306,25 +279,20 @@ class MissionNode:
 
     def _on_configuration(self, message: ActiveConfiguration) -> None:
         reports = messages.configurations(message, rospy.get_time())
-        self._stable = bool(reports) and all(report.state == FunctionGrounding.STABLE for report in reports)
-        if self._state is None:
-            broken = [report for report in reports if report.state == FunctionGrounding.FAILED]
-            self._failed = f"the manipulator could not deploy {broken[0].configuration}" if broken else None
-        else:
-            self._take(mission.on_configuration(self._mission, rospy.get_time(), self._stable))
+        self._readiness.take_configurations(reports)
+        if self._state is not None:
+            self._take(mission.on_configuration(self._mission, rospy.get_time(), self._readiness.stable))
         for report in reports:
             self._tell(report)
 
     def _on_status(self, message: GoalStatusArray) -> None:
-        self._server_seen = True
-        if self._state is None:
-            return
-        listed = (GoalStatus.of(s.status) for s in message.status_list if s.goal_id.id == self._goal_id.id)
-        self._take(mission.on_goal_status(self._mission, rospy.get_time(), next(listed, None)))
+        self._readiness.has_server = True
+        if self._state is not None:
+            self._take(mission.on_goal_status(self._mission, rospy.get_time(), self._goal.status_in(message)))
 
     def _on_result(self, message: MoveBaseActionResult) -> None:
         report = messages.result(message, rospy.get_time())
-        if self._state is not None and report.id == self._goal_id.id:
+        if self._state is not None and report.id == self._goal.id:
             status = GoalStatus.of(message.status.status)
             self._take(mission.on_goal_result(self._mission, report.stamp, status, report.text))
 
@@ -334,7 +302,7 @@ class MissionNode:
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for report in messages.diagnostics(message, rospy.get_time()):
             if isinstance(report, QualityReport) and report.level is not None:
-                self._observed.add(report.name)
-            self._graph_seen |= not isinstance(report, QualityReport)
+                self._readiness.observed.add(report.name)
+            self._readiness.has_graph |= not isinstance(report, QualityReport)
             if not isinstance(report, CostReport):
                 self._tell(report)

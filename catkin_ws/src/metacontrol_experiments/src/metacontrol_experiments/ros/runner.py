@@ -1,4 +1,4 @@
-"""Runs one mission from nothing to nothing: an own master, the system, the recorder, and all of it ended again."""
+"""Run one mission: start a master, the system and the recorder, and end all of them again."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from metacontrol_bags.bag import TOPICS
 from roslib.packages import find_node
 from rospkg import ResourceNotFound
 
-from metacontrol_experiments.io.processes import ProcessTree, free_port, is_free
+from metacontrol_experiments.io.processes import ProcessTree, RunError, free_port, is_free, signals_as_interrupts
+from metacontrol_experiments.mission.settings import BAG_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from metacontrol_experiments.mission.settings import Settings
 
 RECORDER = "/mission_recorder"
-BAG_NAME = "mission.bag"
 
 _RECORDER_GRACE_S = 15.0
 _LAUNCH_GRACE_S = 12.0
@@ -35,12 +35,8 @@ _POINTER = ("The traceback for the exception", "log file:")
 _COMPLAINT = re.compile(r"error|exception|fatal|has died|unused args|invalid|no such", re.IGNORECASE)
 
 
-class RunError(RuntimeError):
-    """The mission could not be started; the message names the log."""
-
-
 def run_mission(settings: Settings, display: Display) -> State:
-    """Runs a mission and records it to OUTPUT/mission.bag.
+    """Run a mission and record it to OUTPUT/mission.bag.
 
     Whatever happens, no process of the run is left behind.
 
@@ -112,7 +108,7 @@ def _run(settings: Settings, display: Display, tree: ProcessTree, port: int, bag
 
 @contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
-    """Keeps other runs out of a folder.
+    """Keep other runs out of a folder.
 
     Raises:
         RunError: one is at work in it.
@@ -129,7 +125,7 @@ def _alone_in(folder: Path) -> Iterator[None]:
 
 
 def _record_command(bag: Path) -> list[str]:
-    """The recorder itself: its Python front end would not pass signals on.
+    """Return the command of the recorder itself: its Python front end would not pass signals on.
 
     Raises:
         RunError: rosbag is not installed.
@@ -144,7 +140,7 @@ def _record_command(bag: Path) -> list[str]:
 
 
 def _last_complaint(console: Path) -> str:
-    """The last line of a log that tells of an error, else the last line."""
+    """Return the last line of a log that tells of an error, else the last line."""
     text = _COLOUR.sub("", console.read_text(encoding="utf-8", errors="replace"))
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith(_POINTER)]
     return ([line for line in lines if _COMPLAINT.search(line)] or lines or ["it said nothing"])[-1]
@@ -152,25 +148,10 @@ def _last_complaint(console: Path) -> str:
 
 @contextmanager
 def _closing(tree: ProcessTree) -> Iterator[None]:
-    """Ends the processes at the end, and lets nobody disturb it."""
+    """End the processes at the end, without being disturbed by signals."""
     try:
         yield
     finally:
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, signal.SIG_IGN)
         tree.close()
-
-
-@contextmanager
-def signals_as_interrupts() -> Iterator[None]:
-    """SIGTERM and SIGHUP end a run as Ctrl-C does."""
-
-    def interrupt(_number: int, _frame: object) -> None:
-        raise KeyboardInterrupt
-
-    former = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    try:
-        yield
-    finally:
-        for number, handler in former.items():
-            signal.signal(number, handler)

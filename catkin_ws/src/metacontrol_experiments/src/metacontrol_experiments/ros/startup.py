@@ -1,4 +1,4 @@
-"""Waiting for a system that is starting: its master, its reasoner, the recorder."""
+"""Wait for a system that is starting: its master, its reasoner, the recorder."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import rospy
 from metacontrol_bags.bag import TOPICS
 
 from metacontrol_experiments.io.processes import wait_until
-from metacontrol_experiments.ros.striker import ImpatientTransport
+from metacontrol_experiments.ros.fault_injection import ImpatientTransport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,12 +30,12 @@ class Startup:
     """Waits for one part after the other."""
 
     def __init__(self, attend: Callable[[], None]) -> None:
-        """Takes what is done again and again meanwhile; it raises an error to give up."""
+        """Take what is called again and again meanwhile; it raises an error to give up."""
         self._attend = attend
         self._master = rosgraph.Master("/mission")
 
     def wait(self, condition: Callable[[], bool], what: str) -> None:
-        """Waits for a condition.
+        """Wait for a condition.
 
         Raises:
             StartError: it did not come true in time; the message says what it is.
@@ -49,7 +49,7 @@ class Startup:
             raise StartError(f"waited {START_S:g} s in vain for {what}")
 
     def wait_for_master(self) -> None:
-        """Waits for the master and simulated time: before rospy's node begins.
+        """Wait for the master and simulated time: before rospy's node begins.
 
         Raises:
             StartError: it did not come up in time.
@@ -57,7 +57,7 @@ class Startup:
         self.wait(self._simulated_time, "the ROS master with /use_sim_time")
 
     def wait_for_reasoner(self) -> None:
-        """Waits until the reasoner has told the master of its decisions.
+        """Wait until the reasoner has told the master of its decisions.
 
         Raises:
             StartError: it did not come up in time.
@@ -65,7 +65,7 @@ class Startup:
         self.wait(self._decisions_offered, f"the node {REASONER} with its topic {DECISION_TOPIC}")
 
     def wait_for_recorder(self, recorder: str, *publishers: rospy.Publisher) -> None:
-        """Waits until the node `recorder` subscribes to all that is recorded, and is connected to these of this node.
+        """Wait until the node `recorder` subscribes to all that is recorded, and is connected to these of this node.
 
         Raises:
             StartError: it did not come up in time.
@@ -90,7 +90,7 @@ class Startup:
 
 
 def _topics_to(node: str) -> set[str]:
-    """The topics of this node over which it is connected to a subscriber."""
+    """Return the topics of this node over which it is connected to a subscriber."""
     with xmlrpc.client.ServerProxy(rospy.get_node_uri(), transport=ImpatientTransport()) as proxy:
         answer: Any = proxy.getBusInfo(rospy.get_name())
     return {topic for _, subscriber, direction, _, topic, *_ in answer[2] if subscriber == node and direction == "o"}

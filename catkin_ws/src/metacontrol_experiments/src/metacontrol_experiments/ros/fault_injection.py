@@ -1,4 +1,4 @@
-"""Lets contingencies happen in a running system: signals to nodes, and services of simulator and power meter."""
+"""Let contingencies happen in a running system, by signals to nodes and services of simulator and power meter."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from pybullet_simulator.world.clutter import ClutterError, scatter
 from robot_formulas.geometry import Pose
 from simulator_msgs.srv import SetLight, SpawnObstacle
 
-from metacontrol_experiments.contingency.components import ComponentError, node_of
-from metacontrol_experiments.contingency.contingency import AT_START, ContingencyError, Kind, StrikeError, make
+from metacontrol_experiments.contingency.contingency import AT_START, InjectionError, Kind
+from metacontrol_experiments.contingency.parsing import ComponentError, ContingencyError, make, node_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -57,7 +57,7 @@ class ImpatientTransport(xmlrpc.client.Transport):
         return connection
 
 
-class Striker:
+class FaultInjector:
     """Knows which node is behind a component, and how each kind of contingency is made."""
 
     def __init__(self, components: Mapping[str, str], owns: Callable[[int], bool]) -> None:
@@ -65,13 +65,13 @@ class Striker:
 
         Args:
             components: name -> node.
-            owns: tells whether a process may be struck.
+            owns: tells whether a process may be signalled.
         """
         self._components = components
         self._owns = owns
         self._pids: dict[str, int] = {}  # of frozen nodes, which no longer tell theirs
 
-    def strike(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> dict[str, str]:
+    def inject(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> dict[str, str]:
         """Let a contingency happen now; return what is worth telling of it.
 
         Args:
@@ -79,7 +79,7 @@ class Striker:
             way: where the robot starts and where it goes; clutter at random places follows from it and the seed.
 
         Raises:
-            StrikeError: it could not.
+            InjectionError: it could not.
         """
         try:
             if contingency.kind.hits_component:
@@ -92,19 +92,19 @@ class Striker:
                 return self._call("simulator/set_light", SetLight, light=f"{contingency.value:g}")(contingency.value)
             return self._clutter(contingency, way)
         except (OSError, xmlrpc.client.Error, rosgraph.MasterException, rospy.ROSException) as error:
-            raise StrikeError(f"{contingency}: {' '.join(str(error).split())}") from error
+            raise InjectionError(f"{contingency}: {' '.join(str(error).split())}") from error
         except (rospy.ServiceException, ComponentError, ClutterError, GridMessageError) as error:
-            raise StrikeError(f"{contingency}: {error}") from error
+            raise InjectionError(f"{contingency}: {error}") from error
 
     def _signal(self, contingency: Contingency) -> dict[str, str]:
         """Send a component's node the signal of a kind."""
         node = rospy.resolve_name(node_of(contingency.target, self._components))
         pid = self._pids.get(node) or self._pid_of(node)
         if not self._owns(pid):
-            raise StrikeError(f"{node} (pid {pid}) is not a process that may be struck from here")
+            raise InjectionError(f"{node} (pid {pid}) is not a process that may be struck from here")
         number = _SIGNALS[contingency.kind]
         if contingency.kind.spoils_data and not _handles(pid, number):
-            raise StrikeError(f"{node} (pid {pid}) is no driver whose data can be spoilt")
+            raise InjectionError(f"{node} (pid {pid}) is no driver whose data can be spoilt")
         os.kill(pid, number)
         if contingency.kind is Kind.FREEZE:
             self._pids[node] = pid
@@ -124,7 +124,7 @@ class Striker:
         places = tuple(Pose(x, y, 0.0) for x, y in contingency.places)
         if not places and contingency.count:
             if way is None:
-                raise StrikeError(f"{contingency}: random places need a pose on amcl_pose; list the places instead")
+                raise InjectionError(f"{contingency}: random places need a pose on amcl_pose; list the places instead")
             grid = read_grid(rospy.wait_for_message("map", OccupancyGrid, _WAIT_S))
             places = scatter(grid, *way, contingency.count, contingency.seed or 0)
         spawn = self._call("simulator/spawn_obstacle", SpawnObstacle)
@@ -140,24 +140,24 @@ class Striker:
         def call(*arguments: float, **fields: float) -> dict[str, str]:
             answer = proxy(*arguments, **fields)
             if not answer.success:
-                raise StrikeError(f"{service} refused: {getattr(answer, 'message', '') or arguments}")
+                raise InjectionError(f"{service} refused: {getattr(answer, 'message', '') or arguments}")
             return told
 
         return call
 
 
 def _handles(pid: int, number: int) -> bool:
-    """Whether a process takes a signal that would end it otherwise."""
+    """Tell whether a process takes a signal that would end it otherwise."""
     with open(f"/proc/{pid}/status", encoding="ascii", errors="replace") as status:
         caught = next((line.split()[1] for line in status if line.startswith("SigCgt:")), "0")
     return bool(int(caught, 16) >> (number - 1) & 1)
 
 
-def serve(strike: Callable[[Contingency], None], seed: int) -> rospy.Service:
+def serve(inject: Callable[[Contingency], None], seed: int) -> rospy.Service:
     """Offer the service `contingency/strike`, by which anybody lets a contingency happen now.
 
     Args:
-        strike: lets it happen; called in a thread of rospy; raises StrikeError.
+        inject: lets it happen; called in a thread of rospy; raises InjectionError.
         seed: of random places where the request has none.
     """
 
@@ -168,8 +168,8 @@ def serve(strike: Callable[[Contingency], None], seed: int) -> rospy.Service:
             what = {"count": request.value, "seed": request.seed or seed}
         try:
             contingency = make(kind, what, AT_START, SERVICE)
-            strike(contingency)
-        except (ContingencyError, StrikeError) as error:
+            inject(contingency)
+        except (ContingencyError, InjectionError) as error:
             rospy.logwarn(f"contingency refused: {error}")
             return ContingencyResponse(False, str(error))
         return ContingencyResponse(True, contingency.event)

@@ -1,4 +1,4 @@
-"""Lets contingencies happen in lockstep, as `striker_node` does on ROS."""
+"""Let contingencies happen in lockstep, as the module `ros.fault_injection` does on ROS."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pybullet_simulator.world.obstacles import CLUTTER_MASS, CLUTTER_SIZE, Obsta
 from pybullet_simulator.world.world import Box
 from robot_formulas.geometry import Pose
 
-from metacontrol_experiments.contingency.contingency import Kind, StrikeError
+from metacontrol_experiments.contingency.contingency import InjectionError, Kind
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from metacontrol_experiments.lockstep.drivers import Drivers
 
 
-class Striker:
+class FaultInjector:
     """Knows how each kind of contingency is made."""
 
     def __init__(self, simulation: Simulation, drivers: Drivers, grid: Grid, way: tuple[Pose, Pose]) -> None:
@@ -39,15 +39,15 @@ class Striker:
         self._way = way
         self.obstacles: list[tuple[float, float]] = []  # places of all clutter so far, m
 
-    def strike(self, contingency: Contingency) -> dict[str, str]:
+    def inject(self, contingency: Contingency) -> dict[str, str]:
         """Let a contingency happen now; return what is worth telling of it.
 
         Raises:
-            StrikeError: it cannot.
+            InjectionError: it cannot.
         """
         kind, value = contingency.kind, contingency.value
         if kind.hits_component:
-            self._drivers.strike(kind, contingency.target)
+            self._drivers.inject(kind, contingency.target)
             return {"how": kind.value}
         if kind is Kind.POWER:
             self._simulation.set_consumption_factor(value)
@@ -66,7 +66,7 @@ class Striker:
                 box = Box("", "clutter", place.x, place.y, *CLUTTER_SIZE, place.yaw)
                 self._simulation.spawn(box, CLUTTER_MASS)
         except (ClutterError, ObstacleError) as error:
-            raise StrikeError(f"{contingency}: {error}") from error
+            raise InjectionError(f"{contingency}: {error}") from error
         self.obstacles += [(round(place.x, 1), round(place.y, 1)) for place in places]
         return {"places": " ".join(f"{place.x:.3f},{place.y:.3f}" for place in places)}
 
@@ -79,7 +79,7 @@ def check(contingency: Contingency, components: Collection[str]) -> None:
         components: those that run.
 
     Raises:
-        StrikeError: it hits another one.
+        InjectionError: it hits another one.
     """
     if contingency.kind.hits_component and contingency.target not in components:
-        raise StrikeError(f"{contingency}: in lockstep there are only the components {' and '.join(components)}")
+        raise InjectionError(f"{contingency}: in lockstep there are only the components {' and '.join(components)}")

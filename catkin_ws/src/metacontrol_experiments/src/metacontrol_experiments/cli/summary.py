@@ -1,0 +1,31 @@
+"""The command `metacontrol summary`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+from metacontrol_bags.bag import BagError, read_record
+from metacontrol_bags.metrics import MetricsError, summarise
+
+from metacontrol_experiments.cli.display import refusing
+
+
+@click.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--output", type=click.Path(dir_okay=False, path_type=Path), help="Write to a file instead.")
+def summary(bag: Path, output: Path | None) -> None:
+    """Print the summary of a mission's BAG as JSON."""
+    with refusing(BagError, MetricsError):
+        told = summarise(read_record(bag))
+        if output:
+            write_summary(told, output)
+        else:
+            click.echo(json.dumps(told, indent=2))
+
+
+def write_summary(summary: dict[str, Any], path: Path) -> None:
+    """Write a summary as JSON."""
+    path.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")

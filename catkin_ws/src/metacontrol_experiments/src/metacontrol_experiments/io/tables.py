@@ -1,0 +1,109 @@
+"""Tables as CSV files: delays, the runs of a calibration, measured levels."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections import defaultdict
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import rospkg
+
+from metacontrol_experiments.campaign.calibration import QUALITIES, CalibrationError, Run, measure
+from metacontrol_experiments.lockstep.delays import KINDS, DelayError, Delays
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+_COLUMNS = tuple(field.name for field in fields(Run))
+
+
+def read_delays(path: Path | None = None) -> Delays:
+    """Read a file of delays, by default the one of this package. A line is which delay, seconds.
+
+    Raises:
+        DelayError: it cannot be read, or a kind has no sample.
+    """
+    path = path or Path(rospkg.RosPack().get_path("metacontrol_experiments")) / "config" / "delays.csv"
+    samples: defaultdict[str, list[float]] = defaultdict(list)
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            for row in csv.DictReader(file):
+                samples[row["delay"]].append(float(row["seconds"]))
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise DelayError(f"{path}: no table of delay and seconds ({error}); make one by: metacontrol delays") from error
+    lacking = [kind for kind in KINDS if not samples[kind]]
+    if lacking or not all(math.isfinite(value) and value >= 0.0 for values in samples.values() for value in values):
+        raise DelayError(f"{path}: times below 0, or none of {', '.join(lacking)}; make it anew by: metacontrol delays")
+    return Delays(samples)
+
+
+def write_delays(path: Path, found: Iterable[tuple[str, float]]) -> None:
+    """Write a file of delays, in the order of kind and time."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["delay", "seconds"])
+        writer.writerows(
+            (kind, f"{value:.4f}") for kind, value in sorted(found, key=lambda d: (KINDS.index(d[0]), d[1]))
+        )
+
+
+def read_runs(path: Path) -> list[Run]:
+    """Read a file of runs; a last line that was cut off by an interruption is left out.
+
+    Raises:
+        CalibrationError: it is no such file.
+    """
+    if not path.exists():
+        return []
+    text = path.read_text(encoding="utf-8")
+    whole = text[: text.rfind("\n") + 1]
+    rows = csv.DictReader(whole.splitlines())
+    if whole and tuple(rows.fieldnames or ()) != _COLUMNS:
+        raise CalibrationError(f"{path}: its columns are not {', '.join(_COLUMNS)}; name another file of runs")
+    try:
+        return [_run(row) for row in rows]
+    except (TypeError, ValueError, KeyError) as error:
+        raise CalibrationError(f"{path}: line {rows.line_num} is no run ({error}); take it out") from error
+
+
+def append_runs(path: Path, runs: Iterable[Run]) -> Iterator[Run]:
+    """Write each run to the end of a file as it comes, and yield it: an interrupted calibration can go on."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(text[: text.rfind("\n") + 1])
+        writer = csv.writer(file, lineterminator="\n")
+        if not file.tell():
+            writer.writerow(_COLUMNS)
+        file.flush()
+        for run in runs:
+            writer.writerow(asdict(run).values())
+            file.flush()
+            yield run
+
+
+def write_levels(path: Path, runs: Sequence[Run]) -> None:
+    """Write the expected levels of all variants, with their spread, as `rosmodel generate all` reads them."""
+    seeds = sorted({run.seed for run in runs})
+    spreads = [f"{name}_spread" for name in QUALITIES]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["name", *QUALITIES, "source", *spreads, "missions", "seeds"])
+        for variant, levels in measure(runs).items():
+            own = [run for run in runs if run.variant == variant]
+            values = [f"{levels[name].value:.3f}" for name in QUALITIES]
+            deviations = [f"{levels[name].spread:.3f}" for name in QUALITIES]
+            writer.writerow([variant, *values, "measured", *deviations, len(own), f"{seeds[0]}-{seeds[-1]}"])
+
+
+def _run(row: dict[str, str]) -> Run:
+    """Return a line's run.
+
+    Raises:
+        TypeError, ValueError, KeyError: it is none.
+    """
+    kinds = {"str": str, "int": int, "float": float}
+    return Run(**{field.name: kinds[str(field.type)](row[field.name]) for field in fields(Run)})
