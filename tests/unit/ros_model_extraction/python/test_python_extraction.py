@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from pathlib import Path
 
@@ -444,7 +445,8 @@ def test_source_that_was_cut_up_is_read_or_refused_without_a_traceback(tmp_path,
     except SourceError as error:
         assert "cut.py:" in str(error)
     else:
-        assert all(port.is_resolved or "@cut.py:" in port.name for port in result.ports)
+        # The place may be in a module of the package that the cut one imports.
+        assert all(port.is_resolved or re.search(r"}.*@\S+\.py:\d+$", port.name) for port in result.ports)
 
 
 def test_hard_code_costs_no_more_than_a_bound(node):

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from tree_sitter import Node
 
-from ros_model_extraction.cpp.program import MAX_DEPTH, MAX_VALUES, Place, Program, as_text
+from ros_model_extraction.cpp.declarations import Place
+from ros_model_extraction.cpp.program import MAX_DEPTH, MAX_VALUES, Program, as_text
 from ros_model_extraction.cpp.syntax import arguments_of, parameters, text
 from ros_model_extraction.python.values import Const, Hole, Text, joined
 

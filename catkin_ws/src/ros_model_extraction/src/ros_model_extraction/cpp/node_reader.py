@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from ros_model.language.metamodel import PortKind, Position
 from tree_sitter import Node
 
+from ros_model_extraction.cpp.declarations import File, Place
 from ros_model_extraction.cpp.handles import Handles, in_namespace
-from ros_model_extraction.cpp.program import Place, Program
+from ros_model_extraction.cpp.program import Program
 from ros_model_extraction.cpp.syntax import arguments_of, parameter_types, template_arguments, text, type_text
 from ros_model_extraction.found import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
 from ros_model_extraction.python.values import Const, Text
@@ -43,20 +43,17 @@ _IMAGE = "sensor_msgs/Image"
 _CAMERA_INFO = "sensor_msgs/CameraInfo"
 
 
-def read_cpp_node(
-    sources: Sequence[Path], package_folder: Path, parameters: Callable[[str], Any] | None = None
+def node_of(
+    files: Sequence[File], remarks: Iterable[Remark] = (), parameters: Callable[[str], Any] | None = None
 ) -> NodeSource:
     """Return what C++ sources make of a node.
 
     Args:
-        sources: of the executable and of the package's libraries that it links.
-        package_folder: its package; positions name files relative to it.
+        files: the sources, then the headers that they include.
+        remarks: what is to be said of the files.
         parameters: the value of a parameter by its name as the code has it, or KeyError; without it, defaults count.
-
-    Raises:
-        SourceError: none of the sources can be read.
     """
-    program = Program(sources, package_folder)
+    program = Program(files)
     reader = _Reader(program, parameters)
     nodes = list(program.expressions())
     for node, place in nodes:  # first what parameters fill variables with, which names may depend on
@@ -64,8 +61,8 @@ def read_cpp_node(
             reader.parameter(node, place)
     for node, place in nodes:
         reader.read(node, place)
-    remarks = unique([*program.remarks, *reader.remarks])
-    return NodeSource(reader.node_name, tuple(reader.ports), tuple(reader.parameters), remarks, reader.position)
+    said = unique([*remarks, *reader.remarks])
+    return NodeSource(reader.node_name, tuple(reader.ports), tuple(reader.parameters), said, reader.position)
 
 
 class _Reader:

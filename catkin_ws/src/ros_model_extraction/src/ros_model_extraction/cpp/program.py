@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
-import tree_sitter_cpp
-from ros_model.language.metamodel import Position
-from tree_sitter import Language, Node, Parser
+from tree_sitter import Node
 
+from ros_model_extraction.cpp.declarations import Declared, File, Place, declarations, reset_pointer
 from ros_model_extraction.cpp.syntax import (
     arguments_of,
     child_of,
@@ -24,51 +21,13 @@ from ros_model_extraction.cpp.syntax import (
     type_text,
     walk,
 )
-from ros_model_extraction.found import Remark, SourceError
-from ros_model_extraction.io.source_files import read_source
 from ros_model_extraction.python.values import Const, Hole, Text, joined
 
 MAX_DEPTH = 16
 MAX_VALUES = 16
 
-_LANGUAGE = Language(tree_sitter_cpp.language())
 _KNOWN_TEXTS = {"ros::this_node::getName": "~", "ros::this_node::getNamespace": ""}
 _SAME_TEXT = ("std::string", "string", "ros::names::resolve", "ros::names::remap")
-_HEADERS = (".h", ".hpp", ".hh", ".hxx")
-
-
-@dataclass(frozen=True)
-class File:
-    """A source file: its path for people, its tree."""
-
-    shown: str
-    root: Node
-
-    def position(self, node: Node) -> Position:
-        """Return where a node stands."""
-        return Position(self.shown, node.start_point[0] + 1, node.start_point[1] + 1)
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where an expression stands: file, function (its definition, None outside), class ("" outside)."""
-
-    file: File
-    function: Node | None = None
-    owner: str = ""
-
-
-@dataclass(frozen=True)
-class Declared:
-    """A variable: its type, what it is made with (one value, or the arguments of a constructor), and where.
-
-    `is_indirect`: it is declared as a pointer (not a smart one) or a reference.
-    """
-
-    type: str
-    values: tuple[Node, ...]
-    place: Place
-    is_indirect: bool = False
 
 
 @dataclass
@@ -85,41 +44,20 @@ class _Index:
 class Program:
     """The sources of an executable, with the headers of its package that they include."""
 
-    def __init__(self, sources: Sequence[Path], package_folder: Path) -> None:
-        """Read and index them.
-
-        Raises:
-            SourceError: none of the sources can be read. Others are remarks.
-        """
-        self.files: list[File] = []
-        self.remarks: list[Remark] = []
-        self._folder = package_folder
+    def __init__(self, files: Sequence[File]) -> None:
+        """Index the files: sources, then the headers that they include."""
+        self._files = files
         self._index = _Index()
         self._locals: dict[int, dict[str, list[Declared]]] = {}
         self._fills: dict[tuple[str, str], list[tuple[Node | str | None, Place, str]]] = defaultdict(list)
-        parser = Parser(_LANGUAGE)
-        todo, seen = list(sources), set()
-        while todo:
-            path = todo.pop(0)
-            if path.resolve() in seen:
-                continue
-            seen.add(path.resolve())
-            try:
-                self.files.append(self._read(path, parser))
-            except SourceError as error:
-                self.remarks.append(error.remark)
-                continue
-            todo += self._included(self.files[-1], path)
-        if not self.files and self.remarks:
-            raise SourceError(self.remarks[0])
-        for file in reversed(self.files):  # headers, which declare, before the sources that include them
+        for file in reversed(files):  # headers, which declare, before the sources that include them
             self._index_file(file)
         for name, values, place in self._index.given:  # only now all declarations are known, wherever they stand
             self._give(name, values, place)
 
     def expressions(self) -> Iterator[tuple[Node, Place]]:
         """Yield every node with its place."""
-        for file in self.files:
+        for file in self._files:
             yield from self._walk(file.root, Place(file))
 
     def alias(self, type_name: str) -> str:
@@ -260,31 +198,6 @@ class Program:
 
     # --- the index
 
-    def _read(self, path: Path, parser: Parser) -> File:
-        shown = str(path.relative_to(self._folder)) if path.is_relative_to(self._folder) else str(path)
-        root = parser.parse(read_source(path, shown)).root_node
-        if root.has_error:
-            bad = next((node for node in walk(root) if node.is_error or node.is_missing), root)
-            position = Position(shown, bad.start_point[0] + 1, bad.start_point[1] + 1)
-            self.remarks.append(
-                Remark(position, "not read: this is no C++ that can be parsed; the rest of the file is")
-            )
-        return File(shown, root)
-
-    def _included(self, file: File, path: Path) -> Iterator[Path]:
-        for node in walk(file.root):
-            if node.type == "preproc_include":
-                name = text(child_of(node, "path")).strip('<>"')
-                for folder in (path.parent, self._folder / "include", self._folder / "src"):
-                    header = folder / name
-                    if (
-                        name.endswith(_HEADERS)
-                        and os.path.isfile(header)
-                        and header.resolve().is_relative_to(self._folder)
-                    ):
-                        yield header
-                        break
-
     def _index_file(self, file: File) -> None:
         for node, place in self._walk(file.root, Place(file)):
             match node.type:
@@ -301,7 +214,7 @@ class Program:
                 case "declaration" | "field_declaration":
                     self._index_declaration(node, place)
                 case "call_expression" | "new_expression":
-                    if reset := _reset(node):
+                    if reset := reset_pointer(node):
                         self._index.given.append((*reset, place))
                     name = text(node.child_by_field_name("function") or node.child_by_field_name("type"))
                     made = re.match(r"(?:\w+::)*make_(?:shared|unique)<(.*)>$", name)
@@ -313,7 +226,7 @@ class Program:
     def _index_declaration(self, node: Node, place: Place) -> None:
         if name := function_name(node):
             self._index.functions[name.rpartition("::")[2]].append((node, place))
-        for name, declared in _declarations(node, place):
+        for name, declared in declarations(node, place):
             if place.function is None and place.owner:
                 self._index.members[place.owner, name].append(declared)
             elif place.function is None:
@@ -369,10 +282,10 @@ class Program:
             found: dict[str, list[Declared]] = defaultdict(list)
             for node in walk(function):
                 if node.type == "declaration":
-                    for name, declared in _declarations(node, place):
+                    for name, declared in declarations(node, place):
                         found[name].append(declared)
                     continue
-                given = _reset(node)
+                given = reset_pointer(node)
                 if node.type == "assignment_expression":
                     given = text(child_of(node, "left")), (child_of(node, "right"),)
                 if given and given[0] in found:
@@ -383,42 +296,6 @@ class Program:
 
     def _is_local(self, name: str, place: Place) -> bool:
         return place.function is not None and (name in self._local(place) or name in parameters(place.function))
-
-
-def _declarations(node: Node, place: Place) -> Iterator[tuple[str, Declared]]:
-    """Yield the variables that a declaration declares."""
-    kind = type_text(node.child_by_field_name("type"))
-    for declarator in node.children_by_field_name("declarator"):
-        value: tuple[Node, ...] = ()
-        name_node = declarator
-        if declarator.type == "init_declarator":
-            given = declarator.child_by_field_name("value")
-            name_node = child_of(declarator, "declarator")
-            if given is not None:
-                is_list = given.type in ("argument_list", "initializer_list")
-                value = tuple(given.named_children) if is_list else (given,)
-        elif declarator.type == "function_declarator":
-            # `Type name(a, b);` may look like a function: its parameters are then the names of variables.
-            listed = declarator.child_by_field_name("parameters")
-            children = listed.named_children if listed else []
-            value = tuple(child.named_children[0] for child in children if child.named_children)
-            name_node = child_of(declarator, "declarator")
-        default = node.child_by_field_name("default_value")
-        if default is not None:
-            is_list = default.type in ("argument_list", "initializer_list")
-            value = tuple(default.named_children) if is_list else (default,)
-        shown = text(name_node)
-        is_indirect = shown.startswith(("*", "&"))
-        yield shown.lstrip("*& ").partition("[")[0].strip(), Declared(kind, value, place, is_indirect)
-
-
-def _reset(node: Node) -> tuple[str, tuple[Node, ...]] | None:
-    """Return the smart pointer that a call `pointer.reset(value)` gives a value, and the value."""
-    function = node.child_by_field_name("function") if node.type == "call_expression" else None
-    if function is None or function.type != "field_expression" or text(child_of(function, "field")) != "reset":
-        return None
-    arguments = arguments_of(node)
-    return (text(child_of(function, "argument")), (arguments[0],)) if arguments else None
 
 
 def _key(place: Place) -> str:

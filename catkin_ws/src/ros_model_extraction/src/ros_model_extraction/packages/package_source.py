@@ -101,7 +101,7 @@ def read_executable(
         from ros_model_extraction.python.node_reader import read_python_node
 
         return read_python_node(executable.sources[0], library, package.plugins, parameters)
-    from ros_model_extraction.cpp.node_reader import read_cpp_node
+    from ros_model_extraction.io.cpp_files import read_cpp_node
 
     return read_cpp_node(executable.sources, package.folder, parameters)
 

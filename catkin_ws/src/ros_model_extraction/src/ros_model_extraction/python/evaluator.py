@@ -9,23 +9,20 @@ from __future__ import annotations
 import ast
 import builtins
 import contextlib
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from dataclasses import replace
-from typing import Any, ClassVar
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
-from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.python import known as python_known
 from ros_model_extraction.python.callers import root_frame, skipped
-from ros_model_extraction.python.calls import MAX_VALUES, CallEvaluator, Given
+from ros_model_extraction.python.calls import MAX_VALUES
+from ros_model_extraction.python.expressions import ExpressionEvaluator
 from ros_model_extraction.python.modules import Binding, Module, Scope, at_end, reaching
-from ros_model_extraction.python.operations import is_number, operated
 from ros_model_extraction.python.values import (
     Class,
     Const,
     External,
     Frame,
     Function,
-    Hole,
     Instance,
     Items,
     ModuleValue,
@@ -33,15 +30,17 @@ from ros_model_extraction.python.values import (
     Results,
     Super,
     Table,
-    Text,
     Unknown,
     Value,
     World,
-    joined,
     source_of,
     text_of,
     weight,
 )
+
+if TYPE_CHECKING:
+    from ros_model_extraction.io.python_modules import Library
+
 
 MAX_STEPS = 3_000
 """Expressions looked at for one question; a hard one of the project's own packages takes some hundreds."""
@@ -57,7 +56,7 @@ _GET_PARAMETER = ("rospy.get_param", "rospy.client.get_param", "rospy.get_param_
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 
-class Evaluator(CallEvaluator):
+class Evaluator(ExpressionEvaluator):
     """Evaluates expressions of the modules of a library."""
 
     def __init__(self, library: Library, parameters: Callable[[str], Any] | None = None) -> None:
@@ -266,247 +265,6 @@ class Evaluator(CallEvaluator):
                 return values[0][0].scope if isinstance(values[0][0], Class) else None
         return None
 
-    def _dispatch(self, node: ast.expr, frame: Frame, world: World) -> Results:
-        method = self._METHODS.get(type(node))
-        found: Results = getattr(self, method)(node, frame, world) if method else [(Unknown(node), world)]
-        return found
-
-    _METHODS: ClassVar[dict[type[ast.expr], str]] = {
-        ast.Attribute: "_attribute_of",
-        ast.BinOp: "_operation",
-        ast.BoolOp: "_alternatives",
-        ast.Call: "_call",
-        ast.Constant: "_constant",
-        ast.Dict: "_dict",
-        ast.GeneratorExp: "_comprehension",
-        ast.IfExp: "_conditional",
-        ast.JoinedStr: "_f_string",
-        ast.List: "_literal",
-        ast.ListComp: "_comprehension",
-        ast.Name: "_name",
-        ast.NamedExpr: "_named",
-        ast.Set: "_literal",
-        ast.SetComp: "_comprehension",
-        ast.Subscript: "_subscript",
-        ast.Tuple: "_literal",
-        ast.UnaryOp: "_negation",
-    }
-
-    def _constant(self, node: ast.Constant, _frame: Frame, world: World) -> Results:
-        return [(Const(node.value), world)]
-
-    def _named(self, node: ast.NamedExpr, frame: Frame, world: World) -> Results:
-        return self.evaluate(node.value, frame, world)
-
-    def _negation(self, node: ast.UnaryOp, frame: Frame, world: World) -> Results:
-        results: Results = []
-        for value, w in self.evaluate(node.operand, frame, world):
-            is_known = isinstance(node.op, ast.USub) and isinstance(value, Const) and is_number(value.value)
-            results.append((Const(-value.value) if is_known and isinstance(value, Const) else Unknown(node), w))
-        return results
-
-    def _attribute_of(self, node: ast.Attribute, frame: Frame, world: World) -> Results:
-        return [
-            result
-            for value, w in self.evaluate(node.value, frame, world)
-            for result in self._member(value, node.attr, w)
-        ]
-
-    def _f_string(self, node: ast.JoinedStr, frame: Frame, world: World) -> Results:
-        found: list[tuple[list[Text], World]] = [([], world)]
-        for part in node.values:
-            following = []
-            for texts, w in found:
-                if not isinstance(part, ast.FormattedValue):
-                    results: Results = self.evaluate(part, frame, w)
-                elif part.format_spec is not None or part.conversion not in (-1, ord("s")):
-                    results = [(Unknown(part.value), w)]
-                else:
-                    results = self.evaluate(part.value, frame, w)
-                for value, after in results:
-                    whole = getattr(part, "value", part)
-                    text = None if isinstance(value, Unknown) else text_of(value)
-                    following.append(([*texts, text or Text((Hole(whole),))], after))
-            found = following[: MAX_VALUES + 1]
-        return [(joined(texts), w) for texts, w in found]
-
-    def _operation(self, node: ast.BinOp, frame: Frame, world: World) -> Results:
-        results: Results = []
-        for values, w in self.evaluate_all([Given(node.left), Given(node.right)], frame, world):
-            results.append((operated(node, *values), w))
-        return results
-
-    def _literal(self, node: ast.Tuple | ast.List | ast.Set, frame: Frame, world: World) -> Results:
-        found: list[tuple[list[Value], World]] = [([], world)]
-        for element in node.elts:
-            inner = element.value if isinstance(element, ast.Starred) else element
-            following = []
-            for values, before in found:
-                for value, after in self.evaluate(inner, frame, before):
-                    if not isinstance(element, ast.Starred):
-                        following.append(([*values, value], after))
-                    elif (items := python_known.elements(value)) is not None:
-                        following.append(([*values, *items], after))
-                    else:
-                        return [(Unknown(element), world)]
-            found = following[: MAX_VALUES + 1]
-        return [(Items(tuple(values)), w) for values, w in found]
-
-    def _dict(self, node: ast.Dict, frame: Frame, world: World) -> Results:
-        if any(key is None for key in node.keys):
-            return [(Unknown(node), world)]
-        nodes = [Given(part) for pair in zip(node.keys, node.values, strict=True) for part in pair if part]
-        return [
-            (Table(tuple(zip(values[::2], values[1::2], strict=True))), w)
-            for values, w in self.evaluate_all(nodes, frame, world)
-        ]
-
-    def _subscript(self, node: ast.Subscript, frame: Frame, world: World) -> Results:
-        results: Results = []
-        for (value, index), w in self.evaluate_all([Given(node.value), Given(node.slice)], frame, world):
-            found: Value | None = None
-            if isinstance(index, Const):
-                match value:
-                    case Items(values) if isinstance(index.value, int) and -len(values) <= index.value < len(values):
-                        found = values[index.value]
-                    case Table(items):
-                        found = next((item for key, item in items if key == index), None)
-            elif among := _among(value):  # which one is not known: any
-                for number, chosen in self.choose(("item", node, frame), len(among), w):
-                    results.append((among[number], chosen))
-                continue
-            results.append((found or Unknown(node), w))
-        return results
-
-    def _conditional(self, node: ast.IfExp, frame: Frame, world: World) -> Results:
-        results: Results = []
-        for test, w in self.evaluate(node.test, frame, world):
-            if isinstance(test, Const):
-                results += self.evaluate(node.body if test.value else node.orelse, frame, w)
-                continue
-            branches = (node.body, node.orelse)
-            for index, chosen in self.choose(("if", node, frame), 2, w):
-                results += self.evaluate(branches[index], frame, chosen)
-        return results
-
-    def _alternatives(self, node: ast.BoolOp, frame: Frame, world: World) -> Results:
-        """`a or b`: a where it is known to count, else either."""
-        if not isinstance(node.op, ast.Or):
-            return [(Unknown(node), world)]
-        results: Results = []
-        for index, chosen in self.choose(("or", node, frame), len(node.values), world):
-            is_last = index == len(node.values) - 1
-            for value, w in self.evaluate(node.values[index], frame, chosen):
-                if is_last or not (isinstance(value, Const) and not value.value):
-                    results.append((value, w))
-            if index == 0 and results and all(isinstance(v, Const) and v.value for v, _ in results):
-                break
-        return results
-
-    def _comprehension(
-        self, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame, world: World
-    ) -> Results:
-        inner = Frame(frame.scope.module.scopes[node], frame)
-        values = []
-        for value, _ in self.evaluate(node.elt, inner, world):
-            values.append(value)
-        if any(generator.ifs for generator in node.generators) or any(isinstance(value, Unknown) for value in values):
-            return [(Unknown(node), world)]
-        return [(Items(tuple(values)), world)]
-
-    def _member(self, value: Value, name: str, world: World) -> Results:
-        found: Results = []
-        match value:
-            case External(outside):
-                found = [(External(f"{outside}.{name}"), world)]
-            case ModuleValue(module):
-                found = self._module_member(module, name, world)
-            case Class(scope):
-                found = self._class_member(scope, name, None, world)
-            case Instance(scope):
-                found = self._attribute(value, name, world)
-            case Super(instance, after):
-                classes = self.program.bases(instance.scope)
-                start = classes.index(after) + 1 if after in classes else len(classes)
-                found = self._inherited(classes[start:], name, instance, world)
-            case Const() if name == "value":  # of a member of an Enum
-                found = [(value, world)]
-        return found or [(Unknown(name), world)]
-
-    def _class_member(self, scope: Scope, name: str, instance: Instance | None, world: World) -> Results:
-        if name == "__name__":
-            return [(Const(scope.name), world)]
-        return self._inherited(self.program.bases(scope), name, instance, world)
-
-    def _inherited(
-        self, classes: Iterable[Scope | External], name: str, instance: Instance | None, world: World
-    ) -> Results:
-        for base in classes:
-            if isinstance(base, External):
-                if base.name in ("builtins.object", "?"):
-                    continue
-                return [(External(f"{base.name}.{name}"), world)]
-            method = self.program.method(base, name)
-            if method and instance and method.decorators & {"property", "cached_property"}:
-                frame = replace(root_frame(method), instance=instance)
-                return self._returned(method, frame, world)
-            if method:
-                return [(Function(method, root_frame(base), instance), world)]
-            values = [b for b in base.bindings.get(name, ()) if b.how == "value" or b.annotation]
-            if values:
-                return self._bound(values[-1:], root_frame(base), world)
-        return [(Unknown(name), world)]
-
-    def _attribute(self, instance: Instance, name: str, world: World) -> Results:
-        """Return what an attribute of an object may hold: what its methods assign, its fields, its class's members."""
-        classes = [base for base in self.program.bases(instance.scope) if isinstance(base, Scope)]
-        if name == "__class__":
-            return [(Class(instance.scope), world)]
-        assigned = [
-            (binding, method)
-            for base in classes
-            for method in base.inner
-            for binding in _assigned(method, name)
-            if method.owner is base
-        ]
-        if assigned:
-            results: Results = []
-            for index, chosen in self.choose(("attribute", instance, name), len(assigned), world):
-                binding, method = assigned[index]
-                if method.name == "__init__" and method.owner:
-                    frame = self.construction(instance, method.owner)
-                else:
-                    frame = replace(root_frame(method), instance=instance)
-                results += self._binding(binding, frame, chosen)
-            known = [(v, w) for v, w in results if not (isinstance(v, Const) and v.value is None)]
-            return known or results
-        if field := self._field(instance, name, classes, world):
-            return field
-        return self._class_member(instance.scope, name, instance, world)
-
-    def _field(self, instance: Instance, name: str, classes: Sequence[Scope], world: World) -> Results:
-        """Return what was given for a field of a dataclass or named tuple; nothing where it is none."""
-        if instance.call is None or instance.frame is None or any(self.program.method(c, "__init__") for c in classes):
-            return []
-        fields = [
-            field
-            for base in reversed(classes)
-            for field, bindings in base.bindings.items()
-            if any(b.annotation is not None for b in bindings)
-        ]
-        if name not in fields:
-            return []
-        results: Results = []
-        for arguments, w in self.arguments(instance.call, instance.frame, world):
-            given = arguments.get(fields.index(name), name)
-            if given is not None:
-                results += self.given(given, instance.frame, w)
-            elif arguments.is_open:
-                results.append((Unknown(name), w))
-            else:
-                results += self._inherited(classes, name, None, w)
-        return results
-
     def _call(self, node: ast.Call, frame: Frame, world: World) -> Results:
         results: Results = []
         if isinstance(node.func, ast.Attribute):
@@ -598,15 +356,6 @@ class Evaluator(CallEvaluator):
         return results
 
 
-def _among(value: Value) -> tuple[Value, ...]:
-    match value:
-        case Items(values):
-            return values
-        case Table(items):
-            return tuple(item for _, item in items)
-    return ()
-
-
 def _at(value: Value, binding: Binding) -> Value:
     """Return the element of a value at the path that a binding unpacks."""
     for index in binding.path:
@@ -615,11 +364,3 @@ def _at(value: Value, binding: Binding) -> Value:
             return Unknown(binding.name)
         value = items[index]
     return value
-
-
-def _assigned(method: Scope, attribute: str) -> Iterator[Binding]:
-    """Yield what a method assigns to an attribute of its object, in functions inside it too."""
-    arguments = getattr(method.node, "args", None)
-    if not isinstance(arguments, ast.arguments) or not arguments.args:
-        return
-    yield from method.bindings.get(f"{arguments.args[0].arg}.{attribute}", ())

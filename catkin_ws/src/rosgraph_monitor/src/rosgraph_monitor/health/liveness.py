@@ -93,17 +93,20 @@ def due_at(state: Liveness, timing: Timing) -> float:
 
 
 def on_connected(state: Liveness, now: float) -> Liveness:
-    """The connection stands: ask at once. Being accepted is no sign of life yet, the kernel does that."""
+    """Return the state once the connection stands: ask at once.
+
+    Being accepted is no sign of life yet: the kernel does that.
+    """
     return replace(state, connecting_since=None, connected=True, asked_at=None, next_at=now)
 
 
 def on_answer(state: Liveness, now: float, timing: Timing) -> Liveness:
-    """The node has answered a probe."""
+    """Return the state after the node has answered a probe."""
     return replace(state, life=Life.ALIVE, asked_at=None, next_at=now + timing.probe_period, fruitless=0)
 
 
 def on_closed(state: Liveness, now: float, timing: Timing) -> Liveness:
-    """The connection that stood was closed by the other end: try again before judging, at once if that helps.
+    """Return the state after the other end closed the connection: try again before judging, at once if that helps.
 
     A server that goes on closing without an answer is no better than one that hangs.
     """
@@ -114,17 +117,17 @@ def on_closed(state: Liveness, now: float, timing: Timing) -> Liveness:
 
 
 def on_broken(state: Liveness, error: int, now: float, timing: Timing) -> Liveness:
-    """The connection that stood failed with this errno: the host is lost, or the other end reset it."""
+    """Return the state after the connection failed with this errno: the host is lost, or the other end reset it."""
     return on_unreachable(state, now, timing) if error in _NO_WAY else on_closed(state, now, timing)
 
 
 def on_no_socket(state: Liveness, now: float, timing: Timing) -> Liveness:
-    """This process could not make a socket: that says nothing of the node."""
+    """Return the state after this process could not make a socket, which says nothing of the node."""
     return replace(state, connecting_since=None, next_at=now + timing.retry_period)
 
 
 def on_connect_error(state: Liveness, error: int, now: float, timing: Timing) -> Liveness:
-    """An attempt to connect failed with this errno.
+    """Return the state after an attempt to connect failed with this errno.
 
     A process that ends in the middle of it resets the connection: the host was reached, so that counts as closed.
     """
@@ -136,10 +139,10 @@ def on_connect_error(state: Liveness, error: int, now: float, timing: Timing) ->
 
 
 def on_refused(_state: Liveness, now: float, timing: Timing) -> Liveness:
-    """An attempt to connect was refused: nobody is there."""
+    """Return the state after an attempt to connect was refused: nobody is there."""
     return Liveness(life=Life.DEAD, next_at=now + timing.retry_period)
 
 
 def on_unreachable(_state: Liveness, now: float, timing: Timing) -> Liveness:
-    """An attempt to connect found no way to the host, or its name has no address."""
+    """Return the state after no way led to the host, or its name had no address."""
     return Liveness(life=Life.UNREACHABLE, next_at=now + timing.retry_period)

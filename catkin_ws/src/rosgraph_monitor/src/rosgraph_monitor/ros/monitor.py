@@ -133,7 +133,7 @@ class MonitorNode:
         self._events.set()
 
     def _on_life(self) -> None:
-        """A node died or came back: find out whether it has unregistered or has another address, then evaluate."""
+        """Poll after a node died or came back: it may have unregistered, or have another address. Then evaluate."""
         self._polled.clear()
         self._poller.request()
         self._events.set()

@@ -1,0 +1,89 @@
+"""Reads C++ sources, with the headers of their package that they include."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import tree_sitter_cpp
+from ros_model.language.metamodel import Position
+from tree_sitter import Language, Parser
+
+from ros_model_extraction.cpp.declarations import File
+from ros_model_extraction.cpp.node_reader import node_of
+from ros_model_extraction.cpp.syntax import (
+    child_of,
+    text,
+    walk,
+)
+from ros_model_extraction.found import NodeSource, Remark, SourceError
+from ros_model_extraction.io.source_files import read_source
+
+_LANGUAGE = Language(tree_sitter_cpp.language())
+_HEADERS = (".h", ".hpp", ".hh", ".hxx")
+
+
+def read_cpp_node(
+    sources: Iterable[Path], package_folder: Path, parameters: Callable[[str], Any] | None = None
+) -> NodeSource:
+    """Return what C++ sources make of a node.
+
+    Args:
+        sources: of the executable and of the package's libraries that it links.
+        package_folder: its package; positions name files relative to it.
+        parameters: the value of a parameter by its name as the code has it, or KeyError; without it, defaults count.
+
+    Raises:
+        SourceError: none of the sources can be read.
+    """
+    files, remarks = _read_files(sources, package_folder)
+    return node_of(files, remarks, parameters)
+
+
+def _read_files(sources: Iterable[Path], package_folder: Path) -> tuple[list[File], list[Remark]]:
+    """Return the sources and then the headers, and remarks about those that can't be read.
+
+    Raises:
+        SourceError: none of the sources can be read.
+    """
+    files: list[File] = []
+    remarks: list[Remark] = []
+    parser = Parser(_LANGUAGE)
+    todo, seen = list(sources), set()
+    while todo:
+        path = todo.pop(0)
+        if path.resolve() in seen:
+            continue
+        seen.add(path.resolve())
+        try:
+            files.append(_read(path, package_folder, parser, remarks))
+        except SourceError as error:
+            remarks.append(error.remark)
+            continue
+        todo += _included(files[-1], path, package_folder)
+    if not files and remarks:
+        raise SourceError(remarks[0])
+    return files, remarks
+
+
+def _read(path: Path, folder: Path, parser: Parser, remarks: list[Remark]) -> File:
+    shown = str(path.relative_to(folder)) if path.is_relative_to(folder) else str(path)
+    root = parser.parse(read_source(path, shown)).root_node
+    if root.has_error:
+        bad = next((node for node in walk(root) if node.is_error or node.is_missing), root)
+        position = Position(shown, bad.start_point[0] + 1, bad.start_point[1] + 1)
+        remarks.append(Remark(position, "not read: this is no C++ that can be parsed; the rest of the file is"))
+    return File(shown, root)
+
+
+def _included(file: File, path: Path, folder: Path) -> Iterator[Path]:
+    for node in walk(file.root):
+        if node.type == "preproc_include":
+            name = text(child_of(node, "path")).strip('<>"')
+            for place in (path.parent, folder / "include", folder / "src"):
+                header = place / name
+                if name.endswith(_HEADERS) and os.path.isfile(header) and header.resolve().is_relative_to(folder):
+                    yield header
+                    break
