@@ -59,6 +59,8 @@ def main() -> None:
             os.close(log)
     os.chdir(role["cwd"])
     sys.argv = [script, *role["arguments"]]
+    if "rospy" in sys.modules:  # it takes names and remappings from the arguments when it is imported
+        sys.modules["rospy"].names.reload_mappings(sys.argv)
     runpy.run_path(script, run_name="__main__")
 
 
