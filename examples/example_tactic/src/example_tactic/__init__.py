@@ -1,0 +1,1 @@
+"""A tactic of the manipulator."""
