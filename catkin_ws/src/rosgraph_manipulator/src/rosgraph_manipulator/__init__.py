@@ -1,1 +1,1 @@
-"""R4: deploys a configuration of the system."""
+"""Changes the configuration of a running system: the last step of the adaptation loop, R4."""

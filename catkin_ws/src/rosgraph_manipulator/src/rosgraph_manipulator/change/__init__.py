@@ -1,1 +1,1 @@
-"""Changes of configuration: tactics, order, journal, and supervision of what runs. Pure."""
+"""Changes of configuration: the plans, their order, the way back, the requests and the journal. Pure."""

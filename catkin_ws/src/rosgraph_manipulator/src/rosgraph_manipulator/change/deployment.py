@@ -1,4 +1,4 @@
-"""One change of configuration: the plans one after the other, and the way back when none gets there."""
+"""One change of configuration: try the plans in order, and restore the last good configuration when all fail."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Result(enum.IntEnum):
 
 
 class DeploymentError(Exception):
-    """A step of a deployment failed; the message says which and why."""
+    """A step of a deployment failed; the message says which one and why."""
 
 
 class CancelledError(DeploymentError):
-    """The request was taken back, or, where it is superseded, another one takes its place at once."""
+    """The request was cancelled. Where it is superseded, another request follows at once, so nothing is restored."""
 
     def __init__(self, message: str, superseded: bool = False) -> None:
         super().__init__(message)
@@ -36,22 +36,22 @@ class CancelledError(DeploymentError):
 
 
 class ChangeExecutor(StepExecutor, Protocol):
-    """What a deployment needs of the running system; the calls block, and raise DeploymentError."""
+    """What a deployment does to the running system. The calls block, and raise DeploymentError."""
 
     def begin(self, wanted: Configuration, plan: Plan) -> None:
-        """Prepare the way to a configuration by a plan; nothing is touched."""
+        """Begin a plan for a configuration; nothing is touched yet."""
 
     def wait_until_ready(self) -> None:
-        """Wait until the wanted configuration's nodes answer and what it offers is there."""
+        """Wait until the nodes of the wanted configuration answer, and its topics and its action server are there."""
 
     def wait_until_settled(self) -> None:
-        """Wait until nodes that were started are past the age at which most that die early are dead."""
+        """Wait for the settling time, in which a node with a fault at its start would die."""
 
     def restore(self, configuration: Configuration) -> None:
-        """Stop what runs, and start all of a configuration."""
+        """Stop all nodes that run, and start all nodes of a configuration."""
 
     def stop_everything(self) -> None:
-        """Stop what the launcher runs, and the robot."""
+        """Stop all nodes that the launcher runs, and stop the robot."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,11 @@ class Outcome:
     """How a request ended.
 
     Attributes:
-        result: the code.
-        running: the configuration that runs now; None: none does, or, where a request was superseded, a part of one.
+        result: the result code.
+        running: the configuration that runs now. None: no complete configuration runs.
         message: why, in one line.
         tactic: name of the tactic that got there, `rollback`, or empty.
-        cancelled: whether the request was taken back.
+        cancelled: whether the request was cancelled.
     """
 
     result: Result
@@ -75,14 +75,14 @@ class Outcome:
 
 @dataclass
 class Stopwatch:
-    """Durations of a change's phases, s, in the order in which they first began."""
+    """Measures the phases of a change, in s; a phase that comes twice is added up."""
 
     clock: Callable[[], float]
     phases: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
-        """Add the time that the body takes to a phase."""
+        """Measure the time of the body, and add it to a phase."""
         self.phases.setdefault(name, 0.0)
         began = self.clock()
         try:
@@ -92,7 +92,7 @@ class Stopwatch:
 
 
 def durations(phases: Mapping[str, float], launcher_phases: Mapping[str, float], ok: bool) -> dict[str, float]:
-    """Return the durations of a change's phases; the launcher's own take the place of `change` where all went well."""
+    """Return the durations of a change's phases, s. Where all went well, the launcher's phases replace `change`."""
     found: dict[str, float] = {}
     for name, duration in phases.items():
         found.update(launcher_phases if ok and name == "change" else {name: duration})
@@ -106,14 +106,14 @@ def deploy(
     last_good: Configuration | None,
     watch: Stopwatch,
 ) -> Outcome:
-    """Carry out the first plan that gets to the wanted configuration; where none does, restore the last good one.
+    """Carry out plans until one succeeds; where none does, restore the last good configuration.
 
     Args:
-        executor: the running system.
+        executor: carries out steps on the running system.
         wanted: the configuration to deploy.
-        plans: cheapest first.
-        last_good: what ran before and may be restored; None: there is nothing to go back to.
-        watch: takes the durations.
+        plans: the plans, cheapest first.
+        last_good: the configuration to restore; None: there is none.
+        watch: measures the phases.
     """
     reasons: list[str] = []
     touched = False

@@ -1,4 +1,4 @@
-"""What becomes of a request that comes while another one is carried out."""
+"""What happens to a request that arrives while another one is carried out."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from dataclasses import dataclass
 
 
 class Policy(enum.Enum):
-    """What a new request does."""
+    """What a new request does while another one is carried out."""
 
-    WAIT = "wait"  # its turn comes
-    REPLACE = "replace"  # it takes the place of all others: the running one is given up at once
-    REFUSE = "refuse"  # it is refused while another one runs
+    WAIT = "wait"  # it waits for its turn
+    REPLACE = "replace"  # it replaces all others: the running one is interrupted at once
+    REFUSE = "refuse"  # it is refused
 
 
 @dataclass(frozen=True)
 class Arrival:
-    """What a new request does to itself and to others.
+    """What happens when a request arrives.
 
     Attributes:
         accepted: whether it will be carried out.
-        dropped: requests that waited and will not be carried out any more.
-        interrupts: whether the running one is to be given up.
+        dropped: waiting requests that will not be carried out.
+        interrupts: whether the running request must be interrupted.
     """
 
     accepted: bool
@@ -30,7 +30,7 @@ class Arrival:
 
 
 class RequestQueue:
-    """Requests by their ids: one runs, others may wait."""
+    """The ids of requests: one runs, others may wait."""
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
@@ -39,11 +39,11 @@ class RequestQueue:
 
     @property
     def running(self) -> str | None:
-        """The request that is carried out."""
+        """The request that is carried out; None: none is."""
         return self._running
 
     def arrive(self, request: str) -> Arrival:
-        """Take in a new request."""
+        """Add a new request, and return what happens."""
         if self._policy is Policy.REFUSE and (self._running or self._waiting):
             return Arrival(accepted=False)
         dropped: tuple[str, ...] = ()
@@ -53,19 +53,19 @@ class RequestQueue:
         return Arrival(True, dropped, interrupts=self._policy is Policy.REPLACE and self._running is not None)
 
     def take_back(self, request: str) -> bool:
-        """Take a request back that waits; return False where it does not wait (any more)."""
+        """Remove a waiting request; return False where it does not wait."""
         if request not in self._waiting:
             return False
         self._waiting.remove(request)
         return True
 
     def next(self) -> str | None:
-        """Begin with the next request, when none runs; return it, or None."""
+        """Begin the next request where none runs, and return it; None where there is nothing to begin."""
         if self._running is None and self._waiting:
             self._running = self._waiting.pop(0)
             return self._running
         return None
 
     def finish(self) -> None:
-        """Note that the running request is done with."""
+        """Note that the running request has ended."""
         self._running = None

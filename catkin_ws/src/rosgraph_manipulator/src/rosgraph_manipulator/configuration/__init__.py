@@ -1,1 +1,1 @@
-"""Configurations: which launch file deploys which, and what they consist of."""
+"""Configurations: the launch file of each, the nodes and parameters in it, and how two of them differ. Pure."""

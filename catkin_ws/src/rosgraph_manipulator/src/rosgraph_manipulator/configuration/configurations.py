@@ -122,7 +122,7 @@ def _configuration(name: str, entry: object, find_launch_file: FindLaunchFile) -
 
 
 def _parse_command(where: str, command: str) -> tuple[str, list[str]]:
-    """Read the published `roslaunch PKG FILE [ARG:=VALUE ...]`; it is never given to a shell."""
+    """Return the launch file's address and the arguments of `roslaunch PKG FILE [ARG:=VALUE ...]`. No shell sees it."""
     try:
         words = shlex.split(command)
     except ValueError as error:
@@ -137,10 +137,10 @@ def _parse_command(where: str, command: str) -> tuple[str, list[str]]:
 
 
 def action_type(text: object, parameter: str) -> str:
-    """Turn the published `PKG.msg.TYPEAction` (or `PKG/TYPEAction`) into `PKG/TYPEAction`.
+    """Return an action's type as `PKG/TYPEAction`, from that or from the published `PKG.msg.TYPEAction`.
 
     Raises:
-        ConfigurationError: it is neither.
+        ConfigurationError: the text has another form.
     """
     match = re.fullmatch(r"([a-z]\w*)(?:\.msg\.|/)([A-Z]\w*Action)", str(text))
     if not match:

@@ -1,4 +1,4 @@
-"""What a configuration consists of, and how two of them differ."""
+"""The nodes and parameters of a configuration, and how two configurations differ."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ QUALITY_PREFIX = "qa_"  # of the global parameters that hold a system's expected
 
 @dataclass(frozen=True)
 class NodeDescription:
-    """One node as a launch file has it.
+    """A node in a launch file.
 
     Attributes:
-        name: resolved name in the graph.
-        namespace: the one that it is started in.
-        package: of the executable.
-        executable: its file name.
-        args: command line arguments in one text.
+        name: full name in the ROS graph.
+        namespace: namespace in which it is started.
+        package: package of its executable.
+        executable: file name of its executable.
+        args: its command line arguments, in one text.
         remaps: pairs (from, to).
-        environment: pairs (variable, value) beside the launcher's own.
-        cwd: `node`, a word that roslaunch knows, or None.
+        environment: pairs (variable, value) that are added to the launcher's environment.
+        cwd: `node`, `ROS_HOME`, `cwd` or None, as in roslaunch.
         output: `log` or `screen`.
-        respawn: whether the launch file wants it started again even after a clean end.
-        launch_prefix: words before the command, or None.
-        parameters: private ones, by their name relative to the node's.
+        respawn: whether it is started again even after it ended with status 0.
+        launch_prefix: words before its command, or None.
+        parameters: its private parameters, by their names relative to the node's.
     """
 
     name: str
@@ -44,7 +44,12 @@ class NodeDescription:
 
 @dataclass(frozen=True)
 class SystemDescription:
-    """The nodes that a configuration starts, by resolved name, and the parameters that belong to none of them."""
+    """What a configuration starts.
+
+    Attributes:
+        nodes: its nodes, by full name.
+        parameters: the parameters outside the namespaces of its nodes, by full name.
+    """
 
     nodes: Mapping[str, NodeDescription] = field(default_factory=dict)
     parameters: Mapping[str, Any] = field(default_factory=dict)
@@ -59,16 +64,16 @@ class SystemDescription:
 
 @dataclass(frozen=True)
 class Difference:
-    """What has to change on the way from one configuration to another; names are in the wanted one's order.
+    """What differs between two configurations. Names are in the order of the wanted one.
 
     Attributes:
-        running: where the way begins.
-        wanted: where it ends.
+        running: the configuration that runs.
+        wanted: the configuration to deploy.
         starts: nodes that only the wanted configuration has.
-        stops: nodes that only the running one has.
-        replaced: nodes of both that differ in more than values of parameters.
-        parameters: by node of both that is not replaced, the private parameters that get another value.
-        shared: parameters of no node that get another value, by full name.
+        stops: nodes that only the running configuration has.
+        replaced: nodes of both that differ in more than the values of parameters.
+        parameters: the private parameters with a new value, for each node of both that is not replaced.
+        shared: parameters outside the nodes' namespaces that get a new value, by full name.
     """
 
     running: SystemDescription
@@ -81,16 +86,16 @@ class Difference:
 
     @property
     def touches_nodes(self) -> bool:
-        """Whether any node has to do something else than it does."""
+        """Whether any node must be started, stopped or replaced, or gets new parameters."""
         return bool(self.starts or self.stops or self.replaced or self.parameters)
 
 
 def compare(running: SystemDescription, wanted: SystemDescription) -> Difference:
-    """Return what has to change.
+    """Return what differs.
 
-    A shared parameter that changes replaces every node, since any may have read it at its start; expected quality
-    levels are read by none. A parameter that the wanted configuration leaves out replaces its node: the node must see
-    what it finds at a start.
+    A shared parameter that changes replaces all nodes, because any node may have read it at its start. Expected quality
+    levels are an exception: no node reads them. A node is also replaced where the wanted configuration lacks one of
+    its parameters, because a running node does not notice that a parameter was deleted.
     """
     both = [name for name in wanted.nodes if name in running.nodes]
     shared = _changed(running.parameters, wanted.parameters)
@@ -125,7 +130,7 @@ def _changed(running: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[str,
 
 
 def same_value(one: Any, other: Any) -> bool:
-    """Whether two values of a parameter are the same: 1 and 1.0 are, 1 and true are not."""
+    """Tell whether two values of a parameter are the same: 1 and 1.0 are, 1 and true are not."""
     if isinstance(one, bool) != isinstance(other, bool):
         return False
     if isinstance(one, dict) and isinstance(other, dict):

@@ -1,1 +1,1 @@
-"""The pending goal of an action across changes of its server. Pure."""
+"""The pending goal of an action, which outlives its server. Pure."""

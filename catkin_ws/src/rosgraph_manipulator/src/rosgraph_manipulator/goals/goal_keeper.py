@@ -1,6 +1,6 @@
-"""Keeps the pending goal of an action across a change of its server.
+"""Keeps the pending goal of an action while its server is replaced.
 
-Works on action messages of any type: it reads only the goal ids and states that actionlib defines.
+It works with action messages of any type: it reads only the goal ids and states that actionlib defines.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ CONFIRMATIONS = 3  # statuses with a goal at work, every 0.2 s: more than a serv
 
 
 class GoalKeeper:
-    """The newest goal of one action server that is neither finished nor cancelled."""
+    """Knows the newest goal of an action that is neither finished nor cancelled."""
 
     def __init__(self) -> None:
         self._goal: Any = None
@@ -45,12 +45,12 @@ class GoalKeeper:
 
     @property
     def is_at_work(self) -> bool:
-        """Whether the server's last status has the pending goal as one that it works at or will."""
+        """Whether the server's last status lists the pending goal as PENDING or ACTIVE."""
         return self.pending_id in self._listed
 
     @property
     def strays(self) -> frozenset[str]:
-        """Goals that the server has at work though they are not pending: they were cancelled or replaced meanwhile."""
+        """Goals that the server works at although they were cancelled or replaced while it was being started."""
         return self._listed - {self.pending_id}
 
     @property
@@ -59,21 +59,21 @@ class GoalKeeper:
         return self._changing
 
     def adopt(self, goal: Any) -> None:
-        """Take over a goal from an earlier keeper, until the server's status shows that it has ended meanwhile."""
+        """Begin with the pending goal of an earlier keeper, unless the server's next status shows that it has ended."""
         self._goal, self._doubted = copy.deepcopy(goal), True
 
     def server_changes(self, changing: bool) -> None:
-        """Tell that the server is being replaced: that it drops the goal meanwhile does not end the goal."""
+        """Note whether the server is being replaced. A goal that it drops meanwhile stays pending."""
         self._changing, self._cancelled = changing, None
 
     def on_goal(self, goal: Any) -> None:
-        """Take in a message of the topic `goal`; a newer goal replaces the pending one."""
+        """Process a message of the topic `goal`; a newer goal replaces the pending one."""
         if goal.goal_id.id and goal.goal_id.id in self._finished:
             return
         self._goal, self._doubted, self._cancelled = copy.deepcopy(goal), False, None
 
     def on_status(self, status: Any) -> None:
-        """Take in a message of the topic `status`: it ends goals, and names those sent without an id."""
+        """Process a message of the topic `status`: goals end, and a goal that was sent without an id gets one."""
         self._listed = frozenset(entry.goal_id.id for entry in status.status_list if entry.status in AT_WORK)
         for entry in status.status_list:
             goal_id, state = entry.goal_id.id, entry.status
@@ -89,10 +89,10 @@ class GoalKeeper:
             self._doubted = False
 
     def _doubt_cancellation(self) -> None:
-        """See whether the server goes on with a cancelled goal.
+        """Make a cancelled goal pending again where the server still works at it.
 
-        A client that cancels all goals and sends a new one does so on two topics, which may arrive here the other way
-        round than at the server.
+        A client may cancel all goals and then send a new one, on two topics. The two messages may arrive here in
+        another order than at the server.
         """
         if self._cancelled is None:
             return
@@ -106,12 +106,12 @@ class GoalKeeper:
             self._finished.pop(goal_id, None)
 
     def on_result(self, result: Any) -> None:
-        """Take in a message of the topic `result`."""
+        """Process a message of the topic `result`."""
         if result.status.status in TERMINAL:
             self._end(result.status.goal_id.id, result.status.status)
 
     def on_cancel(self, cancel: Any) -> None:
-        """Take in a message of the topic `cancel`, by actionlib's rules: by id, up to a time, or all."""
+        """Process a message of the topic `cancel`, by actionlib's rules: by id, up to a time, or all."""
         if self._goal is None:
             return
         goal_id = self._goal.goal_id

@@ -1,6 +1,6 @@
-"""What the relay of an action does with its goals while the server behind it comes and goes.
+"""What the relay of an action does with a goal while the server behind it is replaced.
 
-Clients see one goal at work from the beginning to the end, whatever server pursues it.
+A client sees one goal from the beginning to the end, whichever server pursues it.
 """
 
 from __future__ import annotations
@@ -27,31 +27,31 @@ class Link:
     """One goal of a client.
 
     Attributes:
-        sent: whether the server behind has it.
-        cancelled: whether its client has taken it back.
+        sent: whether the goal was sent to the server that is there now.
+        cancelled: whether the client has cancelled it.
     """
 
     sent: bool = False
     cancelled: bool = False
 
     def needs_sending(self, changing: bool) -> bool:
-        """Whether the goal is to be sent to the server behind; not while that is being replaced."""
+        """Tell whether the goal must be sent to the server; not while the server is being replaced."""
         return not (self.sent or self.cancelled or changing)
 
     def cancel(self) -> Ending | None:
-        """Take the goal back; it ends at once where no server has it, else when the server says so."""
+        """Cancel the goal. Return how it ends where no server has it; None where the server must end it."""
         self.cancelled = True
         return None if self.sent else Ending.CANCELLED
 
     def ended_behind(self, state: int, changing: bool) -> Ending | None:
-        """Take in that the goal has ended at the server behind.
+        """Process the end of the goal at the server.
 
         Args:
-            state: its last state there; LOST: the server knows nothing of it, so it is another one.
-            changing: whether the server is being replaced, so that it may have dropped the goal for that.
+            state: its last state there. LOST means that a new server does not know the goal.
+            changing: whether the server is being replaced, and may have dropped the goal for that reason.
 
         Returns:
-            How it ends for the client; None: it does not, and is to be sent again.
+            How the goal ends for the client; None: it goes on, and must be sent again.
         """
         self.sent = False
         if state == GoalStatus.SUCCEEDED:

@@ -1,4 +1,4 @@
-"""Reads launch files, through roslaunch, into descriptions; and turns a node's description into a command."""
+"""Reads launch files through roslaunch, and makes commands of their nodes."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class LaunchFileError(Exception):
 
 @dataclass(frozen=True)
 class LaunchFile:
-    """What a launch file asks for.
+    """The content of a launch file.
 
     Attributes:
-        system: nodes and parameters.
-        clear: full names of parameters to delete first.
-        commands: `rosparam` calls (arguments) to run first.
+        system: its nodes and parameters.
+        clear: full names of the parameters to delete before any is set.
+        commands: the `rosparam` calls to make before that, each as a tuple of words.
     """
 
     system: SystemDescription
@@ -48,7 +48,7 @@ def read_launch_file(path: str | Path, args: Sequence[str] = ()) -> LaunchFile:
     """Read a launch file with its arguments (`NAME:=VALUE`).
 
     Raises:
-        LaunchFileError: it is missing or malformed, starts nothing, or wants what can't be done here.
+        LaunchFileError: the file is missing or malformed, starts no node, or has nodes for another machine.
     """
     config = roslaunch.config.ROSLaunchConfig()
     try:
@@ -62,7 +62,7 @@ def read_model(path: Path) -> LaunchFile:
     """Read a `.rossystem` model as the launch file that is generated from it.
 
     Raises:
-        LaunchFileError: the model can't be read or launched.
+        LaunchFileError: the model can't be read, or its launch file can't be used.
     """
     config = roslaunch.config.ROSLaunchConfig()
     try:
@@ -73,7 +73,7 @@ def read_model(path: Path) -> LaunchFile:
 
 
 def command_line(node: NodeDescription) -> tuple[list[str], int]:
-    """Return the words that start a node, without `__log:=`, and how many of them are its launch-prefix.
+    """Return the command line that starts a node, without `__log:=`, and the number of words of its launch-prefix.
 
     Raises:
         LaunchFileError: there is no such package or executable.
@@ -105,12 +105,12 @@ _ERRORS = (
     OSError,
     ValueError,
     KeyError,
-    TypeError,  # roslaunch lets it through for values that are no text
+    TypeError,  # roslaunch does not catch it for values that are no text
 )
 
 
 class _StableNames(dict[str, str]):
-    """What `$(anon NAME)` stands for: the same at every reading, so that two readings can be compared."""
+    """The names for `$(anon NAME)`: the same at every reading, so that two readings can be compared."""
 
     def __contains__(self, _key: object) -> bool:
         return True

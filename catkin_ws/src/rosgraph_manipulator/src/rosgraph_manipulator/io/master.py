@@ -43,7 +43,7 @@ class NodeApi:
 
     @classmethod
     def address(cls, name: str) -> str | None:
-        """Return the address that the master has of a node; None where it has none."""
+        """Return a node's address, as the master knows it; None where the node is not registered."""
         try:
             code, _, uri = _master().lookupNode(CALLER, name)
         except (*_TRANSPORT_ERRORS, ValueError):
@@ -136,7 +136,7 @@ def services_of(node: str) -> list[str]:
 
 
 def forget_node(name: str) -> None:
-    """Unregister, on its behalf, a node that ended without doing so; a node that answers is left alone.
+    """Unregister a node that ended without doing so itself; a node that answers is left alone.
 
     Raises:
         MasterError: the master does not answer.

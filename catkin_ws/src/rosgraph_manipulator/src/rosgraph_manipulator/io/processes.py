@@ -1,8 +1,10 @@
-"""The processes of nodes: started in a session of their own, watched, ended; none outlives its owner.
+"""Processes of nodes: each has its own session, and none outlives the process that started it, its owner.
 
-Three nets catch what a dying owner would leave behind: the kernel kills the nodes themselves (parent-death signal), a
-reaper of our own kills whatever carries the owner's mark in its environment, children of nodes included, and an owner
-that starts kills what an earlier one of the same name left.
+Three things keep a dying owner from leaving processes behind:
+
+- The kernel kills the nodes (parent-death signal).
+- A reaper process kills all that carry the owner's mark in their environment, also the children of nodes.
+- An owner that starts kills what an earlier owner with the same mark left.
 """
 
 from __future__ import annotations
@@ -27,8 +29,8 @@ MARK = "MROS_LAUNCHER"
 """Environment variable of every process that a launcher starts; its value names the launcher and its master."""
 
 DIE_WITH_OWNER = ("/usr/bin/setpriv", "--pdeathsig", "KILL", "--")
-"""From util-linux, which every Debian has. The signal comes when the *thread* that started the process ends, so only a
-main thread may start one."""
+"""From util-linux, which every Debian has. The kernel sends the signal when the *thread* ends that started the process,
+so only a main thread may start one."""
 
 WARM_START = Path(__file__).with_name("warm_start.py")
 
@@ -39,13 +41,13 @@ class StartError(Exception):
 
 @dataclass(frozen=True)
 class Command:
-    """What to start.
+    """A command to start.
 
     Attributes:
-        words: executable with its arguments.
-        cwd: folder to start it in.
-        environment: the whole of it, with the mark.
-        log: file for the standard output; None: it goes where the owner's goes.
+        words: the executable and its arguments.
+        cwd: the folder in which it is started.
+        environment: its whole environment, with the mark.
+        log: file for its standard output; None: it shares the owner's standard output.
         prefixed: whether the words begin with a launch-prefix.
     """
 
@@ -71,7 +73,7 @@ class Command:
 
 @dataclass
 class Process:
-    """One process; `waiting` while it has not been given its role."""
+    """One process; `waiting` tells whether it still waits for its command."""
 
     popen: subprocess.Popen[bytes]
     started: float  # time.monotonic()
@@ -80,7 +82,7 @@ class Process:
 
     @property
     def pid(self) -> int:
-        """Process id, which is the id of its session and group, too."""
+        """Process id, which is also the id of its session and of its process group."""
         return self.popen.pid
 
     @property
@@ -89,10 +91,10 @@ class Process:
         return self.popen.poll()
 
     def begin(self, command: Command) -> None:
-        """Give a waiting process its role.
+        """Give a waiting process its command.
 
         Raises:
-            StartError: it has ended.
+            StartError: the process has ended.
         """
         role = {"arguments": command.words[1:], "cwd": command.cwd, "log": command.log}
         assert self.popen.stdin is not None  # noqa: S101
@@ -104,12 +106,12 @@ class Process:
         self.waiting, self.started = False, time.monotonic()
 
     def signal(self, number: int) -> None:
-        """Send a signal to the process and its children, as far as they are in its group."""
+        """Send a signal to the process and to its children in the same process group."""
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.pid, number)
 
     def close(self) -> None:
-        """Kill what is left of the process's group, and free what the owner holds of it."""
+        """Kill what is left of the process group, and close the pipe and the file descriptor of the process."""
         self.signal(signal.SIGKILL)
         self.popen.wait()
         if self.popen.stdin is not None:
@@ -138,7 +140,7 @@ def start(command: Command) -> Process:
 
 
 def prepare(command: Command) -> Process | None:
-    """Start a Python node's process, which does its imports and waits for `begin`; None where it is no Python node.
+    """Start a process that does the imports of a Python node and then waits for `begin`; None for any other node.
 
     Raises:
         StartError: the system refuses.
@@ -169,7 +171,7 @@ def _popen(words: Sequence[str], command: Command, cwd: str, stdout: Any = None,
 
 
 def wait_for_ends(processes: Sequence[Process], timeout: float) -> bool:
-    """Wait until all processes have ended; False where some have not within `timeout` (s)."""
+    """Wait until all processes have ended; return False where some still run after `timeout` (s)."""
     deadline = time.monotonic() + timeout
     left = [process for process in processes if process.status is None]
     while left:
@@ -185,7 +187,7 @@ def wait_for_ends(processes: Sequence[Process], timeout: float) -> bool:
 
 
 def kill_marked(mark: str, spared: frozenset[int] = frozenset()) -> list[int]:
-    """Kill every process that carries a mark in its environment; return their ids."""
+    """Kill every process with this mark in its environment; return their ids."""
     killed = []
     for process in psutil.process_iter():
         if process.pid in spared or process.pid == os.getpid():
@@ -198,14 +200,14 @@ def kill_marked(mark: str, spared: frozenset[int] = frozenset()) -> list[int]:
 
 
 def start_reaper(mark: str) -> subprocess.Popen[bytes]:
-    """Start the process that waits for the end of this one, however it comes, and then kills what carries the mark."""
+    """Start the reaper: it waits until this process has ended, and then kills every process with the mark."""
     return subprocess.Popen(
         [sys.executable, "-m", __name__, str(os.getpid()), mark], start_new_session=True, stdin=subprocess.DEVNULL
     )
 
 
 def main() -> None:
-    """Reap: wait for the end of process argv[1], then kill whatever carries the mark argv[2]."""
+    """Wait until process argv[1] has ended, then kill every process with the mark argv[2]."""
     with contextlib.suppress(ProcessLookupError):
         select.select([os.pidfd_open(int(sys.argv[1]))], [], [])
     while kill_marked(sys.argv[2]):  # again: a dying process may have started another one

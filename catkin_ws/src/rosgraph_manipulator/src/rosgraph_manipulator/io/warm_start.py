@@ -1,11 +1,11 @@
-"""Runs a Python node whose imports are done before it is told to begin.
+"""Runs a Python node whose imports are done in advance.
 
     python warm_start.py SCRIPT
 
-It imports what SCRIPT imports, then waits for one line of JSON on its standard input:
-`{"arguments": [...], "cwd": FOLDER, "log": FILE or null}`, and becomes `SCRIPT arguments...`. So the imports, which
-take most of a start, can be over before the old node has gone, or before anybody knows which variant is next. An end of
-the input instead ends the process. It imports no package of ours: it stands for somebody else's node.
+It imports what SCRIPT imports. Then it waits for one line of JSON on its standard input:
+`{"arguments": [...], "cwd": FOLDER, "log": FILE or null}`, and runs `SCRIPT arguments...`. The imports take most of a
+start. Done in advance, they are over before the old node has ended, or before the next variant is known. Where the
+input ends without a line, the process ends. It imports no package of ours, because it becomes somebody else's node.
 """
 
 import ast
@@ -17,10 +17,10 @@ import sys
 
 
 def imported_by(script: str) -> list[ast.stmt]:
-    """Return the import statements at the top level of a script; catkin's relay scripts are seen through.
+    """Return the import statements at the top level of a script; for a relay script of catkin, those of its target.
 
     Raises:
-        SyntaxError, OSError, ValueError: the script is no Python text; running it will say so.
+        SyntaxError, OSError, ValueError: the script can't be read as Python; its run will show the same error.
     """
     with open(script, encoding="utf-8") as file:
         body = ast.parse(file.read(), script).body
@@ -32,7 +32,7 @@ def imported_by(script: str) -> list[ast.stmt]:
 
 
 def prepare(script: str) -> None:
-    """Do the script's imports; what fails here fails again, with its own message, when the script runs."""
+    """Do the script's imports. An import that fails here fails again, with its own message, when the script runs."""
     with contextlib.suppress(SyntaxError, OSError, ValueError):
         for statement in imported_by(script):
             with contextlib.suppress(Exception):
@@ -40,7 +40,7 @@ def prepare(script: str) -> None:
 
 
 def main() -> None:
-    """Prepare, wait, become the script."""
+    """Do the imports, wait for the command, and run the script."""
     script = sys.argv[1]
     sys.argv = [script]
     sys.path[0] = os.path.dirname(script)

@@ -1,1 +1,1 @@
-"""ROS shells: the nodes rosgraph_manipulator, rosgraph_launcher and action_relay."""
+"""The nodes rosgraph_manipulator, rosgraph_launcher and action_relay, and the clients of nodes."""

@@ -1,7 +1,7 @@
-"""The pending goal of an action, kept over changes of its server: the ROS shell around `goal_keeper`.
+"""Keeps the pending goal of an action while its server is replaced; the decisions are in `goal_keeper`.
 
-The goal stands on the parameter server, as `ACTION/resume_goal`, as long as it is pending. A server that knows the
-parameter takes it over before its first status, whoever starts it; a manipulator that comes back finds it there.
+As long as the goal is pending, it is stored in the parameter `ACTION/resume_goal`. A server that knows the parameter
+continues the goal before it publishes its first status. A manipulator that is started again finds the goal there, too.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SEND_PERIOD = 0.5  # s, wall, between two sendings of a goal that the new server
 
 
 class PendingGoal:
-    """Carries the pending goal of an action over to a new server."""
+    """Watches an action, and hands its pending goal to a new server."""
 
     def __init__(self, action: str, action_type: str, adopt: bool = False, changing: bool = False) -> None:
         """Begin to watch the action.
@@ -36,8 +36,8 @@ class PendingGoal:
         Args:
             action: its name.
             action_type: e.g. `move_base_msgs/MoveBaseAction`.
-            adopt: take over the goal that an earlier manipulator has left; else it is forgotten.
-            changing: its server is being replaced at this moment.
+            adopt: whether to keep the goal that an earlier manipulator has left; otherwise that goal is deleted.
+            changing: whether the action's server is being replaced at this moment.
 
         Raises:
             ConfigurationError: the type is not installed.
@@ -66,11 +66,11 @@ class PendingGoal:
 
     @property
     def status_topic(self) -> str:
-        """Resolved name of the server's status topic."""
+        """Full name of the server's status topic."""
         return str(rospy.resolve_name(f"{self._action}/status"))
 
     def server_stops(self) -> None:
-        """Note that the server is about to be stopped, or has died."""
+        """Note that the server will be stopped now, or has died."""
         with self._lock:
             self._keeper.server_changes(True)
             self._old_server = self._server
@@ -83,11 +83,11 @@ class PendingGoal:
 
     @property
     def server_is_new(self) -> bool:
-        """Whether a server has published its status that is not the one of `server_stops`."""
+        """Whether a server has published its status that is another one than the server before `server_stops`."""
         return self._server is not None and self._server is not self._old_server
 
     def server_started(self) -> None:
-        """Note that a new server is there, and tell it what was cancelled meanwhile."""
+        """Note that a new server is there, and cancel at it what was cancelled meanwhile."""
         with self._lock:
             self._keeper.server_changes(False)
             strays = self._keeper.strays
@@ -97,10 +97,10 @@ class PendingGoal:
             self._cancel_publisher.publish(GoalID(id=goal_id))
 
     def deliver(self) -> bool:
-        """Send the goal again while the new server does not have it; return whether it has, or there is none.
+        """Send the goal where the new server does not have it; return True where it has it, or no goal is pending.
 
-        The server may say that it is there before it hears goals, and a topic holds nothing back: so it is sent more
-        than once, which a server that has it already ignores.
+        A server may publish its status before it receives goals, and a goal sent too early is lost. So the goal is
+        sent repeatedly. A server that has the goal already ignores it.
         """
         with self._lock:
             goal = self._keeper.pending
@@ -126,7 +126,7 @@ class PendingGoal:
         return locked
 
     def _store(self, again: bool = False) -> None:
-        """Bring the parameter up to date."""
+        """Update the parameter."""
         goal_id = self._keeper.pending_id
         if goal_id == self._stored and not (again and goal_id is not None):
             return

@@ -1,4 +1,4 @@
-"""Node action_relay: stands between the clients of an action and a server that is replaced now and then."""
+"""Node action_relay: offers an action of its own in front of a server that may be replaced."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class _Goal:
 
 
 class Relay:
-    """Goals in, goals out, results and feedback back."""
+    """Passes goals to the server, and feedback and results to the clients."""
 
     def __init__(self, action: str, server: str, kind: Any) -> None:
-        """Begin to serve `action` by the server of the action `server`; both are of a type."""
+        """Begin to offer the action `action`, whose goals the action `server` pursues; `kind` is the type of both."""
         self._goals: dict[str, _Goal] = {}
         self._lock = threading.RLock()
         self._changing = False
@@ -41,7 +41,7 @@ class Relay:
         self._server.start()
 
     def spin(self) -> None:
-        """Send what can be sent, until the node ends."""
+        """Send waiting goals when the server can take them, until the node ends."""
         end = threading.Event()
         rospy.on_shutdown(end.set)
         while not end.wait(PERIOD):
@@ -103,7 +103,7 @@ class Relay:
 
 
 def main() -> None:
-    """Run the node; exit status 2 where it is not told what to relay."""
+    """Run the node; exit with status 2 where a parameter can't be used."""
     with Lifetime("action_relay", ConfigurationError) as life:
         life.start()
         names = [rospy.get_param(f"~{key}", "") for key in ("action", "server")]
