@@ -144,3 +144,30 @@ def test_goal_at_work_that_is_not_pending_is_a_stray():
     keeper.on_goal(goal("new"))
     keeper.on_status(status("old", GoalStatus.ACTIVE))
     assert keeper.strays == {"old"}
+
+
+def test_goal_that_a_new_server_lacks_is_sent_again_and_again_until_it_has_it(keeper):
+    keeper.server_changes(True)
+    keeper.server_changes(False)
+    assert keeper.to_send(10.0).goal_id.id == "a"
+    assert keeper.to_send(10.4) is None  # the server has not had the time to tell that it has it
+    assert keeper.to_send(10.6).goal_id.id == "a"
+    assert not keeper.is_delivered
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    assert keeper.to_send(20.0) is None
+    assert keeper.is_delivered
+
+
+def test_every_new_server_is_sent_the_goal_at_once(keeper):
+    keeper.to_send(10.0)
+    keeper.server_changes(True)
+    keeper.server_changes(False)
+    assert keeper.to_send(10.1).goal_id.id == "a"
+
+
+def test_goal_that_was_cancelled_meanwhile_is_not_sent(keeper):
+    keeper.server_changes(True)
+    keeper.on_cancel(GoalID(id="a"))
+    keeper.server_changes(False)
+    assert keeper.to_send(10.0) is None
+    assert keeper.is_delivered

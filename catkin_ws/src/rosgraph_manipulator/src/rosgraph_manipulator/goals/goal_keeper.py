@@ -18,6 +18,7 @@ TERMINAL = frozenset(
 # What a server says of a goal that it drops because it is being shut down.
 DROPPED_BY_SHUTDOWN = frozenset({GoalStatus.PREEMPTED, GoalStatus.ABORTED, GoalStatus.RECALLED})
 REMEMBERED = 1000  # ids of goals that have ended: many more than can be told twice
+SEND_PERIOD = 0.5  # s, after which a goal is sent again: a server tells every 0.2 s which goals it has
 CONFIRMATIONS = 3  # statuses with a goal at work, every 0.2 s: more than a server needs to heed a cancellation
 
 
@@ -32,6 +33,7 @@ class GoalKeeper:
         self._listed: frozenset[str] = frozenset()
         self._cancelled: Any = None  # the goal that was cancelled last, until the server's status shows that it was
         self._confirmations = 0  # statuses since then that have it at work
+        self._sent_at = float("-inf")  # when the pending goal was sent to the present server
 
     @property
     def pending(self) -> Any:
@@ -64,7 +66,23 @@ class GoalKeeper:
 
     def server_changes(self, changing: bool) -> None:
         """Note whether the server is being replaced. A goal that it drops meanwhile stays pending."""
-        self._changing, self._cancelled = changing, None
+        self._changing, self._cancelled, self._sent_at = changing, None, float("-inf")
+
+    @property
+    def is_delivered(self) -> bool:
+        """Whether the server has the pending goal, or no goal is pending."""
+        return self._goal is None or self.is_at_work
+
+    def to_send(self, now: float) -> Any:
+        """Return the goal that must be sent again at `now` (s, a clock that never goes back); None: send nothing.
+
+        A server may publish its status before it receives goals, and a goal sent too early is lost. So the goal is sent
+        repeatedly. A server that has the goal already ignores it.
+        """
+        if self.is_delivered or now - self._sent_at <= SEND_PERIOD:
+            return None
+        self._sent_at = now
+        return self.pending
 
     def on_goal(self, goal: Any) -> None:
         """Process a message of the topic `goal`; a newer goal replaces the pending one."""

@@ -24,7 +24,6 @@ from rosgraph_manipulator.configuration.configurations import ConfigurationError
 from rosgraph_manipulator.goals.goal_keeper import GoalKeeper
 
 QUEUE = 10
-SEND_PERIOD = 0.5  # s, wall, between two sendings of a goal that the new server does not have: it tells every 0.2 s
 
 
 class PendingGoal:
@@ -47,7 +46,6 @@ class PendingGoal:
         self._goal_type = action_type + "Goal"
         self._keeper = GoalKeeper()
         self._lock = threading.RLock()
-        self._sent_at = 0.0  # time.monotonic()
         self._stored: str | None = None  # id of the goal in the parameter
         self._server: object = None  # what stands for the present server's connection
         self._old_server: object = None
@@ -91,26 +89,18 @@ class PendingGoal:
         with self._lock:
             self._keeper.server_changes(False)
             strays = self._keeper.strays
-            self._sent_at = 0.0
             self._store(again=True)  # the server may have taken it from there
         for goal_id in strays:
             self._cancel_publisher.publish(GoalID(id=goal_id))
 
     def deliver(self) -> bool:
-        """Send the goal where the new server does not have it; return True where it has it, or no goal is pending.
-
-        A server may publish its status before it receives goals, and a goal sent too early is lost. So the goal is
-        sent repeatedly. A server that has the goal already ignores it.
-        """
+        """Send the goal where it is time for that; return whether the server has it, or no goal is pending."""
         with self._lock:
-            goal = self._keeper.pending
-            if goal is None or self._keeper.is_at_work:
-                return True
-            if time.monotonic() - self._sent_at > SEND_PERIOD:
+            goal = self._keeper.to_send(time.monotonic())
+            if goal is not None:
                 rospy.loginfo("sending the pending goal %s to the new server of %s", goal.goal_id.id, self._action)
                 self._goal_publisher.publish(goal)
-                self._sent_at = time.monotonic()
-        return False
+            return self._keeper.is_delivered
 
     def _on_status(self, status: GoalStatusArray) -> None:
         # Each connection has a header of its own, so another one is another process.
