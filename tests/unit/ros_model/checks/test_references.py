@@ -5,8 +5,9 @@ import os
 from pathlib import Path
 
 import pytest
+from ros_model.checks.families import check_family, families
 from ros_model.checks.packages import check_packages
-from ros_model.checks.systems import check_family, check_system, families
+from ros_model.checks.systems import check_system
 from ros_model.cli.rosmodel import main
 from ros_model.io.installed import InstalledPackages
 from ros_model.language.library import Library

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ros_model.checks.systems import misfits
+from ros_model.checks.values import misfits
 from ros_model.findings import WARNING, Finding, sorted_by_place
 from ros_model.language.library import BUILTIN_TYPES, full_type
 from ros_model.language.metamodel import CONNECTION_OF

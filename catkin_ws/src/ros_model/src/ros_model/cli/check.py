@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ros_model.checks.families import check_family, families
 from ros_model.checks.packages import check_packages
-from ros_model.checks.systems import check_family, check_system, families
+from ros_model.checks.systems import check_system
 from ros_model.cli import BAD_INPUT
 from ros_model.cli.reports import FORMATS
 from ros_model.errors import ModelError

@@ -1,0 +1,85 @@
+"""What is wrong with connections: their ends, and the types of these."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ros_model.checks.references import wrong_port
+from ros_model.findings import Finding
+from ros_model.language.library import Library, Unknown, hint
+from ros_model.language.metamodel import ENDS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ros_model.language.metamodel import (
+        Connection,
+        Port,
+        PortKind,
+        PortPath,
+        RosSystem,
+    )
+    from ros_model.language.packages import Node
+
+
+def wrong_ends(connection: Connection, whole: RosSystem) -> Iterator[Finding]:
+    """Yield the ends of a connection that are missing, or no ports of the right kind."""
+    source_kind, target_kind = ENDS[connection.kind]
+    for kind, role, ends in (
+        (source_kind, "source", connection.sources),
+        (target_kind, "target", connection.targets),
+    ):
+        if not ends:
+            yield Finding(f"connection '{connection.name}' has no {role}", connection.position, "connection")
+        for end in ends:
+            if problem := _end(end, kind, whole):
+                text, rule = problem
+                place = end.position if end.position.line else connection.position
+                yield Finding(f"connection '{connection.name}': {text}", place, rule)
+
+
+def _end(end: PortPath, kind: PortKind, whole: RosSystem) -> tuple[str, str] | None:
+    component = whole.component(end.component)
+    if component is None:
+        known = hint(end.component, (component.name for component in whole.components))
+        return f"'{end}' names no component of this system{known}", "connection"
+    kinds = {port.kind for port in component.ports if port.name == end.port}
+    if not kinds:
+        known = hint(end.port, (port.name for port in component.ports if port.kind is kind))
+        return f"'{end.component}' has no port '{end.port}'{known}", "connection"
+    if kind not in kinds:
+        found = " and ".join(sorted(k.value for k in kinds))
+        return f"'{end}' is a {found}, must be a {kind.value}", "wrong-kind"
+    return None
+
+
+def wrong_types(connection: Connection, whole: RosSystem, library: Library) -> Iterator[Finding]:
+    """Yield the ends that their nodes do not declare, and those whose type is not that of the first end with one."""
+    first: tuple[PortPath, str] | None = None
+    for ends, kind in zip((connection.sources, connection.targets), ENDS[connection.kind], strict=True):
+        for end in ends:
+            port = _port(end, kind, whole)
+            node = library.node(port.reference) if port and port.reference else None
+            if port is None or port.reference is None or node is None or isinstance(node, Unknown):
+                continue
+            text = f"connection '{connection.name}': '{end}'"
+            place = end.position if end.position.line else connection.position
+            if problem := wrong_port(kind, port.reference, node):
+                yield Finding(f"{text}: {problem[0]}", place, problem[1])
+            found = _type(kind, port.reference.name, node)
+            if found and first is None:
+                first = end, found
+            elif found and first and found.removesuffix("Action") != first[1].removesuffix("Action"):
+                yield Finding(f"{text} is {found}, but '{first[0]}' is {first[1]}", place, "type-mismatch")
+
+
+def _port(end: PortPath, kind: PortKind, whole: RosSystem) -> Port | None:
+    component = whole.component(end.component)
+    ports = component.ports if component else ()
+    return next((port for port in ports if port.name == end.port and port.kind is kind), None)
+
+
+def _type(kind: PortKind, name: str, node: Node) -> str:
+    """Return the type of a node's port, "" if it is not known; where it has the kind only otherwise, that one's."""
+    declared = [port for port in node.ports if port.name == name]
+    return next((port.type for port in sorted(declared, key=lambda port: port.kind is not kind)), "")

@@ -1,0 +1,115 @@
+"""What is wrong with references: they are incomplete, or lead nowhere or to something of another kind."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from ros_model.checks.values import first_known, value_place
+from ros_model.findings import WARNING, Finding
+from ros_model.language.library import Library, Unknown, hint
+from ros_model.language.metamodel import RosParameter
+from ros_model.language.typed_values import misfit
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ros_model.language.metamodel import (
+        Component,
+        Port,
+        PortKind,
+        Position,
+        Reference,
+        RosSystem,
+    )
+    from ros_model.language.packages import Node
+
+_PACKAGE = re.compile(r"[A-Za-z0-9_][\w.-]*", re.ASCII)  # and no path
+
+
+def incomplete(system: RosSystem) -> Iterator[Finding]:
+    """Yield the references that lack a part, or name no package."""
+    for component in system.components:
+        if component.node:
+            yield from _incomplete_reference(component.node, bool(component.node.node), "", component.position)
+        for element in _elements(component):
+            if element.reference:
+                complete = bool(element.reference.name)
+                yield from _incomplete_reference(element.reference, complete, ".name", element.position)
+
+
+def _incomplete_reference(reference: Reference, complete: bool, more: str, position: Position) -> Iterator[Finding]:
+    place = _place(reference, position)
+    if not complete:
+        text = f"reference '{reference}' is not package.artifact.node{more}"
+        yield Finding(text, place, "incomplete-reference")
+    elif not _PACKAGE.fullmatch(reference.package):
+        text = f"reference '{reference}': '{reference.package}' is no name of a package"
+        yield Finding(text, place, "incomplete-reference")
+
+
+def not_followed(system: RosSystem) -> Iterator[Finding]:
+    """Yield once that no `.ros` model is known, where the system has references."""
+    for component in system.components:
+        if component.executable:
+            text = "no .ros model is known, so references are not followed: give the folder of some with --path"
+            yield Finding(text, _place(component.executable, component.position), "unknown-reference", WARNING)
+            return
+
+
+def followed(system: RosSystem, library: Library) -> Iterator[Finding]:
+    """Yield the references that lead nowhere, or to something of another kind; of one fault in a node only one."""
+    for component in system.components:
+        told: set[str] = set()
+        if component.node and component.node.node:
+            yield from _unknown_node(component.node, component.position, library, told)
+        for element in _elements(component):
+            reference = element.reference
+            if reference is None or not reference.name:
+                continue
+            node = library.node(reference)
+            if isinstance(node, Unknown):
+                yield from _unknown_node(reference, element.position, library, told)
+            elif isinstance(element, RosParameter):
+                yield from _wrong_parameter(element, reference, node)
+            elif problem := wrong_port(element.kind, reference, node):
+                text, rule = problem
+                yield Finding(text, _place(reference, element.position), rule)
+
+
+def _unknown_node(reference: Reference, position: Position, library: Library, told: set[str]) -> Iterator[Finding]:
+    found = library.node(reference)
+    if isinstance(found, Unknown) and found.message not in told:
+        told.add(found.message)
+        yield Finding(found.message, _place(reference, position), "unknown-reference", found.severity)
+
+
+def wrong_port(kind: PortKind, reference: Reference, node: Node) -> tuple[str, str] | None:
+    """Return what is wrong with a reference to a port of a node, and the rule that says so."""
+    declared = [declaration for declaration in node.ports if declaration.name == reference.name]
+    where = f"'{reference.package}.{reference.artifact}.{reference.node}'"
+    if not declared:
+        known = [declaration.name for declaration in node.ports if declaration.kind is kind]
+        return f"{where} declares no {kind.value} '{reference.name}'{hint(reference.name, known)}", "unknown-reference"
+    if all(declaration.kind is not kind for declaration in declared):
+        return f"{where} declares '{reference.name}' as a {declared[0].kind.value}, not a {kind.value}", "wrong-kind"
+    return None
+
+
+def _wrong_parameter(parameter: RosParameter, reference: Reference, node: Node) -> Iterator[Finding]:
+    declared = next((known for known in node.parameters if known.name == reference.name), None)
+    if declared is None:
+        text = f"'{reference.package}.{reference.artifact}.{reference.node}' declares no parameter '{reference.name}'"
+        text += hint(reference.name, (known.name for known in node.parameters))
+        yield Finding(text, _place(reference, parameter.position), "unknown-reference")
+    elif parameter.value is not None and declared.type:
+        problem = misfit("value", parameter.value, reference.name, declared.type)
+        yield from [Finding(f"{problem}, as it is declared", value_place(parameter), "value")] if problem else ()
+
+
+def _elements(component: Component) -> tuple[Port | RosParameter, ...]:
+    return (*component.ports, *component.parameters)
+
+
+def _place(reference: Reference, position: Position) -> Position:
+    return first_known(reference.position, position)
