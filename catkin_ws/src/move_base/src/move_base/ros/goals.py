@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-import queue
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import actionlib
@@ -13,6 +13,7 @@ import rospy
 from actionlib.goal_id_generator import GoalIDGenerator
 from geometry_msgs.msg import PoseStamped
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedback, MoveBaseResult
+from node_kit.io.inbox import Inbox
 from robot_formulas.geometry import Pose
 
 from move_base.navigation.navigator import Outcome
@@ -76,7 +77,7 @@ class GoalServer:
         self._global_frame = global_frame
         self._begin = begin
         self._cancel = cancel
-        self._requests: queue.SimpleQueue[tuple[str, ServerGoalHandle]] = queue.SimpleQueue()
+        self._requests = Inbox()
         self._active: ServerGoalHandle | None = None
         self._waiting: tuple[ServerGoalHandle, float] | None = None
         self._fed_back = -math.inf
@@ -93,12 +94,7 @@ class GoalServer:
 
     def take_requests(self, now: float) -> None:
         """Deals with the goals and cancellations that have come; `now` in s."""
-        while not self._requests.empty():
-            kind, handle = self._requests.get()
-            if kind == "goal":
-                self._take_goal(handle, now)
-            elif _is_same(handle, self._current()):
-                self._drop_goal("cancelled by the client")
+        self._requests.drain()
         if self._waiting is not None:
             self._resolve_waiting(now)
 
@@ -132,10 +128,10 @@ class GoalServer:
             handle.set_rejected(MoveBaseResult(), problem)
             return
         handle.set_accepted("This goal has been accepted.")
-        self._requests.put(("goal", handle))
+        self._requests.put(partial(self._take_goal, handle))
 
     def _on_cancel(self, handle: ServerGoalHandle) -> None:
-        self._requests.put(("cancel", handle))
+        self._requests.put(partial(self._take_cancellation, handle))
 
     def _on_simple_goal(self, message: PoseStamped) -> None:
         """Sends the pose as an action goal on the action's topic, where others can see it, too."""
@@ -149,14 +145,18 @@ class GoalServer:
         """The goal at work, or the one that waits for its frame."""
         return self._active or (self._waiting[0] if self._waiting is not None else None)
 
-    def _take_goal(self, handle: ServerGoalHandle, now: float) -> None:
+    def _take_goal(self, handle: ServerGoalHandle) -> None:
         current = self._current()
         if current is not None and handle.get_goal_id().stamp < current.get_goal_id().stamp:
             handle.set_canceled(MoveBaseResult(), "a newer goal is active")
             return
         if current is not None:
             self._drop_goal("preempted by a newer goal", stop=False)
-        self._waiting = (handle, now)
+        self._waiting = (handle, rospy.get_time())
+
+    def _take_cancellation(self, handle: ServerGoalHandle) -> None:
+        if _is_same(handle, self._current()):
+            self._drop_goal("cancelled by the client")
 
     def _resolve_waiting(self, now: float) -> None:
         """Starts the waiting goal as soon as its frame is known."""

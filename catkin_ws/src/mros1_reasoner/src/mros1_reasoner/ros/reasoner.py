@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import logging
 import math
-import threading
 import time
-from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
 from functools import partial
 from typing import TypeVar
 
@@ -17,6 +14,7 @@ from actionlib_msgs.msg import GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED, Decision
 from metacontrol_msgs import msg as messages
+from node_kit.io.inbox import Inbox
 from node_kit.ros.lifetime import Lifetime
 from ros_model.errors import ModelError
 from std_msgs.msg import Bool
@@ -73,8 +71,7 @@ class ReasonerNode:
         _warm_up(knowledge_base, reasoner, objectives)
         name = f"{rospy.get_name().strip('/')}-{int(time.time())}"
         self.core = Mape(knowledge_base, reasoner, objectives, settings, clock=rospy.get_time, name=name)
-        self._waiting: deque[Callable[[], object]] = deque()
-        self._wake = threading.Condition()
+        self._inbox = Inbox()
         self._reader = DiagnosticsReader(knowledge_base.qualities, knowledge_base.components, parameters.nodes)
         self._throttle, self._levels_told = Throttle(), Throttle(self._period, burst=1)
         self._told: set[str] = set()
@@ -84,7 +81,7 @@ class ReasonerNode:
         self._decisions = rospy.Publisher("mros1_reasoner/decision", messages.Decision, queue_size=10, latch=True)
         self._requests = None
         if parameters.asks and not settings.dry_run:
-            self._requests = Requests(parameters.action, parameters.execution_deadline, self._queue, self._report)
+            self._requests = Requests(parameters.action, parameters.execution_deadline, self._inbox.put, self._report)
         self._listen(parameters.task_actions)
         self._services = Services(self, parameters.save_folder)
         for objective in objectives:
@@ -108,7 +105,7 @@ class ReasonerNode:
             is_heartbeat = now >= heartbeat
             if is_heartbeat:
                 heartbeat = now + self._period
-            self._drain()
+            self._inbox.drain()
             if self._requests:
                 self._requests.look()
                 if is_heartbeat:
@@ -116,9 +113,7 @@ class ReasonerNode:
             self._take(Step(is_heartbeat))
             self._journal.flush()
             until = min(heartbeat, now + _LONGEST_WAIT, self._next_look())
-            with self._wake:
-                if not self._waiting:
-                    self._wake.wait(max(0.0, until - time.monotonic()))
+            self._inbox.wait(max(0.0, until - time.monotonic()))
 
     def _next_look(self) -> float:
         """Return the wall time at which to look whether the moment has come for which the core or a request waits."""
@@ -134,25 +129,10 @@ class ReasonerNode:
         """Have the loop's thread do something; wait for what it returns.
 
         Raises:
-            MapeError, KnowledgeBaseError, ReasonerError, ValueError: as `work` does.
             TimeoutError: the loop is busy for too long.
+            Exception: as `work` does.
         """
-        answer: Future[_T] = Future()
-
-        def run() -> None:
-            if not answer.set_running_or_notify_cancel():
-                return  # nobody waits any more
-            try:
-                answer.set_result(work())
-            except (MapeError, KnowledgeBaseError, ReasonerError, ValueError) as error:
-                answer.set_exception(error)
-
-        self._queue(run)
-        try:
-            return answer.result(_ANSWER_DEADLINE)
-        except TimeoutError:
-            answer.cancel()
-            raise
+        return self._inbox.call(work, _ANSWER_DEADLINE)
 
     def command(self, command: entries.Command) -> None:
         """Take in what an operator asks for, in the loop's thread.
@@ -169,19 +149,15 @@ class ReasonerNode:
         reading = self._reader.read(array.status, array.header.stamp.to_sec())
         if not reading.facts and not reading.remarks:
             return
-        if len(self._waiting) > _QUEUE:
-            reading = Reading(
-                remarks=(Remark("queue", "diagnostics come faster than they can be read: some are lost"),)
-            )
-            self._queue(lambda: self._take_reading(reading), at_most=_QUEUE + 1)
-            return
-        self._queue(lambda: self._take_reading(reading))
+        if not self._inbox.put(lambda: self._take_reading(reading), at_most=_QUEUE):
+            lost = Remark("queue", "diagnostics come faster than they can be read: some are lost")
+            self._inbox.put(lambda: self._tell_remark(lost), at_most=_QUEUE + 1)
 
     def _on_active(self, active: messages.ActiveConfiguration) -> None:
-        self._queue(lambda: self._take_active(active))
+        self._inbox.put(lambda: self._take_active(active))
 
     def _on_obj_error(self, message: Bool) -> None:
-        self._queue(lambda: self._take(TaskFact("", message.data, message="reported on obj_error")))
+        self._inbox.put(lambda: self._take(TaskFact("", message.data, message="reported on obj_error")))
 
     def _on_task_status(self, objective: str, action: str, statuses: GoalStatusArray) -> None:
         """Take in how the newest goal of an objective's action fares, where that is new."""
@@ -189,19 +165,7 @@ class ReasonerNode:
         if newest is None or self._goals.get(objective) == newest:
             return
         self._goals[objective] = newest
-        self._queue(lambda: self._take(TaskFact(objective, newest[1], message=f"a goal of {action} was aborted")))
-
-    def _queue(self, work: Callable[[], object], at_most: float = math.inf) -> None:
-        with self._wake:
-            if len(self._waiting) <= at_most:
-                self._waiting.append(work)
-            self._wake.notify()
-
-    def _drain(self) -> None:
-        with self._wake:
-            works, self._waiting = self._waiting, deque()
-        for work in works:
-            work()
+        self._inbox.put(lambda: self._take(TaskFact(objective, newest[1], message=f"a goal of {action} was aborted")))
 
     def _take(self, content: entries.Content) -> bool:
         """Take something in and announce what follows; say what is wrong where it does not fit."""
@@ -259,7 +223,7 @@ class ReasonerNode:
     def _report(self, decision: str, ok: bool, message: str = "", *, blame: bool = True) -> None:
         """Take in how a decision went."""
         self._take(Result(decision, ok, message, blame))
-        self._queue(lambda: None)  # look at once at what happened meanwhile
+        self._inbox.put(lambda: None)  # look at once at what happened meanwhile
 
     def _tell_decision(self, decision: Decision) -> None:
         if decision.state == EXECUTED:

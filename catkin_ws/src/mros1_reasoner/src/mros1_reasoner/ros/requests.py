@@ -32,7 +32,7 @@ class Requests:
     """Asks the manipulator for configurations. All but what actionlib calls happens in the loop's thread."""
 
     def __init__(
-        self, action: str, deadline: float, queue: Callable[[Callable[[], object]], None], report: Callable[..., None]
+        self, action: str, deadline: float, queue: Callable[[Callable[[], object]], object], report: Callable[..., None]
     ) -> None:
         """Look for the manipulator from now on.
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import sys
 import time
-from collections import deque
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as FutureTimeout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import rospy
 from geometry_msgs.msg import Twist
+from node_kit.io.inbox import Inbox
 from node_kit.ros.lifetime import Lifetime
 from robot_formulas.geometry import Pose
 from robot_formulas.power import PowerError
@@ -65,7 +63,7 @@ class SimulatorNode:
         laser_steps, camera_steps = _steps("~laser_rate", 10.0, 50.0), _steps("~camera_rate", 10.0, 50.0)
         self._simulation = Simulation(world, _settings())
         self._pacer = Pacer(STEP / factor if factor > 0.0 else 0.0)
-        self._work: deque[Callable[[], None]] = deque()
+        self._inbox = Inbox()
         self._output = Output(self._simulation, world, laser_steps, camera_steps)
         self._view = WindowView(self._simulation) if self._simulation.settings.gui else None
         self._inputs = (
@@ -86,8 +84,7 @@ class SimulatorNode:
             pause = self._pacer.wait(time.monotonic())
             # A pause of 0 lets the threads that receive and send have the interpreter when no pace is kept.
             time.sleep(pause)
-            while self._work:
-                self._work.popleft()()
+            self._inbox.drain()
             self._simulation.step()
             step += 1
             self._output.publish(step)
@@ -102,14 +99,14 @@ class SimulatorNode:
 
     def _on_command(self, twist: Twist) -> None:
         values = (twist.linear.x, twist.linear.y, twist.angular.z)
-        self._work.append(lambda: self._offer("cmd_vel", lambda: self._simulation.command(*values)))
+        self._inbox.put(lambda: self._offer("cmd_vel", lambda: self._simulation.command(*values)))
 
     def _on_load(self, message: Float32) -> None:
-        self._work.append(lambda: self._offer("power_load", lambda: self._simulation.set_power_load(message.data)))
+        self._inbox.put(lambda: self._offer("power_load", lambda: self._simulation.set_power_load(message.data)))
 
     def _on_factor(self, message: Float32) -> None:
         topic, factor = "power_consumption_factor", message.data
-        self._work.append(lambda: self._offer(topic, lambda: self._simulation.set_consumption_factor(factor)))
+        self._inbox.put(lambda: self._offer(topic, lambda: self._simulation.set_consumption_factor(factor)))
 
     def _offer(self, topic: str, take: Callable[[], None]) -> None:
         try:
@@ -143,20 +140,11 @@ class SimulatorNode:
 
     def _in_loop(self, do: Callable[[], Any]) -> tuple[Any, str]:
         """Have something done between two steps; return its result and, where it was refused, why."""
-        future: Future[Any] = Future()
-
-        def work() -> None:
-            try:
-                future.set_result(do())
-            except (ObstacleError, SimulationError) as error:
-                future.set_exception(error)
-
-        self._work.append(work)
         try:
-            return future.result(_SERVICE_S), ""
+            return self._inbox.call(do, _SERVICE_S), ""
         except (ObstacleError, SimulationError) as error:
             return None, str(error)
-        except FutureTimeout:
+        except TimeoutError:
             return None, f"the simulation did not answer within {_SERVICE_S:g} s"
 
 

@@ -47,7 +47,7 @@ class RosExecutor:
         ready_timeout: float,
         settle_time: float,
         launcher_timeout: float,
-        on_report: Callable[[], None],
+        on_report: Callable[[], object],
     ) -> None:
         """Begin to follow the launcher.
 

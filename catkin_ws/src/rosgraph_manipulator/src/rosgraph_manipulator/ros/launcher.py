@@ -5,18 +5,15 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-import queue
 import select
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
 
 import rosgraph
 import rospy
 from metacontrol_msgs.msg import LauncherState, Phase
 from metacontrol_msgs.srv import ChangeConfiguration, ChangeConfigurationRequest, ChangeConfigurationResponse
+from node_kit.io.inbox import ClosedError, Inbox
 from node_kit.ros.lifetime import LONGEST_END, Lifetime
 
 from rosgraph_manipulator.configuration.parameters import SettingError, boolean, number
@@ -28,20 +25,11 @@ from rosgraph_manipulator.launching.restarts import RestartPolicy
 LOOK_PERIOD = 0.2  # s, wall, after which the main thread sees at the latest that the node must end
 
 
-@dataclass
-class _Job:
-    """Work that another thread wants the main thread to do."""
-
-    work: Callable[[], Any]
-    done: threading.Event = field(default_factory=threading.Event)
-    answer: Any = None
-
-
 class LauncherNode:
     """The service and the topic of the launcher. Only the service callbacks run outside the main thread."""
 
     def __init__(self, options: LauncherOptions, life: Lifetime) -> None:
-        self._jobs: queue.Queue[_Job] = queue.Queue()
+        self._inbox = Inbox(self._wake)
         self._wake_read, self._wake_write = os.pipe()
         os.set_blocking(self._wake_write, False)
         self._ends = ""
@@ -58,6 +46,7 @@ class LauncherNode:
         """Tell the main thread to stop the nodes and then to end this node."""
         self._ends = self._ends or reason
         self._life.cut_off(self._longest_end)
+        self._inbox.close("the launcher is shutting down")
         self._wake()
 
     def _end_on_request(self) -> None:
@@ -72,12 +61,9 @@ class LauncherNode:
         rospy.on_shutdown(self._end_on_request)
         while not self._ends:
             self._wait()
-            with contextlib.suppress(queue.Empty):
-                job = self._jobs.get_nowait()
-                job.answer = job.work()
-                job.done.set()
+            self._inbox.do_next()
             self._launcher.look_after()
-            if self._jobs.empty():
+            if not self._inbox:
                 self._launcher.stand_by()
         self._launcher.close(gently=not self._life.watch.lost)
         self._closed.set()
@@ -98,13 +84,10 @@ class LauncherNode:
             os.write(self._wake_write, b"\0")
 
     def _on_change(self, request: ChangeConfigurationRequest) -> ChangeConfigurationResponse:
-        job = _Job(lambda: self._change(request))
-        self._jobs.put(job)
-        self._wake()
-        while not job.done.wait(0.5):
-            if self._ends:
-                raise rospy.ServiceException("the launcher is shutting down")
-        return job.answer
+        try:
+            return self._inbox.call(lambda: self._change(request))
+        except ClosedError as error:
+            raise rospy.ServiceException(str(error)) from error
 
     def _change(self, request: ChangeConfigurationRequest) -> ChangeConfigurationResponse:
         try:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import queue
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import actionlib
@@ -17,6 +16,7 @@ from metacontrol_msgs.msg import (
     MvpReconfigurationAction,
     MvpReconfigurationResult,
 )
+from node_kit.io.inbox import Inbox
 from node_kit.io.master_watch import MasterWatch
 from node_kit.ros.lifetime import Lifetime
 
@@ -59,8 +59,7 @@ class Manipulator:
         self._options = options
         self._tactics = tactics
         policy = choice("~concurrency", get("~concurrency", Policy.WAIT.value), [policy.value for policy in Policy])
-        # No SimpleQueue: Python 3.11's waits for ever when a signal comes while it waits for a time.
-        self._work: queue.Queue[Callable[[], None]] = queue.Queue()
+        self._inbox = Inbox()
         self._requests = RequestQueue(Policy(policy))
         self._handles: dict[str, actionlib.ServerGoalHandle] = {}
         self._lock = threading.Lock()  # requests, handles, interruption
@@ -104,7 +103,7 @@ class Manipulator:
             ready_timeout=number("~ready_timeout", get("~ready_timeout", 15.0), low=0.1),
             settle_time=number("~settle_time", get("~settle_time", 0.5), low=0.0),
             launcher_timeout=launcher_timeout,
-            on_report=lambda: self._work.put(self._follow_launcher),
+            on_report=lambda: self._inbox.put(self._follow_launcher),
         )
         self._executor.check = self._check
         self._executor.suppose(report)
@@ -128,11 +127,7 @@ class Manipulator:
             self._deploy(wanted)
         self._server.start()
         while not rospy.is_shutdown():
-            try:
-                work = self._work.get(timeout=0.2)
-            except queue.Empty:
-                continue
-            work()
+            self._inbox.do_next(wait_s=0.2)
 
     def _heartbeat(self) -> None:
         if self._journal.needs_heartbeat(time.time()):
@@ -173,7 +168,7 @@ class Manipulator:
             handle.set_rejected(MvpReconfigurationResult(Result.FAILED), "another change is under way")
             return
         handle.set_accepted()
-        self._work.put(self._next_request)
+        self._inbox.put(self._next_request)
 
     def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
         request = handle.get_goal_id().id
