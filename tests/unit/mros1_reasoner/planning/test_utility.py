@@ -107,5 +107,5 @@ def test_package_of_a_user_adds_a_utility_function(tmp_path, monkeypatch):
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
     monkeypatch.syspath_prepend(str(tmp_path))
     assert utility({"halved": "use"}) == 0.45
-    with pytest.raises(UtilityError, match="'broken' can't be imported from nowhere:make"):
+    with pytest.raises(UtilityError, match="utility='broken'>: nowhere:make fails: ModuleNotFoundError"):
         make_utility({"broken": None}, QUALITIES)

@@ -238,7 +238,7 @@ def test_generator_from_outside_runs_with_all_others(run, models, outside, tmp_p
         ("def write(project, output):\n    return 1 / 0\n", "poetry_by_{name}:write", "fails: ZeroDivisionError"),
         ("import nowhere_to_be_found\n", "poetry_by_{name}:write", "No module named 'nowhere_to_be_found'"),
         ("", "poetry_by_{name}:write", "has no attribute 'write'"),
-        ("", "", "names no function"),
+        ("", "", "name one as MODULE:ATTRIBUTE"),
         (
             "from ros_model.generators import write_file\n"
             "def write(project, output):\n    return [write_file(output / '..' / 'x', '', output)]\n",

@@ -14,6 +14,7 @@ from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.parameters import ParameterError, Parameters
 from mros1_reasoner.pellet.process import make_reasoner
+from node_kit.plugins import PluginError
 from pybullet_simulator.physics.simulation import Settings as SimulationSettings
 from pybullet_simulator.physics.simulation import Simulation, SimulationError
 from pybullet_simulator.robot.motion_sensors import REAL
@@ -22,7 +23,7 @@ from pybullet_simulator.world.world_file import read_world
 from ros_model.errors import ModelError
 from ros_model.io.files import resolve
 from ros_model.io.models import read_system
-from rosgraph_manipulator.change.tactics import TacticError, load_tactics
+from rosgraph_manipulator.change.tactics import load_tactics
 from rosgraph_manipulator.configuration.configurations import ConfigurationError
 from rosgraph_manipulator.io.configuration_file import options_from
 from rosgraph_manipulator.io.launch_files import LaunchFileError, read_launch_file
@@ -60,11 +61,10 @@ _UNUSABLE = (
     ModelError,
     PackageError,
     ParameterError,
+    PluginError,
     ReasonerError,
     SimulationError,
-    TacticError,
     WorldError,
-    plugins.PluginError,
     rospkg.ResourceNotFound,
 )
 
@@ -146,7 +146,7 @@ def restarts_between(package: str, launch_file: str) -> Callable[[str, str], boo
     system = describe_system(package, launch_file)
     try:
         tactics = load_tactics()
-    except TacticError as error:
+    except PluginError as error:
         raise LockstepError(str(error)) from error
     return cache(lambda running, wanted: restarts(plan_change(system, running, wanted, tactics)))
 

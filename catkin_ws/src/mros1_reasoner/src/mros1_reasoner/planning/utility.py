@@ -6,14 +6,13 @@ A package adds one with `<export><mros1_reasoner utility="NAME" function="module
 from __future__ import annotations
 
 import ast
-import importlib
 import logging
 import math
 import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from node_kit.plugins import exported
+from node_kit.plugins import PluginError, find
 
 from mros1_reasoner.knowledge.model import Design, Direction, Quality
 from mros1_reasoner.planning.planner import Utility
@@ -59,23 +58,25 @@ def make_utility(wanted: str | Mapping[str, Any], qualities: Mapping[str, Qualit
         qualities: how the levels of each quality compare.
 
     Raises:
-        UtilityError: no plug-in is called so, or it does not take the parameters.
+        UtilityError: no plug-in is called so, it is broken, or it does not take the parameters.
     """
     if isinstance(wanted, str):
         return quality(wanted, qualities)
     if not isinstance(wanted, Mapping) or len(wanted) != 1:
         raise UtilityError(f"utility {wanted!r}: expected the name of a quality, or one plug-in with its parameters")
     ((name, parameters),) = wanted.items()
-    functions = {attributes["utility"]: attributes for _, attributes in exported(_PACKAGE) if "utility" in attributes}
-    if name not in functions:
-        known = ", ".join(sorted(functions))
+    plugins = find(_PACKAGE, "utility")
+    if name not in plugins:
+        known = ", ".join(sorted(plugins))
         raise UtilityError(f"utility {name!r}: no package exports one of that name: known: {known}")
-    module, _, attribute = functions[name].get("function", "").partition(":")
     try:
-        make = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise UtilityError(f"utility {name!r} can't be imported from {module}:{attribute}: {error}") from error
-    made: Utility = make(parameters, qualities)
+        make = plugins[name].load()
+        with plugins[name].guard(UtilityError):
+            made: Utility = make(parameters, qualities)
+        if not callable(made):
+            raise plugins[name].error(f"returned {made!r}", "return a function: design -> number")
+    except PluginError as error:
+        raise UtilityError(str(error)) from error
     return made
 
 

@@ -14,7 +14,9 @@ from ros_model.errors import ModelError
 from ros_model.io.excerpts import caret_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+
+    from node_kit.plugins import Plugin, PluginError
 
 _COMMANDS = {
     "check": "ros_model.cli.check:check",
@@ -55,27 +57,49 @@ class _Commands(click.Group):
     """A group that imports a command when it is asked for."""
 
     def list_commands(self, _context: click.Context) -> list[str]:
-        return sorted({**_added_commands(), **_COMMANDS})
+        return sorted({*_added_commands(), *_COMMANDS})
 
     def get_command(self, _context: click.Context, name: str) -> click.Command | None:
-        where = _COMMANDS.get(name) or _added_commands().get(name)
-        if where is None and name in _OFFERED:
+        if name in _COMMANDS:
+            module, _, function = _COMMANDS[name].partition(":")
+            ours: click.Command = getattr(importlib.import_module(module), function)
+            return ours
+        plugin = _added_commands().get(name)
+        if plugin is None and name in _OFFERED:
             raise ModelError(
                 f"no command {name!r}: package {_OFFERED[name]} offers it: build it and source the workspace"
             )
-        if where is None:
-            return None
-        module, _, function = where.partition(":")
-        found: click.Command = getattr(importlib.import_module(module), function)
-        return found
+        return _loaded(plugin) if plugin else None
 
 
-def _added_commands() -> dict[str, str]:
-    """Return the commands that other packages export: command -> where it is."""
-    from node_kit.plugins import exported  # slow to import
+def _added_commands() -> Mapping[str, Plugin]:
+    """Return the commands that other packages export, by name."""
+    from node_kit.plugins import find  # slow to import
 
-    exports = (attributes for _, attributes in exported(_PLUGINS))
-    return {found["command"]: found["function"] for found in exports if {"command", "function"} <= found.keys()}
+    return find(_PLUGINS, "command")
+
+
+def _loaded(plugin: Plugin) -> click.Command:
+    """Return a plug-in's command; where it can't be loaded, one that says why, so that the others' help is shown."""
+    from node_kit.plugins import PluginError
+
+    try:
+        found = plugin.load()
+        if not isinstance(found, click.Command):
+            raise plugin.error("is no command", "decorate it with click.command")
+    except PluginError as error:
+        return _broken(plugin.name, error)
+    return found
+
+
+def _broken(name: str, error: PluginError) -> click.Command:
+    def fail() -> None:
+        raise ModelError(str(error)) from error
+
+    takes_all = {"ignore_unknown_options": True, "allow_extra_args": True}
+    return click.Command(
+        name, callback=fail, short_help="(can't be loaded)", add_help_option=False, context_settings=takes_all
+    )
 
 
 def _version(context: click.Context, _option: click.Parameter, asked: bool) -> None:

@@ -9,12 +9,11 @@ offers another tactic in its package.xml:
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from node_kit.plugins import exported
+from node_kit.plugins import find
 
 from rosgraph_manipulator.configuration.description import Difference, SystemDescription, compare
 
@@ -23,10 +22,6 @@ PACKAGE = "rosgraph_manipulator"
 PARAMETERS_COST, RESTART_COST, REPLACE_COST = 0.05, 0.6, 1.2
 """Seconds by which plans are compared, measured with D2's move_base (tests/bench/reconfigure_*.py). A plan counts one
 restart, however many nodes it starts: they start side by side."""
-
-
-class TacticError(Exception):
-    """A tactic plug-in can't be used; the message names its package."""
 
 
 @dataclass(frozen=True)
@@ -228,7 +223,7 @@ def plan_change(
     for name, tactic in tactics.items():
         try:
             plan = tactic(difference, nodes)
-        except Exception as error:  # the code of a plug-in is not ours: the other tactics still plan
+        except (Exception, SystemExit) as error:  # the code of a plug-in is not ours: the other tactics still plan
             problems.append(f"tactic {name} makes no plan: {type(error).__name__}: {error}")
         else:
             proposed += [plan] if plan else []
@@ -243,21 +238,9 @@ def load_tactics() -> dict[str, Tactic]:
     """Return the tactics that packages export, by name.
 
     Raises:
-        TacticError: an export can't be used.
+        PluginError: an export can't be used.
     """
-    found: dict[str, Tactic] = {}
-    for package, attributes in exported(PACKAGE):
-        if "tactic" not in attributes:
-            continue
-        name, function = attributes["tactic"], attributes.get("function", "")
-        if name in found:
-            raise TacticError(f"package {package}: package.xml: tactic {name!r} exists already: rename it")
-        module, _, attribute = function.partition(":")
-        try:
-            found[name] = getattr(importlib.import_module(module), attribute)
-        except (ImportError, AttributeError, ValueError) as error:
-            raise TacticError(f"package {package}: tactic {name!r} names function {function!r}: {error}") from error
-    return found
+    return {name: plugin.load() for name, plugin in find(PACKAGE, "tactic").items()}
 
 
 def _calls_to_set(values: Mapping[str, Any], adjustable: Mapping[str, Adjustable]) -> list[SetParameters] | None:

@@ -6,9 +6,9 @@ import sys
 
 import click
 from metacontrol_msgs.msg import ActiveConfiguration
+from node_kit.plugins import PluginError
 from ros_model.errors import ModelError
 
-from rosgraph_manipulator.change.tactics import TacticError
 from rosgraph_manipulator.configuration.configurations import ConfigurationError
 from rosgraph_manipulator.io.launch_files import LaunchFileError
 from rosgraph_manipulator.ros.client import ClientError
@@ -16,7 +16,7 @@ from rosgraph_manipulator.ros.client import ClientError
 HELP = {"help_option_names": ["-h", "--help"]}
 REMAPPING = ":="  # in arguments for ROS, such as `__ns:=/robot`
 
-ERRORS = (ClientError, ConfigurationError, LaunchFileError, ModelError, TacticError)
+ERRORS = (ClientError, ConfigurationError, LaunchFileError, ModelError, PluginError)
 
 
 def run(command: click.Command) -> None:

@@ -18,6 +18,7 @@ from metacontrol_msgs.msg import (
 )
 from node_kit.io.inbox import Inbox
 from node_kit.io.master_watch import MasterWatch
+from node_kit.plugins import PluginError
 from node_kit.ros.lifetime import Lifetime
 
 from rosgraph_manipulator.change.deployment import (
@@ -32,7 +33,7 @@ from rosgraph_manipulator.change.deployment import (
 from rosgraph_manipulator.change.journal import Journal, Resumption, parse_journal, resume
 from rosgraph_manipulator.change.reactions import DeployedConfigurations, Reaction
 from rosgraph_manipulator.change.request_queue import Policy, RequestQueue
-from rosgraph_manipulator.change.tactics import Plan, Tactic, TacticError, load_tactics, plan_change
+from rosgraph_manipulator.change.tactics import Plan, Tactic, load_tactics, plan_change
 from rosgraph_manipulator.configuration.configurations import (
     KEYS,
     Configuration,
@@ -316,7 +317,7 @@ def read_parameters(arguments: list[str]) -> dict[str, Any]:
 
 def main() -> None:
     """Run the node; exit status 2 when its configuration cannot be used."""
-    with Lifetime("rosgraph_manipulator", ConfigurationError, SettingError, TacticError) as life:
+    with Lifetime("rosgraph_manipulator", ConfigurationError, PluginError, SettingError) as life:
         life.start()
         options = options_from(read_parameters(rospy.myargv()[1:]))
         initial = str(rospy.get_param("~initial_configuration", ""))
