@@ -17,8 +17,9 @@ from pathlib import Path
 
 import pytest
 import rospkg
+from node_kit.io.xml_rpc import CallError
 from ros_model.graph.snapshot import GraphSnapshot
-from ros_model.io.master import SnapshotError, take_snapshot
+from ros_model.io.master import take_snapshot
 from ros_model.io.models import read_system
 from ros_model.language.metamodel import PortKind
 from ros_model_extraction import ros_defaults as plumbing
@@ -46,7 +47,7 @@ def free_port() -> int:
 def ends_of(uri: str) -> set[End]:
     try:
         return set(interfaces(take_snapshot(uri), Details()))
-    except SnapshotError:
+    except CallError:
         return set()
 
 

@@ -7,8 +7,9 @@ import threading
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
+from node_kit.io.xml_rpc import CallError, GoneError
 from ros_model.graph.snapshot import build_snapshot
-from ros_model.io.master import MasterClient, MasterGoneError, SnapshotError, take_snapshot
+from ros_model.io.master import MasterClient, take_snapshot
 
 STATE = [
     [
@@ -146,21 +147,21 @@ def test_master_that_is_gone_is_named():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         uri = f"http://127.0.0.1:{free.getsockname()[1]}"
-    with pytest.raises(MasterGoneError, match=uri):
+    with pytest.raises(GoneError, match=uri):
         take_snapshot(uri)
 
 
 def test_silent_master_times_out():
     with socket.create_server(("127.0.0.1", 0)) as silent:
         uri = f"http://127.0.0.1:{silent.getsockname()[1]}"
-        with pytest.raises(SnapshotError, match="does not answer getSystemState"):
+        with pytest.raises(CallError, match="does not answer getSystemState"):
             take_snapshot(uri, timeout=0.1)
 
 
 @pytest.mark.parametrize("garbage", [1, "x", [1, "", "state"], [1, "", [[], []]], [1, "", [[["/t", [3]]], [], []]]])
 def test_garbage_is_refused(garbage):
     table = answers([]) | {"getSystemState": lambda _caller: garbage}
-    with master(**table) as uri, pytest.raises(SnapshotError):
+    with master(**table) as uri, pytest.raises(CallError):
         take_snapshot(uri)
 
 
@@ -169,18 +170,18 @@ def test_master_is_known_by_its_process():
         client = MasterClient(uri)
         assert client.master_pid() == 4711
         client.close()
-    with master(getPid=lambda _caller: [1, "", "none"]) as uri, pytest.raises(SnapshotError, match="garbage"):
+    with master(getPid=lambda _caller: [1, "", "none"]) as uri, pytest.raises(CallError, match="garbage"):
         MasterClient(uri).master_pid()
 
 
 def test_error_of_the_master_is_passed_on():
     table = answers([]) | {"getTopicTypes": lambda _caller: [-1, "not today", 0]}
-    with master(**table) as uri, pytest.raises(SnapshotError, match="not today"):
+    with master(**table) as uri, pytest.raises(CallError, match="not today"):
         take_snapshot(uri)
 
 
 def test_address_that_is_no_address():
-    with pytest.raises(SnapshotError, match="ROS_MASTER_URI"):
+    with pytest.raises(CallError, match="ROS_MASTER_URI"):
         MasterClient("localhost:11311")
 
 
@@ -198,7 +199,7 @@ def test_master_that_answers_by_drops_times_out():
         thread = threading.Thread(target=drip, daemon=True)
         thread.start()
         try:
-            with pytest.raises(SnapshotError, match="does not answer getSystemState"):
+            with pytest.raises(CallError, match="does not answer getSystemState"):
                 take_snapshot(f"http://127.0.0.1:{server.getsockname()[1]}", timeout=0.3)
         finally:
             ended.set()

@@ -3,8 +3,8 @@
 import queue
 
 import pytest
+from node_kit.io.xml_rpc import CallError
 from ros_model.graph.snapshot import GraphSnapshot, NodeState
-from ros_model.io.master import SnapshotError
 from rosgraph_monitor.health.liveness import Life
 from rosgraph_monitor.io.graph_poller import GraphPoller
 
@@ -57,7 +57,7 @@ def stand(request):
     made = Stand(getattr(request, "param", 0.01))
     made.poller.start()
     yield made
-    made.master.answers.put(SnapshotError("the test is over"))
+    made.master.answers.put(CallError("the test is over"))
     made.poller.close()
 
 
@@ -70,7 +70,7 @@ def test_poll_has_what_was_known_and_tells_whom_to_watch(stand):
 
 def test_poll_that_fails_leaves_the_latest_and_the_next_one_counts_again(stand):
     stand.answer(GRAPH)
-    stand.master.answers.put(SnapshotError("no answer"))
+    stand.master.answers.put(CallError("no answer"))
     later = GraphSnapshot()
     stand.answer(later)
     assert stand.poller.latest.snapshot is later

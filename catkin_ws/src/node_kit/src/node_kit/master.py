@@ -92,21 +92,18 @@ class View:
             now: when that came.
             patience: wall s for which silence is borne.
         """
-        match came:
-            case Answer(pid) if self.pid in (None, pid):
-                return View(Standing.THERE, pid)
-            case Answer():
-                return replace(self, standing=Standing.ANOTHER)
-            case Refusal() if self.refused_at is not None and asked - self.refused_at >= _APART:
-                return replace(self, standing=Standing.GONE)
-            case Refusal():
-                return replace(
-                    self, standing=Standing.REFUSED, refused_at=asked if self.refused_at is None else self.refused_at
-                )
-            case Silence(reason):
-                since = asked if self.silent_since is None else self.silent_since
-                standing = Standing.MUTE if now - since >= patience else Standing.SILENT
-                return replace(self, standing=standing, reason=reason, refused_at=None, silent_since=since)
+        if isinstance(came, Answer):
+            if self.pid in (None, came.pid):
+                return View(Standing.THERE, came.pid)
+            return replace(self, standing=Standing.ANOTHER)
+        if isinstance(came, Refusal):
+            if self.refused_at is None:
+                return replace(self, standing=Standing.REFUSED, refused_at=asked)
+            standing = Standing.GONE if asked - self.refused_at >= _APART else Standing.REFUSED
+            return replace(self, standing=standing)
+        since = asked if self.silent_since is None else self.silent_since
+        standing = Standing.MUTE if now - since >= patience else Standing.SILENT
+        return replace(self, standing=standing, reason=came.reason, refused_at=None, silent_since=since)
 
     def text(self, uri: str, consequence: str, patience: float = PATIENCE) -> str:
         """Return the line that tells of a master which does not answer or is lost."""

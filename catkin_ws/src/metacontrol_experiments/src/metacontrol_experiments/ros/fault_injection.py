@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import http.client
 import os
 import signal
-import xmlrpc.client
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import rosgraph
 import rospy
@@ -19,6 +17,7 @@ from metacontrol_sim.srv import (
     IncreaseConsumptionFactor,
 )
 from nav_msgs.msg import OccupancyGrid
+from node_kit.io.xml_rpc import CallError, Client
 from pybullet_simulator.robot.faults import SIGNALS, Fault
 from pybullet_simulator.ros.grid_messages import GridMessageError, read_grid
 from pybullet_simulator.world.clutter import ClutterError, scatter
@@ -45,16 +44,6 @@ _SIGNALS = {
 _WAIT_S = 10.0
 _CALL_S = 2.0
 """Wall seconds for a service or the map to be there, and for a call to a node's own API."""
-
-
-class ImpatientTransport(xmlrpc.client.Transport):
-    """Calls that end after a time, since a hung node would never answer."""
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        """Return a connection with a time-out."""
-        connection = super().make_connection(host)
-        connection.timeout = _CALL_S
-        return connection
 
 
 class FaultInjector:
@@ -91,7 +80,7 @@ class FaultInjector:
             if contingency.kind is Kind.LIGHT:
                 return self._call("simulator/set_light", SetLight, light=f"{contingency.value:g}")(contingency.value)
             return self._clutter(contingency, way)
-        except (OSError, xmlrpc.client.Error, rosgraph.MasterException, rospy.ROSException) as error:
+        except (CallError, OSError, rospy.ROSException, ValueError) as error:
             raise InjectionError(f"{contingency}: {' '.join(str(error).split())}") from error
         except (rospy.ServiceException, ComponentError, ClutterError, GridMessageError) as error:
             raise InjectionError(f"{contingency}: {error}") from error
@@ -114,10 +103,11 @@ class FaultInjector:
 
     def _pid_of(self, node: str) -> int:
         """Return the process of a node, as its own API tells."""
-        uri = rosgraph.Master(rospy.get_name()).lookupNode(node)
-        with xmlrpc.client.ServerProxy(uri, transport=ImpatientTransport()) as proxy:
-            answer: Any = proxy.getPid(rospy.get_name())
-        return int(answer[2])
+        caller = rospy.get_name()
+        with Client(rosgraph.get_master_uri(), caller, _CALL_S) as master:
+            uri = master.call("lookupNode", node)
+        with Client(uri, caller, _CALL_S, peer=f"node {node} at") as api:
+            return int(api.call("getPid"))
 
     def _clutter(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> dict[str, str]:
         """Put obstacles on the floor: the listed ones, or random ones off the ends of the way."""

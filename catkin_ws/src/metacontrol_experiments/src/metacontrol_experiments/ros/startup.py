@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import xmlrpc.client
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import rosgraph
 import rospy
 from metacontrol_bags.bag import TOPICS
+from node_kit.io.xml_rpc import CallError, Client
 
 from metacontrol_experiments.io.processes import wait_until
-from metacontrol_experiments.ros.fault_injection import ImpatientTransport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,6 +19,8 @@ DECISION_TOPIC = "mros1_reasoner/decision"
 
 START_S = 90.0
 """Wall seconds that each part has to come up; on two busy cores the whole system takes 10 to 20."""
+_CALL_S = 2.0
+"""Wall seconds for an answer of the master, and of a node's own API."""
 
 
 class StartError(RuntimeError):
@@ -32,7 +33,7 @@ class Startup:
     def __init__(self, attend: Callable[[], None]) -> None:
         """Take what is called again and again meanwhile; it raises an error to give up."""
         self._attend = attend
-        self._master = rosgraph.Master("/mission")
+        self._master = Client(rosgraph.get_master_uri(), "/mission", _CALL_S)
 
     def wait(self, condition: Callable[[], bool], what: str) -> None:
         """Wait for a condition.
@@ -43,7 +44,10 @@ class Startup:
 
         def met() -> bool:
             self._attend()
-            return condition()
+            try:
+                return condition()
+            except CallError:  # not up yet, or too busy
+                return False
 
         if not wait_until(met, START_S):
             raise StartError(f"waited {START_S:g} s in vain for {what}")
@@ -74,23 +78,20 @@ class Startup:
         self.wait(lambda: self._recorded(recorder, names), f"the recorder {recorder}")
 
     def _simulated_time(self) -> bool:
-        try:
-            return bool(self._master.getParam("/use_sim_time"))
-        except (OSError, rosgraph.MasterException):  # not up yet, or not set yet
-            return False
+        return bool(self._master.call("getParam", "/use_sim_time"))
 
     def _decisions_offered(self) -> bool:
-        publishers, _, _ = self._master.getSystemState()
+        publishers, _, _ = self._master.call("getSystemState")
         return any(topic == rospy.resolve_name(DECISION_TOPIC) and REASONER in nodes for topic, nodes in publishers)
 
     def _recorded(self, recorder: str, own: set[str]) -> bool:
-        _, subscribers, _ = self._master.getSystemState()
+        _, subscribers, _ = self._master.call("getSystemState")
         taken = {topic for topic, nodes in subscribers if recorder in nodes}
         return taken.issuperset(TOPICS) and own <= _topics_to(recorder)
 
 
 def _topics_to(node: str) -> set[str]:
     """Return the topics of this node over which it is connected to a subscriber."""
-    with xmlrpc.client.ServerProxy(rospy.get_node_uri(), transport=ImpatientTransport()) as proxy:
-        answer: Any = proxy.getBusInfo(rospy.get_name())
-    return {topic for _, subscriber, direction, _, topic, *_ in answer[2] if subscriber == node and direction == "o"}
+    with Client(rospy.get_node_uri(), rospy.get_name(), _CALL_S, peer="node") as api:
+        links = api.call("getBusInfo")
+    return {topic for _, subscriber, direction, _, topic, *_ in links if subscriber == node and direction == "o"}

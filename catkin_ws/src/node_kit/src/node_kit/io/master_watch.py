@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import http.client
 import logging
 import math
 import threading
 import time
-import xmlrpc.client
 from collections.abc import Callable
-from typing import Any
-from xml.parsers.expat import ExpatError
 
+from node_kit.io.xml_rpc import CallError, Client, GoneError, SilentError
 from node_kit.master import PATIENCE, Answer, Refusal, Silence, Standing, View
 
 _log = logging.getLogger(__name__)
@@ -46,7 +43,7 @@ class MasterWatch:
             uri: address of the master.
 
         Raises:
-            OSError: it is no address.
+            CallError: it is no address.
         """
         self.thread = threading.Thread(target=self._run, args=(_Asker(uri),), name="master watch", daemon=True)
         self.thread.start()
@@ -102,33 +99,15 @@ class _Asker:
     """Asks for the master's process id."""
 
     def __init__(self, uri: str) -> None:
-        self._transport = _Transport()
-        self._master = xmlrpc.client.ServerProxy(uri, transport=self._transport)
+        self._master = Client(uri, "/node_kit")
 
     def __call__(self, timeout: float) -> Answer | Refusal | Silence:
         """Ask, and wait for so many wall s."""
-        self._transport.timeout = timeout
         try:
-            return Answer(int(self._master.getPid("/node_kit")[2]))  # type: ignore[index, arg-type]
-        except ConnectionRefusedError:
+            return Answer(int(self._master.call("getPid", timeout=timeout)))
+        except GoneError:
             return Refusal()
-        except (OSError, http.client.HTTPException) as error:
-            return Silence(str(error) or type(error).__name__)
-        except (xmlrpc.client.Error, ExpatError, LookupError, TypeError, ValueError) as error:
-            return Silence(f"garbage: {error}")
-
-
-class _Transport(xmlrpc.client.Transport):
-    """A kept connection, on which nothing is waited for longer than a time."""
-
-    accept_gzip_encoding = False
-    timeout = 0.0
-    """Wall s."""
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        """Return the connection, with the time of this question."""
-        connection = super().make_connection(host)
-        connection.timeout = self.timeout
-        if connection.sock:
-            connection.sock.settimeout(self.timeout)
-        return connection
+        except SilentError as error:
+            return Silence(error.reason)
+        except (CallError, TypeError, ValueError) as error:
+            return Silence(f"garbage: {getattr(error, 'reason', error)}")

@@ -18,6 +18,7 @@ import rosgraph
 import rospy
 
 from node_kit.io.master_watch import MasterWatch
+from node_kit.io.xml_rpc import CallError
 from node_kit.master import View
 
 BAD_START = 2
@@ -79,7 +80,7 @@ class Lifetime:
             if not self.watch.confirm():
                 self.end("there is no master", BAD_START)
             rospy.init_node(self._name, disable_signals=True)
-        except (OSError, rospy.ROSInitException) as error:
+        except (CallError, OSError, rospy.ROSInitException) as error:
             raise _StartError(str(error)) from error
         self._name = rospy.get_name()
         rospy.core.add_shutdown_hook(self._after_goodbye)  # comes after rospy's own, in their order

@@ -59,16 +59,17 @@ def _checked_address(uri: str) -> str:
 
 
 def _models(uri: str, name: str, timeout: float, everything: bool) -> Models:
-    from ros_model.io.master import MasterGoneError, SnapshotError, take_snapshot
+    from node_kit.io.xml_rpc import CallError, GoneError
+    from ros_model.io.master import take_snapshot
 
     from ros_model_extraction.io.live_nodes import ask_nodes
     from ros_model_extraction.running.graph import models_of
 
     try:
         graph = take_snapshot(uri, timeout)
-    except MasterGoneError as error:
+    except GoneError as error:
         raise ModelError(f"ROS master {uri} can't be reached: start the system, or set --master") from error
-    except SnapshotError as error:
+    except CallError as error:
         raise ModelError(f"{error}: start the system, or set --master") from error
     stamp = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
     title = f"The running system of the ROS master {uri}, {stamp}. Written by rosmodel snapshot."

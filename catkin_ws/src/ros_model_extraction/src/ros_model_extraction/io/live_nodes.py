@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import http.client
 import io
 import os
 import socket
-import xmlrpc.client
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
-from xml.parsers.expat import ExpatError
 
 import rosgraph.network
 import rospkg
-from ros_model.io.master import TimedTransport
+from node_kit.io.xml_rpc import CallError, Client, GoneError
 
 from ros_model_extraction.running.details import Details, Origin
 
@@ -27,8 +24,6 @@ if TYPE_CHECKING:
 _CALLER = "/rosmodel"
 _WORKERS = 16
 _HEADER_PART = 4096
-_UNREADABLE = (OSError, http.client.HTTPException, xmlrpc.client.Error, ExpatError, ValueError, TypeError, LookupError)
-"""What an answer that is late, broken or garbage may raise."""
 
 
 def ask_nodes(snapshot: GraphSnapshot, master: str, timeout: float = 2.0) -> Details:
@@ -58,12 +53,11 @@ def _pid(uri: str, timeout: float) -> int | str:
     """Return the process id of a node on this host, else why there is none."""
     try:
         host = urlsplit(uri).hostname or ""
-        with xmlrpc.client.ServerProxy(uri, transport=TimedTransport(timeout)) as proxy:
-            answer: Any = proxy.getPid(_CALLER)
-        pid = int(answer[2])
-    except ConnectionRefusedError:
+        with Client(uri, _CALLER, timeout, peer="node") as node:
+            pid = int(node.call("getPid"))
+    except GoneError:
         return _DEAD
-    except _UNREADABLE:
+    except (CallError, TypeError, ValueError):
         return "it does not answer"
     return pid if rosgraph.network.is_local_address(host) else f"it runs on the host {host}"
 
@@ -109,14 +103,11 @@ def executable_of(arguments: Sequence[str], folder: Path, packages: Iterable[str
 def _service_addresses(master: str, services: Iterable[str], timeout: float) -> dict[str, str]:
     names = list(services)
     try:
-        with xmlrpc.client.ServerProxy(master, transport=TimedTransport(timeout)) as proxy:
-            calls = xmlrpc.client.MultiCall(proxy)
-            for name in names:
-                calls.lookupService(_CALLER, name)
-            answers: list[Any] = list(iter(calls()))
-    except _UNREADABLE:
+        with Client(master, _CALLER, timeout) as client:
+            answers = client.call_all([("lookupService", name) for name in names])
+    except CallError:
         return {}
-    return {name: str(answer[2]) for name, answer in zip(names, answers, strict=False) if answer[0] == 1}
+    return {name: str(uri) for name, (known, uri) in zip(names, answers, strict=True) if known}
 
 
 def _service_type(service: str, uri: str, timeout: float) -> str:
@@ -128,5 +119,5 @@ def _service_type(service: str, uri: str, timeout: float) -> str:
             rosgraph.network.write_ros_handshake_header(connection, question)
             answer = rosgraph.network.read_ros_handshake_header(connection, io.BytesIO(), _HEADER_PART)
         return str(answer.get("type", ""))
-    except (*_UNREADABLE, rosgraph.network.ROSHandshakeException):
+    except (OSError, LookupError, TypeError, ValueError, rosgraph.network.ROSHandshakeException):
         return ""

@@ -9,8 +9,10 @@ import subprocess
 import time
 from collections.abc import Callable
 
+from node_kit.io.xml_rpc import CallError
+
 from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError, read_launch_file
-from rosgraph_manipulator.io.master import MasterError, advertised, get_parameters, set_parameters
+from rosgraph_manipulator.io.master import advertised, get_parameters, set_parameters
 from rosgraph_manipulator.io.node_commands import NodeCommands
 from rosgraph_manipulator.io.node_processes import NodeProcesses
 from rosgraph_manipulator.io.processes import Command, Process, StartError
@@ -105,7 +107,7 @@ class Launcher:
             self._report()
             for name, command in commands.items():
                 self._nodes.started(name, self._processes.begin(name, command, prepared.pop(name, None)))
-        except (MasterError, StartError, OSError, subprocess.SubprocessError) as error:
+        except (CallError, StartError, OSError, subprocess.SubprocessError) as error:
             self._end(start)
             self._nodes.end_change(time.monotonic(), failed_to_start=start)
             self._report()
@@ -164,7 +166,7 @@ class Launcher:
         for name in self._nodes.to_inspect(now):
             try:
                 self._nodes.inspected(name, advertised([name]))
-            except MasterError:
+            except CallError:
                 return
 
     def _follow(self, ending: Ending) -> Verdict:

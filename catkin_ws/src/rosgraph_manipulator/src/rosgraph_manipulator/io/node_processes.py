@@ -10,8 +10,10 @@ from collections.abc import Callable, Collection, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from node_kit.io.xml_rpc import CallError
+
 from rosgraph_manipulator.io import processes
-from rosgraph_manipulator.io.master import MasterError, NodeApi, forget_node
+from rosgraph_manipulator.io.master import NodeApi, forget_node
 from rosgraph_manipulator.io.processes import Command, Process, StartError
 from rosgraph_manipulator.launching.managed_nodes import standby_changes
 from rosgraph_manipulator.launching.options import LauncherOptions
@@ -116,7 +118,7 @@ class NodeProcesses:
         for name in forget:
             try:
                 forget_node(name)
-            except MasterError as error:
+            except CallError as error:
                 self._log(f"node {name} may still be listed: {error}")
 
     # -- standby --------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from typing import Any
 
 import rospy
 from geometry_msgs.msg import Twist
+from node_kit.io.xml_rpc import CallError
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.progress import ChangeProgress
@@ -16,7 +17,7 @@ from rosgraph_manipulator.change.tactics import Plan
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
 from rosgraph_manipulator.configuration.description import SystemDescription
 from rosgraph_manipulator.io.launch_files import LaunchFileError, command_line, read_launch_file
-from rosgraph_manipulator.io.master import MasterError, NodeApi, advertised, publishers
+from rosgraph_manipulator.io.master import NodeApi, advertised, publishers
 from rosgraph_manipulator.launching.report import LauncherReport
 from rosgraph_manipulator.ros.goal import PendingGoal
 from rosgraph_manipulator.ros.launcher_client import LauncherClient
@@ -195,7 +196,7 @@ class RosExecutor:
             return
         try:
             servers = publishers(self._goal.status_topic)
-        except MasterError as error:
+        except CallError as error:
             rospy.logwarn("%s", error)
             servers = set()
         if self._progress.server_died(servers):
@@ -247,7 +248,7 @@ class RosExecutor:
         try:
             drivers = publishers(rospy.resolve_name("cmd_vel")) - {rospy.get_name()}
             servers = publishers(self._goal.status_topic) if self._goal else None
-        except MasterError as error:
+        except CallError as error:
             raise DeploymentError(str(error)) from error
         if self._progress.leave(leaving, drivers, servers) and self._goal is not None:
             self._goal.server_stops()
@@ -269,7 +270,7 @@ class RosExecutor:
             try:
                 if condition():
                     return
-            except MasterError as error:
+            except CallError as error:
                 raise DeploymentError(str(error)) from error
             if time.monotonic() > deadline:
                 raise DeploymentError(f"{what} within {self._ready_timeout:g} s; see the nodes' logs")

@@ -18,6 +18,7 @@ from metacontrol_msgs.msg import (
 )
 from node_kit.io.inbox import Inbox
 from node_kit.io.master_watch import MasterWatch
+from node_kit.io.xml_rpc import CallError
 from node_kit.plugins import PluginError
 from node_kit.ros.lifetime import Lifetime
 
@@ -42,7 +43,7 @@ from rosgraph_manipulator.configuration.configurations import (
 )
 from rosgraph_manipulator.configuration.parameters import SettingError, choice, number
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
-from rosgraph_manipulator.io.master import MasterError, set_parameters
+from rosgraph_manipulator.io.master import set_parameters
 from rosgraph_manipulator.launching.report import FAILED
 from rosgraph_manipulator.ros.announcer import Announcer
 from rosgraph_manipulator.ros.executor import RosExecutor
@@ -142,7 +143,7 @@ class Manipulator:
             if noted is self._journal:
                 return
             self._journal = noted
-            with contextlib.suppress(MasterError):  # without a master there is nobody to read it
+            with contextlib.suppress(CallError):  # without a master there is nobody to read it
                 set_parameters({rospy.resolve_name("~journal"): noted.as_parameter()})
 
     # -- requests -------------------------------------------------------------------------------------------------

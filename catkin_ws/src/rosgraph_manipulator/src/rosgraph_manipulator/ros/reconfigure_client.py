@@ -18,11 +18,12 @@ from dynamic_reconfigure.msg import (
     StrParameter,
 )
 from dynamic_reconfigure.srv import Reconfigure
+from node_kit.io.xml_rpc import CallError
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.tactics import Adjustable
 from rosgraph_manipulator.configuration.description import same_value
-from rosgraph_manipulator.io.master import MasterError, NodeApi, services_of
+from rosgraph_manipulator.io.master import NodeApi, services_of
 
 DESCRIPTION_TIMEOUT = 1.0  # s, wall, for all servers of a node to describe themselves
 SET_TIMEOUT = 1.0  # s, wall, for a server to take values
@@ -43,7 +44,7 @@ class ReconfigureClient:
             return {}
         try:
             identity = (address, servers := _servers(node))
-        except MasterError as error:
+        except CallError as error:
             rospy.logwarn("node %s is not asked for its parameters: %s", node, error)
             return {}
         known = self._known.get(node)

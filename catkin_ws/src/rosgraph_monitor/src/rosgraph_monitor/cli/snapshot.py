@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 import rosgraph
-from ros_model.io.master import SnapshotError, take_snapshot
+from node_kit.io.xml_rpc import CallError
+from ros_model.io.master import take_snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -25,7 +26,7 @@ def main(as_json: bool, timeout: float) -> None:
     """Print what runs, as the ROS master lists it; exit with status 2 and one line if the master can't be asked."""
     try:
         snapshot = take_snapshot(rosgraph.get_master_uri(), timeout)
-    except SnapshotError as error:
+    except CallError as error:
         click.echo(f"snapshot: {error}: start roscore or set ROS_MASTER_URI", err=True)
         sys.exit(2)
     if as_json:

@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ros_model.io.master import SnapshotError
+from node_kit.io.xml_rpc import CallError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -100,7 +100,7 @@ class GraphPoller:
         lives = self._connections.lives()
         try:
             snapshot = self._client.snapshot()
-        except SnapshotError:
+        except CallError:
             return  # who watches the master tells of it
         self.count += 1
         self.latest = PolledGraph(snapshot, lives, time.monotonic() - begin)

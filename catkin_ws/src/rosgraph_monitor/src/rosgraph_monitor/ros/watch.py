@@ -10,11 +10,12 @@ import click
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
+from node_kit.io.xml_rpc import CallError
 from node_kit.ros.lifetime import BAD_START, LONGEST_END, Lifetime
 from rich.console import Console
 from rich.live import Live
 from ros_model.graph.snapshot import GraphSnapshot
-from ros_model.io.master import MasterClient, SnapshotError
+from ros_model.io.master import MasterClient
 
 from rosgraph_monitor.diagnostics.overview import Overview
 
@@ -33,11 +34,11 @@ def command(once: float | None) -> None:
 
     Exit status: 2 without a ROS master.
     """
-    client = MasterClient(rosgraph.get_master_uri(), "/watch")
     life = Lifetime("watch")  # not begun: signals are the terminal's, which is put in order at the end
     try:
+        client = MasterClient(rosgraph.get_master_uri(), "/watch")
         graph = client.snapshot()
-    except SnapshotError as error:
+    except CallError as error:
         life.say(f"{error}: start roscore or set ROS_MASTER_URI")
         sys.exit(BAD_START)
     rospy.on_shutdown(lambda: life.cut_off(LONGEST_END))
@@ -59,7 +60,7 @@ def command(once: float | None) -> None:
             _show(console, client, graph, overview, lock)
     except KeyboardInterrupt:
         return
-    except SnapshotError as error:
+    except CallError as error:
         life.say(str(error))
 
 
