@@ -6,15 +6,16 @@ from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Objective
-from mros1_reasoner.loop.mape import Mape, MapeError
+from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.loop.view import MapeError
 
 
 class Robot:
     """A loop whose decisions are carried out at once, but for designs that do not come up."""
 
-    def __init__(self, core, broken=()):
-        self.core, self.broken, self.now = core, set(broken), 0.0
+    def __init__(self, core, knowledge_base, broken=()):
+        self.core, self.knowledge_base, self.broken, self.now = core, knowledge_base, set(broken), 0.0
 
     def run(self, seconds=0.0):
         """Let time pass, and carry out what is decided; return (objective, configuration, state) of everything."""
@@ -46,7 +47,8 @@ def make(load, pellet):
     def make(objectives=(PICK_AND_PLACE,), broken=(), text=None, **settings):
         knowledge_base = load(text or model())
         pellet.load(knowledge_base.ontology)
-        return Robot(Mape(knowledge_base, pellet, objectives, Settings(start_grace=0.0, **settings)), broken)
+        core = Mape(knowledge_base, pellet, objectives, Settings(start_grace=0.0, **settings))
+        return Robot(core, knowledge_base, broken)
 
     return make
 
@@ -107,7 +109,7 @@ def test_scenario_2_blocked_arm_makes_the_base_move(make):
 
 
 def test_error_of_a_leaf_climbs_in_the_ontology(one_arm):
-    one_arm.core.pause()
+    one_arm.core.operator.pause()
     one_arm.core.observe_task(one_arm.now, "o_F2", True)
     one_arm.run(seconds=1.0)
     assert {o.status for o in one_arm.core.analysis.objectives.values()} == {v.IN_ERROR_NFR}
@@ -189,10 +191,10 @@ def test_several_roots_are_served_and_share_what_they_require(make):
     assert ("o_look", "FD3", EXECUTED) in done
     assert [entry for entry in done if entry[0] == "o_F2"] == [("o_F2", "FD2.1", EXECUTED)]
     assert robot.groundings == {"o_build": "FD1", "o_F1": "FD1.1", "o_F2": "FD2.1", "o_look": "FD3"}
-    robot.core.remove_objective("o_look")
+    robot.core.operator.remove_objective("o_look")
     robot.run(seconds=1.0)
     assert set(robot.core.objectives) == {"o_build", "o_F1", "o_F2"}
-    robot.core.remove_objective("o_build")
+    robot.core.operator.remove_objective("o_build")
     robot.run(seconds=1.0)
     assert robot.core.objectives == {}
 
@@ -221,10 +223,10 @@ def test_requirement_that_nobody_has_deployed_is_grounded(make):
 
 
 def test_locked_requirement_keeps_the_root_as_it_is(one_arm):
-    one_arm.core.lock("o_F2")
+    one_arm.core.operator.lock("o_F2")
     one_arm.core.observe_task(one_arm.now, "o_F2", True)
     assert one_arm.run(seconds=1.0) == [("o_F2", "", FAILED)]
-    one_arm.core.unlock("o_F2")
+    one_arm.core.operator.unlock("o_F2")
     assert one_arm.run(seconds=1.0) == [("o_F2", "FD2.2", EXECUTED)]
 
 
@@ -248,9 +250,9 @@ def test_feasible_heeds_requirements(make):
 
 def test_saved_knowledge_base_asks_for_the_root_only(one_arm, tmp_path):
     one_arm.core.observe_task(one_arm.now, "o_F2", True)
-    one_arm.core.pause()
+    one_arm.core.operator.pause()
     one_arm.run(seconds=1.0)
-    one_arm.core.save(tmp_path / "saved.owl")
+    one_arm.knowledge_base.save(tmp_path / "saved.owl", one_arm.core.facts, one_arm.core.analysis)
     again = KnowledgeBase([tmp_path / "saved.owl"])
     assert again.objectives == (PICK_AND_PLACE,)
     assert again.designs["FD1"].requires == ("F1",)
@@ -270,8 +272,8 @@ def test_requirement_whose_configuration_has_failed_before_is_replaced_when_it_i
 
 
 def test_locked_requirement_is_not_released_by_a_change_above(one_arm):
-    one_arm.core.lock("o_F2")
+    one_arm.core.operator.lock("o_F2")
     one_arm.core.observe_component(1.0, "rgbd", "FALSE")
     assert one_arm.run(seconds=1.0) == [("o_F2", "", FAILED)]
-    one_arm.core.unlock("o_F2")
+    one_arm.core.operator.unlock("o_F2")
     assert one_arm.run(seconds=1.0) == [("o_build", "FD2", EXECUTED)]

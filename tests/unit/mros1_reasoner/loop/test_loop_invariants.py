@@ -7,8 +7,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from metacontrol_bags.decision import DECIDED
 from mros1_reasoner.knowledge.model import Objective
-from mros1_reasoner.loop.mape import Mape, MapeError
+from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.loop.view import MapeError
 
 DESIGNS = {**D1, "FD3": ("F3", 0.5, ("F2",)), "FD3.0": ("F3", 0.4, ())}
 ROOTS = (Objective("o_build", "F0", {"error": 0.5}), Objective("o_look", "F3"))
@@ -19,7 +20,7 @@ EVENTS = st.one_of(
     st.tuples(st.just("active"), st.sampled_from(sorted(DESIGNS)), st.sampled_from(["STABLE", "FAILED", "RECOVERING"])),
     st.tuples(st.just("remove"), st.sampled_from(["o_build", "o_look"]), st.just(None)),
     st.tuples(st.just("add"), st.sampled_from(ROOTS), st.just(None)),
-    st.tuples(st.just("limit"), st.sampled_from([None, 0.3, 1.0]), st.just(None)),
+    st.tuples(st.just("limit"), st.sampled_from([0.3, 0.6, 1.0]), st.just(None)),
     st.tuples(st.sampled_from(["lock", "unlock", "pause", "resume"]), st.just(None), st.just(None)),
     st.tuples(st.just("wait"), st.sampled_from([0.5, 3.0, 20.0, 100.0]), st.just(None)),
     st.tuples(st.just("report"), st.booleans(), st.booleans()),
@@ -39,18 +40,18 @@ def apply(core, now, event):
         case "active":
             core.observe_active(now, DESIGNS[what][0], what, how)
         case "remove":
-            core.remove_objective(what)
+            core.operator.remove_objective(what)
         case "add":
-            core.add_objective(what)
+            core.operator.add_objective(what)
         case "limit":
-            core.set_nfr("o_build", "error", what)
+            core.operator.set_nfr("o_build", "error", what)
         case "wait":
             return now + what
         case "report":
             if core.pending:
                 core.report(now, core.pending.id, what, "why not", blame=how)
         case _:
-            getattr(core, kind)()
+            getattr(core.operator, kind)()
     return now
 
 
@@ -85,16 +86,16 @@ def test_loop_holds_whatever_happens(load, pellet, events, approval, improves):
             now = apply(core, now, event)
         check(core, core.step(now))
         if core.proposal:
-            core.approve(core.proposal.id)
-    core.resume()
-    core.unlock()
+            core.operator.approve(core.proposal.id)
+    core.operator.resume()
+    core.operator.unlock()
     for _ in range(60):
         if core.pending:
             core.report(now, core.pending.id, True)
         decisions = core.step(now)
         check(core, decisions)
         if core.proposal:
-            core.approve(core.proposal.id)
+            core.operator.approve(core.proposal.id)
         due = core.due(now)
         if not decisions and (due is None or due > now + 30.0):
             break

@@ -6,8 +6,9 @@ import pytest
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.knowledge.reasoner import ReasonerError
-from mros1_reasoner.loop.mape import Mape, MapeError
+from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.loop.view import MapeError
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
 
@@ -283,12 +284,12 @@ def test_improvement_waits_for_the_cool_down(knowledge_base, counting):
     assert (second.to_configuration, second.stamp_analysed) == ("scan_slow", 2.0 + Settings().cool_down)
 
 
-def test_limit_that_the_operator_lifts_is_used_where_improving_is_wanted(knowledge_base, counting):
+def test_limits_that_the_operator_raises_are_used_where_improving_is_wanted(knowledge_base, counting):
     core = Mape(knowledge_base, counting, [OBJECTIVE], Settings(always_improve=True))
     core.observe_active(0.0, "f_move", "scan_slow", "STABLE")
     core.step(0.0)
-    core.set_nfr("o_move", "safety", 0.9)
-    core.set_nfr("o_move", "energy", None)
+    core.operator.set_nfr("o_move", "safety", 0.9)
+    core.operator.set_nfr("o_move", "energy", 0.9)
     (decision,) = core.step(1.0)
     assert (decision.trigger, decision.to_configuration) == ("operator", "scan_fast")
 

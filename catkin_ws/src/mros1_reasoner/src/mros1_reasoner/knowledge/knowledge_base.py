@@ -241,10 +241,16 @@ class KnowledgeBase:
         return world
 
     def save(self, path: Path, facts: Facts | None = None, analysis: Analysis | None = None) -> None:
-        """Write everything as one OWL file (RDF/XML) that loads again as a model."""
+        """Write everything as one OWL file (RDF/XML) that loads again as a model.
+
+        Raises:
+            KnowledgeBaseError: the file can't be written.
+        """
         world = self.world(facts, analysis)
         try:
             world.get_ontology(v.RUNTIME).save(str(path), format="rdfxml")
+        except OSError as error:
+            raise KnowledgeBaseError(f"{path}: {error.strerror or error}: give another file") from error
         finally:
             world.close()
 

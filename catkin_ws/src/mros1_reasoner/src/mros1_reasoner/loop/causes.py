@@ -1,8 +1,12 @@
-"""Causes that report no error, but a chance to do better."""
+"""Causes: what asks for an adaptation of an objective, errors and chances to do better."""
 
 from __future__ import annotations
 
 from metacontrol_bags.decision import Cause
+
+from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.knowledge.model import Objective
+from mros1_reasoner.loop.view import Running, View
 
 RECOVERY = "compRecov"
 """The rule by which the return of a component is a cause."""
@@ -14,3 +18,83 @@ OPERATOR = "operator"
 def is_chance(cause: Cause) -> bool:
     """Return whether nothing is wrong, but a better design may have become available."""
     return cause.rules == RECOVERY or cause.trigger == OPERATOR
+
+
+def errors(view: View, name: str, now: float) -> list[Cause]:
+    """Return what is wrong with an objective itself, the earliest first."""
+    running, result = view.running[name], view.analysis.objectives.get(name)
+    if running.design is None:
+        return _nothing_runs(view, name, now)
+    found: list[Cause] = []
+    if result and v.IN_ERROR_COMPONENT in result.causes:
+        found += _component_errors(view, name, now)
+    if result and v.IN_ERROR_NFR in result.causes:
+        found += [_violation(view, view.objectives[name], quality, now) for quality in result.violated]
+    if running.task_failure:
+        stamp, why = running.task_failure
+        found.append(Cause(stamp, f"task:{name}", f"the task failed{f': {why}' if why else ''}", "S9"))
+    elif result and v.IN_ERROR_NFR in result.causes and not result.violated and not _inherits(view, running):
+        found.append(Cause(now, f"qa:{name}", f"a rule of the model finds an error of quality in {name}"))
+    return sorted(found, key=_by_time)
+
+
+def heeds_chances(view: View, name: str) -> bool:
+    """Return whether a better design is taken for an objective when nothing is wrong with the one that runs."""
+    always = view.objectives[name].always_improve
+    return view.running[name].degraded or (view.settings.always_improve if always is None else always)
+
+
+def chances(view: View, name: str, now: float) -> list[Cause]:
+    """Return why a better design may have become available for an objective, the earliest first."""
+    found = [
+        Cause(min(stamp, now), trigger, words, "" if trigger == OPERATOR else RECOVERY)
+        for trigger, (stamp, words) in view.running[name].chances.items()
+    ]
+    return sorted(found, key=_by_time)
+
+
+def _nothing_runs(view: View, name: str, now: float) -> list[Cause]:
+    requirers = view.requirers(name)
+    if not view.has_waited(now) or (name not in view.roots and not requirers):
+        return []
+    return [Cause(now, "initial", f"no configuration runs{f', which {requirers[0]} requires' if requirers else ''}")]
+
+
+def _inherits(view: View, running: Running) -> bool:
+    """Return whether something that the running design requires is in error."""
+    results = [view.analysis.objectives.get(o) for o in view.required(running.design)]
+    return any(result and result.in_error for result in results)
+
+
+def _component_errors(view: View, name: str, now: float) -> list[Cause]:
+    running = view.running[name]
+    found = []
+    for component in view.analysis.unrealisable.get(running.design or "", ()):
+        known = view.components.get(component)
+        words = f"component {component}, which {running.design} requires, does not work"
+        stamp = known.stamp if known else now
+        found.append(Cause(stamp, f"component:{component}", words, "compError, compErrFG, S1a"))
+    if running.is_broken or not (found or _inherits(view, running)):
+        words = f"configuration {running.design} does not run"
+        found.append(Cause(running.failed_stamp or now, f"component:{running.design}", words, "S1a"))
+    return found
+
+
+def _violation(view: View, objective: Objective, quality: str, now: float) -> Cause:
+    level, limit = view.levels[objective.name, quality], objective.limits[quality]
+    since = level.passed_since if level.passed_since is not None else now
+    kind = view.kb.qualities[quality]
+    return Cause(
+        stamp=since,
+        trigger=f"qa:{quality}",
+        text=f"{quality} {level.value:.3g} {kind.operator} {limit:g} for {now - since:.1f} s",
+        rules="QA, S9",
+        quality=quality,
+        level=level.value,
+        limit=limit,
+        excess=kind.excess(level.value, limit) / (abs(limit) or 1.0),
+    )
+
+
+def _by_time(cause: Cause) -> tuple[float, str]:
+    return cause.stamp, cause.trigger

@@ -1,4 +1,4 @@
-"""R3 for objectives that may require others: causes, the objective to find another design for, explained decisions."""
+"""R3 for objectives that may require others: the objective to find another design for, and explained decisions."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 from metacontrol_bags.decision import ADVISED, DECIDED, FAILED, Cause, Decision
 
-from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Design, Direction, Objective
-from mros1_reasoner.loop.causes import OPERATOR, RECOVERY, is_chance
-from mros1_reasoner.loop.state import Running, State
+from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance
+from mros1_reasoner.loop.state import State
+from mros1_reasoner.loop.view import Running
 from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan
 
 
@@ -36,10 +36,10 @@ class Deliberation:
         stamp: Callable[[float], float],
         name: str,
     ) -> None:
-        """Decide by a state, which is changed only where it keeps what was decided.
+        """Decide by what is known.
 
         Args:
-            state: what is known.
+            state: what is known; it keeps what is wanted, what was refused and what was tried in vain.
             utility: of a design.
             distance: how big a change it is from one design to another.
             wall: wall clock that measures durations, s.
@@ -56,8 +56,7 @@ class Deliberation:
         running = self._state.running[name]
         causes = self._causes(name, timing.now)
         if not causes:
-            running.refusal = ()
-            self._state.wanted.pop(name, None)
+            self._state.rest(name)
             return None
         if self._state.waits(name, timing.now):
             return None
@@ -109,11 +108,11 @@ class Deliberation:
         if self._state.locked & {name, *(o for o, _ in steps)}:
             reason = f"locked by the operator; {outcome.choice} would be taken: {outcome.reason}"
             return self._refuse(name, replace(outcome, reason=reason), causes, timing, self._wall() - began)
-        self._state.wanted.update({o: plan.choice for o, plan in steps if plan.choice})
+        self._state.want({o: plan.choice for o, plan in steps if plan.choice})
         if any(self._state.waits(o, timing.now) for o, _ in steps if o in self._state.running):
             return None
         running = self._state.running.get(objective)
-        if self._state.settings.dry_run and not self._is_news(self._state.running[name], causes, outcome):
+        if self._state.settings.dry_run and not self._state.is_news(name, _gist(causes, outcome)):
             return None
         design = running.design if running else None
         words = f"{name}: {'; '.join(cause.text for cause in causes)}: "
@@ -140,19 +139,11 @@ class Deliberation:
     ) -> Decision | None:
         """Return the decision to leave things as they are; it is told once."""
         running = self._state.running[name]
-        self._state.wanted.pop(name, None)
-        if not self._is_news(running, causes, outcome):
+        if not self._state.refuse(name, _gist(causes, outcome)):
             return None
-        running.degraded = True
         text = "; ".join(cause.text for cause in causes)
         words = f"{name}: {text}: stays with {running.design or 'nothing'}: {outcome.reason}"
         return self._decision(name, causes, outcome, timing, words, plan_wall)
-
-    def _is_news(self, running: Running, causes: list[Cause], outcome: Plan) -> bool:
-        errors = tuple(cause.trigger for cause in causes if not is_chance(cause))
-        refusal = (errors, outcome.choice, outcome.degraded)
-        is_news, running.refusal = refusal != running.refusal, refusal
-        return is_news
 
     def _decision(
         self, objective: str, causes: list[Cause], outcome: Plan, timing: Timing, words: str, plan_wall: float
@@ -208,71 +199,17 @@ class Deliberation:
             self._state.note_in_vain(now, running.design, name, "did not run")
 
     def _causes(self, name: str, now: float) -> list[Cause]:
-        """Return everything that asks for an adaptation of an objective itself, the earliest first."""
-        running, result = self._state.running[name], self._state.analysis.objectives.get(name)
-        if running.design is None:
-            requirers = self._state.requirers(name)
-            if not self._state.has_waited(now) or (name not in self._state.roots and not requirers):
-                return []
-            words = f"no configuration runs{f', which {requirers[0]} requires' if requirers else ''}"
-            return [Cause(now, "initial", words)]
-        errors: list[Cause] = []
-        if result and v.IN_ERROR_COMPONENT in result.causes:
-            errors += self._component_causes(name, now)
-        if result and v.IN_ERROR_NFR in result.causes:
-            errors += [self._violation(self._state.objectives[name], quality, now) for quality in result.violated]
-        if running.task_failure:
-            stamp, why = running.task_failure
-            errors.append(Cause(stamp, f"task:{name}", f"the task failed{f': {why}' if why else ''}", "S9"))
-        elif result and v.IN_ERROR_NFR in result.causes and not result.violated and not self._inherits(running):
-            errors.append(Cause(now, f"qa:{name}", f"a rule of the model finds an error of quality in {name}"))
-        return [*sorted(errors, key=_by_time), *self._chances(name, now, has_errors=bool(errors))]
-
-    def _chances(self, name: str, now: float, *, has_errors: bool) -> list[Cause]:
-        """Return why a better design may have become available, where it would be taken or is planned for anyway."""
-        running, always = self._state.running[name], self._state.objectives[name].always_improve
-        heeds = running.degraded or (self._state.settings.always_improve if always is None else always)
-        if heeds and not has_errors and now < running.calm_until:
-            return []
-        found = [
-            Cause(min(stamp, now), trigger, words, "" if trigger == OPERATOR else RECOVERY)
-            for trigger, (stamp, words) in running.updatable.items()
-        ]
-        running.updatable.clear()
-        return sorted(found, key=_by_time) if heeds or has_errors else []
-
-    def _inherits(self, running: Running) -> bool:
-        """Return whether something that the running design requires is in error."""
-        results = [self._state.analysis.objectives.get(o) for o in self._state.required(running.design)]
-        return any(result and result.in_error for result in results)
-
-    def _component_causes(self, name: str, now: float) -> list[Cause]:
+        """Return everything that asks for an adaptation of an objective itself, errors first, chances after them."""
+        found = errors(self._state, name, now)
         running = self._state.running[name]
-        causes = []
-        for component in self._state.analysis.unrealisable.get(running.design or "", ()):
-            known = self._state.components.get(component)
-            words = f"component {component}, which {running.design} requires, does not work"
-            stamp = known.stamp if known else now
-            causes.append(Cause(stamp, f"component:{component}", words, "compError, compErrFG, S1a"))
-        if running.is_broken or not (causes or self._inherits(running)):
-            words = f"configuration {running.design} does not run"
-            causes.append(Cause(running.failed_stamp or now, f"component:{running.design}", words, "S1a"))
-        return causes
-
-    def _violation(self, objective: Objective, quality: str, now: float) -> Cause:
-        level, limit = self._state.levels[objective.name, quality], objective.limits[quality]
-        since = level.passed_since if level.passed_since is not None else now
-        kind = self._state.kb.qualities[quality]
-        return Cause(
-            stamp=since,
-            trigger=f"qa:{quality}",
-            text=f"{quality} {level.value:.3g} {kind.operator} {limit:g} for {now - since:.1f} s",
-            rules="QA, S9",
-            quality=quality,
-            level=level.value,
-            limit=limit,
-            excess=kind.excess(level.value, limit) / (abs(limit) or 1.0),
-        )
+        if running.design is None:
+            return found
+        heeds = heeds_chances(self._state, name)
+        if heeds and not found and now < running.calm_until:
+            return []
+        better = chances(self._state, name, now)
+        self._state.use_chances(name)
+        return [*found, *better] if heeds or found else []
 
     def _improves(self, running: Running, outcome: Plan) -> bool:
         if running.degraded and not outcome.degraded:
@@ -339,5 +276,7 @@ class Deliberation:
         )
 
 
-def _by_time(cause: Cause) -> tuple[float, str]:
-    return cause.stamp, cause.trigger
+def _gist(causes: list[Cause], outcome: Plan) -> tuple[object, ...]:
+    """Return what makes an outcome another one than before."""
+    wrong = tuple(cause.trigger for cause in causes if not is_chance(cause))
+    return wrong, outcome.choice, outcome.degraded

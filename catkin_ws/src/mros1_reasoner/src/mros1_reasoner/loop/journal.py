@@ -102,24 +102,24 @@ def _carry_out(core: Mape, now: float, command: entries.Command) -> list[Decisio
     """Have the loop do what an operator asks for."""
     match command:
         case entries.Pause():
-            core.pause()
+            core.operator.pause()
         case entries.Resume():
-            core.resume()
+            core.operator.resume()
         case entries.Lock(objective):
-            core.lock(objective)
+            core.operator.lock(objective)
         case entries.Unlock(objective):
-            core.unlock(objective)
+            core.operator.unlock(objective)
         case entries.Approve(decision):
-            return [core.approve(decision)]
+            return [core.operator.approve(decision)]
         case entries.Reject(decision):
-            return [core.reject(decision, now)]
+            return [core.operator.reject(decision, now)]
         case entries.AddObjective(name, function, limits):
-            core.add_objective(Objective(name, function, limits))
+            core.operator.add_objective(Objective(name, function, limits))
         case entries.RemoveObjective(name):
-            core.remove_objective(name)
+            core.operator.remove_objective(name)
         case entries.SetNfr(objective, quality, limit):
             for name in [objective] if objective else list(core.objectives):
-                core.set_nfr(name, quality, limit)
+                core.operator.set_nfr(name, quality, limit)
     return []
 
 

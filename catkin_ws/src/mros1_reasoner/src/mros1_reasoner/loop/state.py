@@ -1,10 +1,11 @@
-"""What the loop knows: objectives, what runs for each of them, facts, and what was tried in vain. Times in s."""
+"""What the loop knows, and everything that changes it; who only reads takes a `view.View`. Times are s of ROS time."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from typing import Any
 
 from metacontrol_bags.decision import Decision
 from metacontrol_msgs.msg import FunctionGrounding
@@ -12,131 +13,114 @@ from metacontrol_msgs.msg import FunctionGrounding
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
+from mros1_reasoner.loop.causes import OPERATOR
 from mros1_reasoner.loop.levels import Levels
 from mros1_reasoner.loop.settings import Settings
-
-BUSY = (FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING)
-
-
-@dataclass
-class Component:
-    """The last status of a component."""
-
-    status: str
-    stamp: float  # of the diagnostic that reported the status first
+from mros1_reasoner.loop.view import BUSY, Component, Running, View
 
 
-@dataclass
-class Running:
-    """What runs for an objective."""
-
-    design: str | None = None
-    state: str = ""
-    busy_since: float | None = None
-    failed_stamp: float = 0.0
-    binding_error: bool = False
-    task_failure: tuple[float, str] | None = None  # when, and why
-    calm_until: float = -math.inf  # no limit counts before
-    not_before: float = -math.inf  # no request is made before
-    attempts: int = 0
-    degraded: bool = False
-    refusal: tuple[object, ...] = ()  # the last refusal, so as to tell it once
-    updatable: dict[str, tuple[float, str]] = field(default_factory=dict)  # trigger -> when, and in words
-
-    @property
-    def is_broken(self) -> bool:
-        """Whether the design is known not to run, or not as a whole."""
-        return self.state == FunctionGrounding.FAILED or self.binding_error
-
-
-class State:
-    """What is known and asked for at this moment.
-
-    Attributes:
-        objectives: every objective by name, those included that designs require.
-        roots: names of the objectives that were asked for.
-        running: what runs, by objective.
-        active: configuration and state of each function, as the manipulator says.
-        wanted: by objective, the design that waits for what it requires.
-        components: last status of components.
-        levels: observed levels.
-        error_log: until when a design is not tried again for an objective, and why.
-        locked: objectives that keep their configuration.
-        proposal: decision that waits for approval.
-        started: time of the first step.
-        facts: those of the last analysis.
-        analysis: the last one.
-    """
+class State(View):
+    """What is known and asked for at this moment; the attributes are those of View."""
 
     def __init__(self, knowledge_base: KnowledgeBase, objectives: Iterable[Objective], settings: Settings) -> None:
         """Know the objectives, and that nothing runs."""
         self.kb, self.settings = knowledge_base, settings
-        self.objectives = {objective.name: objective for objective in objectives}
-        self.roots = dict.fromkeys(self.objectives)
-        self.running = {objective: Running() for objective in self.objectives}
+        self.objectives: dict[str, Objective] = {objective.name: objective for objective in objectives}
+        self.roots: dict[str, None] = dict.fromkeys(self.objectives)
+        self.running: dict[str, Running] = {objective: Running() for objective in self.objectives}
         self.active: dict[str, tuple[str, str]] = {}
         self.wanted: dict[str, str] = {}
-        self.components = {c: Component(s, 0.0) for c, s in knowledge_base.component_statuses.items()}
+        self.components: dict[str, Component] = {
+            c: Component(status, 0.0) for c, status in knowledge_base.component_statuses.items()
+        }
         self.levels = Levels(settings.violation_window, settings.level_timeout, settings.correction_memory)
         self.error_log: dict[tuple[str, str], tuple[float, str]] = {}
         self.locked: set[str] = set()
+        self.paused = False
         self.proposal: Decision | None = None
+        self.pending: Decision | None = None
+        self.pending_since = 0.0
         self.started: float | None = None
+        self.has_analysed = False
         self.facts = Facts()
         self.analysis = Analysis()
+        self.seen: tuple[object, ...] | None = None
 
-    # Objectives, and those that designs require
+    # Facts
 
-    def add(self, objective: Objective) -> None:
-        """Have one more objective; what runs for its function already is taken over."""
-        self.objectives[objective.name] = objective
-        self.running[objective.name] = Running()
-        active = self.active.get(objective.function)
-        if active:
-            self.take_active(objective.name, *active, now=-math.inf)
+    def note_level(self, now: float, name: str, quality: str, level: float, stamp: float) -> None:
+        """Note the level of a quality that was observed of what runs for an objective; the diagnostic has a stamp."""
+        limit = self.objectives[name].limits.get(quality)
+        passed = limit is not None and self.kb.qualities[quality].violates(level, limit)
+        expected = self.kb.designs[self.running[name].design or ""].expected.get(quality)
+        self.levels.observe(now, (name, quality), level, passed=passed, stamp=stamp, expected=expected)
 
-    def drop(self, name: str) -> None:
-        """Forget an objective and everything that is known of it."""
-        if self.proposal and self.proposal.objective == name:
-            self.proposal = None
-        del self.objectives[name], self.running[name]
-        self.locked.discard(name)
-        self.levels.drop(name)
-        self.error_log = {key: entry for key, entry in self.error_log.items() if key[1] != name}
+    def forget_levels(self, quality: str) -> None:
+        """Know the levels of a quality no longer."""
+        self.levels.forget(quality=quality)
 
-    def provider(self, function: str) -> str:
-        """Return the name of the objective by which a function is provided to the designs that require it."""
-        root = next((name for name in self.roots if self.objectives[name].function == function), None)
-        if root:
-            return root
-        name = f"o_{function.removeprefix('f_')}"
-        return name if name not in self.roots else f"o_{function}"
+    def note_component(self, name: str, status: str, stamp: float) -> None:
+        """Note another status of a component."""
+        self.components[name] = Component(status, stamp)
 
-    def required(self, design: str | None) -> tuple[str, ...]:
-        """Return the objectives that a design requires."""
-        return tuple(self.provider(f) for f in self.kb.designs[design].requires) if design else ()
+    def note_binding(self, now: float, name: str, in_error: bool) -> None:
+        """Note whether a binding of what runs for an objective is in error."""
+        running = self.running[name]
+        self._run(name, failed_stamp=running.failed_stamp if running.binding_error else now, binding_error=in_error)
 
-    def requirers(self, name: str) -> list[str]:
-        """Return the objectives whose running design requires an objective."""
-        return [o for o in self.objectives if name in self.required(self.running[o].design)]
+    def note_task_failure(self, name: str, failure: tuple[float, str] | None) -> None:
+        """Note when the task of an objective has failed, and why; None: it goes on."""
+        self._run(name, task_failure=failure)
 
-    def deployments(self) -> dict[str, str]:
-        """Return the design that runs by objective."""
-        return {name: running.design for name, running in self.running.items() if running.design}
+    def note_active(self, now: float, function: str, configuration: str, state: str) -> None:
+        """Note what runs for a function, as the manipulator says."""
+        self.active[function] = configuration, state
+        for name in [o.name for o in self.objectives.values() if o.function == function]:
+            self._take_active(name, configuration, state, now)
 
-    def needed(self, *deployments: Mapping[str, str]) -> dict[str, str]:
-        """Return the objectives that deployments need, with the function of each, from the roots down."""
-        needed = {name: self.objectives[name].function for name in self.roots}
-        queue = list(needed)
-        while queue:
-            name = queue.pop(0)
-            for design in {deployment[name]: None for deployment in deployments if name in deployment}:
-                for function in self.kb.designs[design].requires:
-                    provider = self.provider(function)
-                    if provider not in needed:
-                        needed[provider] = function
-                        queue.append(provider)
-        return needed
+    def _take_active(self, name: str, configuration: str, state: str, now: float) -> None:
+        running = self.running[name]
+        if state in BUSY:
+            self._run(name, busy_since=running.busy_since if running.state in BUSY else now)
+        if state != running.state and state == FunctionGrounding.FAILED:
+            self._run(name, failed_stamp=max(now, 0.0))  # 0: before anything was asked for
+        self._run(name, state=state)
+        if state != FunctionGrounding.RECONFIGURING and running.design != configuration:
+            self._deploy(name, configuration, now)  # while it reconfigures, it may be the old or the new one
+
+    def _deploy(self, name: str, design: str, now: float) -> None:
+        """Note that a design runs: what was observed of the one before it says nothing of this one."""
+        running = self.running[name]
+        if running.design is not None and running.design != design:
+            self._run(name, calm_until=max(running.calm_until, now + self.settings.cool_down))
+        self._run(name, design=design, degraded=False, binding_error=False, task_failure=None, refusal=())
+        if self.wanted.get(name) == design:
+            del self.wanted[name]
+        self.levels.forget(name, now=now)
+
+    # Objectives
+
+    def ask_for(self, objective: Objective) -> None:
+        """Have one more root objective."""
+        self.roots[objective.name] = None
+        self._add(objective)
+        self.reconsider()
+
+    def ask_no_longer(self, name: str) -> None:
+        """Have a root objective no longer; objectives that only it required go with it."""
+        del self.roots[name]
+        self._drop(name)
+        self.match_requirements()
+        self.reconsider()
+
+    def set_limit(self, name: str, quality: str, limit: float, why: str) -> None:
+        """Give an objective another limit of a quality, which may make another design the better one."""
+        before = self.objectives[name]
+        limits = {q: value for q, value in before.limits.items() if q != quality}
+        self.objectives[name] = replace(before, limits={**limits, quality: limit})
+        self.levels.forget(name, quality)  # since when the limit is passed must be found anew
+        self._run(name, chances={**self.running[name].chances, OPERATOR: (math.inf, why)})
+        self.reconsider()
 
     def match_requirements(self) -> None:
         """Have an objective for every function that is required, and release those that no longer are."""
@@ -146,104 +130,140 @@ class State:
             if not missing:
                 break
             for name, function in missing.items():
-                self.add(Objective(name, function))
+                self._add(Objective(name, function))
         for name in [name for name in self.objectives if name not in needed]:
-            self.wanted.pop(name, None)
-            self.drop(name)
+            self._drop(name)
 
-    def take_active(self, name: str, configuration: str, state: str, now: float) -> None:
-        """Take in what runs for an objective, as the manipulator says."""
-        running = self.running[name]
-        if state in BUSY:
-            running.busy_since = running.busy_since if running.state in BUSY else now
-        if state != running.state and state == FunctionGrounding.FAILED:
-            running.failed_stamp = max(now, 0.0)  # 0: before anything was asked for
-        running.state = state
-        if state != FunctionGrounding.RECONFIGURING and running.design != configuration:
-            self.deployed(name, configuration, now)  # while it reconfigures, it may be the old or the new one
+    def _add(self, objective: Objective) -> None:
+        """Have one more objective; what runs for its function already is taken over."""
+        self.objectives[objective.name] = objective
+        self.running[objective.name] = Running()
+        active = self.active.get(objective.function)
+        if active:
+            self._take_active(objective.name, *active, now=-math.inf)
 
-    def deployed(self, objective: str, design: str, now: float) -> None:
-        """Note that a design runs: what was observed of the one before it says nothing of this one."""
-        running = self.running[objective]
-        if running.design is not None and running.design != design:
-            running.calm_until = max(running.calm_until, now + self.settings.cool_down)
-        running.design = design
-        running.degraded = False
-        running.binding_error = False
-        running.task_failure = None
-        running.refusal = ()
-        if self.wanted.get(objective) == design:
-            del self.wanted[objective]
-        self.levels.forget(objective, now=now)
+    def _drop(self, name: str) -> None:
+        """Forget an objective and everything that is known of it."""
+        if self.proposal and self.proposal.objective == name:
+            self.proposal = None
+        self.wanted.pop(name, None)
+        del self.objectives[name], self.running[name]
+        self.locked.discard(name)
+        self.levels.drop(name)
+        self.error_log = {key: entry for key, entry in self.error_log.items() if key[1] != name}
 
-    # Facts
+    # Steps and analyses
 
-    def is_busy(self, running: Running, now: float) -> bool:
-        """Return whether somebody is still reconfiguring it."""
-        since = running.busy_since
-        return running.state in BUSY and since is not None and now - since < self.settings.busy_limit
+    def begin_step(self, now: float) -> None:
+        """Note the time of the first step."""
+        if self.started is None:
+            self.started = now
 
-    def waits(self, name: str, now: float) -> bool:
-        """Return whether nothing can be asked for an objective at this moment."""
-        running = self.running[name]
-        return self.is_busy(running, now) or now < running.not_before
+    def forget_expired(self, now: float) -> None:
+        """Drop what has expired from the error log."""
+        self.error_log = {key: entry for key, entry in self.error_log.items() if entry[0] > now}
 
-    def facts_at(self, now: float) -> Facts:
-        """Return what is known now, for an analysis."""
-        grounded = {name: running for name, running in self.running.items() if running.design}
-        return Facts(
-            objectives=tuple(self.objectives.values()),
-            groundings={name: running.design or "" for name, running in grounded.items()},
-            levels=self.levels.counting(now, {name: running.calm_until for name, running in self.running.items()}),
-            components={name: component.status for name, component in self.components.items()},
-            broken=frozenset(name for name, running in grounded.items() if running.is_broken),
-            failed=frozenset(name for name, running in grounded.items() if running.task_failure),
-            requires={name: self.required(running.design) for name, running in grounded.items()},
-        )
-
-    def what_counts(self, facts: Facts, now: float) -> tuple[object, ...]:
-        """Return what an analysis and a decision depend on: while it is the same, neither can bring anything new."""
-        passed = frozenset(
-            (name, quality)
-            for (name, quality), level in facts.levels.items()
-            if quality in self.objectives[name].limits
-            and self.kb.qualities[quality].violates(level, self.objectives[name].limits[quality])
-        )
-        waits = tuple((self.is_busy(r, now), now < r.not_before) for r in self.running.values())
-        improves = tuple((tuple(r.updatable), now < r.calm_until) for r in self.running.values() if r.updatable)
-        return (
-            replace(facts, levels={}),
-            frozenset(facts.levels),
-            passed,
-            waits,
-            improves,
-            self.has_waited(now),
-            frozenset(self.error_log),
-        )
-
-    def has_waited(self, now: float) -> bool:
-        """Return whether the time is over in which a running configuration is waited for."""
-        return self.started is not None and now - self.started >= self.settings.start_grace
-
-    def heed_recoveries(self) -> None:
-        """A return counts once, for every objective; after that the component simply works."""
+    def note_analysis(self, facts: Facts, analysis: Analysis, seen: tuple[object, ...]) -> None:
+        """Keep an analysis; the return of a component counts once for every objective, then it simply works."""
+        self.has_analysed, self.facts, self.analysis, self.seen = True, facts, analysis, seen
         for name, component in self.components.items():
-            if component.status != v.RECOVERED or self.facts.components.get(name) != v.RECOVERED:
+            if component.status != v.RECOVERED or facts.components.get(name) != v.RECOVERED:
                 continue
-            for objective, result in self.analysis.objectives.items():
+            for objective, result in analysis.objectives.items():
                 if v.UPDATABLE in result.causes:
-                    words = f"component {name} works again"
-                    self.running[objective].updatable[f"component:{name}"] = component.stamp, words
+                    chance = {f"component:{name}": (component.stamp, f"component {name} works again")}
+                    self._run(objective, chances={**self.running[objective].chances, **chance})
             self.components[name] = Component(v.WORKS, component.stamp)
 
-    def is_fine(self, name: str) -> bool:
-        """Return whether an objective is grounded and not in error."""
-        running = self.running.get(name)
-        if running is None or running.design is None or running.is_broken or running.task_failure:
-            return False
-        result = self.analysis.objectives.get(name)
-        return running.design not in self.analysis.unrealisable and not (result and result.in_error)
+    def reconsider(self) -> None:
+        """Have the next step analyse and decide, whatever counts then."""
+        self.seen = None
+
+    def pause(self) -> None:
+        """Decide nothing."""
+        self.paused = True
+
+    def resume(self) -> None:
+        """Decide again."""
+        self.paused = False
+        self.reconsider()
+
+    def lock(self, names: Iterable[str]) -> None:
+        """Have objectives keep their configuration."""
+        self.locked |= set(names)
+        self.reconsider()
+
+    def unlock(self, names: Iterable[str]) -> None:
+        """Have objectives no longer keep their configuration."""
+        self.locked -= set(names)
+        self.reconsider()
+
+    # Decisions
+
+    def rest(self, name: str) -> None:
+        """Forget what was refused and wanted for an objective: nothing asks for an adaptation of it."""
+        self._run(name, refusal=())
+        self.wanted.pop(name, None)
+
+    def want(self, designs: Mapping[str, str]) -> None:
+        """Want designs for objectives until they are deployed."""
+        self.wanted.update(designs)
+
+    def is_news(self, name: str, outcome: tuple[object, ...]) -> bool:
+        """Keep what came out for an objective instead of an adaptation; return whether that is another outcome."""
+        is_news = outcome != self.running[name].refusal
+        self._run(name, refusal=outcome)
+        return is_news
+
+    def refuse(self, name: str, outcome: tuple[object, ...]) -> bool:
+        """Leave an objective as it is; return whether that is another outcome than before."""
+        self.wanted.pop(name, None)
+        is_news = self.is_news(name, outcome)
+        if is_news:
+            self._run(name, degraded=True)
+        return is_news
+
+    def use_chances(self, name: str) -> None:
+        """Forget the chances of an objective: they have been considered."""
+        self._run(name, chances={})
 
     def note_in_vain(self, now: float, design: str, objective: str, reason: str) -> None:
         """Put a design into the error log, for an objective and for as long as the settings say."""
         self.error_log[design, objective] = now + self.settings.error_log_expiry, reason
+
+    def propose(self, decision: Decision | None) -> None:
+        """Have a decision wait for approval; None: have none wait."""
+        self.proposal = decision
+
+    def begin(self, decision: Decision, wall: float) -> None:
+        """Have a decision carried out from this wall time on."""
+        self.proposal, self.pending, self.pending_since = None, decision, wall
+        self.reconsider()
+
+    def succeed(self, now: float) -> None:
+        """Note that the pending decision was carried out."""
+        decision = self._end()
+        name, design = decision.objective, decision.to_configuration
+        if self.running[name].state in (*BUSY, FunctionGrounding.FAILED):
+            self._run(name, state=FunctionGrounding.STABLE, busy_since=None)
+        self._deploy(name, design, now)
+        self.active[self.objectives[name].function] = design, FunctionGrounding.STABLE
+        self._run(name, calm_until=now + self.settings.cool_down, attempts=0, degraded=decision.degraded)
+
+    def fail(self, now: float, why: str | None) -> None:
+        """Note that the pending decision was not carried out, and why; None: the configuration is not to blame."""
+        decision = self._end()
+        if why is not None:
+            self.note_in_vain(now, decision.to_configuration, decision.objective, why)
+        running = self.running[decision.objective]
+        wait = min(self.settings.backoff * 2**running.attempts, self.settings.backoff_limit)
+        self._run(decision.objective, not_before=now + wait, attempts=running.attempts + 1)
+
+    def _end(self) -> Decision:
+        assert self.pending is not None  # noqa: S101 - who reports has asked
+        decision, self.pending = self.pending, None
+        self.reconsider()
+        return decision
+
+    def _run(self, name: str, **changes: Any) -> None:
+        self.running[name] = replace(self.running[name], **changes)

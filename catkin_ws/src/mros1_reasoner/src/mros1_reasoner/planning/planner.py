@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from metacontrol_bags.decision import Candidate
@@ -114,6 +114,29 @@ def plan(
     others = sorted((c for c in candidates if c is not best), key=lambda c: (bool(c.refused_because), *by_use(c)))
     lost = (c.lost(_loss(c, best, degraded)) for c in others)
     return Plan(best.design.name, degraded, (best.chosen(), *lost), reason)
+
+
+def feasible_designs(
+    functions: Iterable[str], designs: Collection[Design], utility: Utility
+) -> dict[str, tuple[str, ...]]:
+    """Return by function the names of the designs that fulfil it, the most useful first.
+
+    Args:
+        functions: the functions.
+        designs: those that can be realised; without those whose required functions none of them fulfils.
+        utility: of a design.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+
+    def fulfilling(function: str) -> tuple[str, ...]:
+        if function not in found:
+            fit = [d for d in designs if d.function == function and all(fulfilling(name) for name in d.requires)]
+            found[function] = tuple(d.name for d in sorted(fit, key=lambda d: (-utility(d), d.name)))
+        return found[function]
+
+    for function in functions:
+        fulfilling(function)
+    return found
 
 
 def difference(first: Design, second: Design) -> float:

@@ -27,9 +27,10 @@ from mros1_reasoner.loop import entries, journal
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark, newest_goal
 from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Result, StaleFact, Step, TaskFact
 from mros1_reasoner.loop.entry_text import kind_of, values_of
-from mros1_reasoner.loop.mape import Mape, MapeError
+from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.parameters import ParameterError, Parameters
 from mros1_reasoner.loop.throttle import Throttle
+from mros1_reasoner.loop.view import MapeError
 from mros1_reasoner.pellet.process import make_reasoner
 from mros1_reasoner.replay.explain import line
 from mros1_reasoner.ros.journal import JournalTopic
@@ -62,7 +63,7 @@ class ReasonerNode:
         """
         parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
         self._period = parameters.period
-        knowledge_base = parameters.knowledge_base()
+        self.knowledge_base = knowledge_base = parameters.knowledge_base()
         objectives = parameters.objectives(knowledge_base)
         settings = parameters.settings(knowledge_base)
         reasoner.load(knowledge_base.ontology)

@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop import entries
-from mros1_reasoner.loop.mape import MapeError
+from mros1_reasoner.loop.view import MapeError
 
 if TYPE_CHECKING:
     from mros1_reasoner.ros.reasoner import ReasonerNode
@@ -103,7 +103,8 @@ class Services:
                 raise MapeError(say)
             if not path.parent.is_dir():
                 raise MapeError(f"{path.parent}: no such folder: make it first")
-            self._node.core.save(path)
+            core = self._node.core
+            self._node.knowledge_base.save(path, core.facts, core.analysis)
             saved.append(str(path))
 
         ok, message = self._answer(work)

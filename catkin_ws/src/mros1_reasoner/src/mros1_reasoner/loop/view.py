@@ -1,0 +1,253 @@
+"""What the loop knows, to read: objectives, what runs for each of them, facts, and what was tried in vain.
+
+Only `state.State` changes it. Times are s of ROS time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Set
+from dataclasses import dataclass, field, replace
+
+from metacontrol_bags.decision import Decision
+from metacontrol_msgs.msg import FunctionGrounding
+
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
+from mros1_reasoner.loop.levels import Levels
+from mros1_reasoner.loop.settings import Settings
+
+BUSY = (FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING)
+
+
+class MapeError(Exception):
+    """A fact, a report or a wish does not fit; one line that says why."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """The last status of a component, and the stamp of the diagnostic that reported it first."""
+
+    status: str
+    stamp: float
+
+
+@dataclass(frozen=True)
+class Running:
+    """What runs for an objective.
+
+    Attributes:
+        design: the deployed design; None while there is none.
+        state: of the grounding, as the manipulator says.
+        busy_since: when the present reconfiguration began.
+        failed_stamp: when the grounding was first known not to run.
+        binding_error: whether a binding of it is in error.
+        task_failure: when the task of the objective has failed, and why.
+        calm_until: no limit counts before.
+        not_before: no request is made before.
+        attempts: failed requests in a row.
+        degraded: whether the design was taken although it does not keep every limit.
+        refusal: the last refusal, so that it is told once.
+        chances: why a better design may have become available: trigger -> when, and in words.
+    """
+
+    design: str | None = None
+    state: str = ""
+    busy_since: float | None = None
+    failed_stamp: float = 0.0
+    binding_error: bool = False
+    task_failure: tuple[float, str] | None = None
+    calm_until: float = -math.inf
+    not_before: float = -math.inf
+    attempts: int = 0
+    degraded: bool = False
+    refusal: tuple[object, ...] = ()
+    chances: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether the design is known not to run, or not as a whole."""
+        return self.state == FunctionGrounding.FAILED or self.binding_error
+
+
+class View:
+    """What is known and asked for at this moment.
+
+    Attributes:
+        kb: the models.
+        settings: how the loop behaves.
+        objectives: every objective by name, those included that designs require.
+        roots: names of the objectives that were asked for.
+        running: what runs, by objective.
+        active: configuration and state of each function, as the manipulator says.
+        wanted: by objective, the design that waits for what it requires.
+        components: last status of components.
+        levels: observed levels.
+        error_log: until when a design is not tried again for an objective, and why.
+        locked: objectives that keep their configuration.
+        paused: whether nothing is decided.
+        proposal: decision that waits for approval.
+        pending: decision that is under way.
+        pending_since: wall time at which it was put forward, s.
+        started: time of the first step; None before.
+        has_analysed: whether there was an analysis.
+        facts: those of the last analysis.
+        analysis: the last one.
+        seen: what counted at the last analysis; None where another one is due anyway.
+    """
+
+    kb: KnowledgeBase
+    settings: Settings
+    objectives: Mapping[str, Objective]
+    roots: Collection[str]
+    running: Mapping[str, Running]
+    active: Mapping[str, tuple[str, str]]
+    wanted: Mapping[str, str]
+    components: Mapping[str, Component]
+    levels: Levels
+    error_log: Mapping[tuple[str, str], tuple[float, str]]
+    locked: Set[str]
+    paused: bool
+    proposal: Decision | None
+    pending: Decision | None
+    pending_since: float
+    started: float | None
+    has_analysed: bool
+    facts: Facts
+    analysis: Analysis
+    seen: tuple[object, ...] | None
+
+    # Objectives, and those that designs require
+
+    def named(self, objective: str) -> set[str]:
+        """Return the objective of a name; all objectives where the name is empty.
+
+        Raises:
+            MapeError: there is no such objective.
+        """
+        if objective and objective not in self.objectives:
+            raise MapeError(f"no objective is called {objective!r}: known: {', '.join(self.objectives)}")
+        return {objective} if objective else set(self.objectives)
+
+    def pursuing(self, name: str) -> list[str]:
+        """Return the objectives of that name or that function; for no name the only root objective.
+
+        Raises:
+            MapeError: there is none.
+        """
+        names = [o.name for o in self.objectives.values() if name in (o.name, o.function)]
+        if not name and len(self.roots) == 1:
+            names = list(self.roots)
+        if not names:
+            raise MapeError(f"task of {name or 'an objective without a name'}: known: {', '.join(self.objectives)}")
+        return names
+
+    def grounded_by(self, grounding: str) -> list[str]:
+        """Return the objectives that have a grounding of that name; all that have one where none has that name."""
+        grounded = [name for name, running in self.running.items() if running.design]
+        named = [n for n in grounded if self.kb.grounding(n, self.running[n].design or "") == grounding]
+        return named or grounded
+
+    def provider(self, function: str) -> str:
+        """Return the name of the objective by which a function is provided to the designs that require it."""
+        root = next((name for name in self.roots if self.objectives[name].function == function), None)
+        if root:
+            return root
+        name = f"o_{function.removeprefix('f_')}"
+        return name if name not in self.roots else f"o_{function}"
+
+    def required(self, design: str | None) -> tuple[str, ...]:
+        """Return the objectives that a design requires."""
+        return tuple(self.provider(f) for f in self.kb.designs[design].requires) if design else ()
+
+    def requirers(self, name: str) -> list[str]:
+        """Return the objectives whose running design requires an objective."""
+        return [o for o in self.objectives if name in self.required(self.running[o].design)]
+
+    def deployments(self) -> dict[str, str]:
+        """Return the design that runs by objective."""
+        return {name: running.design for name, running in self.running.items() if running.design}
+
+    def needed(self, *deployments: Mapping[str, str]) -> dict[str, str]:
+        """Return the objectives that deployments need, with the function of each, from the roots down."""
+        needed = {name: self.objectives[name].function for name in self.roots}
+        queue = list(needed)
+        while queue:
+            name = queue.pop(0)
+            for design in {deployment[name]: None for deployment in deployments if name in deployment}:
+                for function in self.kb.designs[design].requires:
+                    provider = self.provider(function)
+                    if provider not in needed:
+                        needed[provider] = function
+                        queue.append(provider)
+        return needed
+
+    # Facts
+
+    def is_busy(self, running: Running, now: float) -> bool:
+        """Return whether somebody is still reconfiguring it."""
+        since = running.busy_since
+        return running.state in BUSY and since is not None and now - since < self.settings.busy_limit
+
+    def waits(self, name: str, now: float) -> bool:
+        """Return whether nothing can be asked for an objective at this moment."""
+        running = self.running[name]
+        return self.is_busy(running, now) or now < running.not_before
+
+    def facts_at(self, now: float) -> Facts:
+        """Return what is known now, for an analysis."""
+        grounded = {name: running for name, running in self.running.items() if running.design}
+        return Facts(
+            objectives=tuple(self.objectives.values()),
+            groundings={name: running.design or "" for name, running in grounded.items()},
+            levels=self.levels.counting(now, {name: running.calm_until for name, running in self.running.items()}),
+            components={name: component.status for name, component in self.components.items()},
+            broken=frozenset(name for name, running in grounded.items() if running.is_broken),
+            failed=frozenset(name for name, running in grounded.items() if running.task_failure),
+            requires={name: self.required(running.design) for name, running in grounded.items()},
+        )
+
+    def what_counts(self, facts: Facts, now: float) -> tuple[object, ...]:
+        """Return what an analysis and a decision depend on: while it is the same, neither can bring anything new."""
+        passed = frozenset(
+            (name, quality)
+            for (name, quality), level in facts.levels.items()
+            if quality in self.objectives[name].limits
+            and self.kb.qualities[quality].violates(level, self.objectives[name].limits[quality])
+        )
+        waits = tuple((self.is_busy(r, now), now < r.not_before) for r in self.running.values())
+        improves = tuple((tuple(r.chances), now < r.calm_until) for r in self.running.values() if r.chances)
+        return (
+            replace(facts, levels={}),
+            frozenset(facts.levels),
+            passed,
+            waits,
+            improves,
+            self.has_waited(now),
+            frozenset(self.error_log),
+        )
+
+    def has_waited(self, now: float) -> bool:
+        """Return whether the time is over in which a running configuration is waited for."""
+        return self.started is not None and now - self.started >= self.settings.start_grace
+
+    def is_fine(self, name: str) -> bool:
+        """Return whether an objective is grounded and not in error."""
+        running = self.running.get(name)
+        if running is None or running.design is None or running.is_broken or running.task_failure:
+            return False
+        result = self.analysis.objectives.get(name)
+        return running.design not in self.analysis.unrealisable and not (result and result.in_error)
+
+    def due(self, now: float) -> float | None:
+        """Return the next time at which a step can bring something without a new fact, None where there is none."""
+        times = [self.started + self.settings.start_grace] if self.started is not None else []
+        times += self.levels.due({name: running.calm_until for name, running in self.running.items()})
+        for running in self.running.values():
+            times.append(running.not_before)
+            if running.chances:
+                times.append(running.calm_until)
+            if running.busy_since is not None:
+                times.append(running.busy_since + self.settings.busy_limit)
+        times += [expiry for expiry, _ in self.error_log.values()]
+        return min((moment for moment in times if now < moment < math.inf), default=None)
