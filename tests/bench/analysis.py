@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.knowledge.model import Facts, Objective
 from mros1_reasoner.pellet.owlready import run_pellet
 from mros1_reasoner.pellet.process import PelletReasoner
@@ -42,7 +42,7 @@ def _measure(name: str, count: int, samples: int, *, unlike: bool = False) -> tu
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.owl"
         path.write_text(_model(count, unlike=unlike))
-        knowledge_base = KnowledgeBase([path])
+        knowledge_base = read_knowledge_base([path])
     reasoner = PelletReasoner()
     try:
         reasoner.load(knowledge_base.ontology)

@@ -7,7 +7,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.knowledge.model import Direction
 from mros1_reasoner.pellet.process import PelletReasoner
 from reasoner_helpers import application
@@ -31,7 +31,7 @@ def load(tmp_path):
         path.write_text(text if text is not None else application())
         for name, content in files.items():
             (tmp_path / f"{name}.owl").write_text(content)
-        return KnowledgeBase([path], vocabularies, DIRECTIONS)
+        return read_knowledge_base([path], vocabularies, DIRECTIONS)
 
     return make
 

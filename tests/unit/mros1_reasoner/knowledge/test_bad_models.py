@@ -1,7 +1,7 @@
 """Models that make no sense are refused, or what makes none is left out, with a line that names the individual."""
 
 import pytest
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBaseError
+from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import InconsistentError
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings

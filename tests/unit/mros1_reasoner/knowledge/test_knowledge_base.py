@@ -2,9 +2,10 @@ import logging
 import socket
 
 import pytest
+from mros1_reasoner.io.ontology_files import read_knowledge_base, save_knowledge_base
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase, KnowledgeBaseError
 from mros1_reasoner.knowledge.model import Direction, Facts
+from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
 from reasoner_helpers import HEAD, OBJECTIVE, application, value
@@ -32,7 +33,7 @@ def test_designs_come_with_levels_and_components(knowledge_base):
 
 def test_missing_file_is_named(tmp_path):
     with pytest.raises(KnowledgeBaseError, match=r"nowhere\.owl: No such file"):
-        KnowledgeBase([tmp_path / "nowhere.owl"])
+        read_knowledge_base([tmp_path / "nowhere.owl"])
 
 
 @pytest.mark.parametrize("text", ["", "just words\n", "<html><body/></html>", "<rdf:RDF", "\x00\x01", '{"a": 1}'])
@@ -168,8 +169,8 @@ def test_saved_knowledge_base_loads_again(load, pellet, tmp_path):
     knowledge_base = load()
     pellet.load(knowledge_base.ontology)
     facts = Facts((OBJECTIVE,), {"o_move": "scan_slow"}, {("o_move", "safety"): 0.7}, {"laser": "FALSE"})
-    knowledge_base.save(tmp_path / "saved.owl", facts, knowledge_base.analyse(facts, pellet))
-    again = KnowledgeBase([tmp_path / "saved.owl"])
+    save_knowledge_base(tmp_path / "saved.owl", knowledge_base, facts, knowledge_base.analyse(facts, pellet))
+    again = read_knowledge_base([tmp_path / "saved.owl"])
     assert again.designs.keys() == knowledge_base.designs.keys()
     assert again.designs["scan_slow"].expected == knowledge_base.designs["scan_slow"].expected
     assert again.objectives[0].limits == OBJECTIVE.limits

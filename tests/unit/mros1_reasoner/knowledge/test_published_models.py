@@ -4,8 +4,8 @@ import logging
 import socket
 
 import pytest
+from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Direction, Facts, Objective
 
 # As Protege saves it: named individuals with rdf:type, floats and decimals, absolute IRIs, a namespace of its own.
@@ -102,7 +102,7 @@ def causes(knowledge_base, pellet, **facts):
 
 @pytest.mark.parametrize("required_by", ["mros:requiredBy", "requiredBy"])
 def test_model_as_protege_saves_it(write, pellet, required_by):
-    knowledge_base = KnowledgeBase(write(navigation=navigation(required_by)))
+    knowledge_base = read_knowledge_base(write(navigation=navigation(required_by)))
     assert knowledge_base.designs["f1_v1_r1"].expected == {"safety": 0.32}
     assert knowledge_base.designs["f3_v3_r1"].expected == {"safety": 0.72}
     assert knowledge_base.designs["f3_v3_r1"].components == {"laser_resender"}
@@ -111,21 +111,21 @@ def test_model_as_protege_saves_it(write, pellet, required_by):
 
 
 def test_model_in_several_files(write):
-    knowledge_base = KnowledgeBase(write(domain=SPLIT, navigation=navigation()))
+    knowledge_base = read_knowledge_base(write(domain=SPLIT, navigation=navigation()))
     assert set(knowledge_base.qualities) == {"safety"}
 
 
 def test_import_is_found_by_the_iri_of_a_file_of_another_name(write, caplog):
     imports = '<owl:imports rdf:resource="http://ros/navigation_domain"/>'
     files = write(navigation=navigation(imports=imports), elsewhere=SPLIT)
-    knowledge_base = KnowledgeBase(files[:1])
+    knowledge_base = read_knowledge_base(files[:1])
     assert "safety" in knowledge_base.qualities
     assert "going on without" not in caplog.text
 
 
 def test_rules_of_the_model_are_set_aside_and_named(write, pellet, caplog):
     with caplog.at_level(logging.WARNING):
-        knowledge_base = KnowledgeBase(write(navigation=navigation(extra=STATUS_RULE)))
+        knowledge_base = read_knowledge_base(write(navigation=navigation(extra=STATUS_RULE)))
     assert "its own rules are set aside, the generic ones hold: qa_safety_rule" in caplog.text
     assert "INTERNAL_ERROR" not in knowledge_base.ontology
     assert causes(knowledge_base, pellet) == set()
@@ -133,7 +133,7 @@ def test_rules_of_the_model_are_set_aside_and_named(write, pellet, caplog):
 
 def test_quality_that_is_a_degree_takes_its_direction_from_the_setting(write, pellet):
     directions = {"safety": Direction.HIGHER_IS_BETTER}
-    knowledge_base = KnowledgeBase(write(navigation=navigation()), (), directions)
+    knowledge_base = read_knowledge_base(write(navigation=navigation()), (), directions)
     assert causes(knowledge_base, pellet, levels={("o_navigateA", "safety"): 0.4}) == {v.IN_ERROR_NFR}
     assert causes(knowledge_base, pellet, levels={("o_navigateA", "safety"): 0.6}) == set()
 
@@ -143,13 +143,15 @@ def test_published_vocabulary_given_beside_ours_does_no_harm(write, pellet):
         '<owl:Ontology rdf:about="http://ros/navigation">', '<owl:Ontology rdf:about="http://metacontrol.org/tomasys">'
     )
     (model, given) = write(navigation=navigation(), tomasys=vocabulary)
-    knowledge_base = KnowledgeBase([model], [given])
+    knowledge_base = read_knowledge_base([model], [given])
     assert causes(knowledge_base, pellet, components={"laser_resender": "FALSE"}) == {v.IN_ERROR_COMPONENT}
 
 
 @pytest.mark.parametrize("iri", ["http://ros_navigation#", "http://models21#", "http://ros/navigation_domain#"])
 def test_iris_of_the_model_do_not_matter(write, pellet, iri):
-    knowledge_base = KnowledgeBase(write(app=navigation(quality=f"{iri}safety").replace("http://ros/navigation#", iri)))
+    knowledge_base = read_knowledge_base(
+        write(app=navigation(quality=f"{iri}safety").replace("http://ros/navigation#", iri))
+    )
     assert causes(knowledge_base, pellet, components={"laser_resender": "FALSE"}) == {v.IN_ERROR_COMPONENT}
 
 
@@ -160,5 +162,5 @@ def test_objective_asks_to_improve_always(write):
         [("tomasys:typeF", "http://ros/navigation#f_navigate")],
         [("tomasys:o_always_improve", "http://www.w3.org/2001/XMLSchema#boolean", "true")],
     )
-    (objective,) = KnowledgeBase(write(navigation=navigation(extra=extra))).objectives
+    (objective,) = read_knowledge_base(write(navigation=navigation(extra=extra))).objectives
     assert objective == Objective("o_navigateB", "f_navigate", {}, always_improve=True)

@@ -6,11 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from mros1_reasoner.io.ontology_files import own_ontologies, read_triples
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.knowledge_base import own_ontologies
 from mros1_reasoner.knowledge.model import Facts
 from mros1_reasoner.knowledge.reasoner import Assertion
-from mros1_reasoner.knowledge.triples import read_triples
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
 FACTS = Facts(objectives=(OBJECTIVE,), groundings={"o_move": "scan_slow"})

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from metacontrol_bags.decision import DECIDED
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.knowledge.model import Design, Direction, Objective, Quality
 from mros1_reasoner.loop.levels import Levels
 from mros1_reasoner.loop.mape import Mape
@@ -63,7 +63,7 @@ class Mission:
 
 @pytest.fixture(scope="module")
 def d2(pellet):
-    return KnowledgeBase([D2])
+    return read_knowledge_base([D2])
 
 
 @pytest.fixture

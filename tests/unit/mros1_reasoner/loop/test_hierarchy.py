@@ -3,8 +3,8 @@
 import pytest
 from hierarchy_helpers import D1, PICK_AND_PLACE, model
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
+from mros1_reasoner.io.ontology_files import read_knowledge_base, save_knowledge_base
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
@@ -252,8 +252,8 @@ def test_saved_knowledge_base_asks_for_the_root_only(one_arm, tmp_path):
     one_arm.core.observe_task(one_arm.now, "o_F2", True)
     one_arm.core.operator.pause()
     one_arm.run(seconds=1.0)
-    one_arm.knowledge_base.save(tmp_path / "saved.owl", one_arm.core.facts, one_arm.core.analysis)
-    again = KnowledgeBase([tmp_path / "saved.owl"])
+    save_knowledge_base(tmp_path / "saved.owl", one_arm.knowledge_base, one_arm.core.facts, one_arm.core.analysis)
+    again = read_knowledge_base([tmp_path / "saved.owl"])
     assert again.objectives == (PICK_AND_PLACE,)
     assert again.designs["FD1"].requires == ("F1",)
     text = (tmp_path / "saved.owl").read_text()

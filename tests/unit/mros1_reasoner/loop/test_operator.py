@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import pytest
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED, PROPOSED
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase, KnowledgeBaseError
+from mros1_reasoner.io.ontology_files import read_knowledge_base, save_knowledge_base
 from mros1_reasoner.knowledge.model import Objective
+from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.loop.view import MapeError
@@ -61,7 +62,7 @@ def test_locked_objective_keeps_its_configuration_and_says_what_it_would_do(make
 
 def test_lock_of_an_unknown_objective_is_refused(make):
     with pytest.raises(MapeError, match="no objective is called 'o_fly': known: o_move"):
-        make().lock("o_fly")
+        make().operator.lock("o_fly")
 
 
 def test_proposal_waits_for_approval(make):
@@ -165,10 +166,10 @@ def test_saved_knowledge_base_has_the_statuses_and_loads_again(make, knowledge_b
     core = make()
     core.operator.pause()
     fail(core, 1.0, "laser")
-    knowledge_base.save(tmp_path / "saved.owl", core.facts, core.analysis)
-    again = KnowledgeBase([tmp_path / "saved.owl"])
+    save_knowledge_base(tmp_path / "saved.owl", knowledge_base, core.facts, core.analysis)
+    again = read_knowledge_base([tmp_path / "saved.owl"])
     assert again.component_statuses["laser"] == "FALSE"
     assert [replace(o, limits=dict(o.limits)) for o in again.objectives] == [OBJECTIVE]
     assert "IN_ERROR_COMPONENT" in (tmp_path / "saved.owl").read_text()
     with pytest.raises(KnowledgeBaseError, match=r"nowhere/saved\.owl: No such file"):
-        knowledge_base.save(tmp_path / "nowhere" / "saved.owl")
+        save_knowledge_base(tmp_path / "nowhere" / "saved.owl", knowledge_base)

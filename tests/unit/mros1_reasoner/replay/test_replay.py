@@ -5,9 +5,9 @@ from bag_helpers import Bag, Life
 from click.testing import CliRunner
 from mros1_reasoner.cli import commands
 from mros1_reasoner.cli.commands import explain, replay_command
+from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.loop.entries import ActiveFact, ComponentFact, LevelFact, Lock, Unlock
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.loop.parameters import Parameters
 from mros1_reasoner.replay.replay import first_messages
 from reasoner_helpers import HEAD, application
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.io.ontology_files import read_knowledge_base
 from ros_model.io.files import resolve
 from ros_model.io.project import load_project
 from rosgraph_monitor.observers.plugins import available
@@ -75,7 +75,7 @@ def test_manipulator_waits_for_what_others_need_of_a_variant(robot):
 
 
 def test_ontology_and_configuration_agree(robot):
-    designs = KnowledgeBase([robot / "models/d2.owl"]).designs
+    designs = read_knowledge_base([robot / "models/d2.owl"]).designs
     manipulator = yaml.safe_load((robot / "config/rosgraph_manipulator.yaml").read_text())
     assert set(designs) == set(manipulator["configurations"]) == {"calm", "quick"}
     assert designs["calm"].components == {"simulator", "front_laser"}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.io.ontology_files import read_knowledge_base
 from ros_model.cli.rosmodel import main
 from ros_model.io.project import load_project
 from roslaunch.config import load_config_default
@@ -100,7 +100,7 @@ def test_hierarchy_of_functions_reaches_the_ontology(models):
     }
     (models / "metacontrol.yaml").write_text(yaml.safe_dump(settings))
     generate(models)
-    designs = KnowledgeBase([models / "robot.owl"]).designs
+    designs = read_knowledge_base([models / "robot.owl"]).designs
     assert {name: (design.function, design.requires) for name, design in designs.items()} == {
         "slow": ("f_pick", ("f_move",)),
         "both": ("f_pick", ()),

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import rospkg
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBaseError
+from mros1_reasoner.io.parameters import ParameterError, Parameters
+from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.loop.parameters import ParameterError, Parameters
 from mros1_reasoner.pellet.process import make_reasoner
 from node_kit.plugins import PluginError
 from pybullet_simulator.physics.simulation import Settings as SimulationSettings

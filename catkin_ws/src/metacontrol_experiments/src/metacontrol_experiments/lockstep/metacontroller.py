@@ -15,7 +15,7 @@ from metacontrol_bags.messages import diagnostics
 from metacontrol_bags.record import ComponentReport, QualityReport
 from metacontrol_msgs.msg import DiagnosticWords, FunctionGrounding
 from mros1_reasoner.knowledge.reasoner import ReasonerError
-from mros1_reasoner.loop.diagnostics import LevelFact, StaleFact
+from mros1_reasoner.loop.entries import LevelFact, StaleFact
 from pybullet_simulator.physics.simulation import STEP
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding
 

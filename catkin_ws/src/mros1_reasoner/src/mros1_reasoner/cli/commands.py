@@ -17,15 +17,16 @@ from rich.console import Console
 from rich.table import Table
 from ros_model.errors import ModelError
 
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase, KnowledgeBaseError
+from mros1_reasoner.io.parameters import ParameterError, Parameters
+from mros1_reasoner.io.recording import Recording, RecordingError, Run, read_decisions, read_recording
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.entries import ActiveFact
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.loop.parameters import ParameterError, Parameters
 from mros1_reasoner.pellet.process import make_reasoner
 from mros1_reasoner.replay.explain import render
-from mros1_reasoner.replay.recording import Recording, RecordingError, Run, read_decisions, read_recording
 from mros1_reasoner.replay.replay import Pair, Replayed, pairs, replay, usual_duration, without_journal
 
 _DIFFERS, _REFUSED = 1, 2

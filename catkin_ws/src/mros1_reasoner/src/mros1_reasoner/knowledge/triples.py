@@ -1,4 +1,4 @@
-"""Triples as text: terms in the notation of N-Triples, read from OWL files in any format that owlready2 reads."""
+"""Triples as text: terms in the notation of N-Triples, from OWL in any format that owlready2 reads."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import io
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
 
 import owlready2
 
@@ -22,7 +21,7 @@ _ESCAPED = {"n": "\n", "r": "\r", "t": "\t", "b": "\b", "f": "\f"}
 
 
 class TripleError(Exception):
-    """A file holds no readable triples."""
+    """A text holds no readable triples."""
 
 
 class Graph:
@@ -75,30 +74,30 @@ class Graph:
         return self._literals[predicate].get(subject, [])
 
 
-def read_triples(path: Path) -> list[Triple]:
-    """Return the triples of an OWL file (RDF/XML, OWL/XML or N-Triples), without following its imports.
+def parse_owl(data: bytes, base: str) -> list[Triple]:
+    """Return the triples of OWL (RDF/XML, OWL/XML or N-Triples), without following its imports.
+
+    Args:
+        data: the text.
+        base: IRI to which relative ones refer where the text names no base.
 
     Raises:
-        TripleError: the file is missing, unreadable, or not OWL; one line with the file and the reason.
+        TripleError: it is not OWL; one line with the reason.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise TripleError(f"{path}: {error.strerror or error}: check the path") from error
     world = owlready2.World()
     try:
         graph = world.get_ontology("http://metacontrol.org/file#").graph
-        graph.parse(io.BytesIO(data), default_base=path.resolve().as_uri())
+        graph.parse(io.BytesIO(data), default_base=base)
         saved = io.BytesIO()
         world.save(saved, format="ntriples")
     except Exception as error:  # owlready2's parsers raise whatever their parts do
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise TripleError(f"{path}: is not an OWL file ({reason}): save it as RDF/XML") from error
+        raise TripleError(f"is not an OWL file ({reason}): save it as RDF/XML") from error
     finally:
         world.close()
     triples = list(parse_ntriples(saved.getvalue().decode()))
     if len(triples) <= 1:
-        raise TripleError(f"{path}: is not an OWL file (it holds no statement): save it as RDF/XML")
+        raise TripleError("is not an OWL file (it holds no statement): save it as RDF/XML")
     return triples
 
 

@@ -10,10 +10,10 @@ import rospy
 import yaml
 from metacontrol_msgs.msg import JournalEntry, ReasonerJournal
 
+from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.loop.entries import Entry
 from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.journal import Journal
-from mros1_reasoner.loop.parameters import Parameters
 
 
 class JournalTopic:

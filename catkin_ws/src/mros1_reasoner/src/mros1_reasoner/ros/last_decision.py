@@ -7,7 +7,7 @@ from metacontrol_bags import messages
 from metacontrol_bags.decision import Decision
 from metacontrol_msgs import msg
 
-from mros1_reasoner.replay.recording import RecordingError
+from mros1_reasoner.io.recording import RecordingError
 
 
 def last_decision(topic: str, wait: float) -> Decision:

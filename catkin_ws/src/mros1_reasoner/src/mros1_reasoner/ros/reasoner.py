@@ -19,16 +19,17 @@ from node_kit.ros.lifetime import Lifetime
 from ros_model.errors import ModelError
 from std_msgs.msg import Bool
 
+from mros1_reasoner.io.parameters import ParameterError, Parameters
 from mros1_reasoner.knowledge import vocabulary
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase, KnowledgeBaseError
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Facts, Objective
+from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.loop import entries, journal
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark, newest_goal
 from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Result, StaleFact, Step, TaskFact
 from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.loop.parameters import ParameterError, Parameters
 from mros1_reasoner.loop.throttle import Throttle
 from mros1_reasoner.loop.view import MapeError
 from mros1_reasoner.pellet.process import make_reasoner

@@ -11,7 +11,8 @@ from metacontrol_msgs import srv as services
 from metacontrol_msgs.msg import FunctionFeasibility
 from std_srvs.srv import Trigger, TriggerResponse
 
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBaseError
+from mros1_reasoner.io.ontology_files import save_knowledge_base
+from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop import entries
 from mros1_reasoner.loop.view import MapeError
@@ -104,7 +105,7 @@ class Services:
             if not path.parent.is_dir():
                 raise MapeError(f"{path.parent}: no such folder: make it first")
             core = self._node.core
-            self._node.knowledge_base.save(path, core.facts, core.analysis)
+            save_knowledge_base(path, self._node.knowledge_base, core.facts, core.analysis)
             saved.append(str(path))
 
         ok, message = self._answer(work)

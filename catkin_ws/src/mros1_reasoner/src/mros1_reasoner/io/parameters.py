@@ -1,4 +1,4 @@
-"""The node's parameters, pure: from a mapping, as the parameter server or a bag holds it, to what the loop needs."""
+"""The node's parameters: from a mapping, as the parameter server or a bag holds it, to what the loop needs."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import rospkg
 from ros_model.io.files import resolve
 
+from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Direction, Objective
 from mros1_reasoner.loop.settings import Settings
@@ -111,7 +112,7 @@ class Parameters:
                 known = " or ".join(d.value for d in Direction)
                 raise ParameterError(f"parameter ~qa_direction/{quality} is {direction!r}: expected {known}") from error
         models = self.model_files if models is None else models
-        return KnowledgeBase(models, self.vocabulary_files if vocabularies is None else vocabularies, directions)
+        return read_knowledge_base(models, self.vocabulary_files if vocabularies is None else vocabularies, directions)
 
     def objectives(self, knowledge_base: KnowledgeBase) -> tuple[Objective, ...]:
         """Return the model's objectives, else one for each function that no design requires, with the NFRs given."""

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from mros1_reasoner.loop.parameters import ParameterError, Parameters
+from mros1_reasoner.io.parameters import ParameterError, Parameters
 from reasoner_helpers import application
 
 

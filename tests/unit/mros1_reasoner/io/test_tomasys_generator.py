@@ -2,9 +2,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.io.ontology_files import read_knowledge_base
+from mros1_reasoner.io.tomasys_generator import generate
 from mros1_reasoner.knowledge.model import Direction, Quality
-from mros1_reasoner.knowledge.tomasys_generator import generate
 from ros_model.generators import find_generators
 from ros_model.io.project import load_project
 
@@ -33,7 +33,7 @@ def test_committed_model_is_the_generated_one(written):
 
 
 def test_every_variant_is_a_design_with_its_levels_and_components(project, written):
-    knowledge_base = KnowledgeBase([written])
+    knowledge_base = read_knowledge_base([written])
     assert set(knowledge_base.designs) == {variant.name for variant in project.variants}
     required = project.required_components()
     for variant in project.variants:
@@ -44,13 +44,13 @@ def test_every_variant_is_a_design_with_its_levels_and_components(project, writt
 
 
 def test_laser_variants_require_the_laser_and_camera_variants_the_camera(written):
-    designs = KnowledgeBase([written]).designs.values()
+    designs = read_knowledge_base([written]).designs.values()
     assert all(("front_laser" in d.components) != d.name.endswith("_k") for d in designs)
     assert all(("camera" in d.components) == d.name.endswith("_k") for d in designs)
 
 
 def test_objectives_and_directions_are_those_of_metacontrol_yaml(written):
-    knowledge_base = KnowledgeBase([written])
+    knowledge_base = read_knowledge_base([written])
     assert [(o.name, o.function, dict(o.limits)) for o in knowledge_base.objectives] == [
         ("o_navigate", "f_navigate", {"safety": 0.6, "energy": 0.62})
     ]
@@ -67,7 +67,7 @@ def test_ranges_and_comparisons_are_those_of_metacontrol_yaml(project, tmp_path)
     }
     settings["objectives"] = {"o_go": {"function": "f_navigate", "always_improve": True}}
     (path,) = generate(replace(project, settings=settings), tmp_path)
-    knowledge_base = KnowledgeBase([path])
+    knowledge_base = read_knowledge_base([path])
     assert knowledge_base.qualities["energy"] == Quality(Direction.LOWER_IS_BETTER, True, 0.0, 2.5)
     assert knowledge_base.qualities["safety"] == Quality(Direction.LOWER_IS_BETTER, False, 0.0, 1.0)
     assert knowledge_base.objectives[0].always_improve is True

@@ -1,0 +1,150 @@
+"""Ontologies in files: models with their imports, which are looked for beside them and never on the network."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.knowledge.loading import renamed, without_concluding_rules
+from mros1_reasoner.knowledge.model import Analysis, Direction, Facts
+from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError, read_model
+from mros1_reasoner.knowledge.triples import Triple, TripleError, iri_of, local_name, parse_owl
+
+_log = logging.getLogger(__name__)
+
+_OWL_FOLDER = Path(__file__).resolve().parents[3] / "owl"
+
+
+def read_knowledge_base(
+    models: Sequence[Path],
+    vocabularies: Sequence[Path] = (),
+    directions: Mapping[str, Direction] | None = None,
+) -> KnowledgeBase:
+    """Return the knowledge base of models, read beside the vocabulary.
+
+    Args:
+        models: OWL files of the application.
+        vocabularies: further OWL files to load before them; the package's own are always loaded.
+        directions: of quality attributes by name; else as the models say (`qa_sign`), else lower is better.
+
+    Raises:
+        KnowledgeBaseError: a file or an individual can't be used.
+    """
+    if not models:
+        raise KnowledgeBaseError("no application model is given: set model_file to an OWL file")
+    own = own_ontologies()
+    others = [path for path in vocabularies if path.resolve() not in {file.resolve() for file in own}]
+    triples, files = _read_ontologies(own, [*others, *models])
+    return KnowledgeBase(read_model(triples, ", ".join(str(path) for path in models), directions), files)
+
+
+def save_knowledge_base(
+    path: Path, knowledge_base: KnowledgeBase, facts: Facts | None = None, analysis: Analysis | None = None
+) -> None:
+    """Write a knowledge base, facts and statuses as one OWL file (RDF/XML) that loads again as a model.
+
+    Raises:
+        KnowledgeBaseError: the file can't be written.
+    """
+    text = knowledge_base.rdf_xml(facts, analysis)
+    try:
+        path.write_bytes(text)
+    except OSError as error:
+        raise KnowledgeBaseError(f"{path}: {error.strerror or error}: give another file") from error
+
+
+def own_ontologies() -> tuple[Path, Path]:
+    """Return the paths of owl/tomasys.owl and owl/mros.owl.
+
+    Raises:
+        KnowledgeBaseError: they are not beside this package.
+    """
+    folder = _OWL_FOLDER
+    if not folder.is_dir():
+        import rospkg
+
+        try:
+            folder = Path(rospkg.RosPack().get_path("mros1_reasoner")) / "owl"
+        except rospkg.ResourceNotFound as error:
+            raise KnowledgeBaseError("owl/tomasys.owl is not found: source the workspace") from error
+    return folder / "tomasys.owl", folder / "mros.owl"
+
+
+def read_triples(path: Path) -> list[Triple]:
+    """Return the triples of an OWL file (RDF/XML, OWL/XML or N-Triples), without following its imports.
+
+    Raises:
+        KnowledgeBaseError: the file is missing, unreadable, or not OWL; one line with the file and the reason.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise KnowledgeBaseError(f"{path}: {error.strerror or error}: check the path") from error
+    try:
+        return parse_owl(data, path.resolve().as_uri())
+    except TripleError as error:
+        raise KnowledgeBaseError(f"{path}: {error}") from error
+
+
+def _read_ontologies(own: Sequence[Path], others: Sequence[Path]) -> tuple[list[Triple], tuple[Path, ...]]:
+    """Read files and, from the folders they lie in, what they import.
+
+    Args:
+        own: the vocabulary and its rules, which are taken as they are.
+        others: rules of theirs that conclude a derived status are set aside, with a warning that names them.
+
+    Returns:
+        The triples, and the files that were read beside our own.
+
+    Raises:
+        KnowledgeBaseError: a file can't be read.
+    """
+    known = set()
+    triples: list[Triple] = []
+    queue = [(path, True) for path in own] + [(path, False) for path in others]
+    read: dict[Path, Path] = {}
+    imports: list[tuple[str, Path]] = []
+    while queue or imports:
+        if not queue:
+            iri, importer = imports.pop()
+            path = None if iri in known else _find_import(iri, importer)
+            if path is not None:
+                queue.append((path, False))
+            elif iri not in known:
+                _log.warning("%s imports <%s>, which is not among the given files: going on without", importer, iri)
+            known.add(iri)
+            continue
+        path, ours = queue.pop(0)
+        if path.resolve() in read:
+            continue
+        read[path.resolve()] = path
+        content = read_triples(path)
+        known |= {
+            iri_of(s).rstrip("#/") for s, p, o in content if iri_of(p) == v.RDF_TYPE and iri_of(o) == v.OWL_ONTOLOGY
+        }
+        imports += [(iri_of(o).rstrip("#/"), path) for _, p, o in content if iri_of(p) == v.OWL_IMPORTS]
+        content = renamed(content, len(read))
+        triples += content if ours else without_concluding_rules(content, str(path))
+    return list(dict.fromkeys(triples)), tuple(read.values())[len(own) :]
+
+
+def _find_import(iri: str, importer: Path) -> Path | None:
+    """Return the file beside the importing one that bears the last part of the IRI as its name, else the IRI itself."""
+    name = local_name(iri)
+    folder = importer.resolve().parent
+    for file_name in (name, f"{name}.owl", f"{name}.rdf"):
+        path = folder / file_name
+        if file_name and path.is_file() and path.parent == folder:
+            return path
+    bears = re.compile(rf"Ontology[^>]*\b(?:about|ontologyIRI)=[\"']{re.escape(iri)}[#/]?[\"']".encode())
+    for path in sorted([*folder.glob("*.owl"), *folder.glob("*.rdf")]):
+        try:
+            if bears.search(path.read_bytes()):
+                return path
+        except OSError:
+            continue
+    return None

@@ -1,0 +1,75 @@
+"""What changes in an application's ontology when it is loaded beside others: labels, and rules that ours replace."""
+
+from __future__ import annotations
+
+import logging
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+
+from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.knowledge.triples import Triple, iri_of, literal_of, local_name
+
+_log = logging.getLogger(__name__)
+
+
+def renamed(triples: Iterable[Triple], number: int) -> list[Triple]:
+    """Give blank nodes labels of their own, requiredBy its one IRI, and drop what is about the file itself."""
+
+    def term(text: str) -> str:
+        if text.startswith("_:"):
+            return f"_:f{number}x{text[2:]}"
+        if text.startswith("<") and local_name(text[1:-1]) == "requiredBy":
+            return f"<{v.REQUIRED_BY}>"
+        return text
+
+    def is_about_file(triple: Triple) -> bool:
+        predicate = iri_of(triple[1])
+        is_ontology = predicate == v.RDF_TYPE and iri_of(triple[2]) == v.OWL_ONTOLOGY
+        return predicate == v.OWL_IMPORTS or is_ontology or predicate.startswith(v.OWLREADY)
+
+    return [(term(s), term(p), term(o)) for s, p, o in triples if not is_about_file((s, p, o))]
+
+
+def without_concluding_rules(triples: list[Triple], where: str) -> list[Triple]:
+    """Set aside the rules that conclude a derived status: two values of one would contradict each other.
+
+    A warning names them and the file `where` they are.
+    """
+    by_subject: dict[str, list[Triple]] = defaultdict(list)
+    for triple in triples:
+        by_subject[triple[0]].append(triple)
+
+    def reach(node: str) -> set[str]:
+        """Return the node and the nodes of its lists and atoms, which belong to it alone."""
+        nodes, waiting = {node}, [node]
+        while waiting:
+            for _, _, value in by_subject[waiting.pop()]:
+                if value in by_subject and value not in nodes and _is_rule_part(by_subject[value]):
+                    nodes.add(value)
+                    waiting.append(value)
+        return nodes
+
+    dropped: set[str] = set()
+    labels = []
+    for rule in [s for s, p, o in triples if iri_of(p) == v.RDF_TYPE and iri_of(o) == v.SWRL + "Imp"]:
+        heads = [o for _, p, o in by_subject[rule] if iri_of(p) == v.SWRL + "head"]
+        concluded = {
+            iri_of(o)
+            for head in heads
+            for node in reach(head)
+            for _, p, o in by_subject[node]
+            if iri_of(p) == v.SWRL + "propertyPredicate"
+        }
+        statuses = concluded & set(v.DERIVED_STATUSES)
+        if statuses:
+            dropped |= reach(rule)
+            label = next((literal_of(o) for _, p, o in by_subject[rule] if iri_of(p) == v.RDFS_LABEL), None)
+            labels.append(label[0] if label else f"a rule for {local_name(sorted(statuses)[0])}")
+    if labels:
+        _log.warning("%s: its own rules are set aside, the generic ones hold: %s", where, ", ".join(sorted(labels)))
+    return [triple for triple in triples if triple[0] not in dropped]
+
+
+def _is_rule_part(statements: Sequence[Triple]) -> bool:
+    predicates = {iri_of(predicate) for _, predicate, _ in statements}
+    return v.RDF_FIRST in predicates or any(predicate.startswith(v.SWRL) for predicate in predicates)

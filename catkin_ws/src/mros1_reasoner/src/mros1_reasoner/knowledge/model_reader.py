@@ -1,0 +1,297 @@
+"""The application's model, read from the triples of its ontologies."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.knowledge.model import Design, Direction, Objective, Quality
+from mros1_reasoner.knowledge.reasoner import Assertion
+from mros1_reasoner.knowledge.triples import (
+    Graph,
+    Triple,
+    assertion_triple,
+    iri_of,
+    literal_of,
+    local_name,
+    write_ntriples,
+)
+
+_log = logging.getLogger(__name__)
+
+_DECIMAL = v.XSD + "decimal"
+# Statements that hold at one moment only. They come as facts of each analysis, so the ontology goes without them.
+_MOMENTARY = (*v.DERIVED_STATUSES, v.O_UPDATABLE, v.C_STATUS, v.FD_ERROR_LOG, v.SOLVES_O, v.TYPE_FD, v.REQUIRES_O)
+_COMPARISONS = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES)
+_LEVELS = (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION, v.HAS_VALUE, v.IS_QA_TYPE)
+
+
+class KnowledgeBaseError(Exception):
+    """The models can't be used; one line that says which file or individual, why, and what to do."""
+
+
+@dataclass(frozen=True)
+class ApplicationModel:
+    """What the ontologies of an application say.
+
+    Attributes:
+        where: the files, for messages.
+        function_iris: IRI of each function by name.
+        design_iris: IRI of each design by name.
+        component_iris: IRI of each component by name.
+        quality_iris: IRI of each quality attribute by name.
+        objective_iris: IRI of each objective by name, those included that a grounding requires.
+        grounding_iris: IRI of each grounding by the names of its objective and its design.
+        qualities: how levels compare, of every quality attribute by name.
+        designs: every design by name, with its expected levels.
+        objectives: those that the ontologies hold already, but for those that a grounding requires.
+        component_statuses: statuses that the ontologies assert.
+        ontology: vocabulary, rules and models as N-Triples, without what comes as facts.
+    """
+
+    where: str
+    function_iris: Mapping[str, str]
+    design_iris: Mapping[str, str]
+    component_iris: Mapping[str, str]
+    quality_iris: Mapping[str, str]
+    objective_iris: Mapping[str, str]
+    grounding_iris: Mapping[tuple[str, str], str]
+    qualities: Mapping[str, Quality]
+    designs: Mapping[str, Design]
+    objectives: tuple[Objective, ...]
+    component_statuses: Mapping[str, str]
+    ontology: str
+
+
+def read_model(
+    triples: Sequence[Triple], where: str, directions: Mapping[str, Direction] | None = None
+) -> ApplicationModel:
+    """Return what the triples of ontologies say.
+
+    Args:
+        triples: of the vocabulary, its rules and the application's models.
+        where: the files, for messages.
+        directions: of quality attributes by name; else as the models say (`qa_sign`), else lower is better.
+
+    Raises:
+        KnowledgeBaseError: an individual can't be used.
+    """
+    return _Reader(Graph(triples), where, directions or {}).read()
+
+
+class _Reader:
+    def __init__(self, graph: Graph, where: str, directions: Mapping[str, Direction]) -> None:
+        self._graph, self._where, self._directions = graph, where, directions
+        self._functions = self._names((v.FUNCTION,), graph.objects(v.SOLVES_F) | graph.objects(v.TYPE_F))
+        if not self._functions:
+            raise KnowledgeBaseError(f"{where}: no individual of class Function: give the model that has them")
+        self._designs = self._names((v.FUNCTION_DESIGN,), graph.subjects(v.SOLVES_F))
+        self._components = self._names(
+            (v.COMPONENT, v.COMPONENT_STATE, v.COMPONENT_SPECIFICATION),
+            graph.subjects(v.REQUIRED_BY) | graph.subjects(v.C_STATUS),
+        )
+        self._quality_types = self._names((v.QA_TYPE,), graph.objects(v.IS_QA_TYPE))
+        self._objectives = self._names((v.OBJECTIVE,), graph.subjects(v.TYPE_F))
+        self._function_name = _inverse(self._functions)
+        self._component_name = _inverse(self._components)
+        self._quality_name = _inverse(self._quality_types)
+        self._qualities = {name: self._quality(name) for name in sorted(self._quality_types)}
+
+    def read(self) -> ApplicationModel:
+        graph = self._graph
+        designs = {name: self._design(name) for name in sorted(self._designs)}
+        required = graph.objects(v.REQUIRES_O)
+        asked_for = [name for name, iri in sorted(self._objectives.items()) if iri not in required]
+        objectives = tuple(self._objective(name) for name in asked_for)
+        self._check_requirements(designs)
+        return ApplicationModel(
+            where=self._where,
+            function_iris=self._functions,
+            design_iris=self._designs,
+            component_iris=self._components,
+            quality_iris=self._quality_types,
+            objective_iris=self._objectives,
+            grounding_iris=self._groundings(),
+            qualities=self._qualities,
+            designs=designs,
+            objectives=objectives,
+            component_statuses={
+                self._component_name[subject]: str(value)
+                for subject, value in graph.literals(v.C_STATUS)
+                if value in v.COMPONENT_STATUSES
+            },
+            ontology=self._static(),
+        )
+
+    def _groundings(self) -> dict[tuple[str, str], str]:
+        objective_name, design_name = _inverse(self._objectives), _inverse(self._designs)
+        return {
+            (objective_name[objective], design_name[design]): iri
+            for iri, objective in self._graph.pairs(v.SOLVES_O)
+            for design in self._graph.objects_of(iri, v.TYPE_FD)
+            if objective in objective_name and design in design_name
+        }
+
+    def _names(self, classes: Iterable[str], also: Iterable[str]) -> dict[str, str]:
+        """Return local name -> IRI of the individuals of the classes and of those that properties show to be one."""
+        iris = {iri for name in classes for iri in self._graph.instances(name)} | set(also)
+        result: dict[str, str] = {}
+        for iri in sorted(iris):
+            name = local_name(iri)
+            if result.setdefault(name, iri) != iri:
+                raise KnowledgeBaseError(
+                    f"{self._where}: two individuals are called {name}: {result[name]} and {iri}: rename one of them"
+                )
+        return result
+
+    def _quality(self, name: str) -> Quality:
+        """Return how levels of a quality compare: as given, else as the model says, else lower is better."""
+        iri = self._quality_types[name]
+        low, high = (self._bound(iri, predicate) for predicate in (v.QA_MIN, v.QA_MAX))
+        operators = set(self._graph.literals_of(iri, v.QA_COMPARISON_OPERATOR))
+        signs = {_number(text) for text in self._graph.literals_of(iri, v.QA_SIGN)}
+        if signs - {1.0, -1.0} or len(signs) > 1:
+            raise KnowledgeBaseError(f"{self._where}: qa_sign of {name} must be one value, 1 or -1")
+        try:
+            quality = Quality.compared_by(operators.pop() if operators else ">", low, high)
+        except ValueError as error:
+            raise KnowledgeBaseError(f"{self._where}: qa_comparison_operator of {name}: {error}") from error
+        if operators:
+            raise KnowledgeBaseError(f"{self._where}: {name} has several qa_comparison_operator: give it one")
+        direction = Direction.HIGHER_IS_BETTER if signs == {-1.0} else Direction.LOWER_IS_BETTER
+        reaching = quality.reaching_violates or "true" in self._graph.literals_of(iri, v.QA_REACHING_VIOLATES)
+        direction = self._directions.get(name, direction if signs else quality.direction)
+        return replace(quality, direction=direction, reaching_violates=reaching)
+
+    def _bound(self, quality: str, predicate: str) -> float | None:
+        numbers = [_number(text) for text in self._graph.literals_of(quality, predicate)]
+        if len(numbers) > 1 or not all(math.isfinite(number) for number in numbers):
+            name = local_name(quality)
+            raise KnowledgeBaseError(f"{self._where}: {local_name(predicate)} of {name} must be one finite number")
+        return numbers[0] if numbers else None
+
+    def _design(self, name: str) -> Design:
+        iri = self._designs[name]
+        functions = sorted(self._graph.objects_of(iri, v.SOLVES_F))
+        if len(functions) != 1:
+            say = "no Function" if not functions else "several Functions"
+            raise KnowledgeBaseError(f"{self._where}: FunctionDesign {name} solves {say}: give it one solvesF")
+        expected = self._read_levels(iri, v.HAS_QA_ESTIMATION)
+        if not expected:
+            _log.warning("FunctionDesign %s has no expected quality levels (hasQAestimation)", name)
+        return Design(
+            name=name,
+            function=self._function_name[functions[0]],
+            expected=expected,
+            components=frozenset(self._component_name[c] for c in self._graph.subjects_of(v.REQUIRED_BY, iri)),
+            requires=tuple(sorted(local_name(f) for f in self._graph.objects_of(iri, v.REQUIRES_F))),
+        )
+
+    def _objective(self, name: str) -> Objective:
+        iri = self._objectives[name]
+        functions = self._graph.objects_of(iri, v.TYPE_F)
+        if len(functions) != 1:
+            raise KnowledgeBaseError(f"{self._where}: Objective {name} must have one Function: give it one typeF")
+        limits = self._read_levels(iri, v.HAS_NFR)
+        improves = {text in ("true", "1") for text in self._graph.literals_of(iri, v.O_ALWAYS_IMPROVE)}
+        return Objective(name, self._function_name[functions.pop()], limits, improves.pop() if improves else None)
+
+    def _read_levels(self, owner: str, predicate: str) -> dict[str, float]:
+        levels: dict[str, float] = {}
+        for value in sorted(self._graph.objects_of(owner, predicate)):
+            types = self._graph.objects_of(value, v.IS_QA_TYPE)
+            numbers = [_number(literal) for literal in self._graph.literals_of(value, v.HAS_VALUE)]
+            if len(types) != 1 or len(numbers) != 1 or not math.isfinite(numbers[0]):
+                _log.warning(
+                    "QAvalue %s of %s is left out: it needs one isQAtype and one finite hasValue",
+                    local_name(value),
+                    local_name(owner),
+                )
+                continue
+            quality = self._quality_name[types.pop()]
+            kind = self._qualities[quality]
+            if not kind.holds(numbers[0]):
+                _log.warning(
+                    "QAvalue %s of %s is left out: %g is not within the range of %s, %s to %s",
+                    local_name(value),
+                    local_name(owner),
+                    numbers[0],
+                    quality,
+                    "any" if kind.low is None else f"{kind.low:g}",
+                    "any" if kind.high is None else f"{kind.high:g}",
+                )
+                continue
+            if quality in levels:
+                _log.warning("%s has two levels of %s: %s is left out", local_name(owner), quality, local_name(value))
+                continue
+            levels[quality] = numbers[0]
+        return levels
+
+    def _check_requirements(self, designs: Mapping[str, Design]) -> None:
+        """Refuse requirements that nothing can fulfil; tell of functions that no design solves."""
+        solving: dict[str, list[Design]] = {function: [] for function in sorted(self._functions)}
+        for design in designs.values():
+            solving[design.function].append(design)
+        for function, solvers in solving.items():
+            if not solvers:
+                _log.warning("Function %s can't be fulfilled: no FunctionDesign solves it", function)
+        finished: set[str] = set()
+
+        def visit(function: str, path: tuple[tuple[str, str], ...]) -> None:
+            start = next((i for i, (above, _) in enumerate(path) if above == function), None)
+            if start is not None:
+                cycle = "".join(f"{above} -> ({design}) " for above, design in path[start:])
+                raise KnowledgeBaseError(
+                    f"{self._where}: functions require each other ({cycle}-> {function}): break the cycle"
+                )
+            if function in finished:
+                return
+            for design in solving[function]:
+                for needed in design.requires:
+                    if needed not in solving:
+                        raise KnowledgeBaseError(
+                            f"{self._where}: {design.name} requires {needed}, which is no Function"
+                        )
+                    visit(needed, (*path, (function, design.name)))
+            finished.add(function)
+
+        for function in sorted(self._functions):
+            visit(function, ())
+
+    def _static(self) -> str:
+        values = self._graph.instances(v.QA_VALUE) | {
+            value
+            for predicate in (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION)
+            for value in self._graph.objects(predicate)
+        }
+        dropped = {*_MOMENTARY, *_LEVELS, *_COMPARISONS}
+
+        def stays(triple: Triple) -> bool:
+            subject, predicate, value = triple
+            name = iri_of(predicate)
+            if name in (v.B_STATUS, v.CC_AVAILABILITY):
+                return literal_of(value) not in (("true", v.XSD + "boolean"), ("1", v.XSD + "boolean"))
+            return name not in dropped and iri_of(subject) not in values
+
+        triples = [triple for triple in self._graph.triples if stays(triple)]
+        for name, quality in self._qualities.items():
+            iri = self._quality_types[name]
+            triples.append(assertion_triple(Assertion(iri, v.RDF_TYPE, v.QA_TYPE)))
+            triples.append(assertion_triple(Assertion(iri, v.QA_SIGN, str(quality.direction.sign), _DECIMAL)))
+            if quality.reaching_violates:
+                triples.append(assertion_triple(Assertion(iri, v.QA_REACHING_VIOLATES, "true", v.XSD + "boolean")))
+        return write_ntriples(triples)
+
+
+def _inverse(names: Mapping[str, str]) -> dict[str, str]:
+    return {iri: name for name, iri in names.items()}
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
