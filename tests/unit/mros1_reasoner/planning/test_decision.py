@@ -6,9 +6,10 @@ from types import SimpleNamespace
 import pytest
 from bag_helpers import Types
 from metacontrol_bags import messages
+from mros1_reasoner.cli.decision_tables import render
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.replay.explain import line, render
+from mros1_reasoner.planning.log_line import line
 from reasoner_helpers import OBJECTIVE
 from rich.console import Console
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import time
 from collections.abc import Callable
@@ -12,7 +11,7 @@ from typing import TypeVar
 import rospy
 from actionlib_msgs.msg import GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray
-from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED, Decision
+from metacontrol_bags.decision import DECIDED, Decision
 from metacontrol_msgs import msg as messages
 from node_kit.io.inbox import Inbox
 from node_kit.ros.lifetime import Lifetime
@@ -30,16 +29,14 @@ from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark, 
 from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Result, StaleFact, Step, TaskFact
 from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.loop.throttle import Throttle
 from mros1_reasoner.loop.view import MapeError
 from mros1_reasoner.pellet.process import make_reasoner
-from mros1_reasoner.replay.explain import line
+from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic
-from mros1_reasoner.ros.messages import fill_decision
+from mros1_reasoner.ros.log import Log, log_core
 from mros1_reasoner.ros.requests import Requests
 from mros1_reasoner.ros.services import Services
 
-_LOG = "[RosReasoner] -- %s"
 _TIMER_PERIOD = 0.02  # s, wall, the shortest between two looks at ROS time while the core waits for a moment
 _FASTEST = 10.0  # ROS time may run so much faster than wall time
 _LONGEST_WAIT = 1.0  # s, wall, until it is seen that somebody has asked the node to end
@@ -75,20 +72,19 @@ class ReasonerNode:
         self.core = Mape(knowledge_base, reasoner, objectives, settings, clock=rospy.get_time, name=name)
         self._inbox = Inbox()
         self._reader = DiagnosticsReader(knowledge_base.qualities, knowledge_base.components, parameters.nodes)
-        self._throttle, self._levels_told = Throttle(), Throttle(self._period, burst=1)
-        self._told: set[str] = set()
+        self._log = Log(self._period)
         self._taken_over: set[str] = set()
         self._goals: dict[str, tuple[str, bool]] = {}  # newest goal of an objective's task, and whether it failed
         self._journal = JournalTopic(name, parameters, knowledge_base.files)
-        self._decisions = rospy.Publisher("mros1_reasoner/decision", messages.Decision, queue_size=10, latch=True)
+        self._decisions = DecisionTopic()
         self._requests = None
         if parameters.asks and not settings.dry_run:
             self._requests = Requests(parameters.action, parameters.execution_deadline, self._inbox.put, self._report)
         self._listen(parameters.task_actions)
         self._services = Services(self, parameters.save_folder)
         for objective in objectives:
-            self._tell_objective(objective)
-        rospy.loginfo(_LOG, "Reasoner Initialization Ok")
+            self._log.tell_objective(objective)
+        self._log.tell("Reasoner Initialization Ok")
 
     def _listen(self, task_actions: dict[str, str]) -> None:
         active = "rosgraph_manipulator/active_configuration"
@@ -143,9 +139,9 @@ class ReasonerNode:
             MapeError, ReasonerError: it does not fit.
         """
         self._announce(self._applied(command))
-        rospy.loginfo(_LOG, f"operator: {' '.join((kind_of(command), *values_of(command)))}".strip())
+        self._log.tell(f"operator: {' '.join((kind_of(command), *values_of(command)))}".strip())
         if isinstance(command, entries.AddObjective):
-            self._tell_objective(self.core.objectives[command.name])
+            self._log.tell_objective(self.core.objectives[command.name])
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         reading = self._reader.read(array.status, array.header.stamp.to_sec())
@@ -174,9 +170,9 @@ class ReasonerNode:
         try:
             self._announce(self._applied(content))
         except (MapeError, KnowledgeBaseError) as error:
-            self._warn(kind_of(content), str(error))
+            self._log.warn(kind_of(content), str(error))
         except ReasonerError as error:
-            self._warn("analysis", f"analysis failed: {error}")
+            self._log.warn("analysis", f"analysis failed: {error}")
         else:
             return True
         return False
@@ -190,13 +186,13 @@ class ReasonerNode:
 
     def _take_reading(self, reading: Reading) -> None:
         for remark in reading.remarks:
-            self._tell_remark(remark)
+            self._log.tell_remark(remark)
         for fact in reading.facts:
             taken = self._take(fact)
             if isinstance(fact, LevelFact) and taken:
-                self._tell_level(fact)
+                self._log.tell_level(fact)
             elif isinstance(fact, StaleFact):
-                self._warn("stale", f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
+                self._log.warn("stale", f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
 
     def _take_active(self, active: messages.ActiveConfiguration) -> None:
         for function in active.functions:
@@ -206,15 +202,15 @@ class ReasonerNode:
             if taken and function.function not in self._taken_over:
                 self._taken_over.add(function.function)
                 say = f"{function.function} runs {function.configuration} ({function.state}): taken over as it is"
-                rospy.loginfo(_LOG, say)
+                self._log.tell(say)
 
     # What goes out
 
     def _announce(self, decisions: list[Decision]) -> None:
         """Tell of decisions and have those carried out that are to be."""
         for decision in decisions:
-            self._publish(decision)
-            self._tell_decision(decision)
+            self._decisions.publish(decision)
+            self._log.tell_decision(decision)
             if decision.state != DECIDED:
                 continue
             if self._requests:
@@ -227,67 +223,14 @@ class ReasonerNode:
         self._take(Result(decision, ok, message, blame))
         self._inbox.put(lambda: None)  # look at once at what happened meanwhile
 
-    def _tell_decision(self, decision: Decision) -> None:
-        if decision.state == EXECUTED:
-            rospy.loginfo("Exited timer_cb after successful reconfiguration")
-            took = f"{decision.objective} has {decision.to_configuration} after {decision.execute_wall_s:.2f} s"
-            rospy.loginfo(_LOG, f"executed: {took} ({decision.id})")
-        elif decision.state == FAILED and decision.to_configuration:
-            rospy.logwarn(_LOG, f"failed: {decision.explanation} ({decision.id})")
-        else:
-            (rospy.loginfo if decision.to_configuration else rospy.logwarn)(_LOG, line(decision))
-
-    def _publish(self, decision: Decision) -> None:
-        message = fill_decision(messages.Decision(), decision, rospy.Time.from_sec, messages)
-        message.header.stamp = rospy.Time.now()
-        self._decisions.publish(message)
-
-    # What is logged
-
-    def _tell_objective(self, objective: Objective) -> None:
-        rospy.loginfo("Objective created and set to ungrounded")
-        limits = ", ".join(f"{quality} {limit:g}" for quality, limit in sorted(objective.limits.items()))
-        rospy.loginfo(_LOG, f"{objective.name} needs {objective.function} with {limits or 'no limits'}")
-
-    def _tell_level(self, fact: LevelFact) -> None:
-        """Log a level as published tools expect it, but at most once in a period for each quality."""
-        text = f"QA value received!\tTYPE: {fact.quality}\tVALUE: {fact.text}"
-        if self._levels_told.admit(time.monotonic(), fact.quality, text):
-            rospy.loginfo(text)
-
-    def _tell_remark(self, remark: Remark) -> None:
-        if remark.is_warning:
-            self._warn(remark.kind, remark.text)
-        elif remark.text not in self._told and len(self._told) < _QUEUE:
-            self._told.add(remark.text)
-            rospy.loginfo(_LOG, remark.text)
-
-    def _warn(self, kind: str, text: str) -> None:
-        said = self._throttle.admit(time.monotonic(), kind, text)
-        if said:
-            is_published = text.startswith("Unsupported QA TYPE received: ")  # tools wait for that line as it is
-            rospy.logwarn(said) if is_published else rospy.logwarn(_LOG, said)
-
 
 def main() -> None:
     """Run the node; exit status 2 when it can't start."""
     with Lifetime("reasoner", ParameterError, KnowledgeBaseError, ReasonerError, ModelError) as life:
         reasoner = make_reasoner()  # its process gets ready while this one goes on
         life.start()
-        logger = logging.getLogger("mros1_reasoner")
-        logger.setLevel(logging.INFO)
-        logger.propagate = False
-        logger.addHandler(_RosLog())
+        log_core()
         ReasonerNode(reasoner).run()
-
-
-class _RosLog(logging.Handler):
-    """Takes what the core logs to rosout."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Log a record as the node's own."""
-        log = rospy.logwarn if record.levelno >= logging.WARNING else rospy.loginfo
-        log(_LOG, record.getMessage())
 
 
 def _warm_up(knowledge_base: KnowledgeBase, reasoner: Reasoner, objectives: tuple[Objective, ...]) -> None:

@@ -1,13 +1,13 @@
-"""The commands `explain` and `replay`."""
+"""The command `replay`."""
 
 from __future__ import annotations
 
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import replace as replaced
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import click
 import yaml
@@ -15,65 +15,35 @@ from metacontrol_bags.decision import Decision
 from metacontrol_msgs.msg import FunctionGrounding
 from rich.console import Console
 from rich.table import Table
-from ros_model.errors import ModelError
 
+from mros1_reasoner.cli.decision_tables import render
+from mros1_reasoner.cli.output import ERRORS, NAMESPACE, console, refuse
 from mros1_reasoner.io.parameters import ParameterError, Parameters
-from mros1_reasoner.io.recording import Recording, RecordingError, Run, read_decisions, read_recording
+from mros1_reasoner.io.reasoner_bag import read_recording
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
-from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
-from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
+from mros1_reasoner.knowledge.reasoner import Reasoner
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.entries import ActiveFact
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.pellet.process import make_reasoner
-from mros1_reasoner.replay.explain import render
-from mros1_reasoner.replay.replay import Pair, Replayed, pairs, replay, usual_duration, without_journal
+from mros1_reasoner.replay.comparison import Pair, pairs
+from mros1_reasoner.replay.recording import Recording, RecordingError, Run
+from mros1_reasoner.replay.rerun import Replayed, rerun, usual_duration, without_journal
 
-_DIFFERS, _REFUSED = 1, 2
+_DIFFERS = 1  # exit status
 _OUTCOME = {"state", "objective", "from_configuration", "to_configuration", "degraded"}
-_WIDTH = 150  # characters, where the output is no terminal
-_ERRORS = (RecordingError, ParameterError, KnowledgeBaseError, ModelError, ReasonerError, ValueError, OSError)
-
-_NAMESPACE = click.option("--namespace", help="Of the reasoner, where the bag holds several.")
-_BAG = click.argument("bag", type=click.Path(path_type=Path))
 
 
 @click.command()
-@click.argument("bag", type=click.Path(path_type=Path), required=False)
-@click.option("--topic", default="mros1_reasoner/decision", show_default=True, help="Of a running reasoner.")
-@click.option("--wait", default=3.0, show_default=True, help="For a decision of a running reasoner, s.")
-@_NAMESPACE
-def explain(bag: Path | None, topic: str, wait: float, namespace: str | None) -> None:
-    """Explain all decisions in a BAG, without one the last decision of the running reasoner."""
-    console = _console()
-    if bag is None:
-        from mros1_reasoner.ros.last_decision import last_decision  # the only part that needs ROS
-
-        try:
-            console.print(render(last_decision(topic, wait)))
-        except _ERRORS as error:
-            _refuse("explain", error)
-        return
-    try:
-        decisions = read_decisions(bag, namespace)
-    except _ERRORS as error:
-        _refuse("explain", error)
-    for decision in decisions:
-        console.print(render(decision))
-    if not decisions:
-        console.print(f"{bag}: holds no decisions")
-
-
-@click.command(name="replay")
-@_BAG
+@click.argument("bag", type=click.Path(path_type=Path))
 @click.option("--nfr", "nfrs", multiple=True, metavar="QA=LIMIT", help="Another limit, for all objectives.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Another value of a parameter, as YAML.")
 @click.option("--model", "models", multiple=True, type=click.Path(path_type=Path), help="Another ontology.")
 @click.option("--initial", help="Configuration that ran at first, for a bag that does not tell.")
 @click.option("--duration", type=float, help="Of a reconfiguration in s; as in the bag by default.")
 @click.option("--verbose", "-v", is_flag=True, help="Explain each decision in full.")
-@_NAMESPACE
-def replay_command(
+@NAMESPACE
+def replay(
     bag: Path,
     nfrs: tuple[str, ...],
     settings: tuple[str, ...],
@@ -88,7 +58,7 @@ def replay_command(
     Without changes they are the same. With other limits, parameters or models they tell what it would have done.
     Exit status: 0, 1 where nothing was changed but decisions differ, 2 bad input.
     """
-    console = _console()
+    out = console()
     reasoner: Reasoner | None = None
     try:
         changes = {f"nfr_{name}": value for name, value in _assignments(nfrs)} | dict(_assignments(settings))
@@ -98,8 +68,8 @@ def replay_command(
             _replay_run(recording, run, changes, models, initial, duration, reasoner)
             for run in recording.runs or [Run("replay")]
         ]
-    except _ERRORS as error:
-        _refuse("replay", error)
+    except ERRORS as error:
+        refuse("replay", error)
     finally:
         if reasoner is not None:
             reasoner.close()
@@ -110,7 +80,7 @@ def replay_command(
         remarks=tuple(remark for outcome in found for remark in outcome.remarks),
     )
     beside = pairs(recording, replayed)
-    _print(console, recording, replayed, beside, is_changed, verbose)
+    _print(out, recording, replayed, beside, is_changed, verbose)
     if not is_changed and recording.runs and not all(pair.is_equal for pair in beside):
         sys.exit(_DIFFERS)
 
@@ -129,7 +99,7 @@ def _replay_run(
     reasoner.load(knowledge_base.ontology)
     objectives, settings = parameters.objectives(knowledge_base), parameters.settings(knowledge_base)
     if not run.entries:  # nothing tells when the first configuration came
-        settings = replaced(settings, start_grace=0.0)
+        settings = replace(settings, start_grace=0.0)
     core = Mape(knowledge_base, reasoner, objectives, settings, name=run.name)
     entries = run.entries or without_journal(
         recording,
@@ -139,7 +109,7 @@ def _replay_run(
     if not entries:
         raise RecordingError("the bag holds neither a reasoner's journal nor diagnostics: nothing to replay")
     usual = usual_duration(recording.decisions) if duration is None else duration
-    return replay(core, entries, usual, follow=bool(run.entries))
+    return rerun(core, entries, usual, follow=bool(run.entries))
 
 
 def _knowledge_base(parameters: Parameters, run: Run, models: Sequence[Path]) -> KnowledgeBase:
@@ -183,7 +153,7 @@ def _assignments(texts: Sequence[str]) -> list[tuple[str, Any]]:
 
 
 def _print(
-    console: Console,
+    out: Console,
     recording: Recording,
     replayed: Replayed,
     beside: Sequence[Pair],
@@ -200,20 +170,20 @@ def _print(
             verdict = "[green]the same[/]"
         at = f"{pair.now - recording.start:.2f} s"
         table.add_row(at, known.objective, known.trigger, _change(pair.recorded), _change(pair.replayed), verdict)
-    console.print(table if beside else "no decisions, neither recorded nor replayed")
+    out.print(table if beside else "no decisions, neither recorded nor replayed")
     if verbose:
         for pair in beside:
             if pair.replayed:
-                console.print(render(pair.replayed, recording.start))
+                out.print(render(pair.replayed, recording.start))
     if not recording.runs:
-        console.print("The bag has no journal of the reasoner: what it did with its decisions is assumed.")
+        out.print("The bag has no journal of the reasoner: what it did with its decisions is assumed.")
     elif replayed.parted is not None:
         say = f"From {replayed.parted - recording.start:.2f} s on the replay decides otherwise; what was observed then"
-        console.print(f"{say} is taken as it was.")
+        out.print(f"{say} is taken as it was.")
     elif is_changed:
-        console.print("With the changes it would have decided the same.")
+        out.print("With the changes it would have decided the same.")
     for remark in replayed.remarks:
-        console.print(f"left out: {remark}", style="dim")
+        out.print(f"left out: {remark}", style="dim")
 
 
 def _change(decision: Decision | None) -> str:
@@ -222,12 +192,3 @@ def _change(decision: Decision | None) -> str:
     if not decision.to_configuration:
         return f"stays with {decision.from_configuration or 'nothing'}"
     return f"{decision.from_configuration or 'nothing'} -> {decision.to_configuration}"
-
-
-def _console() -> Console:
-    return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
-
-
-def _refuse(command: str, error: Exception) -> NoReturn:
-    click.echo(f"{command}: {' '.join(str(error).split())}", err=True)
-    sys.exit(_REFUSED)

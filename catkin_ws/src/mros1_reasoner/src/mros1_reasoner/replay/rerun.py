@@ -1,8 +1,8 @@
-"""What the loop would decide on a recorded run, pure: the same core over the journal of a bag, with other parameters.
+"""What the loop would decide on a recorded run: the same core over the journal of a bag, with other parameters.
 
-As long as it decides what was decided then, it takes in what was recorded. From where it decides otherwise, what the
-manipulator did then no longer tells anything: each request is taken for carried out after the usual time, while levels
-and components stay those that were observed then.
+While it decides as it did then, it takes in what was recorded. Once it decides otherwise, what the manipulator did then
+says nothing any more: each request counts as carried out after the usual time. Levels and components stay as they were
+observed then.
 """
 
 from __future__ import annotations
@@ -10,33 +10,20 @@ from __future__ import annotations
 import itertools
 import statistics
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from metacontrol_bags.decision import DECIDED, EXECUTED, PROPOSED, Decision
 
-from mros1_reasoner.io.recording import Recording
 from mros1_reasoner.loop import journal
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.entries import ActiveFact, Approve, Decided, Entry, Reject, Result, Step
 from mros1_reasoner.loop.entry_text import kind_of
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.view import MapeError
+from mros1_reasoner.replay.recording import Recording
 
 DEFAULT_DURATION = 1.0  # s of ROS time, of a reconfiguration, where the bag has none
-_SAME_MOMENT = 2.0  # s of ROS time between decisions that are taken for the same
-_OF_THE_MANIPULATOR = ActiveFact | Result | Approve | Reject | Decided
-_NOT_COMPARED = (  # what depends on when and how fast it is computed
-    "id",
-    "stamp",
-    "stamp_monitored",
-    "reasons",
-    "stamp_analysed",
-    "stamp_planned",
-    "stamp_executed",
-    "analyse_wall_s",
-    "plan_wall_s",
-    "execute_wall_s",
-)
+_CAME_OF_DECISIONS = ActiveFact | Result | Approve | Reject | Decided  # tells what was done then
 
 
 @dataclass(frozen=True)
@@ -54,29 +41,7 @@ class Replayed:
     remarks: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Pair:
-    """A recorded decision beside a replayed one; one of them may be missing.
-
-    Attributes:
-        now: when, s of ROS time.
-        differences: names of the fields that differ; empty where both are there and equal.
-    """
-
-    now: float
-    recorded: Decision | None
-    replayed: Decision | None
-    differences: tuple[str, ...] = ()
-
-    @property
-    def is_equal(self) -> bool:
-        """Whether the replay has decided as recorded."""
-        return self.recorded is not None and self.replayed is not None and not self.differences
-
-
-def replay(
-    core: Mape, entries: Sequence[Entry], duration: float = DEFAULT_DURATION, *, follow: bool = True
-) -> Replayed:
+def rerun(core: Mape, entries: Sequence[Entry], duration: float = DEFAULT_DURATION, *, follow: bool = True) -> Replayed:
     """Have a loop take in the entries of a journal.
 
     Args:
@@ -88,10 +53,10 @@ def replay(
     Raises:
         ReasonerError: an analysis failed.
     """
-    return _Replay(core, duration, follow).run(entries)
+    return _Rerun(core, duration, follow).run(entries)
 
 
-class _Replay:
+class _Rerun:
     def __init__(self, core: Mape, duration: float, follow: bool) -> None:
         self._core = core
         self._duration = duration
@@ -110,7 +75,7 @@ class _Replay:
                 if _targets(decisions) != _brought(entries, index):
                     self._is_free, self._parted = True, item.now
                     self._go_on_with(decisions)
-            elif self._parted is None or not isinstance(item.content, _OF_THE_MANIPULATOR):
+            elif self._parted is None or not isinstance(item.content, _CAME_OF_DECISIONS):
                 self._advance(item.now)
                 self._now = item.now
                 self._go_on_with(self._apply(item))
@@ -189,43 +154,3 @@ def without_journal(
         entries += [Entry(array.now, fact) for fact in reader.read(array.statuses, array.stamp).facts]
     entries.sort(key=lambda item: item.now)
     return [step for item in entries for step in (item, Entry(item.now, Step(heartbeat=True)))]
-
-
-def pairs(recording: Recording, replayed: Replayed) -> list[Pair]:
-    """Put each recorded decision beside the replayed one of the same time, in the order of time.
-
-    Those that do the same are put together first, then those that have the same reason.
-    """
-    recorded = [record for _, record in first_messages(recording.decisions) if record.state != EXECUTED]
-    own = [record for _, record in first_messages(replayed.decisions)]
-    beside: dict[str, Decision] = {}
-    for alike in (("objective", "to_configuration"), ("objective", "trigger")):
-        for record in recorded:
-            match = next((other for other in own if _is_same(record, other, alike)), None)
-            if match is not None and record.id not in beside:
-                own.remove(match)
-                beside[record.id] = match
-    found = [
-        Pair(record.stamp_planned, record, match, _differences(record, match) if match else ())
-        for record, match in ((record, beside.get(record.id)) for record in recorded)
-    ]
-    found += [Pair(record.stamp_planned, None, record) for record in own if record.stamp_planned >= recording.start]
-    return sorted(found, key=lambda pair: pair.now)
-
-
-def first_messages(decisions: Sequence[tuple[float, Decision]]) -> list[tuple[float, Decision]]:
-    """Return the first message about each decision."""
-    first: dict[str, tuple[float, Decision]] = {}
-    for now, record in decisions:
-        first.setdefault(record.id, (now, record))
-    return list(first.values())
-
-
-def _is_same(first: Decision, second: Decision, alike: Sequence[str]) -> bool:
-    are_alike = all(getattr(first, name) == getattr(second, name) for name in alike)
-    return are_alike and abs(first.stamp_planned - second.stamp_planned) <= _SAME_MOMENT
-
-
-def _differences(first: Decision, second: Decision) -> tuple[str, ...]:
-    names = [item.name for item in fields(Decision) if item.name not in _NOT_COMPARED]
-    return tuple(name for name in names if getattr(first, name) != getattr(second, name))

@@ -14,7 +14,7 @@ class _Kind:
     silenced: int = 0
 
 
-class Throttle:
+class LogThrottle:
     """Lets a text pass once in a period, and of one kind only a few texts; tells how many it held back."""
 
     def __init__(self, period: float = 10.0, burst: int = 5) -> None:

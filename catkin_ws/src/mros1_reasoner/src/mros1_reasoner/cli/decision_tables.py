@@ -1,4 +1,4 @@
-"""Decisions in words and tables for people, pure."""
+"""A decision as tables in a terminal."""
 
 from __future__ import annotations
 
@@ -11,32 +11,9 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-_IN_LINE = 4  # candidates that a log line names
+from mros1_reasoner.planning.log_line import milliseconds
+
 _STYLES = {EXECUTED: "green", FAILED: "red", PROPOSED: "yellow", ADVISED: "yellow"}
-_STATES = {
-    ADVISED: "dry run, nobody is asked",
-    PROPOSED: "waits for approval",
-}
-
-
-def line(decision: Decision) -> str:
-    """Return a decision as one line for a log: what, by how much, by which rule, the ranking, durations."""
-    parts = [decision.explanation]
-    rules = list(dict.fromkeys(cause.rules for cause in decision.reasons if cause.rules))
-    excesses = [f"{cause.quality} by {cause.excess:.0%}" for cause in decision.reasons if cause.quality]
-    if excesses:
-        parts.append(f"limit passed: {', '.join(excesses)}")
-    if rules:
-        parts.append(f"rules: {', '.join(rules)}")
-    parts += [text for text in decision.corrections if text not in decision.explanation]
-    if decision.candidates:
-        parts.append(f"candidates: {_ranking(decision)}")
-    parts.append(
-        f"analysed in {_milliseconds(decision.analyse_wall_s)}, planned in {_milliseconds(decision.plan_wall_s)}"
-    )
-    if decision.state in _STATES:
-        parts.insert(0, _STATES[decision.state])
-    return "; ".join(parts)
 
 
 def render(decision: Decision, since: float = 0.0) -> Group:
@@ -49,15 +26,6 @@ def render(decision: Decision, since: float = 0.0) -> Group:
     return Group(
         _heading(decision, since), *_causes(decision.reasons, decision.causes), _candidates(decision), _times(decision)
     )
-
-
-def _ranking(decision: Decision) -> str:
-    texts = []
-    for rank, candidate in enumerate(decision.candidates[:_IN_LINE], 1):
-        reason = "chosen" if candidate.chosen else candidate.lost_because
-        texts.append(f"{rank} {candidate.name} ({candidate.utility:g}{f': {reason}' if reason else ''})")
-    more = len(decision.candidates) - _IN_LINE
-    return ", ".join(texts) + (f", and {more} more" if more > 0 else "")
 
 
 def _heading(decision: Decision, since: float) -> Text:
@@ -109,11 +77,7 @@ def _times(decision: Decision) -> Text:
     parts = [f"{text}" for text in (*decision.corrections, *(f"releases {name}" for name in decision.releases))]
     if decision.stamp_monitored:
         parts.append(f"decided {decision.stamp_planned - decision.stamp_monitored:.2f} s after it was reported")
-    parts += [f"analysis {_milliseconds(decision.analyse_wall_s)}", f"planning {_milliseconds(decision.plan_wall_s)}"]
+    parts += [f"analysis {milliseconds(decision.analyse_wall_s)}", f"planning {milliseconds(decision.plan_wall_s)}"]
     if decision.execute_wall_s:
         parts.append(f"execution {decision.execute_wall_s:.2f} s")
     return Text("; ".join(parts) + "\n", style="dim")
-
-
-def _milliseconds(duration: float) -> str:
-    return f"{duration * 1000:.1f} ms"

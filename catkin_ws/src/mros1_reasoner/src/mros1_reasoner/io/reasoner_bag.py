@@ -1,11 +1,10 @@
-"""What a bag holds of a reasoner: its journal and decisions, or at least what it could hear. Read without ROS."""
+"""Read from a bag, without ROS, what it holds of a reasoner: journal and decisions, or at least what it heard."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,64 +15,15 @@ from metacontrol_bags.typestore import typestore
 from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.typesys import TypesysError
 
-from mros1_reasoner.loop.entries import ActiveFact, Entry
+from mros1_reasoner.loop.entries import ActiveFact
 from mros1_reasoner.loop.entry_text import read_entry
+from mros1_reasoner.replay.recording import Recording, RecordingError, Run, Statuses
 
 _JOURNAL = "mros1_reasoner/journal"
 _DECISION = "mros1_reasoner/decision"
 _ACTIVE = "rosgraph_manipulator/active_configuration"
 _DIAGNOSTICS = "/diagnostics"
 _UNREADABLE = (ReaderError, TypesysError, AttributeError, IndexError, UnicodeDecodeError)
-
-
-class RecordingError(Exception):
-    """A bag can't be used; one line that names it and says what to do."""
-
-
-@dataclass
-class Run:
-    """One life of a reasoner, from its journal.
-
-    Attributes:
-        name: beginning of its decisions' ids.
-        parameters: of the node.
-        files: text of the ontologies that it loaded, by path.
-        first: number of the first entry; more than 0 where the reasoner had forgotten older ones.
-        entries: of its journal, from its start where the bag has the beginning.
-    """
-
-    name: str
-    parameters: dict[str, Any] = field(default_factory=dict)
-    files: dict[str, str] = field(default_factory=dict)
-    first: int = 0
-    entries: list[Entry] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Statuses:
-    """A DiagnosticArray: when it was recorded, its own stamp, and its statuses."""
-
-    now: float
-    stamp: float
-    statuses: tuple[Any, ...]
-
-
-@dataclass
-class Recording:
-    """What a bag holds of one reasoner; times are s of ROS time.
-
-    Attributes:
-        start: of the bag.
-        runs: by the journal; empty where the bag has none.
-        decisions: every message, with when it was recorded.
-        diagnostics: everything on /diagnostics, and `active`, what ran: read only where there is no journal.
-    """
-
-    start: float = 0.0
-    runs: list[Run] = field(default_factory=list)
-    decisions: list[tuple[float, Decision]] = field(default_factory=list)
-    diagnostics: list[Statuses] = field(default_factory=list)
-    active: list[tuple[float, ActiveFact]] = field(default_factory=list)
 
 
 def read_decisions(path: Path, namespace: str | None = None) -> list[Decision]:

@@ -3,12 +3,13 @@
 import pytest
 from bag_helpers import Bag, Life
 from click.testing import CliRunner
-from mros1_reasoner.cli import commands
-from mros1_reasoner.cli.commands import explain, replay_command
+from mros1_reasoner.cli import replay as replay_module
+from mros1_reasoner.cli.explain import explain
+from mros1_reasoner.cli.replay import replay
 from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.loop.entries import ActiveFact, ComponentFact, LevelFact, Lock, Unlock
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.replay.replay import first_messages
+from mros1_reasoner.replay.comparison import first_messages
 from reasoner_helpers import HEAD, application
 
 PARAMETERS = {
@@ -33,7 +34,7 @@ class KeptWarm:
 
 @pytest.fixture(autouse=True)
 def warm(pellet, monkeypatch):
-    monkeypatch.setattr(commands, "make_reasoner", lambda: KeptWarm(pellet))
+    monkeypatch.setattr(replay_module, "make_reasoner", lambda: KeptWarm(pellet))
 
 
 def levels(quality, level, since, until):
@@ -99,14 +100,14 @@ BUSY = [LASER_FAILS, *levels("safety", 0.7, 12.0, 16.0), *levels("energy", 0.9, 
 def test_unchanged_replay_decides_as_recorded(life, bag):
     lived = life(BUSY)
     assert len(first_messages(lived.decisions)) >= 3
-    result = run(replay_command, bag(lived))
+    result = run(replay, bag(lived))
     assert result.exit_code == 0, result.output
     assert result.output.count("the same") == len(first_messages(lived.decisions))
     assert "differs" not in result.output
 
 
 def test_recorder_that_came_late_still_has_all_it_takes(life, bag):
-    result = run(replay_command, bag(life(BUSY), joined=9.0))
+    result = run(replay, bag(life(BUSY), joined=9.0))
     assert result.exit_code == 0, result.output
     assert "the same" in result.output
     assert "differs" not in result.output
@@ -123,7 +124,7 @@ def test_bag_brings_the_imported_files_of_a_model_along(tmp_path, life, bag, mod
     path = bag(life(BUSY))
     for file in tmp_path.glob("*.owl"):
         file.unlink()
-    result = run(replay_command, path)
+    result = run(replay, path)
     assert result.exit_code == 0, result.output
     assert "camera_slow" in result.output
     assert "going on without" not in caplog.text
@@ -132,7 +133,7 @@ def test_bag_brings_the_imported_files_of_a_model_along(tmp_path, life, bag, mod
 def test_other_limit_tells_what_it_would_have_done(life, bag):
     lived = life([LASER_FAILS, *levels("safety", 0.55, 12.0, 18.0)])
     assert len(first_messages(lived.decisions)) == 1
-    result = run(replay_command, bag(lived), "--nfr", "safety=0.5")
+    result = run(replay, bag(lived), "--nfr", "safety=0.5")
     assert result.exit_code == 0
     assert "qa:safety" in result.output
     assert "the replay decides otherwise" in result.output
@@ -143,20 +144,20 @@ def test_after_the_parting_requests_are_taken_for_carried_out(life, bag):
     lived = life(given)
     (decision,) = [record for _, record in first_messages(lived.decisions)]
     assert decision.from_configuration == "scan_slow"
-    result = run(replay_command, bag(lived), "--nfr", "energy=0.35")
+    result = run(replay, bag(lived), "--nfr", "energy=0.35")
     assert "scan_slow -> scan_slower" in result.output
     assert "scan_slower -> camera_slower" in result.output
 
 
 def test_other_parameter_that_changes_nothing(life, bag):
-    result = run(replay_command, bag(life()), "--set", "violation_window=3.0")
+    result = run(replay, bag(life()), "--set", "violation_window=3.0")
     assert result.exit_code == 0
     assert "would have decided the same" in result.output
     assert "the same" in result.output.splitlines()[4]
 
 
 def test_other_choice_at_the_same_moment_stands_beside_the_recorded_one(life, bag):
-    result = run(replay_command, bag(life()), "--nfr", "energy=0.35")
+    result = run(replay, bag(life()), "--nfr", "energy=0.35")
     (row,) = [row for row in result.output.splitlines() if "component:laser" in row]
     assert "scan_slow -> camera_slow " in row
     assert "scan_slow -> camera_slower" in row
@@ -165,7 +166,7 @@ def test_other_choice_at_the_same_moment_stands_beside_the_recorded_one(life, ba
 def test_what_an_operator_did_is_done_again(life, bag):
     lived = life([(START + 4.0, Lock()), LASER_FAILS, (START + 9.0, Unlock())])
     assert [record.to_configuration for _, record in first_messages(lived.decisions)] == ["", "camera_slow"]
-    result = run(replay_command, bag(lived))
+    result = run(replay, bag(lived))
     assert result.exit_code == 0, result.output
     assert result.output.count("the same") == 2
 
@@ -174,13 +175,13 @@ def test_altered_record_is_noticed(life, bag, tmp_path):
     lived = life()
     other = lived.decisions[0]
     lived.decisions[0] = other[0], type(other[1])(**{**other[1].__dict__, "degraded": True})
-    result = run(replay_command, bag(lived))
+    result = run(replay, bag(lived))
     assert result.exit_code == 1
     assert "differs: degraded" in result.output
 
 
 def test_verbose_replay_explains_each_decision(life, bag):
-    result = run(replay_command, bag(life()), "--verbose")
+    result = run(replay, bag(life()), "--verbose")
     assert "requires laser, which does not work" in result.output
 
 
@@ -191,11 +192,11 @@ def test_bag_without_a_journal_is_replayed_from_its_diagnostics(tmp_path, model)
             value = "FALSE" if tick > 50 else "TRUE"
             bag.statuses(START + tick / 10, ("Component status", "laser", 0, (("laser", value),)))
     options = ["--model", model, "--set", "qa_direction={performance: higher_is_better}", "--nfr", "safety=0.6"]
-    result = run(replay_command, path, *options, "--initial", "scan_slow")
+    result = run(replay, path, *options, "--initial", "scan_slow")
     assert result.exit_code == 0, result.output
     assert "scan_slow -> camera_slow" in result.output
     assert "no journal" in result.output
-    assert run(replay_command, path, *options, "--initial", "scan_medium").exit_code == 2
+    assert run(replay, path, *options, "--initial", "scan_medium").exit_code == 2
 
 
 def test_running_configuration_is_taken_from_a_bag_without_a_journal(tmp_path, model):
@@ -204,7 +205,7 @@ def test_running_configuration_is_taken_from_a_bag_without_a_journal(tmp_path, m
         bag.active(START, "f_move", "scan_slow")
         for tick in range(50):
             bag.statuses(START + tick / 10, ("Component status", "laser", 0, (("laser", "FALSE"),)))
-    result = run(replay_command, path, "--model", model, "--nfr", "energy=0.62")
+    result = run(replay, path, "--model", model, "--nfr", "energy=0.62")
     assert "scan_slow -> camera_slow" in result.output, result.output
 
 
@@ -219,7 +220,7 @@ def test_explain_tells_every_decision_of_a_bag(life, bag):
     assert "utility 0.1 is less than 0.2" in result.output
 
 
-@pytest.mark.parametrize("command", [explain, replay_command])
+@pytest.mark.parametrize("command", [explain, replay])
 def test_what_is_no_bag_is_refused_in_one_line(command, tmp_path):
     path = tmp_path / "no.bag"
     path.write_bytes(b"#ROSBAG V2.0\nnot really")
@@ -236,7 +237,7 @@ def test_missing_part_of_the_journal_is_refused(life, tmp_path):
     with Bag(path) as bag:
         bag.journal(START, lived.entries[:3], 0, NAME, PARAMETERS)
         bag.journal(START + 1, lived.entries[5:6], 5, NAME)
-    result = run(replay_command, path)
+    result = run(replay, path)
     assert result.exit_code == 2
     assert "part of the reasoner's journal is missing" in result.output
 
@@ -247,18 +248,18 @@ def test_nonsense_in_a_journal_is_refused(tmp_path, model, kind, values):
     with Bag(path) as bag:
         strange = bag.types.JournalEntry(now=START, kind=kind, values=values)
         bag.journal(START, [], 0, NAME, PARAMETERS, {"a.owl": model.read_text()}, more=[strange])
-    result = run(replay_command, path)
+    result = run(replay, path)
     assert result.exit_code == 2, result.output
     assert repr(kind) in result.output
 
 
 def test_two_reasoners_in_a_bag_need_a_namespace(life, bag):
     path = bag(life(), space="/one")
-    assert run(replay_command, path, "--namespace", "one").exit_code == 0
+    assert run(replay, path, "--namespace", "one").exit_code == 0
     with_two = path.with_name("two.bag")
     with Bag(with_two) as two:
         for space in ("one", "two"):
             two.journal(START, [], 0, NAME, PARAMETERS, topic=f"/{space}/mros1_reasoner/journal")
-    result = run(replay_command, with_two)
+    result = run(replay, with_two)
     assert result.exit_code == 2
     assert "--namespace" in result.output

@@ -1,4 +1,4 @@
-"""The last decision of a running reasoner, for the command `explain`."""
+"""The topic of the reasoner's decisions: the node publishes them, the command `explain` reads the last one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,24 @@ from metacontrol_bags import messages
 from metacontrol_bags.decision import Decision
 from metacontrol_msgs import msg
 
-from mros1_reasoner.io.recording import RecordingError
+from mros1_reasoner.replay.recording import RecordingError
+from mros1_reasoner.ros.messages import fill_decision
+
+_TOPIC = "mros1_reasoner/decision"
+
+
+class DecisionTopic:
+    """Publishes decisions; a new subscriber gets the last one."""
+
+    def __init__(self) -> None:
+        """Offer the topic."""
+        self._publisher = rospy.Publisher(_TOPIC, msg.Decision, queue_size=10, latch=True)
+
+    def publish(self, decision: Decision) -> None:
+        """Publish a decision."""
+        message = fill_decision(msg.Decision(), decision, rospy.Time.from_sec, msg)
+        message.header.stamp = rospy.Time.now()
+        self._publisher.publish(message)
 
 
 def last_decision(topic: str, wait: float) -> Decision:

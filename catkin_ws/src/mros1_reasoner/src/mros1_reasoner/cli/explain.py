@@ -1,0 +1,37 @@
+"""The command `explain`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mros1_reasoner.cli.decision_tables import render
+from mros1_reasoner.cli.output import ERRORS, NAMESPACE, console, refuse
+from mros1_reasoner.io.reasoner_bag import read_decisions
+
+
+@click.command()
+@click.argument("bag", type=click.Path(path_type=Path), required=False)
+@click.option("--topic", default="mros1_reasoner/decision", show_default=True, help="Of a running reasoner.")
+@click.option("--wait", default=3.0, show_default=True, help="For a decision of a running reasoner, s.")
+@NAMESPACE
+def explain(bag: Path | None, topic: str, wait: float, namespace: str | None) -> None:
+    """Explain all decisions in a BAG, without one the last decision of the running reasoner."""
+    out = console()
+    if bag is None:
+        from mros1_reasoner.ros.decisions import last_decision  # the only part that needs ROS
+
+        try:
+            out.print(render(last_decision(topic, wait)))
+        except ERRORS as error:
+            refuse("explain", error)
+        return
+    try:
+        decisions = read_decisions(bag, namespace)
+    except ERRORS as error:
+        refuse("explain", error)
+    for decision in decisions:
+        out.print(render(decision))
+    if not decisions:
+        out.print(f"{bag}: holds no decisions")

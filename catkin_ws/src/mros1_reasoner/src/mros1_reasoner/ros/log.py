@@ -1,0 +1,84 @@
+"""What the node reasoner logs; however much goes wrong, it is a few lines."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+import rospy
+from metacontrol_bags.decision import EXECUTED, FAILED, Decision
+
+from mros1_reasoner.knowledge.model import Objective
+from mros1_reasoner.loop.diagnostics import Remark
+from mros1_reasoner.loop.entries import LevelFact
+from mros1_reasoner.planning.log_line import line
+from mros1_reasoner.ros.log_throttle import LogThrottle
+
+_PREFIX = "[RosReasoner] -- %s"  # as the published reasoner's
+_LONGEST = 1000  # remarks that are told once
+
+
+class Log:
+    """Tells on rosout what the node does."""
+
+    def __init__(self, period: float) -> None:
+        """Tell levels at most once in a period, s."""
+        self._warnings, self._levels = LogThrottle(), LogThrottle(period, burst=1)
+        self._told: set[str] = set()
+
+    def tell(self, text: str) -> None:
+        """Tell something."""
+        rospy.loginfo(_PREFIX, text)
+
+    def warn(self, kind: str, text: str) -> None:
+        """Warn of trouble of a kind, unless much of that kind was told just now."""
+        said = self._warnings.admit(time.monotonic(), kind, text)
+        if said:
+            is_published = text.startswith("Unsupported QA TYPE received: ")  # tools wait for that line as it is
+            rospy.logwarn(said) if is_published else rospy.logwarn(_PREFIX, said)
+
+    def tell_objective(self, objective: Objective) -> None:
+        """Tell that an objective is asked for."""
+        rospy.loginfo("Objective created and set to ungrounded")
+        limits = ", ".join(f"{quality} {limit:g}" for quality, limit in sorted(objective.limits.items()))
+        self.tell(f"{objective.name} needs {objective.function} with {limits or 'no limits'}")
+
+    def tell_level(self, fact: LevelFact) -> None:
+        """Tell a level as published tools expect it."""
+        text = f"QA value received!\tTYPE: {fact.quality}\tVALUE: {fact.text}"
+        if self._levels.admit(time.monotonic(), fact.quality, text):
+            rospy.loginfo(text)
+
+    def tell_remark(self, remark: Remark) -> None:
+        """Warn of a diagnostic that makes no sense; tell once of one that concerns nobody."""
+        if remark.is_warning:
+            self.warn(remark.kind, remark.text)
+        elif remark.text not in self._told and len(self._told) < _LONGEST:
+            self._told.add(remark.text)
+            self.tell(remark.text)
+
+    def tell_decision(self, decision: Decision) -> None:
+        """Tell what was decided, or how it went."""
+        if decision.state == EXECUTED:
+            rospy.loginfo("Exited timer_cb after successful reconfiguration")
+            took = f"{decision.objective} has {decision.to_configuration} after {decision.execute_wall_s:.2f} s"
+            self.tell(f"executed: {took} ({decision.id})")
+        elif decision.state == FAILED and decision.to_configuration:
+            rospy.logwarn(_PREFIX, f"failed: {decision.explanation} ({decision.id})")
+        else:
+            (rospy.loginfo if decision.to_configuration else rospy.logwarn)(_PREFIX, line(decision))
+
+
+def log_core() -> None:
+    """Have what the core logs told on rosout as the node's own."""
+    logger = logging.getLogger("mros1_reasoner")
+    logger.setLevel(logging.INFO)
+    logger.propagate = False
+    logger.addHandler(_RosLog())
+
+
+class _RosLog(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:
+        """Log a record as the node's own."""
+        log = rospy.logwarn if record.levelno >= logging.WARNING else rospy.loginfo
+        log(_PREFIX, record.getMessage())
