@@ -6,8 +6,9 @@ import pytest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist
 from metacontrol_bags.bag import BagError, read_record
-from metacontrol_bags.metrics import MetricsError, configuration_at, mean, periods_missed, share_above, summarise
+from metacontrol_bags.metrics import MetricsError, configuration_at, summarise
 from metacontrol_bags.record import Event, MissionRecord
+from metacontrol_bags.series import mean, periods_missed, share_above
 
 REQUIRED_KEYS = {
     "schema_version",

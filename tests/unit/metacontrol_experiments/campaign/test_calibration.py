@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from metacontrol_bags.metrics import quantile
+from metacontrol_bags.series import quantile
 from metacontrol_experiments.campaign import calibration, variant_table
 from metacontrol_experiments.campaign.calibration import CalibrationError, Job, Run
 from metacontrol_experiments.cli.main import metacontrol

@@ -1,7 +1,6 @@
-"""Reads a mission's bag, without ROS, into a `MissionRecord`.
+"""Read a mission's bag, without ROS, into a `MissionRecord`.
 
-Message types come from the bag itself: whatever the standard types lack is registered from the definitions that every
-connection of a bag carries.
+Message types come from the bag itself: every connection of a bag carries the definition of its messages.
 """
 
 from __future__ import annotations
@@ -70,11 +69,11 @@ _CUBE = 1
 
 
 class BagError(ValueError):
-    """A bag that cannot be used; the message names it and what to do."""
+    """A bag cannot be used; one line that names it and says what to do."""
 
 
 def read_record(path: Path) -> MissionRecord:
-    """Reads a mission's bag.
+    """Return what a mission's bag holds.
 
     Raises:
         BagError: the file is missing, no bag, not closed, or holds messages that do not fit their definition.
@@ -132,7 +131,7 @@ class _Builder:
         }
 
     def build(self, first: float, last: float) -> MissionRecord:
-        """The record; `first` and `last` are the stamps in s of the bag's first and last message."""
+        """Return the record; `first` and `last` are the stamps in s of the bag's first and last message."""
         return MissionRecord(
             events=tuple(self._events),
             poses=np.array(self._poses, dtype=np.float64).reshape(-1, 3),

@@ -1,4 +1,4 @@
-"""The picture of a mission: the map with the path coloured by configuration, below it both quality series."""
+"""Draw a mission: the map with the path coloured by configuration, and below it both quality series."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _MARGIN_M = 0.6
 
 
 def draw(record: MissionRecord, path: Path) -> None:
-    """Draws a mission into a PNG file of 1600 x 2000 pixels.
+    """Draw a mission into a PNG file of 1600 x 2000 pixels.
 
     Raises:
-        MetricsError: the record's events make no sense.
+        MetricsError: an event of the record says what cannot be.
         OSError: the file cannot be written.
     """
     summary = summarise(record)
@@ -52,7 +52,7 @@ def draw(record: MissionRecord, path: Path) -> None:
 
 
 def configuration_spans(record: MissionRecord) -> list[tuple[float, float, str]]:
-    """From when to when (stamps in s) each configuration was in force; a change counts from STABLE on."""
+    """Return from when to when (stamps in s) each configuration was in force; a change counts from STABLE on."""
     start, end = record.start_stamp, record.end_stamp
     stable = [
         report for report in record.configurations if report.state == FunctionGrounding.STABLE and report.stamp < end
@@ -185,13 +185,13 @@ def _draw_quality(axis: Axes, record: MissionRecord, summary: dict[str, Any], na
 
 
 def _colours(record: MissionRecord) -> dict[str, str]:
-    """One colour per configuration, in the order of appearance."""
+    """Return a colour for each configuration, in the order of appearance."""
     names = dict.fromkeys(name for _, _, name in configuration_spans(record))
     return {name: _COLOURS[number % len(_COLOURS)] for number, name in enumerate(names)}
 
 
 def _goal(record: MissionRecord) -> tuple[float, float] | None:
-    """The goal that MISSION_START tells, "x y yaw"."""
+    """Return x and y of the goal in MISSION_START, "x y yaw"; None where it has none."""
     began = record.event(MissionEvent.MISSION_START)
     try:
         x, y, *_ = map(float, (began.values.get("goal", "") if began else "").split())
@@ -201,7 +201,7 @@ def _goal(record: MissionRecord) -> tuple[float, float] | None:
 
 
 def _place(poses: np.ndarray, stamp: float) -> tuple[float, float] | None:
-    """Where the robot was at a moment."""
+    """Return where the robot was at a moment; None where that is not known."""
     if not len(poses):
         return None
     index = min(int(np.searchsorted(poses[:, 0], stamp)), len(poses) - 1)

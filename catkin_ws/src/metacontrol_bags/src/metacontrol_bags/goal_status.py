@@ -21,10 +21,10 @@ class GoalStatus(Enum):
 
     @classmethod
     def of(cls, number: int) -> GoalStatus:
-        """The state of a number; LOST where there is no such number."""
+        """Return the state of a number; LOST where there is no such number."""
         return cls(number) if 0 <= number <= cls.LOST.value else cls.LOST
 
     @property
     def live(self) -> bool:
-        """Whether the server is still at work on the goal."""
+        """Whether the server still pursues the goal."""
         return self in (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)

@@ -23,13 +23,13 @@ class Interval:
     half: float
 
     def text(self, digits: int) -> str:
-        """As a table shows it."""
+        """Return the interval as a table shows it."""
         half = f" ± {self.half:.{digits}f}" if math.isfinite(self.half) else ""
         return f"{self.mean:.{digits}f}{half}"
 
 
 def interval(values: Sequence[float]) -> Interval:
-    """Mean of some values with its confidence interval; an infinite one for a single value."""
+    """Return the mean of values with its confidence interval; an infinite interval for a single value."""
     if len(values) < 2:
         return Interval(values[0], math.inf)
     factor = float(student.ppf(0.5 + CONFIDENCE / 2.0, len(values) - 1))

@@ -1,6 +1,6 @@
-"""From ROS messages to the reports of `record`: the same for a bag's messages (rosbags) and for live ones (rospy).
+"""From ROS messages to reports and decisions, for messages of a bag (rosbags) and for live ones (rospy).
 
-The two differ only in how they write a time, so messages are taken by their fields and no message class is imported.
+The two differ only in how they write a time. Messages are read by their fields; no message class is imported.
 """
 
 from __future__ import annotations
@@ -37,19 +37,22 @@ def seconds(time: Any) -> float:
 
 
 def header_stamp(header: Any, received: float) -> float:
-    """The stamp in a header in s; the time of reception where it was left at zero."""
+    """Return the stamp of a header in s; the time of reception where the stamp is zero."""
     stamp = seconds(header.stamp)
     return stamp if stamp > 0 else received
 
 
 def event(message: Any, received: float) -> Event:
-    """A metacontrol_msgs/MissionEvent."""
+    """Return what a metacontrol_msgs/MissionEvent says."""
     values = {pair.key: pair.value for pair in message.values}
     return Event(header_stamp(message.header, received), message.kind, message.name, values)
 
 
 def diagnostics(message: Any, received: float) -> tuple[DiagnosticReport, ...]:
-    """What a diagnostic_msgs/DiagnosticArray says of components, qualities and cost; what is no number is left out."""
+    """Return what a diagnostic_msgs/DiagnosticArray says of components, qualities and cost.
+
+    A level or cost that is no finite number is left out.
+    """
     stamp = header_stamp(message.header, received)
     reports: list[DiagnosticReport] = []
     for status in message.status:
@@ -66,13 +69,13 @@ def diagnostics(message: Any, received: float) -> tuple[DiagnosticReport, ...]:
 
 
 def configurations(message: Any, received: float) -> tuple[ConfigurationReport, ...]:
-    """The functions of a metacontrol_msgs/ActiveConfiguration."""
+    """Return the functions of a metacontrol_msgs/ActiveConfiguration."""
     stamp = header_stamp(message.header, received)
     return tuple(ConfigurationReport(stamp, f.function, f.configuration, f.state) for f in message.functions)
 
 
 def decision(message: Any, received: float) -> Decision:
-    """Return a metacontrol_msgs/Decision; what an older definition lacks is empty."""
+    """Return what a metacontrol_msgs/Decision says; what an older definition lacks is empty."""
     return Decision(
         id=str(message.id),
         state=str(message.state),
@@ -99,18 +102,18 @@ def decision(message: Any, received: float) -> Decision:
 
 
 def goal(message: Any, received: float) -> GoalReport:
-    """A goal of move_base; by its own stamp, since the clock of who received it may lag."""
+    """Return a goal of move_base with its own stamp: the clock of the recorder may lag."""
     return GoalReport(header_stamp(message.header, received), message.goal_id.id)
 
 
 def result(message: Any, received: float) -> GoalReport:
-    """A result of move_base."""
+    """Return a result of move_base."""
     status = message.status
     return GoalReport(header_stamp(message.header, received), status.goal_id.id, int(status.status), status.text)
 
 
 def _numbers(pairs: Any) -> list[tuple[str, float]]:
-    """Key and value of those pairs whose value is a finite number."""
+    """Return key and value of the pairs whose value is a finite number."""
     found = []
     for pair in pairs:
         try:

@@ -1,4 +1,4 @@
-"""The summary of a mission, from its record alone.
+"""Summarise a mission from its record alone.
 
 Definitions
 - Mission time runs from the event MISSION_START to MISSION_END; `stamp_s` is simulated seconds since MISSION_START.
@@ -6,19 +6,18 @@ Definitions
   are those of the ground truth, `observed_qa` those of what the observers reported, over the time they were not stale.
 - `detect_s` of a component: from the perturbation that hit it to the stamp of the first diagnostic that reports it
   FALSE. Of a QA: from the moment when the ground truth rose above the threshold (the rise that the observers' first
-  report falls into) to the first report above the threshold of that violation; null where the ground truth was not
-  above it then.
+  report falls into) to the first report above the threshold of that violation; null where the ground truth was below
+  the threshold then.
 - `decide_s`: from that diagnostic to the Decision DECIDED. `execute_s`: from DECIDED to EXECUTED.
-- `control` is of the initial configuration, until the first change: the rate that its controller was set to, and the
-  share of its periods in which no velocity command came. A command that is late within its period is none of them; a
-  controller that lags behind its schedule by a whole period, at once or little by little, has missed one.
+- `control` is about the initial configuration until the first change: the rate that its controller was set to, and the
+  share of its periods in which no velocity command came. A command that is late within its period does not count as
+  missed. A controller that lags a whole period behind its schedule, at once or little by little, has missed one.
 - `success` is the paper's: goal reached, mean safety risk < 0.4, risk below its threshold for more than 95 % of the
   time, energy below its threshold for more than 90 % of the time; and not longer than 250 s.
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,11 +25,10 @@ import numpy as np
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import MissionRecord, Samples
+from metacontrol_bags.series import held, mean, periods_missed, share_above, start_of_run
 from metacontrol_bags.words import DiagnosticWords, FunctionGrounding, MissionEvent
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from metacontrol_bags.decision import Decision
 
 SCHEMA_VERSION = 1
@@ -41,7 +39,7 @@ TIMEOUT_S = 250.0
 
 
 class MetricsError(ValueError):
-    """A mission's event says what cannot be."""
+    """An event of a mission says what cannot be; one line that names the event and the value."""
 
 
 DEFAULT_THRESHOLDS = {"safety": 0.6, "energy": 0.62}
@@ -54,15 +52,16 @@ MAX_SHARE = {"safety": 0.05, "energy": 0.10}
 _SAME_MOMENT_S = 0.05
 """Stamps of different nodes may differ by a few periods of `/clock` (0.01 s) for what happened in the same moment."""
 
-_ROUNDING = 1e-6
-"""Periods by which times that are whole numbers of periods apart may seem less."""
-
 _CLOCK_LAG_S = 0.5
-"""So far the clock of a node may lag behind another's on a loaded machine; the mission ends by its own."""
+"""s by which the clock of a node may lag behind another one on a loaded machine; the mission ends by its own."""
 
 
 def summarise(record: MissionRecord) -> dict[str, Any]:
-    """The content of summary.json; figures that the bag does not hold are None."""
+    """Return the content of summary.json; figures that the bag does not hold are None.
+
+    Raises:
+        MetricsError: an event of the mission says what cannot be.
+    """
     start, end = record.start_stamp, record.end_stamp
     began, ended = record.event(MissionEvent.MISSION_START), record.event(MissionEvent.MISSION_END)
     told = began.values if began else {}
@@ -114,17 +113,17 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
 
 
 def thresholds(record: MissionRecord) -> dict[str, float]:
-    """Threshold of each QA, as MISSION_START tells them (`nfr_<qa>`), else D2's."""
+    """Return the threshold of each QA: as MISSION_START has it (`nfr_<qa>`), else that of D2."""
     began = record.event(MissionEvent.MISSION_START)
     told = began.values if began else {}
     return {name: _number(told, f"nfr_{name}", default) for name, default in DEFAULT_THRESHOLDS.items()}
 
 
 def mission_goals(record: MissionRecord) -> dict[str, GoalStatus | None]:
-    """Goals sent during the mission, by id, with how they ended: None where they did not.
+    """Return the goals sent during the mission, by id, with how they ended; None where they did not end.
 
-    The manipulator's re-sending keeps the id, so it does not count as another goal; a goal that a bad result was
-    reported for and that was reached later counts as reached.
+    A goal that the manipulator sends again keeps its id, so it does not count as another goal. A goal that was
+    reached after a bad result counts as reached.
     """
     start, end = record.start_stamp - _SAME_MOMENT_S, record.end_stamp + _SAME_MOMENT_S
     goals: dict[str, GoalStatus | None] = {
@@ -137,59 +136,20 @@ def mission_goals(record: MissionRecord) -> dict[str, GoalStatus | None]:
 
 
 def configuration_at(record: MissionRecord, stamp: float) -> str | None:
-    """The configuration in force at a moment: the last one reported, None before any was."""
+    """Return the configuration in force at a moment: the last one reported; None before the first report."""
     reported = [report.configuration for report in record.configurations if report.stamp <= stamp + _SAME_MOMENT_S]
     return reported[-1] if reported else None
 
 
-def held(samples: Samples, start: float, end: float) -> tuple[np.ndarray, np.ndarray]:
-    """Levels and for how long each held within [start, end]: a sample holds until the next one.
-
-    Returns:
-        Two arrays of the same length: level, duration in s. The time before the first sample is left out.
-    """
-    if not samples or end <= start:
-        return np.empty(0), np.empty(0)
-    times, levels = np.array(samples, dtype=np.float64).T
-    begins = np.clip(times, start, end)
-    ends = np.clip(np.append(times[1:], end), start, end)
-    return levels, np.maximum(ends - begins, 0.0)
-
-
-def share_above(samples: Samples, limit: float, start: float, end: float) -> float | None:
-    """Share of time (0..1) for which the level was above the limit; None without any sample."""
-    levels, durations = held(samples, start, end)
-    total = float(durations.sum())
-    return float(durations[levels > limit].sum()) / total if total > 0 else None
-
-
-def mean(samples: Samples, start: float, end: float) -> float | None:
-    """Mean level weighted by time; None without any sample."""
-    levels, durations = held(samples, start, end)
-    total = float(durations.sum())
-    return float((levels * durations).sum()) / total if total > 0 else None
-
-
-def quantile(samples: Samples, share: float, start: float, end: float) -> float | None:
-    """Level that was not exceeded for a share of the time; None without any sample."""
-    levels, durations = held(samples, start, end)
-    total = float(durations.sum())
-    if total <= 0:
-        return None
-    order = np.argsort(levels, kind="stable")
-    reached = np.cumsum(durations[order]) >= share * total - 1e-9
-    return float(levels[order][int(reached.argmax())])
-
-
 def path_length(record: MissionRecord, start: float, end: float) -> float:
-    """Length of the way driven in m, from the ground truth."""
+    """Return the length of the way driven in m, from the ground truth."""
     stamps = record.poses[:, 0]
     way = record.poses[(stamps >= start) & (stamps <= end), 1:]
     return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
 
 
 def reconfigurations(record: MissionRecord, state: str) -> list[dict[str, Any]]:
-    """Adaptations of the mission that ended in a state (EXECUTED or FAILED), in the order of time."""
+    """Return the adaptations of the mission that ended in a state (EXECUTED or FAILED), in the order of time."""
     decided = {d.id: d for d in record.decisions if d.state == DECIDED and d.stamp >= record.start_stamp}
     closed = [d for d in record.decisions if d.state == state and d.id in decided and d.stamp <= record.end_stamp + 1.0]
     return [_reconfiguration(record, decided[d.id], d) for d in closed]
@@ -210,7 +170,7 @@ def _reconfiguration(record: MissionRecord, decided: Decision, closed: Decision)
 
 
 def _cause(record: MissionRecord, decided: Decision) -> tuple[float | None, float | None]:
-    """When the cause of an adaptation set in, and when it was first reported; None where that is not known."""
+    """Return when the cause of an adaptation set in and when it was first reported; None where that is not known."""
     kind, _, name = decided.trigger.partition(":")
     if kind == "component":
         return _component_cause(record, name, decided)
@@ -234,7 +194,7 @@ def _component_cause(record: MissionRecord, name: str, decided: Decision) -> tup
             if r.status == DiagnosticWords.COMPONENT_FALSE and r.stamp >= struck - _SAME_MOMENT_S
         )
         return struck, next(after, None)
-    return None, _start_of_run([(r.stamp, r.status == DiagnosticWords.COMPONENT_FALSE) for r in reports])
+    return None, start_of_run([(r.stamp, r.status == DiagnosticWords.COMPONENT_FALSE) for r in reports])
 
 
 def _quality_cause(record: MissionRecord, name: str, decided: Decision) -> tuple[float | None, float | None]:
@@ -242,21 +202,11 @@ def _quality_cause(record: MissionRecord, name: str, decided: Decision) -> tuple
     if limit is None:
         return None, decided.stamp_monitored or None
     reports = [r for r in record.observed if r.name == name and r.stamp <= decided.stamp]
-    reported = _start_of_run([(r.stamp, r.level is not None and r.level > limit) for r in reports])
+    reported = start_of_run([(r.stamp, r.level is not None and r.level > limit) for r in reports])
     if reported is None:
         return None, decided.stamp_monitored or None
     truth = [(s, v > limit) for s, v in record.true_quality.get(name, ()) if s <= reported + _SAME_MOMENT_S]
-    return _start_of_run(truth), reported
-
-
-def _start_of_run(flags: Sequence[tuple[float, bool]]) -> float | None:
-    """Stamp at which the unbroken run of true flags began that the last entry belongs to; None where that is false."""
-    began = None
-    for stamp, flag in reversed(flags):
-        if not flag:
-            break
-        began = stamp
-    return began
+    return start_of_run(truth), reported
 
 
 def _good_quality(means: dict[str, float | None], above: dict[str, float | None]) -> bool:
@@ -267,7 +217,7 @@ def _good_quality(means: dict[str, float | None], above: dict[str, float | None]
 
 
 def _collisions(contacts: Samples, start: float, end: float) -> int | None:
-    """Contact episodes during the mission, None where nothing was recorded."""
+    """Return the contact episodes during the mission, None where nothing was recorded."""
     if not contacts:
         return None
     before = [count for stamp, count in contacts if stamp <= start] or [contacts[0][1]]
@@ -291,10 +241,10 @@ def _perturbations(record: MissionRecord) -> list[dict[str, Any]]:
 
 
 def _places(text: str) -> list[list[float]]:
-    """Places x,y of clutter, m in the map frame.
+    """Return the places x,y of clutter, m in the map frame.
 
     Raises:
-        MetricsError: they are none.
+        MetricsError: the text holds no places.
     """
     try:
         return [[float(number) for number in place.split(",")] for place in text.split()]
@@ -303,7 +253,7 @@ def _places(text: str) -> list[list[float]]:
 
 
 def _observed(record: MissionRecord, name: str, limit: float, start: float, end: float) -> dict[str, float | None]:
-    """What the observers saw of a QA: mean, share above the threshold, and for how many seconds it was stale."""
+    """Return what the observers saw of a QA: mean, share above the threshold, and for how many s it was stale."""
     reports = tuple(report for report in record.observed if report.name == name)
     levels = tuple((r.stamp, np.nan if r.level is None else r.level) for r in reports)
     values, durations = held(levels, start, end)
@@ -316,20 +266,8 @@ def _observed(record: MissionRecord, name: str, limit: float, start: float, end:
     }
 
 
-def periods_missed(stamps: Sequence[float], rate: float) -> float | None:
-    """Share of a controller's periods (rate in Hz) in which no command came; None with fewer than two commands."""
-    if len(stamps) < 2:
-        return None
-    lag, missed, periods = 0.0, 0.0, np.diff(np.asarray(stamps)) * rate
-    for period in periods:
-        lag = max(lag + float(period) - 1.0, 0.0)  # an early command gives no credit for later ones
-        missed += math.floor(lag + _ROUNDING)
-        lag -= math.floor(lag + _ROUNDING)
-    return missed / max(float(periods.sum()), 1.0)
-
-
 def _control(record: MissionRecord, told: dict[str, str], start: float, end: float) -> dict[str, float | None]:
-    """Rate of the initial configuration's controller, and the share of its periods that it missed."""
+    """Return the rate of the initial configuration's controller, and the share of its periods that it missed."""
     changes = [
         r.stamp for r in record.configurations if r.state != FunctionGrounding.STABLE and start <= r.stamp <= end
     ]
@@ -341,7 +279,7 @@ def _control(record: MissionRecord, told: dict[str, str], start: float, end: flo
 
 
 def _cost(record: MissionRecord, start: float, end: float) -> dict[str, dict[str, float | None]]:
-    """CPU (mean, per cent of a core) and memory (largest, MB) of each node that reported them during the mission."""
+    """Return CPU (mean, per cent of a core) and memory (largest, MB) of each node that reported them."""
     during = [report for report in record.costs if start <= report.stamp <= end]
     costs = {}
     for node in sorted({report.node for report in during}):
@@ -355,16 +293,16 @@ def _cost(record: MissionRecord, start: float, end: float) -> dict[str, dict[str
 
 
 def _real_time_factor(duration: float, closing: dict[str, str]) -> float | None:
-    """Simulated over wall duration of the mission."""
+    """Return simulated over wall duration of the mission."""
     wall = _number(closing, "wall_duration_s", 0.0)
     return _rounded(duration / wall) if wall > 0 else None
 
 
 def _number(values: dict[str, str], key: str, default: float) -> float:
-    """A number among an event's values.
+    """Return a number among an event's values.
 
     Raises:
-        MetricsError: it is none.
+        MetricsError: the value is no number.
     """
     try:
         return float(values.get(key, default))
@@ -373,7 +311,7 @@ def _number(values: dict[str, str], key: str, default: float) -> float:
 
 
 def _span(begin: float | None, end: float | None) -> float | None:
-    """Seconds from one moment to another, not below 0."""
+    """Return the seconds from one moment to another, not below 0."""
     return None if begin is None or end is None else _rounded(max(0.0, end - begin))
 
 

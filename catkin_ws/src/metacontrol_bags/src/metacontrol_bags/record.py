@@ -1,4 +1,4 @@
-"""What is known of one mission: plain data, filled from a bag, from which the summary and the figure are made.
+"""What a bag holds of a mission, as plain data; the summary and the figure are made of it.
 
 Stamps are simulated seconds on the mission's own clock (`/clock`), as in the bag.
 """
@@ -42,7 +42,7 @@ class ComponentReport:
 
 @dataclass(frozen=True)
 class QualityReport:
-    """What an observer said of a quality attribute: its level, None where it is stale."""
+    """A level of a quality attribute, as an observer reported it; None where it is stale."""
 
     stamp: float
     name: str
@@ -91,7 +91,7 @@ class OccupancyMap:
 
 @dataclass(frozen=True)
 class MissionRecord:
-    """Everything that a bag tells of a mission.
+    """Everything that a bag holds of a mission.
 
     Attributes:
         poses: (n, 3) array of stamp, x, y: ground truth in the map frame.
@@ -121,17 +121,17 @@ class MissionRecord:
     last_stamp: float = 0.0
 
     def event(self, kind: str) -> Event | None:
-        """The first event of a kind, None where there is none."""
+        """Return the first event of a kind, None where there is none."""
         return next((event for event in self.events if event.kind == kind), None)
 
     @property
     def start_stamp(self) -> float:
-        """When the mission started; the first message where no event tells."""
+        """When the mission started: the stamp of the first message where no event says it."""
         event = self.event(MissionEvent.MISSION_START)
         return event.stamp if event else self.first_stamp
 
     @property
     def end_stamp(self) -> float:
-        """When the mission ended; the last message where no event tells."""
+        """When the mission ended: the stamp of the last message where no event says it."""
         event = self.event(MissionEvent.MISSION_END)
         return event.stamp if event else self.last_stamp

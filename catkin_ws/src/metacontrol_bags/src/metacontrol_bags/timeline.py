@@ -1,6 +1,6 @@
-"""What happens in a mission as lines for people: reports of the parts in, one entry per thing worth telling out.
+"""A mission as lines for people: one line for each change.
 
-The components' and observers' reports repeat at every tick; the timeline tells only changes.
+Monitor and observers report at every tick; the timeline leaves out what is as before.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from metacontrol_bags.record import (
 from metacontrol_bags.words import DiagnosticWords, FunctionGrounding, MissionEvent
 
 CALM_S = 5.0
-"""A QA that was below its threshold for this long is told again when it rises above it."""
+"""s: a QA that was below its threshold for this long gets a new line when it rises above the threshold."""
 
 _WELL_AGAIN = (DiagnosticWords.COMPONENT_RECOVERED, DiagnosticWords.COMPONENT_TRUE)
 
@@ -42,10 +42,10 @@ class Entry:
 
 
 class Timeline:
-    """Tells the changes; keeps what was told last."""
+    """Makes lines of reports, and keeps what was reported last."""
 
     def __init__(self, thresholds: dict[str, float]) -> None:
-        """Takes the threshold of each QA."""
+        """Know the threshold of each QA."""
         self._thresholds = thresholds
         self._components: dict[str, str] = {}
         self._violated: dict[str, float] = {}
@@ -53,7 +53,7 @@ class Timeline:
         self._configurations: dict[str, ConfigurationReport] = {}
 
     def tell(self, report: Report) -> tuple[Entry, ...]:
-        """The entries that a report makes, none where it brings nothing new."""
+        """Return the lines that a report makes; none where it brings nothing new."""
         match report:
             case ComponentReport():
                 return self._component(report)

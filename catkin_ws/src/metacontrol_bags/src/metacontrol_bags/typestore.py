@@ -1,4 +1,4 @@
-"""Message types of a bag."""
+"""The message types of a bag."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rosbags.typesys.store import Typestore
 
 
 def typestore(connections: Iterable[Connection]) -> Typestore:
-    """Return the standard types, completed by the definitions in the bag."""
+    """Return the standard types and those that the connections of a bag define."""
     store = get_typestore(Stores.ROS1_NOETIC)
     for connection in connections:
         if connection.msgtype not in store.types:

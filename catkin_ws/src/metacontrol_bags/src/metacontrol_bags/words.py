@@ -1,7 +1,7 @@
 """Words of our messages that bags hold.
 
-They are constants of metacontrol_msgs. This package does without ROS, so they are written here once more; a test
-compares each with the message of the same name.
+They are constants of metacontrol_msgs. This package works without ROS, so the words are repeated here. A test compares
+each with the message of the same name.
 """
 
 from __future__ import annotations

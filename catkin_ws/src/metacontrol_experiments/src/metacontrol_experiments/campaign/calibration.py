@@ -16,7 +16,8 @@ import statistics
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
-from metacontrol_bags.metrics import MAX_SHARE, quantile, share_above, summarise
+from metacontrol_bags.metrics import MAX_SHARE, summarise
+from metacontrol_bags.series import quantile, share_above
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
