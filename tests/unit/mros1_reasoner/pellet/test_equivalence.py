@@ -4,7 +4,7 @@ from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Facts
 from mros1_reasoner.knowledge.reasoner import Assertion
 from mros1_reasoner.knowledge.triples import parse_ntriples
-from mros1_reasoner.pellet.equivalence import Twins
+from mros1_reasoner.pellet.equivalence import EquivalentIndividuals
 from mros1_reasoner.pellet.owlready import OwlreadyReasoner
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
@@ -17,32 +17,32 @@ def names(triples):
 
 
 def test_designs_with_the_same_components_are_one(knowledge_base):
-    reduced = Twins(list(parse_ntriples(knowledge_base.ontology))).reduced
+    reduced = EquivalentIndividuals(list(parse_ntriples(knowledge_base.ontology))).reduced
     assert names(reduced) & set(DESIGNS) == {"scan_fast", "camera_fast"}
 
 
 def test_labels_make_no_difference_but_other_statements_do():
     triples = [("<a>", TYPE, "<C>"), ("<b>", TYPE, "<C>"), ("<c>", TYPE, "<C>"), ("<b>", LABEL, '"b"')]
-    assert {s for s, _, _ in Twins(triples).reduced} == {"<a>"}
+    assert {s for s, _, _ in EquivalentIndividuals(triples).reduced} == {"<a>"}
     triples += [("<x>", "<p>", "<c>"), ("<p>", TYPE, "<http://www.w3.org/2002/07/owl#ObjectProperty>")]
-    assert {s for s, _, _ in Twins(triples).reduced} == {"<a>", "<c>", "<x>", "<p>"}
+    assert {s for s, _, _ in EquivalentIndividuals(triples).reduced} == {"<a>", "<c>", "<x>", "<p>"}
 
 
 def test_who_has_a_property_that_a_fact_cannot_have_is_left_as_it_is():
     triples = [(f"<{name}>", TYPE, "<C>") for name in "ab"] + [(f"<{name}>", "<note>", '"x"') for name in "ab"]
-    assert Twins(triples).reduced == triples
+    assert EquivalentIndividuals(triples).reduced == triples
 
 
 def test_classes_and_rules_are_no_twins():
     owl = "http://www.w3.org/2002/07/owl#"
     triples = [("<A>", TYPE, f"<{owl}Class>"), ("<B>", TYPE, f"<{owl}Class>")]
     triples += [("_:1", TYPE, f"<{v.SWRL}Imp>"), ("_:2", TYPE, f"<{v.SWRL}Imp>")]
-    assert Twins(triples).reduced == triples
+    assert EquivalentIndividuals(triples).reduced == triples
 
 
 def test_what_a_fact_mentions_stands_for_itself():
     triples = [(f"<{name}>", TYPE, "<C>") for name in "abcd"]
-    facts, expand = Twins(triples).split([Assertion("x", "p", "a"), Assertion("c", "p", "1", "t")])
+    facts, expand = EquivalentIndividuals(triples).split([Assertion("x", "p", "a"), Assertion("c", "p", "1", "t")])
     assert {fact.subject for fact in facts if fact.property == v.RDF_TYPE} == {"b", "c"}
     found = expand([Assertion("a", "q", "y"), Assertion("b", "q", "y"), Assertion("z", "q", "b")])
     assert found == {
@@ -56,7 +56,7 @@ def test_what_a_fact_mentions_stands_for_itself():
 
 def test_everybody_mentioned_needs_no_deputy():
     triples = [(f"<{name}>", TYPE, "<C>") for name in "ab"]
-    facts, expand = Twins(triples).split([Assertion("a", "p", "b")])
+    facts, expand = EquivalentIndividuals(triples).split([Assertion("a", "p", "b")])
     assert facts[1:] == [Assertion("b", v.RDF_TYPE, "C")]
     assert expand.groups == ()
 

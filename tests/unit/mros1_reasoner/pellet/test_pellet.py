@@ -10,7 +10,7 @@ from mros1_reasoner.knowledge.model import Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, ReasonerError
 from mros1_reasoner.pellet import process as pellet_module
 from mros1_reasoner.pellet.owlready import OwlreadyReasoner
-from mros1_reasoner.pellet.process import ChildLostError, NoJavaError, PelletReasoner, SteadyReasoner, make_reasoner
+from mros1_reasoner.pellet.process import ChildLostError, NoJavaError, PelletReasoner, PelletWithFallback, make_reasoner
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
 DEADLINE_S = 150.0
@@ -108,7 +108,7 @@ class Broken:
 def test_child_that_is_lost_gives_way_to_owlready2_and_is_tried_again_later(knowledge_base, caplog):
     now = [0.0]
     child = Broken()
-    steady = SteadyReasoner(child, clock=lambda: now[0])
+    steady = PelletWithFallback(child, clock=lambda: now[0])
     steady.load(knowledge_base.ontology)
     assert caplog.text.count("going on with a new JVM for every analysis") == 1
     facts = Facts((OBJECTIVE,), components={"laser": "FALSE"})
@@ -123,7 +123,7 @@ def test_child_that_is_lost_gives_way_to_owlready2_and_is_tried_again_later(know
 def test_lost_child_that_works_again_gets_its_ontology_back(knowledge_base, pellet):
     now = [0.0]
     child = Broken()
-    steady = SteadyReasoner(child, clock=lambda: now[0])
+    steady = PelletWithFallback(child, clock=lambda: now[0])
     steady.load(knowledge_base.ontology)
     pellet.load("")
     steady._child, now[0] = pellet, pellet_module.RETRY_AFTER

@@ -1,1 +1,1 @@
-"""The commands `explain` and `replay`."""
+"""The commands `explain` and `replay`, one module each."""

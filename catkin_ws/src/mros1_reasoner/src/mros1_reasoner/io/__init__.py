@@ -1,1 +1,1 @@
-"""Files: ontologies, parameters that name them, bags. What is read goes to the rooms that decide."""
+"""Files: ontologies, the parameters that name them, bags, the generator `tomasys`. No other room but cli/ touches one."""

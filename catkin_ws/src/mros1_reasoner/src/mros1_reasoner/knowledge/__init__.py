@@ -1,1 +1,1 @@
-"""The TOMASys knowledge base and its vocabulary."""
+"""The TOMASys knowledge base: what models say, facts as assertions, conclusions as statuses. It touches no file."""

@@ -1,1 +1,1 @@
-"""Pellet in a process of its own, and what makes its analyses quick."""
+"""Pellet in a process of its own. This room starts processes, waits for them and reads their answers."""

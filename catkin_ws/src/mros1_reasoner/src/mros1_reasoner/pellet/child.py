@@ -2,7 +2,7 @@
 
 Pellet is AGPL-3: it stays on this side of the process boundary. A frame is a line with the count of bytes that follow,
 then JSON. Requests: {"op": "load", "ontology": N-Triples}, {"op": "infer", "facts": [...], "properties": [...]}.
-Answers: {"ok": true, ...} or {"ok": false, "inconsistent": bool, "message": text}. Run by `pellet.PelletReasoner`.
+Answers: {"ok": true, ...} or {"ok": false, "inconsistent": bool, "message": text}. Run by `process.PelletReasoner`.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class InconsistentOntologyError(Exception):
 
 
 def _datatype(terms: Any, literal: Any) -> str:
-    """Return the datatype's IRI; plain text and xsd:string are one."""
+    """Return the datatype's IRI; plain text has that of xsd:string."""
     name = str(terms.getLiteralDatatype(literal))
     return "http://www.w3.org/2001/XMLSchema#string" if name.endswith(("PlainLiteral", "#string")) or not name else name
 

@@ -1,7 +1,7 @@
-"""Individuals of which an ontology says the very same: one of them can stand for all, which makes an analysis quick.
+"""Equivalent individuals: an ontology says the same of them, so Pellet reasons about one of them only, which is quick.
 
-Where every statement about one individual is also made about another one, exchanging the two leaves the ontology as it
-is. So whatever follows for the one follows for the other, as long as no fact tells them apart.
+When every statement about one individual also holds for another one, the two can be exchanged without a change of the
+ontology. So what follows for one follows for the other, until a fact distinguishes them.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _NOTES = (v.RDFS_LABEL, "http://www.w3.org/2000/01/rdf-schema#comment")
 
 @dataclass(frozen=True)
 class Expansion:
-    """How to read what was inferred: (deputy, those that it stands for)."""
+    """Inferences about one individual of a group, the deputy, expanded to the others: (deputy, others) of each group."""
 
     groups: tuple[tuple[str, tuple[str, ...]], ...]
 
     def __call__(self, values: Iterable[Assertion]) -> set[Assertion]:
-        """Return the values with those of everybody that a deputy stands for."""
+        """Return the values of the deputies and those of the individuals that they stand for."""
         found = set(values)
         for deputy, others in self.groups:
             for value in [value for value in found if deputy in (value.subject, value.value)]:
@@ -38,15 +38,15 @@ class Expansion:
         return found
 
 
-class Twins:
-    """The groups of individuals of which an ontology says the same.
+class EquivalentIndividuals:
+    """Groups of individuals of which an ontology says the same.
 
     Attributes:
         reduced: the ontology with the first one of each group only.
     """
 
     def __init__(self, triples: Sequence[Triple]) -> None:
-        """Find them."""
+        """Find the groups in the triples of an ontology."""
         about: dict[str, list[Triple]] = defaultdict(list)
         candidates = set()
         sayable = {v.RDF_TYPE} | {
@@ -73,7 +73,7 @@ class Twins:
     def split(self, facts: Sequence[Assertion]) -> tuple[list[Assertion], Expansion]:
         """Return the facts to add to the reduced ontology, and how to expand what follows.
 
-        Individuals that facts mention stand for themselves only; of those that are left, one is the deputy.
+        An individual that a fact mentions is in no group. One of the others is the deputy of its group.
         """
         mentioned = {f"<{fact.subject}>" for fact in facts} | {f"<{f.value}>" for f in facts if not f.datatype}
         added: list[Assertion] = []

@@ -1,4 +1,4 @@
-"""The slow way: owlready2's own call of Pellet, a new JVM for every analysis (1.1 to 3 s)."""
+"""Call Pellet through owlready2, slowly: a new JVM for every analysis (1.1 to 3 s)."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class OwlreadyReasoner:
 
 
 def _datatype(iri: str) -> str:
-    """Plain text and xsd:string are one."""
+    """Return the datatype's IRI; plain text has that of xsd:string."""
     return XSD + "string" if not iri or iri.endswith("#PlainLiteral") else iri
 
 

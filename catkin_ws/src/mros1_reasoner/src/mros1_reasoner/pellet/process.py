@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, Reasoner, ReasonerError
 from mros1_reasoner.knowledge.triples import TripleError, parse_ntriples, write_ntriples
-from mros1_reasoner.pellet.equivalence import Twins
+from mros1_reasoner.pellet.equivalence import EquivalentIndividuals
 from mros1_reasoner.pellet.owlready import OwlreadyReasoner
 
 _log = logging.getLogger(__name__)
@@ -27,7 +27,7 @@ _Answer = TypeVar("_Answer")
 
 START_DEADLINE = 20.0  # s, wall: a JVM and its jars, on a loaded machine
 HEAP_MB = 256  # of the JVM; with it, node and child stay below 500 MB
-RETRY_AFTER = 300.0  # s, wall: so long the slow way is taken after the child could not be kept running
+RETRY_AFTER = 300.0  # s, wall, until the child is tried again; until then owlready2 calls Pellet
 NO_JAVA = "no Java runtime found: install openjdk-17-jre-headless"
 
 
@@ -64,7 +64,7 @@ class PelletReasoner:
     """
 
     def __init__(self, deadline: float = 20.0, heap_mb: int = HEAP_MB) -> None:
-        """Start the child; it gets ready while the caller goes on.
+        """Start the child; it loads while the caller continues.
 
         Args:
             deadline: s, wall, for an answer; a child that takes longer is replaced.
@@ -80,7 +80,7 @@ class PelletReasoner:
             raise ReasonerError("the Python package JPype1 is missing: install requirements/python.txt")
         self._jars = _jar_folder()
         self._ontology: str | None = None
-        self._twins = Twins(())
+        self._equivalent = EquivalentIndividuals(())
         self._process: subprocess.Popen[bytes] | None = None
         self._buffer = bytearray()
         self._greeted = False
@@ -95,17 +95,17 @@ class PelletReasoner:
         """See Reasoner.load."""
         self._ontology = None
         try:
-            twins = Twins(list(parse_ntriples(ontology)))
+            equivalent = EquivalentIndividuals(list(parse_ntriples(ontology)))
         except TripleError as error:
             raise ReasonerError(f"the ontology is no N-Triples: {error}") from error
-        reduced = write_ntriples(twins.reduced)
+        reduced = write_ntriples(equivalent.reduced)
         self._ask_twice({"op": "load", "ontology": ontology})  # the whole of it must be free of contradiction
         self._ask_twice({"op": "load", "ontology": reduced})
-        self._ontology, self._twins = reduced, twins
+        self._ontology, self._equivalent = reduced, equivalent
 
     def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
         """See Reasoner.infer."""
-        added, expand = self._twins.split(facts)
+        added, expand = self._equivalent.split(facts)
         answer = self._ask_twice({"op": "infer", "facts": [list(f) for f in added], "properties": list(properties)})
         return sorted(expand(Assertion(*row) for row in answer["values"]))
 
@@ -134,7 +134,7 @@ class PelletReasoner:
         os.set_blocking(self._process.stdin.fileno(), False)  # type: ignore[union-attr]
 
     def _ask_twice(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Ask; when the child dies or hangs, ask a new one once more."""
+        """Ask the child; when it dies or hangs, start a new one and ask that."""
         try:
             return self._ask(request)
         except _ChildError as error:
@@ -201,8 +201,8 @@ class PelletReasoner:
             self._buffer += data
 
 
-class SteadyReasoner:
-    """Pellet in its child process; the slow way while that can't be kept running."""
+class PelletWithFallback:
+    """Pellet in its child process; a slower reasoner while the child can't be kept running."""
 
     def __init__(
         self,
@@ -210,11 +210,11 @@ class SteadyReasoner:
         slow: Callable[[], Reasoner] = OwlreadyReasoner,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Go by the child.
+        """Use the child first.
 
         Args:
-            child: the fast way; it is closed with this.
-            slow: makes the other way.
+            child: the fast reasoner; it is closed with this one.
+            slow: makes the slow reasoner.
             clock: wall clock, s.
         """
         self._child, self._slow, self._clock = child, slow, clock
@@ -254,13 +254,13 @@ class SteadyReasoner:
 
 
 def make_reasoner(deadline: float = 20.0) -> Reasoner:
-    """Return Pellet kept warm; where its child process can't run, owlready2's slow call of it, with a warning.
+    """Return Pellet in a warm child process; with a warning owlready2's slow call where the child can't run.
 
     Raises:
         NoJavaError: there is no Java runtime, without which neither runs.
     """
     try:
-        return SteadyReasoner(PelletReasoner(deadline))
+        return PelletWithFallback(PelletReasoner(deadline))
     except NoJavaError:
         raise
     except (ReasonerError, OSError) as error:

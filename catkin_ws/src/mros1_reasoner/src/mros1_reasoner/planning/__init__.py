@@ -1,1 +1,1 @@
-"""R3: which design to deploy, and why each other one was not taken. Pure."""
+"""R3: choose a design, and say why each other design was not taken."""

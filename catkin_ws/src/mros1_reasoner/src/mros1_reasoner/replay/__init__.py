@@ -1,1 +1,1 @@
-"""Recorded runs: what was decided, and what would have been. Without ROS."""
+"""Run the loop again over a recorded run, and compare its decisions with the recorded ones."""

@@ -1,1 +1,1 @@
-"""ROS shells: the node reasoner and its parts."""
+"""The ROS shell: topics, services, the request to the manipulator, logs."""

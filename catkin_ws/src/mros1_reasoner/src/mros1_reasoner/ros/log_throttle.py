@@ -1,4 +1,4 @@
-"""Keeps warnings few, pure: a flood of bad messages must not become a flood of lines."""
+"""Keep warnings few: a flood of bad messages must not become a flood of lines."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class _Kind:
 
 
 class LogThrottle:
-    """Lets a text pass once in a period, and of one kind only a few texts; tells how many it held back."""
+    """Let a text pass once in a period, and few texts of one kind; the next line says how many were held back."""
 
     def __init__(self, period: float = 10.0, burst: int = 5) -> None:
         """Take the period in s and the number of different texts of one kind that may pass in it."""
