@@ -1,1 +1,1 @@
-"""Files: ontologies, the parameters that name them, bags, the generator `tomasys`. No other room but cli/ touches one."""
+"""Files: ontologies, the parameters that name them, bags, the generator `tomasys`; only cli/ touches files, too."""

@@ -22,7 +22,7 @@ _NOTES = (v.RDFS_LABEL, "http://www.w3.org/2000/01/rdf-schema#comment")
 
 @dataclass(frozen=True)
 class Expansion:
-    """Inferences about one individual of a group, the deputy, expanded to the others: (deputy, others) of each group."""
+    """Expands what was inferred about the deputy of each group to the others: (deputy, others)."""
 
     groups: tuple[tuple[str, tuple[str, ...]], ...]
 
