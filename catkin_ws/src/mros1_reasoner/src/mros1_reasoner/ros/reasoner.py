@@ -149,7 +149,7 @@ class ReasonerNode:
             return
         if not self._inbox.put(lambda: self._take_reading(reading), at_most=_QUEUE):
             lost = Remark("queue", "diagnostics come faster than they can be read: some are lost")
-            self._inbox.put(lambda: self._tell_remark(lost), at_most=_QUEUE + 1)
+            self._inbox.put(lambda: self._log.tell_remark(lost), at_most=_QUEUE + 1)
 
     def _on_active(self, active: messages.ActiveConfiguration) -> None:
         self._inbox.put(lambda: self._take_active(active))
