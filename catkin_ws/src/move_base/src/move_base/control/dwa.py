@@ -72,7 +72,7 @@ class DwaController:
         self.reset()
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
-        """Takes other parameters on the way."""
+        """Take other parameters while the robot drives."""
         self.parameters = parameters.controller
         self._period = 1.0 / parameters.controller_frequency
         footprint, padded = np.array(parameters.local_costmap.footprint), parameters.local_costmap.padded_footprint()
@@ -80,7 +80,7 @@ class DwaController:
         self._shapes = [Footprint(footprint, share * padding) for share in HARD_PADDING]
 
     def reset(self) -> None:
-        """Forgets the last command, for a new goal."""
+        """Forget the last command, for a new goal."""
         self._last = Velocity()
         self._backing_from: Pose | None = None
         self._oscillation = OscillationFlags()
@@ -88,7 +88,7 @@ class DwaController:
     def follow(
         self, robot: Pose, velocity: Velocity, path: NDArray[np.float64], to_goal: float, snapshot: Snapshot
     ) -> Trajectory | None:
-        """Returns the best trajectory along a path, or None where every sample collides.
+        """Return the best trajectory along a path, or None where every sample collides.
 
         Args:
             robot: in the local costmap's frame.
@@ -118,7 +118,7 @@ class DwaController:
         return best
 
     def turn(self, robot: Pose, angle: float, snapshot: Snapshot) -> Trajectory | None:
-        """Returns a turn on the spot by up to `angle` (rad, signed), or None where it is not free.
+        """Return a turn on the spot by up to `angle` (rad, signed), or None where it is not free.
 
         The speed falls with the angle left, so that the turn ends without overshoot.
         """
@@ -132,7 +132,7 @@ class DwaController:
         return rollout.trajectory(0, 0.0)
 
     def _back_off(self, robot: Pose, scene: _Scene) -> Trajectory | None:
-        """Goes on backing off, if it has begun and is not far enough or blocked."""
+        """Go on backing off where that has begun, the robot has not come far enough, and the way is free."""
         if self._backing_from is None:
             return None
         if robot.distance(self._backing_from) < ESCAPE_DISTANCE:
@@ -143,7 +143,7 @@ class DwaController:
         return None
 
     def _align_angle(self, velocity: Velocity, scene: _Scene) -> float:
-        """How far off the path's direction the robot may drive, rad."""
+        """Return by how much the robot may be off the path's direction when it drives, rad."""
         if velocity.x > 1.5 * self.parameters.min_vel_x:
             return ALIGN_ANGLE
         near = scene.path[np.hypot(*(scene.path - scene.path[0]).T) <= NARROW_AHEAD]
@@ -154,7 +154,7 @@ class DwaController:
         return NARROW_ALIGN_ANGLE if narrow else ALIGN_ANGLE
 
     def _shape_for(self, robot: Pose, snapshot: Snapshot) -> Footprint:
-        """The footprint with its margin; a smaller margin where an obstacle is in it already, or nothing could move."""
+        """Return the footprint with its margin; the margin is smaller where an obstacle is already within it."""
         here = Rollout(np.zeros((1, 3)), *(np.array([[value]]) for value in (robot.x, robot.y, robot.yaw)))
         return next((shape for shape in self._shapes if shape.is_free(here, snapshot)[0]), self._shapes[-1])
 
@@ -215,7 +215,7 @@ class DwaController:
         return int(np.clip(np.ceil(p.max_vel_x * horizon / p.sim_granularity), MIN_STEPS, MAX_STEPS))
 
     def _score(self, rollout: Rollout, path: NDArray[np.float64], snapshot: Snapshot) -> NDArray[np.float64]:
-        """Returns the cost of each trajectory (C,) in metres: off the path, short of its end, near obstacles, jerky."""
+        """Return the cost of each trajectory (C,) in metres: off the path, short of its end, near obstacles, jerky."""
         p = self.parameters
         lengths = np.hypot(*np.diff(path, axis=0).T)
         remaining = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
@@ -241,7 +241,7 @@ class DwaController:
 
 
 def _direction_of(path: NDArray[np.float64], over: float = 0.5) -> float:
-    """Returns the direction of a path's first `over` metres, rad."""
+    """Return the direction of a path's first `over` metres, rad."""
     away = np.hypot(*(path - path[0]).T)
     beyond = np.flatnonzero(away >= over)
     step = path[beyond[0] if len(beyond) else -1] - path[0]

@@ -23,14 +23,14 @@ class OscillationFlags:
         self._from: Pose | None = None
 
     def follow(self, robot: Pose, reset_distance: float) -> None:
-        """Forgets everything once the robot has moved by the distance (m) since it last turned or strafed."""
+        """Forget everything once the robot has moved by the distance (m) since it last turned or strafed."""
         if self._from is not None and robot.distance(self._from) >= reset_distance:
             self._last = dict.fromkeys(self._last, 0.0)
             self._forbidden = {}
             self._from = None
 
     def take(self, robot: Pose, velocity: Velocity) -> None:
-        """Learns what the robot does now."""
+        """Learn what the robot does now."""
         axis, speed = (STRAFE, velocity.y) if velocity.y else (TURN, velocity.yaw)
         if not speed or (velocity.x > 0.0 and not velocity.y):
             return
@@ -41,7 +41,7 @@ class OscillationFlags:
         self._from = robot
 
     def allowed(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Returns those of some velocities (C, 3) on the spot that are not forbidden."""
+        """Return the velocities (C, 3) that are not forbidden."""
         bad = np.zeros(len(samples), dtype=bool)
         for axis, direction in self._forbidden.items():
             bad |= samples[:, axis] * direction > 0.0

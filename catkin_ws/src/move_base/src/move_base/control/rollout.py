@@ -42,17 +42,17 @@ class Rollout:
     yaw: NDArray[np.float64]
 
     def only(self, kept: NDArray[np.bool_]) -> Rollout:
-        """Returns those that are marked (C,)."""
+        """Return the marked ones (C,)."""
         return Rollout(self.velocities[kept], self.x[kept], self.y[kept], self.yaw[kept])
 
     def trajectory(self, index: int, cost: float) -> Trajectory:
-        """Returns one of them with its cost."""
+        """Return one of them with its cost."""
         poses = np.stack([self.x[index], self.y[index], self.yaw[index]], axis=1)
         return Trajectory(Velocity(*(float(value) for value in self.velocities[index])), poses, cost)
 
 
 def roll_out(velocities: NDArray[np.float64], robot: Pose, horizon: float, steps: int) -> Rollout:
-    """Integrates constant velocities (C, 3) in closed form over the horizon (s), to so many poses."""
+    """Integrate constant velocities (C, 3) in closed form over the horizon (s), to so many poses."""
     times = np.linspace(horizon / steps, horizon, steps)
     turned = velocities[:, 2:] * times
     # sin(a)/a and (1 - cos(a))/a, whose limits at a = 0 are 1 and 0

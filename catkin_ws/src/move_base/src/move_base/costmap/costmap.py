@@ -67,7 +67,7 @@ class Costmap:
         self._obstacles = np.zeros(self.geometry.shape, dtype=np.uint8)
 
     def reconfigure(self, parameters: CostmapParameters) -> None:
-        """Takes another inflation, padding, rates; obstacles seen stay. Size, frame and other layers can't change."""
+        """Take another inflation, padding or rates. Obstacles stay; size, frame and other layers can't change."""
         self.parameters = parameters
         self._clears_footprint = any(layer.footprint_clearing for layer in parameters.layers_of("obstacle"))
         padded = parameters.padded_footprint()
@@ -82,7 +82,7 @@ class Costmap:
         return self._static_layer is not None and self._static is None
 
     def set_map(self, static: StaticMap) -> None:
-        """Takes a new static map; a costmap that does not roll takes on its size and resolution."""
+        """Take a new static map; a costmap that does not roll takes on its size and resolution."""
         if self._static_layer is None:
             return
         self._static = static
@@ -100,7 +100,7 @@ class Costmap:
         observations: Sequence[tuple[Observation, NDArray[np.float64]]],
         map_pose: Pose | None = None,
     ) -> Snapshot:
-        """Rolls, clears, marks and inflates.
+        """Roll, clear, mark and inflate.
 
         Args:
             robot: pose of the base in the costmap's frame.
@@ -116,7 +116,7 @@ class Costmap:
         return self._combine(map_pose or ORIGIN)
 
     def clear(self, robot: Pose | None = None, keep_radius: float = 0.0) -> None:
-        """Forgets the obstacles seen, except in a square of half-width `keep_radius` (m) around the robot."""
+        """Forget the obstacles seen, except in a square of half-width `keep_radius` (m) around the robot."""
         kept = self._obstacles.copy() if robot is not None and keep_radius > 0.0 else None
         self._obstacles[:] = FREE
         if kept is not None and robot is not None:
@@ -126,7 +126,7 @@ class Costmap:
             self._obstacles[window] = kept[window]
 
     def static_cost(self, x: float, y: float) -> int:
-        """Returns the static layer's own cost at a point (FREE without a static layer or outside of it)."""
+        """Return the static layer's own cost at a point (FREE without a static layer or outside of it)."""
         if self._static_costs is None or not self.geometry.contains(x, y):
             return FREE
         return int(self._static_costs[self.geometry.cell(x, y)])
@@ -146,7 +146,7 @@ class Costmap:
         return Inflation(layer, self.geometry.resolution, self.inscribed_radius, self.circumscribed_radius)
 
     def _roll(self, robot: Pose) -> None:
-        """Moves the window so that the robot is in its middle, by whole cells, keeping what overlaps."""
+        """Move the window so that the robot is in its middle, by whole cells, keeping what overlaps."""
         g = self.geometry
         origin_x = math.floor((robot.x - 0.5 * g.width * g.resolution) / g.resolution) * g.resolution
         origin_y = math.floor((robot.y - 0.5 * g.height * g.resolution) / g.resolution) * g.resolution
@@ -185,7 +185,7 @@ class Costmap:
         profile: tuple[NDArray[np.floating], NDArray[np.floating]],
         reach: float,
     ) -> None:
-        """Frees the star-shaped area between the sensor and its returns.
+        """Free the star-shaped area between the sensor and its returns.
 
         Between two rays the nearer return bounds the area, so nothing behind an edge is cleared; the last cell before a
         return stays, since neighbouring rays fall into neighbouring cells.
@@ -222,7 +222,7 @@ class Costmap:
         return Snapshot(self.geometry, costs, clearance, self._inflation.limit, self.inscribed_radius)
 
     def _place_static(self, map_pose: Pose) -> None:
-        """Resamples the static map into the grid, where grid or map moved since the last time."""
+        """Resample the static map into the grid, where grid or map moved since the last time."""
         if self._static is None or self._static_layer is None:
             return
         placement = (self.geometry, map_pose)
@@ -233,14 +233,14 @@ class Costmap:
 
 
 def _overlap(shift: int, size: int) -> slice:
-    """The part of an axis that is still inside after a move by `shift` cells."""
+    """Return the part of an axis that is still inside after a move by `shift` cells."""
     return slice(max(shift, 0), size + min(shift, 0))
 
 
 def _nearest_by_sector(
     angles: NDArray[np.floating], ranges: NDArray[np.floating]
 ) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-    """Returns edges of the sectors that hold returns, and the nearest return of each, for `_clear_seen`."""
+    """Return edges of the sectors that hold returns, and the nearest return of each, for `_clear_seen`."""
     sectors = np.floor(angles / CLOUD_BIN).astype(np.intp)
     order = np.argsort(sectors, kind="stable")
     kept, starts = np.unique(sectors[order], return_index=True)

@@ -42,14 +42,14 @@ class Geometry:
         return self.height, self.width
 
     def cells(self, points: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Returns rows and columns of points (..., 2); they may lie outside the grid."""
+        """Return rows and columns of points (..., 2); they may lie outside the grid."""
         scale = 1.0 / self.resolution
         columns = np.floor((points[..., 0] - self.origin_x) * scale).astype(np.intp)
         rows = np.floor((points[..., 1] - self.origin_y) * scale).astype(np.intp)
         return rows, columns
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Returns row and column of a point; they may lie outside the grid."""
+        """Return row and column of a point; they may lie outside the grid."""
         return (
             math.floor((y - self.origin_y) / self.resolution),
             math.floor((x - self.origin_x) / self.resolution),
@@ -61,7 +61,7 @@ class Geometry:
         return 0.0 <= along_x < self.width and 0.0 <= along_y < self.height
 
     def centres(self, rows: NDArray[np.integer], columns: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Returns the centres (N, 2) of cells in metres."""
+        """Return the centres (N, 2) of cells in metres."""
         return np.stack(
             [
                 (columns + 0.5) * self.resolution + self.origin_x,
@@ -72,7 +72,7 @@ class Geometry:
 
 
 def occupancy_values(costs: NDArray[np.uint8]) -> NDArray[np.int8]:
-    """Translates costs to the values of an OccupancyGrid as costmap_2d publishes them: 0, 1..98, 99, 100, -1."""
+    """Translate costs to the values of an OccupancyGrid as costmap_2d publishes them: 0, 1..98, 99, 100, -1."""
     table = np.zeros(256, dtype=np.int8)
     table[1:INSCRIBED] = 1 + 97 * (np.arange(1, INSCRIBED) - 1) // 251
     table[INSCRIBED], table[LETHAL], table[UNKNOWN] = 99, 100, -1

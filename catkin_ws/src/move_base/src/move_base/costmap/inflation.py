@@ -23,7 +23,7 @@ class Inflation:
     """
 
     def __init__(self, layer: Layer | None, resolution: float, inscribed: float, circumscribed: float) -> None:
-        """Tabulates the cost function over the distance, so that a look-up inflates the whole grid.
+        """Tabulate the cost function over the distance, so that a look-up inflates the whole grid.
 
         The table of 256 costs reaches a cell beyond the larger of the inflation and the circumscribed radius.
 
@@ -48,7 +48,7 @@ class Inflation:
         self._table = costs.astype(np.uint8)
 
     def apply(self, costs: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Returns the inflated costs (H, W), and each cell's distance to the nearest obstacle (H, W), m."""
+        """Return the inflated costs (H, W), and each cell's distance to the nearest obstacle (H, W), m."""
         cells = cv2.distanceTransform((costs != LETHAL).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         if not cells.size or float(cells.max()) > 1e6:  # no obstacle at all
             cells = np.full(costs.shape, self.limit / self._resolution, dtype=np.float32)

@@ -46,7 +46,7 @@ class Observation:
 
 
 def scan_observation(message: Any, source: ObservationSource) -> Observation:
-    """Converts a sensor_msgs/LaserScan.
+    """Convert a sensor_msgs/LaserScan.
 
     Rays without a return (infinite, or beyond range_max) clear up to the source's raytrace_range if `inf_is_valid`;
     other readings outside the scan's limits are dropped.
@@ -79,7 +79,7 @@ def scan_observation(message: Any, source: ObservationSource) -> Observation:
 
 
 def cloud_observation(message: Any, source: ObservationSource) -> Observation:
-    """Converts a sensor_msgs/PointCloud2 with 32-bit x, y, z; points that are not finite are dropped.
+    """Convert a sensor_msgs/PointCloud2 with 32-bit x, y, z; points that are not finite are dropped.
 
     Raises:
         SensorError: fields are missing, or the data are shorter than announced.

@@ -45,7 +45,7 @@ class StaticMap:
     def create(
         cls, data: Sequence[int], width: int, height: int, resolution: float, origin: tuple[float, float, float]
     ) -> StaticMap:
-        """Checks the fields of a nav_msgs/OccupancyGrid.
+        """Check the fields of a nav_msgs/OccupancyGrid.
 
         Raises:
             MapError: sizes do not fit, or values are not finite.
@@ -59,7 +59,7 @@ class StaticMap:
 
 
 def bounding_geometry(static: StaticMap) -> Geometry:
-    """The upright grid that holds a turned map."""
+    """Return the upright grid that holds a turned map."""
     g = static.geometry
     width, height = g.width * g.resolution, g.height * g.resolution
     corners = Pose(g.origin_x, g.origin_y, static.yaw).apply(
@@ -71,7 +71,7 @@ def bounding_geometry(static: StaticMap) -> Geometry:
 
 
 def resample(static: StaticMap, layer: Layer, target: Geometry, map_pose: Pose) -> NDArray[np.uint8]:
-    """Returns the static map's costs on another grid; what the map does not cover is unknown (if tracked) or FREE."""
+    """Return the static map's costs on another grid; what the map does not cover is unknown (if tracked) or FREE."""
     outside = UNKNOWN if layer.track_unknown_space else FREE
     costs = np.where(static.occupancy >= layer.lethal_cost_threshold, LETHAL, FREE).astype(np.uint8)
     costs[static.occupancy < 0] = outside

@@ -32,10 +32,10 @@ class Transformer(Protocol):
     """Access to the tree of frames."""
 
     def lookup(self, target: str, source: str, stamp: float | None) -> NDArray[np.float64] | None:
-        """Returns the 4 x 4 transform from `source` to `target` at a time (None: newest), or None if there is none."""
+        """Return the 4 x 4 transform from `source` to `target` at a time (None: newest), or None if there is none."""
 
     def newest(self, target: str, source: str) -> float | None:
-        """Returns the time of the newest transform between two frames, s; None where they are not connected."""
+        """Return the time of the newest transform between two frames, s; None where they are not connected."""
 
 
 @dataclass
@@ -47,7 +47,7 @@ class _Sensor:
     used: float = -math.inf  # stamp of the newest observation in a costmap
 
     def newest(self, after: float, target: str, frames: Transformer) -> tuple[Observation, NDArray[np.float64]] | None:
-        """Returns the newest observation later than `after` that can be transformed."""
+        """Return the newest observation later than `after` that can be transformed."""
         for observation in reversed(self.recent):
             if observation.stamp <= after:
                 return None
@@ -57,7 +57,7 @@ class _Sensor:
         return None
 
     def trouble(self, now: float) -> str:
-        """Why nothing current of it is in a costmap, or an empty text.
+        """Return why no current data of it are in a costmap, or an empty text.
 
         The age that counts is that of the newest measurement in a costmap, not of one that can't be transformed.
         """
@@ -80,7 +80,7 @@ class Area:
         self.used: dict[tuple[str, str], float] = {}
 
     def reconfigure(self, parameters: CostmapParameters) -> None:
-        """Takes other parameters, which count from the next update on: at once."""
+        """Take other parameters; the next update uses them, and it is due at once."""
         if parameters != self.parameters:
             self.parameters = parameters
             self.costmap.reconfigure(parameters)
@@ -91,12 +91,12 @@ class Area:
         return self.snapshot is None or now - self.updated >= 1.0 / self.parameters.update_frequency - 1e-3
 
     def updated_at(self, now: float) -> None:
-        """Rates are kept on average even if steps and updates do not divide evenly."""
+        """Note an update; rates hold on average even where steps and updates do not divide evenly."""
         period = 1.0 / self.parameters.update_frequency
         self.updated = max(self.updated + period, now - period) if math.isfinite(self.updated) else now
 
     def robot_pose(self, now: float, frames: Transformer) -> Pose | None:
-        """Returns the robot's pose in the costmap's frame; None where there is none, or it is too old."""
+        """Return the robot's pose in the costmap's frame; None where there is none, or it is too old."""
         p = self.parameters
         matrix = frames.lookup(p.global_frame, p.robot_base_frame, None)
         stamp = frames.newest(p.global_frame, p.robot_base_frame)
@@ -105,7 +105,7 @@ class Area:
         return Pose.from_matrix(matrix)
 
     def map_topic(self) -> str:
-        """Where its map comes from."""
+        """Return the topic that its map comes from."""
         return next((layer.map_topic for layer in self.parameters.layers_of("static")), "map")
 
 
@@ -120,7 +120,7 @@ class Surroundings:
         self._map_frame = ""
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
-        """Takes other parameters on the way: obstacles stay."""
+        """Take other parameters while the robot drives: obstacles stay."""
         self.global_area.reconfigure(parameters.global_costmap)
         self.local_area.reconfigure(parameters.local_costmap)
 
@@ -130,14 +130,14 @@ class Surroundings:
         return [sensor.source for sensor in self._sensors.values()]
 
     def set_map(self, static: StaticMap, frame: str) -> None:
-        """Takes the static map."""
+        """Take the static map."""
         self._map_frame = frame.removeprefix("/")
         for area in (self.global_area, self.local_area):
             area.costmap.set_map(static)
             area.snapshot = None
 
     def observe(self, observation: Observation, now: float) -> str:
-        """Takes a measurement, and returns why it was ignored, or an empty text."""
+        """Take a measurement; return why it was ignored, or an empty text."""
         sensor = self._sensors[(observation.source.topic, observation.source.data_type)]
         if observation.stamp > now + FUTURE_LIMIT:
             return f"{observation.source.topic}: the stamp is more than {FUTURE_LIMIT:g} s ahead of the clock"
@@ -147,19 +147,19 @@ class Surroundings:
         return ""
 
     def clear(self) -> None:
-        """Forgets all obstacles but those of the static map."""
+        """Forget all obstacles but those of the static map."""
         self.global_area.costmap.clear()
         self.local_area.costmap.clear()
 
     def reset_time(self) -> None:
-        """Forgets all stamps, after the clock was set back."""
+        """Forget all stamps, after the clock was set back."""
         for sensor in self._sensors.values():
             sensor.recent, sensor.used = [], -math.inf
         for area in (self.global_area, self.local_area):
             area.updated, area.used = -math.inf, {}
 
     def update(self, now: float, frames: Transformer, robot: Pose | None, local_robot: Pose | None) -> str:
-        """Updates the costmaps that are due.
+        """Update the costmaps that are due.
 
         Args:
             now: time in s.
@@ -187,11 +187,11 @@ class Surroundings:
         return ""
 
     def stale_reason(self, now: float) -> str:
-        """Names the first source whose data are too old, or returns an empty text."""
+        """Name the first source whose data are too old, or return an empty text."""
         return next(filter(None, (sensor.trouble(now) for sensor in self._sensors.values())), "")
 
     def _observations_for(self, area: Area, frames: Transformer) -> list[tuple[Observation, NDArray[np.float64]]]:
-        """What an area has not used yet, the newest of each source, with its transform."""
+        """Return the newest unused observation of each source, with its transform."""
         observations = []
         for source in area.parameters.sources:
             key = (source.topic, source.data_type)
@@ -203,7 +203,7 @@ class Surroundings:
         return observations
 
     def _map_pose(self, area: Area, frames: Transformer) -> Pose | None:
-        """Pose of the map's frame in the area's frame."""
+        """Return the pose of the map's frame in the area's frame."""
         if not self._map_frame or self._map_frame == area.parameters.global_frame:
             return ORIGIN
         matrix = frames.lookup(area.parameters.global_frame, self._map_frame, None)

@@ -118,7 +118,7 @@ class _Work:
         return cls(planned_well=now, controlled=now, anchored=now)
 
     def restart_patience(self, now: float) -> None:
-        """Starts planner's, controller's and oscillation's patience anew; also while the robot has to stand still."""
+        """Start the patience of planner, controller and oscillation anew; also while the robot has to stand still."""
         self.planned_well = self.controlled = self.anchored = now
         self.failed_plans = 0
         self.anchor = None
@@ -138,7 +138,7 @@ class Navigator:
         self._work = _Work.begun(0.0)
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
-        """Takes other parameters on the way: goal, plan and obstacles stay, and so does the robot's speed.
+        """Take other parameters while the robot drives: goal, plan, obstacles and speed stay.
 
         Frames, sizes and sensors are the same as before (`move_base.parameters.reconfiguration` offers no others).
         """
@@ -164,11 +164,11 @@ class Navigator:
         return self._local.snapshot
 
     def set_map(self, static: StaticMap, frame: str) -> None:
-        """Takes the static map."""
+        """Take the static map."""
         self._surroundings.set_map(static, frame)
 
     def observe(self, observation: Observation, now: float) -> str:
-        """Takes a measurement.
+        """Take a measurement.
 
         Returns:
             Why it was ignored, or an empty text.
@@ -176,7 +176,7 @@ class Navigator:
         return self._surroundings.observe(observation, now)
 
     def set_goal(self, goal: Pose, now: float) -> None:
-        """Starts on a goal in the global frame, in place of the present one."""
+        """Start on a goal in the global frame, in place of the present one."""
         self.goal = goal
         self._followed = None
         self.state = State.PLANNING
@@ -184,24 +184,24 @@ class Navigator:
         self._work = _Work.begun(now)
 
     def cancel(self) -> None:
-        """Drops the goal; the caller stops the robot."""
+        """Drop the goal; the caller stops the robot."""
         self.goal = None
         self._followed = None
         self.state = State.IDLE
 
     def clear_costmaps(self) -> None:
-        """Forgets all obstacles but those of the static map."""
+        """Forget all obstacles but those of the static map."""
         self._surroundings.clear()
 
     def reset_time(self, now: float) -> None:
-        """Forgets all stamps, after the clock was set back; the goal stays."""
+        """Forget all stamps, after the clock was set back; the goal stays."""
         self._surroundings.reset_time()
         self._work = _Work.begun(now)
 
     # -- the step --------------------------------------------------------------------------------------------------
 
     def step(self, now: float, frames: Transformer, velocity: Velocity) -> Result:
-        """Updates the costmaps where they are due, and decides.
+        """Update the costmaps that are due, and decide.
 
         Args:
             now: time in s.
@@ -226,7 +226,7 @@ class Navigator:
         return self._drive(now, frames, robot, local_robot, velocity)
 
     def plan_between(self, start: Pose, goal: Pose, tolerance: float) -> Plan:
-        """Plans on the newest global costmap.
+        """Plan on the newest global costmap.
 
         Raises:
             PlanningError: no costmap yet, or no plan.
@@ -253,7 +253,7 @@ class Navigator:
         return Result(velocity=STOP, robot=robot, warning=f"Waiting: {reason}" if waited > QUIET_WAIT else "")
 
     def _hold(self, now: float, robot: Pose, reason: str) -> Result:
-        """Stands still on old data: neither drives nor turns, and no other patience runs meanwhile."""
+        """Stand still on old data: neither drive nor turn. No other patience runs meanwhile."""
         if self._work.stale_since is None:
             self._work.stale_since = now
         waited = now - self._work.stale_since
@@ -336,7 +336,7 @@ class Navigator:
     # -- planning --------------------------------------------------------------------------------------------------
 
     def _plan_if_due(self, now: float, robot: Pose) -> Plan | None:
-        """Plans at planner_frequency, and at once where there is no plan; returns a plan that was newly taken."""
+        """Plan at planner_frequency, and at once where there is no plan; return a plan that was newly taken."""
         p = self.parameters
         period = 1.0 / p.planner_frequency if p.planner_frequency > 0.0 else math.inf
         if self._followed is None or now - self._work.controlled > 1.0:  # the controller is stuck: look for another way
@@ -375,7 +375,7 @@ class Navigator:
         return self._followed.is_better_than(plan, robot, self._global.snapshot, allow_unknown=allow_unknown)
 
     def _in_local_frame(self, path: NDArray[np.float64], frames: Transformer) -> NDArray[np.float64] | None:
-        """Returns points (N, 2) of the global frame in the local one, or None without a transform."""
+        """Return points (N, 2) of the global frame in the local one, or None without a transform."""
         local, planned = self._local.parameters.global_frame, self._global.parameters.global_frame
         if local == planned:
             return path
@@ -383,7 +383,7 @@ class Navigator:
         return None if matrix is None else Pose.from_matrix(matrix).apply(path)
 
     def _hopeless_goal(self) -> str:
-        """Why waiting or recovery can't help: the goal is outside the map or in one of its walls."""
+        """Return why neither waiting nor recovery can help, or an empty text: the goal is off the map or in a wall."""
         assert self.goal is not None  # noqa: S101
         snapshot = self._global.snapshot
         if snapshot is None:
@@ -405,7 +405,7 @@ class Navigator:
         return p.oscillation_timeout > 0.0 and now - self._work.anchored > p.oscillation_timeout
 
     def _start_recovery(self, now: float, robot: Pose, reason: str, new_plan: Plan | None = None) -> Result:
-        """Begins the next recovery behaviour; aborts with the reason when all were tried."""
+        """Begin the next recovery behaviour; abort with the reason when all were tried."""
         p = self.parameters
         behaviour = None
         if p.recovery_behavior_enabled:

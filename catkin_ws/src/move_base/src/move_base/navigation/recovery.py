@@ -39,7 +39,7 @@ class Recovery:
     _yaw: float = 0.0
 
     def begin(self, behaviours: Sequence[RecoveryBehavior], now: float, robot: Pose) -> RecoveryBehavior | None:
-        """Goes on to the next behaviour and returns it; None when all were tried."""
+        """Go on to the next behaviour and return it; return None when all were tried."""
         if self._tried >= len(behaviours):
             return None
         self.behaviour = behaviours[self._tried]
@@ -49,12 +49,12 @@ class Recovery:
         return self.behaviour
 
     def follow(self, robot: Pose) -> None:
-        """Starts the sequence afresh where the robot got away."""
+        """Start the sequence afresh where the robot has got away."""
         if self._where is not None and robot.distance(self._where) > AFRESH_DISTANCE:
             self._tried, self._where = 0, None
 
     def left_to_turn(self, now: float, robot: Pose) -> float:
-        """Returns what is left of a full turn, rad; 0 when it is complete or took too long."""
+        """Return what is left of a full turn, rad; 0 when it is complete or took too long."""
         self._turned += wrap(robot.yaw - self._yaw)
         self._yaw = robot.yaw
         left = 2.0 * math.pi - self._turned

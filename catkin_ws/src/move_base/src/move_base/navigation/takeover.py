@@ -20,7 +20,7 @@ class TakeoverError(ValueError):
 
 
 def decode_parameter(value: object) -> bytes:
-    """Returns the serialised action goal in the parameter's value.
+    """Return the serialised action goal in the parameter's value.
 
     Raises:
         TakeoverError: the value has another form.

@@ -123,7 +123,7 @@ class CostmapParameters:
     layers: tuple[Layer, ...]
 
     def layers_of(self, kind: str) -> tuple[Layer, ...]:
-        """Returns the layers of a kind that are enabled."""
+        """Return the layers of a kind that are enabled."""
         return tuple(layer for layer in self.layers if layer.kind == kind and layer.enabled)
 
     @property
@@ -132,7 +132,7 @@ class CostmapParameters:
         return tuple(source for layer in self.layers_of("obstacle") for source in layer.sources)
 
     def padded_footprint(self) -> NDArray[np.float64]:
-        """Returns the padded footprint's corners (N, 2) in the base frame; each coordinate grows by the padding."""
+        """Return the padded footprint's corners (N, 2) in the base frame; each coordinate grows by the padding."""
         corners = np.array(self.footprint)
         return corners + np.sign(corners) * self.footprint_padding
 
@@ -208,7 +208,7 @@ class MoveBaseParameters:
 
 
 def read_parameters(tree: Mapping[str, Any]) -> MoveBaseParameters:
-    """Reads and checks the parameters of move_base.
+    """Read and checks the parameters of move_base.
 
     Args:
         tree: the node's private namespace, nested as the parameter server returns it.
@@ -279,7 +279,7 @@ def _read_controller(reader: ParameterTree) -> ControllerParameters:
 
 
 def _read_recovery(reader: ParameterTree, local: CostmapParameters) -> tuple[RecoveryBehavior, ...]:
-    """The behaviours that `recovery_behaviors` lists; without it the published default."""
+    """Return the behaviours that `recovery_behaviors` lists; without it, the published default."""
     if not reader.has("recovery_behaviors"):
         radius = float(np.hypot(*np.array(local.footprint).T).max())
         near = reader.number("conservative_reset_dist", 3.0, low=0.0)
@@ -294,7 +294,7 @@ def _read_recovery(reader: ParameterTree, local: CostmapParameters) -> tuple[Rec
 
 
 def _read_lateral_samples(reader: ParameterTree) -> tuple[float, ...]:
-    """Lateral speeds in m/s: `y_vels`, clipped to max_vel_y and min_vel_y.
+    """Return the lateral speeds in m/s: `y_vels`, clipped to max_vel_y and min_vel_y.
 
     A negative min_vel_y is the fastest speed to the right, one of zero or more the slowest sample's magnitude.
     """

@@ -31,7 +31,7 @@ class ServerDescription:
 
 
 def servers(parameters: MoveBaseParameters) -> list[ServerDescription]:
-    """Returns the servers that a node with these parameters offers."""
+    """Return the servers that a node with these parameters offers."""
     found = [ServerDescription("", "MoveBase"), ServerDescription("TrajectoryPlannerROS", "BaseLocalPlanner")]
     costmaps = {"global_costmap": parameters.global_costmap, "local_costmap": parameters.local_costmap}
     for name, costmap in costmaps.items():
@@ -47,7 +47,7 @@ def servers(parameters: MoveBaseParameters) -> list[ServerDescription]:
 def present_values(
     parameters: MoveBaseParameters, tree: Mapping[str, Any], server: ServerDescription, names: Iterable[str]
 ) -> dict[str, Any]:
-    """Returns what a server's parameters have as values now; those that nothing limits are left out."""
+    """Return what a server's parameters have as values now; those that nothing limits are left out."""
     name, _, layer = server.namespace.partition("/")
     source: object = parameters
     if name == "TrajectoryPlannerROS":
@@ -63,7 +63,7 @@ def present_values(
 def changed(
     tree: Mapping[str, Any], namespace: str, values: Mapping[str, Any]
 ) -> tuple[dict[str, Any], MoveBaseParameters]:
-    """Returns the parameter tree with new values in a server's namespace, and what it means.
+    """Return the parameter tree with new values in a server's namespace, and what it means.
 
     Raises:
         ParameterError: the values do not fit, alone or with the others.

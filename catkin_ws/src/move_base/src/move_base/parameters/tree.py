@@ -21,11 +21,11 @@ class ParameterTree:
         self._prefix = prefix
 
     def child(self, name: str) -> ParameterTree:
-        """The level below; empty where there is none."""
+        """Return the level below; it is empty where there is none."""
         return ParameterTree(self._tree.get(name, {}), self.path(name))
 
     def path(self, name: str) -> str:
-        """A parameter's name from the top."""
+        """Return a parameter's name from the top."""
         return f"{self._prefix}/{name}" if self._prefix else name
 
     def has(self, name: str) -> bool:
@@ -33,11 +33,11 @@ class ParameterTree:
         return name in self._tree
 
     def error(self, name: str, rule: str, value: object) -> ParameterError:
-        """The error of a value that breaks a rule."""
+        """Return the error for a value that breaks a rule."""
         return ParameterError(f"~{self.path(name)}: {rule}, is {value!r}; correct the launch or YAML file that sets it")
 
     def value(self, name: str, default: object) -> Any:
-        """Whatever is given, unchecked."""
+        """Return a value as it is given, unchecked."""
         return self._tree.get(name, default)
 
     def number(
@@ -50,7 +50,7 @@ class ParameterTree:
         above: bool = False,
         formerly: str = "",
     ) -> float:
-        """A number within bounds; `formerly` is the name that older files have for it."""
+        """Return a number within bounds; `formerly` is its name in older files."""
         if formerly and not self.has(name) and self.has(formerly):
             name = formerly
         value = self.value(name, default)
@@ -65,39 +65,39 @@ class ParameterTree:
         return float(value)
 
     def integer(self, name: str, default: int, *, low: int, high: int) -> int:
-        """A whole number within bounds; 3.0 is one."""
+        """Return a whole number within bounds; 3.0 is one."""
         value = self.number(name, default, low=low, high=high)
         if value != int(value):
             raise self.error(name, "must be a whole number", value)
         return int(value)
 
     def boolean(self, name: str, default: bool) -> bool:
-        """True or false, no 1 and no "yes"."""
+        """Return a boolean; 1 and "yes" are refused."""
         value = self.value(name, default)
         if not isinstance(value, bool):
             raise self.error(name, "must be true or false", value)
         return value
 
     def text(self, name: str, default: str) -> str:
-        """A text."""
+        """Return a text."""
         value = self.value(name, default)
         if not isinstance(value, str):
             raise self.error(name, "must be a text", value)
         return value
 
     def frame(self, name: str, default: str) -> str:
-        """A frame's name; tf2 knows no leading slash, published files have some."""
+        """Return a frame's name without a leading slash: tf2 refuses it, and published files have it."""
         return self.text(name, default).removeprefix("/")
 
     def sequence(self, name: str, default: tuple[object, ...]) -> tuple[Any, ...]:
-        """A list of anything."""
+        """Return a list of anything."""
         value = self.value(name, default)
         if not isinstance(value, list | tuple):
             raise self.error(name, "must be a list", value)
         return tuple(value)
 
     def plugin(self, where: str, entry: Any, types: Mapping[str, str]) -> tuple[str, str]:
-        """Name and kind of an entry `{name, type}` of a list of plug-ins."""
+        """Return name and kind of an entry `{name, type}` of a list of plug-ins."""
         if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
             raise self.error(where, "must have a name and a type", entry)
         kind = types.get(str(entry.get("type")))
@@ -106,7 +106,7 @@ class ParameterTree:
         return entry["name"], kind
 
     def numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
-        """A list of finite numbers, or a text of them."""
+        """Return finite numbers, given as a list or as a text."""
         given = self.value(name, default)
         if isinstance(given, str):  # base_local_planner's own form of a list
             given = given.strip("[] ").replace(",", " ").split()

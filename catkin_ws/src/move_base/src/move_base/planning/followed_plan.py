@@ -40,7 +40,7 @@ class FollowedPlan:
     progress: int = 0
 
     def cost_left(self, robot: Pose, snapshot: Snapshot, *, allow_unknown: bool) -> float:
-        """Returns the cost of what remains, in weighted metres; infinite where it is blocked or far away."""
+        """Return the cost of what remains, in weighted metres; infinite where it is blocked or far away."""
         points = self._rest(robot)
         if math.hypot(points[0, 0] - robot.x, points[0, 1] - robot.y) > KEEP_DISTANCE:
             return math.inf
@@ -55,7 +55,7 @@ class FollowedPlan:
         return kept < math.inf and cost > KEEP_RATIO * kept
 
     def ahead(self, robot: Pose) -> tuple[NDArray[np.float64], float]:
-        """Returns the next metres of the plan, at least two points (N, 2), and the length left to its end (m)."""
+        """Return the next metres of the plan, at least two points (N, 2), and the length left to its end (m)."""
         points = self._rest(robot)
         count = round(LOOKAHEAD / PATH_SPACING)
         ahead = points[: count + 1 : PATH_STEP]
@@ -64,7 +64,7 @@ class FollowedPlan:
         return ahead, float(np.hypot(*np.diff(points, axis=0).T).sum())
 
     def _rest(self, robot: Pose) -> NDArray[np.float64]:
-        """Moves on to the nearest point within the next few metres, and returns what is left from there."""
+        """Move on to the nearest point within the next few metres, and return what is left from there."""
         window = self.plan.points[self.progress : self.progress + SEARCHED_POINTS]
         squared = (window[:, 0] - robot.x) ** 2 + (window[:, 1] - robot.y) ** 2
         self.progress += int(squared.argmin())

@@ -71,7 +71,7 @@ class Plan:
     goal: Pose
 
     def headings(self) -> NDArray[np.float64]:
-        """Returns the direction of travel at each point, the goal's yaw at the last (N,)."""
+        """Return the direction of travel at each point, the goal's yaw at the last (N,)."""
         steps = np.diff(self.points, axis=0)
         return np.append(np.arctan2(steps[:, 1], steps[:, 0]), self.goal.yaw)
 
@@ -79,7 +79,7 @@ class Plan:
 def make_plan(
     snapshot: Snapshot, start: Pose, goal: Pose, *, tolerance: float = 0.0, escape_radius: float, allow_unknown: bool
 ) -> Plan:
-    """Plans from start to goal.
+    """Plan from start to goal.
 
     Args:
         snapshot: the inflated global costmap.
@@ -122,7 +122,7 @@ def make_plan(
 
 
 def path_cost(points: NDArray[np.float64], snapshot: Snapshot, *, allow_unknown: bool) -> float:
-    """Returns the weighted length (m) of a path on a costmap; infinite where it is blocked or leaves the map."""
+    """Return the weighted length (m) of a path on a costmap; infinite where it is blocked or leaves the map."""
     if len(points) < 2:
         return 0.0
     rows, columns = snapshot.geometry.cells(points)
@@ -136,7 +136,7 @@ def path_cost(points: NDArray[np.float64], snapshot: Snapshot, *, allow_unknown:
 
 
 def resample(points: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
-    """Returns points (N, 2) at equal distances of about `spacing` (m) along a polyline, both ends included."""
+    """Return points (N, 2) at equal distances of about `spacing` (m) along a polyline, both ends included."""
     lengths = np.hypot(*np.diff(points, axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(lengths)])
     count = max(2, round(along[-1] / spacing) + 1)
@@ -147,7 +147,7 @@ def resample(points: NDArray[np.float64], spacing: float) -> NDArray[np.float64]
 def _weigh(
     snapshot: Snapshot, costs: NDArray[np.uint8], clearance: NDArray[np.float32], allow_unknown: bool
 ) -> NDArray[np.float32]:
-    """Returns the weights of cells by their costs and clearances: 1 for a free cell, infinite for a blocked one."""
+    """Return the weights of cells by their costs and clearances: 1 for a free cell, infinite for a blocked one."""
     table = (1.0 + COST_FACTOR * np.arange(256)).astype(np.float32)
     table[INSCRIBED : LETHAL + 1] = np.inf
     table[UNKNOWN] = UNKNOWN_WEIGHT if allow_unknown else np.inf
@@ -159,7 +159,7 @@ def _weigh(
 def _nearest_end(
     snapshot: Snapshot, weights: NDArray[np.float32], start: tuple[int, int], goal: Pose, tolerance: float
 ) -> tuple[int, int]:
-    """Returns the free cell nearest to a blocked goal, within the tolerance, that can be reached from the start."""
+    """Return the free cell nearest to a blocked goal, within the tolerance, that can be reached from the start."""
     g = snapshot.geometry
     cell = g.cell(goal.x, goal.y)
     reach = int(tolerance / g.resolution)
@@ -182,7 +182,7 @@ def _nearest_end(
 
 
 def _open_start(weights: NDArray[np.float32], snapshot: Snapshot, cell: tuple[int, int], escape_radius: float) -> None:
-    """Makes blocked cells around the start passable at a high weight, in place."""
+    """Make blocked cells around the start passable at a high weight, in place."""
     reach = int(escape_radius / snapshot.geometry.resolution)
     top, left = max(cell[0] - reach, 0), max(cell[1] - reach, 0)
     window = (slice(top, cell[0] + reach + 1), slice(left, cell[1] + reach + 1))
@@ -195,7 +195,7 @@ def _open_start(weights: NDArray[np.float32], snapshot: Snapshot, cell: tuple[in
 
 
 def _biased(weights: NDArray[np.float32], start: tuple[int, int], end: tuple[int, int]) -> NDArray[np.float32]:
-    """Adds the bias to the straight line; the tables assume a resolution of 0.05 m closely enough at any other."""
+    """Add the bias to the straight line; the tables assume a resolution of 0.05 m closely enough at any other."""
     direction = np.array([end[0] - start[0], end[1] - start[1]], dtype=np.float32)
     length = float(np.hypot(*direction))
     if length < 1.0:
@@ -212,7 +212,7 @@ def _biased(weights: NDArray[np.float32], start: tuple[int, int], end: tuple[int
 def _straighten(
     nodes: NDArray[np.float64], weights: NDArray[np.float32], geometry: Geometry, longest: int
 ) -> NDArray[np.float64]:
-    """Returns the cheapest chain of straight shortcuts, of at most `longest` steps, between a path's nodes (N, 2)."""
+    """Return the cheapest chain of straight shortcuts, of at most `longest` steps, between a path's nodes (N, 2)."""
     count = len(nodes)
     if count < 3:
         return nodes
@@ -251,7 +251,7 @@ def _straighten(
 
 
 def _smooth(points: NDArray[np.float64], weights: NDArray[np.float32], geometry: Geometry) -> NDArray[np.float64]:
-    """Rounds corners by a moving average; a point that would come into a blocked cell stays where it was."""
+    """Round corners by a moving average; a point that would come into a blocked cell stays where it was."""
     half = SMOOTHING_POINTS // 2
     if len(points) <= SMOOTHING_POINTS:
         return points

@@ -31,7 +31,7 @@ class PathDisplay:
         self._local_plan = rospy.Publisher("~TrajectoryPlannerROS/local_plan", Path, queue_size=1)
 
     def publish(self, result: Result) -> None:
-        """Publishes what a step has decided."""
+        """Publish what a step has decided."""
         now = rospy.Time.now()
         if result.new_plan is not None:
             self._plan.publish(path_of(result.new_plan.points, result.new_plan.headings(), self._global_frame, now))
@@ -55,12 +55,12 @@ class CostmapDisplay:
         self._published = -math.inf
 
     def reconfigure(self, parameters: CostmapParameters) -> None:
-        """Takes other parameters."""
+        """Take other parameters."""
         self._parameters = parameters
         self._footprint = parameters.padded_footprint()
 
     def publish(self, now: float, snapshot: Snapshot | None, frames: TfTransformer) -> None:
-        """Publishes what is due at `now` (s)."""
+        """Publish what is due at `now` (s)."""
         p = self._parameters
         if p.publish_frequency == 0.0 or snapshot is None:
             return

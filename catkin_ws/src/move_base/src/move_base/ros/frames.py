@@ -26,7 +26,7 @@ class TfTransformer:
         self._listener = tf2_ros.TransformListener(self.buffer)
 
     def lookup(self, target: str, source: str, stamp: float | None) -> NDArray[np.float64] | None:
-        """Returns the 4 x 4 transform at a time (s), the newest for None, or None."""
+        """Return the 4 x 4 transform at a time (s), the newest for None, or None."""
         when = rospy.Time() if stamp is None else rospy.Time.from_sec(stamp)
         try:
             transform = self.buffer.lookup_transform_core(target, source, when).transform
@@ -36,7 +36,7 @@ class TfTransformer:
         return matrix if (np.abs(matrix) <= FARTHEST).all() else None  # tf2 takes infinity for a number
 
     def newest(self, target: str, source: str) -> float | None:
-        """Returns the time of the newest transform in s, or None. Frames that never move are current at any time."""
+        """Return the time of the newest transform in s, or None. Frames that never move are current at any time."""
         try:
             stamp: float = self.buffer.get_latest_common_time(target, source).to_sec()
         except tf2_ros.TransformException:
@@ -44,5 +44,5 @@ class TfTransformer:
         return stamp or math.inf
 
     def clear(self) -> None:
-        """Forgets everything, after the clock was set back."""
+        """Forget everything, after the clock was set back."""
         self.buffer.clear()

@@ -44,7 +44,7 @@ class _TakingOverActionServer(actionlib.ActionServer):
         self._resumed = resumed
 
     def start(self) -> None:
-        """Starts like the base class, but the first status message already holds the resumed goal."""
+        """Start like the base class, but the first status message already holds the resumed goal."""
         with self.lock:
             self.initialize()
             self.started = True
@@ -64,7 +64,7 @@ class GoalServer:
         cancel: Callable[[bool], None],
         resumed: MoveBaseActionGoal | None,
     ) -> None:
-        """Prepares the server.
+        """Prepare the server.
 
         Args:
             frames: the transforms.
@@ -89,24 +89,24 @@ class GoalServer:
         rospy.Subscriber(f"{ACTION}_simple/goal", PoseStamped, self._on_simple_goal, queue_size=5)
 
     def start(self) -> None:
-        """Begins to take goals."""
+        """Begin to take goals."""
         self._server.start()
 
     def take_requests(self, now: float) -> None:
-        """Deals with the goals and cancellations that have come; `now` in s."""
+        """Deal with the goals and cancellations that have come; `now` in s."""
         self._requests.drain()
         if self._waiting is not None:
             self._resolve_waiting(now)
 
     def feed_back(self, now: float, robot: Pose) -> None:
-        """Tells the active goal's client where the robot is, if it is time."""
+        """Tell the active goal's client where the robot is, if it is time."""
         if self._active is not None and now - self._fed_back >= FEEDBACK_PERIOD:
             self._fed_back = now
             pose = pose_stamped(robot, self._global_frame, rospy.Time.now())
             self._active.publish_feedback(MoveBaseFeedback(base_position=pose))
 
     def finish(self, outcome: Outcome, text: str) -> None:
-        """Tells the active goal's client how it ended."""
+        """Tell the active goal's client how it ended."""
         handle, self._active = self._active, None
         if handle is None:
             return
@@ -118,7 +118,7 @@ class GoalServer:
             handle.set_aborted(MoveBaseResult(), text)
 
     def reset_time(self) -> None:
-        """Forgets times, after the clock was set back."""
+        """Forget times, after the clock was set back."""
         self._fed_back = -math.inf
 
     def _on_goal(self, handle: ServerGoalHandle) -> None:
@@ -134,7 +134,7 @@ class GoalServer:
         self._requests.put(partial(self._take_cancellation, handle))
 
     def _on_simple_goal(self, message: PoseStamped) -> None:
-        """Sends the pose as an action goal on the action's topic, where others can see it, too."""
+        """Send the pose as an action goal on the action's topic, where others can see it, too."""
         goal = MoveBaseActionGoal()
         goal.header.stamp = rospy.Time.now()
         goal.goal_id = GoalIDGenerator().generate_ID()
@@ -142,7 +142,7 @@ class GoalServer:
         self._sent_on.publish(goal)
 
     def _current(self) -> ServerGoalHandle | None:
-        """The goal at work, or the one that waits for its frame."""
+        """Return the active goal, or the one that waits for its frame."""
         return self._active or (self._waiting[0] if self._waiting is not None else None)
 
     def _take_goal(self, handle: ServerGoalHandle) -> None:
@@ -159,7 +159,7 @@ class GoalServer:
             self._drop_goal("cancelled by the client")
 
     def _resolve_waiting(self, now: float) -> None:
-        """Starts the waiting goal as soon as its frame is known."""
+        """Start the waiting goal as soon as its frame is known."""
         assert self._waiting is not None  # noqa: S101
         handle, since = self._waiting
         target = handle.get_goal().target_pose
@@ -191,7 +191,7 @@ class GoalServer:
 
 
 def resumed_goal(value: object) -> MoveBaseActionGoal | None:
-    """Returns the goal to take over, and deletes the parameter `~resume_goal`: it is meant for this start only."""
+    """Return the goal to take over; delete the parameter `~resume_goal`, which is meant for this start only."""
     if value is None:
         return None
     with contextlib.suppress(KeyError):

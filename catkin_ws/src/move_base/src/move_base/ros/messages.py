@@ -24,7 +24,7 @@ FARTHEST = 1e6
 
 
 def goal_problem(target: PoseStamped) -> str:
-    """Returns why a pose can't be a goal, or an empty text."""
+    """Return why a pose can't be a goal, or an empty text."""
     position, orientation = target.pose.position, target.pose.orientation
     values = (position.x, position.y, position.z, orientation.x, orientation.y, orientation.z, orientation.w)
     if not all(abs(value) <= FARTHEST for value in values):
@@ -38,19 +38,19 @@ def goal_problem(target: PoseStamped) -> str:
 
 
 def matrix_of(position: Any, q: Quaternion) -> NDArray[np.float64]:
-    """Returns the homogeneous 4 x 4 transform of a position and a unit quaternion."""
+    """Return the homogeneous 4 x 4 transform of a position and a unit quaternion."""
     return transform_of((position.x, position.y, position.z), (q.x, q.y, q.z, q.w))
 
 
 def twist_of(velocity: Velocity) -> Twist:
-    """Returns a velocity as the command for it."""
+    """Return a velocity as the command for it."""
     twist = Twist()
     twist.linear.x, twist.linear.y, twist.angular.z = velocity.x, velocity.y, velocity.yaw
     return twist
 
 
 def pose_stamped(pose: Pose, frame: str, stamp: genpy.Time) -> PoseStamped:
-    """Returns a pose in a frame."""
+    """Return a pose in a frame."""
     stamped = PoseStamped()
     stamped.header.stamp = stamp
     stamped.header.frame_id = frame
@@ -60,7 +60,7 @@ def pose_stamped(pose: Pose, frame: str, stamp: genpy.Time) -> PoseStamped:
 
 
 def path_of(points: NDArray[np.float64], headings: NDArray[np.float64], frame: str, stamp: genpy.Time) -> Path:
-    """Returns points (N, 2) with headings (N,) as a path."""
+    """Return points (N, 2) with headings (N,) as a path."""
     path = Path()
     path.header.stamp = stamp
     path.header.frame_id = frame
@@ -73,7 +73,7 @@ def path_of(points: NDArray[np.float64], headings: NDArray[np.float64], frame: s
 
 
 def polygon_of(corners: NDArray[np.float64], frame: str, stamp: genpy.Time) -> PolygonStamped:
-    """Returns corners (N, 2) as a polygon."""
+    """Return corners (N, 2) as a polygon."""
     polygon = PolygonStamped()
     polygon.header.stamp = stamp
     polygon.header.frame_id = frame
@@ -82,7 +82,7 @@ def polygon_of(corners: NDArray[np.float64], frame: str, stamp: genpy.Time) -> P
 
 
 def occupancy_grid(snapshot: Snapshot, frame: str, stamp: genpy.Time) -> OccupancyGrid:
-    """Returns a costmap with the values that costmap_2d publishes."""
+    """Return a costmap with the values that costmap_2d publishes."""
     grid = OccupancyGrid()
     g = snapshot.geometry
     grid.header.stamp = stamp

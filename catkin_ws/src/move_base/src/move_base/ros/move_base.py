@@ -76,7 +76,7 @@ class MoveBaseNode:
         threading.Thread(target=self._offer_reconfiguration, daemon=True).start()
 
     def run(self) -> None:
-        """Steps until shutdown."""
+        """Step until shutdown."""
         period = 1.0 / self._parameters.controller_frequency
         rate = rospy.Rate(self._parameters.controller_frequency)
         last = 0.0
@@ -126,7 +126,7 @@ class MoveBaseNode:
             return present_values(self._reconfigured or self._parameters, self._tree, server, names)
 
     def _reconfigure(self, namespace: str, values: dict[str, Any]) -> str:
-        """Takes values at the next tick; returns why they do not fit, or an empty text."""
+        """Take values at the next tick; return why they do not fit, or an empty text."""
         with self._tree_lock:
             try:
                 self._tree, self._reconfigured = changed(self._tree, namespace, values)
@@ -242,7 +242,7 @@ class MoveBaseNode:
                 self._cmd_vel.publish(Twist())
 
     def _stop_base(self) -> None:
-        """The last command of a node that ends is to stand still."""
+        """Stop the base: this is the last command of a node that ends."""
         with self._lock:
             self._closing = True
             with contextlib.suppress(rospy.ROSException):
@@ -257,7 +257,7 @@ class MoveBaseNode:
 
 
 def main() -> None:
-    """Entry point of the node; exit status 2 when a parameter can't be used."""
+    """Run the node; exit status 2 when a parameter can't be used."""
     with Lifetime("move_base", ParameterError) as life:
         life.longest_end_without_master = life.longest_end  # the base is stopped after the step that is under way
         life.start()

@@ -19,7 +19,7 @@ Take = Callable[[str, dict[str, Any]], str]
 
 
 def offer(descriptions: Sequence[ServerDescription], present: Present, take: Take) -> list[Server]:
-    """Starts the servers.
+    """Start the servers.
 
     Args:
         descriptions: of the servers.
