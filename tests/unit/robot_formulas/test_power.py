@@ -1,8 +1,7 @@
 import math
 
 import pytest
-from robot_formulas.power import Battery, PowerError, PowerMeter, check_factor, power_load
-from robot_formulas.quality import energy_level
+from robot_formulas.power import Battery, PowerError, PowerMeter, check_factor, energy_level, power_load
 
 
 @pytest.mark.parametrize(
@@ -63,3 +62,11 @@ def test_full_load_empties_the_battery_in_three_hours():
     battery.drain(5.0, 2.0 * 3600.0)
     assert battery.charge == 0.0
     assert battery.current(1.0) < 0.0
+
+
+def test_energy_level_follows_the_published_scale():
+    assert energy_level(0.2) == 0.0
+    assert energy_level(2.6) == pytest.approx(0.5)
+    assert energy_level(9.0) == 1.0
+    with pytest.raises(ValueError, match="finite"):
+        energy_level(math.nan)

@@ -1,4 +1,4 @@
-"""The power load of the robot: the published model of D2, and the meter that feeds it once per second."""
+"""The power load of the robot: the published model of D2, its level, the meter that feeds it, and the battery."""
 
 from __future__ import annotations
 
@@ -55,6 +55,17 @@ def check_factor(factor: float) -> float:
     if not math.isfinite(factor) or factor < 0.0:
         raise PowerError(f"consumption factor {factor} refused: it must be a finite number, 0 or more")
     return factor
+
+
+def energy_level(load: float) -> float:
+    """Return the power load (the published model's scale, 0.2 to 5.0) as a level from 0 to 1.
+
+    Raises:
+        ValueError: the load is not finite.
+    """
+    if not math.isfinite(load):
+        raise ValueError(f"power load {load} is not finite")
+    return min(max((load - MIN_LOAD) / (MAX_LOAD - MIN_LOAD), 0.0), 1.0)
 
 
 class PowerMeter:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import psutil
-from robot_formulas.quality import normalised
+from robot_formulas.level import normalised
 
 from rosgraph_monitor.observer import Observer, StaleInputError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from robot_formulas.quality import energy_level
+from robot_formulas.power import energy_level
 from std_msgs.msg import Float32
 
 from rosgraph_monitor.observer import StaleInputError, TopicObserver

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from robot_formulas.quality import normalised, position_uncertainty
+from robot_formulas.level import normalised
+from robot_formulas.localization import position_uncertainty
 
 from rosgraph_monitor.observer import StaleInputError, TopicObserver, Topics
 

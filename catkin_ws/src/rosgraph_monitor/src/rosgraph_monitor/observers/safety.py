@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from nav_msgs.msg import Odometry
-from robot_formulas.quality import (
+from robot_formulas.safety import (
     BRAKING_GAIN,
     braking_distance,
     closest_in_direction,

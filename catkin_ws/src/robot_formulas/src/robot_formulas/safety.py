@@ -1,7 +1,4 @@
-"""Formulas of the quality attributes: pure functions that the observers and the simulator's ground truth share.
-
-Risk-like levels: 0 is harmless, 1 the largest deviation (paper, section on D2; constants of the published observers).
-"""
+"""Safety as a risk: 0 is harmless, 1 the largest deviation. Constants are those of the published observer of D2."""
 
 from __future__ import annotations
 
@@ -15,10 +12,6 @@ if TYPE_CHECKING:
 
 BRAKING_GAIN = 0.40
 """1/s. Published observer: the braking distance is 2.5 s of travel."""
-LOAD_IDLE = 0.2
-"""Smallest power load of the published energy model."""
-LOAD_RANGE = 4.8
-"""Largest (5.0) minus smallest (0.2) power load of the published energy model."""
 
 
 def braking_distance(speed: float, gain: float = BRAKING_GAIN) -> float:
@@ -95,40 +88,3 @@ def closest_in_direction(
     along = px * math.cos(direction_rad) + py * math.sin(direction_rad)
     inside = np.isfinite(distance) & (along >= distance * math.cos(half_angle_rad) - 1e-9)
     return float(distance[inside].min()) if inside.any() else math.inf
-
-
-def energy_level(load: float) -> float:
-    """Return the power load (the published model's scale, 0.2 to 5.0) as a level from 0 to 1.
-
-    Raises:
-        ValueError: the load is not finite.
-    """
-    if not math.isfinite(load):
-        raise ValueError(f"power load {load} is not finite")
-    return min(max((load - LOAD_IDLE) / LOAD_RANGE, 0.0), 1.0)
-
-
-def normalised(value: float, best: float, worst: float) -> float:
-    """Return a measured value as a level from 0 (at `best`, or better) to 1 (at `worst`, or worse).
-
-    Raises:
-        ValueError: the value is not finite, or the ends are the same.
-    """
-    if not math.isfinite(value) or best == worst:
-        raise ValueError(f"{value} can't be a level between {best} and {worst}")
-    return min(max((value - best) / (worst - best), 0.0), 1.0)
-
-
-def position_uncertainty(xx: float, xy: float, yy: float) -> float:
-    """Return the largest standard deviation in m of a position, from its covariance in m2.
-
-    Raises:
-        ValueError: the numbers are no covariance: not finite, or negative in some direction.
-    """
-    if not all(map(math.isfinite, (xx, xy, yy))):
-        raise ValueError(f"covariance ({xx}, {xy}, {yy}) is not finite")
-    mean, half = (xx + yy) / 2.0, (xx - yy) / 2.0
-    spread = math.hypot(half, xy)
-    if xx < 0.0 or yy < 0.0 or mean - spread < -1e-9 * max(mean, 1.0):
-        raise ValueError(f"({xx}, {xy}, {yy}) is no covariance")
-    return math.sqrt(mean + spread)

@@ -1,4 +1,4 @@
-"""The formulas of the quality attributes."""
+"""The formulas of safety."""
 
 import math
 
@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from robot_formulas.quality import (
-    braking_distance,
-    closest_in_direction,
-    energy_level,
-    physical_braking_distance,
-    safety_risk,
-)
+from robot_formulas.safety import braking_distance, closest_in_direction, physical_braking_distance, safety_risk
 
 
 def test_braking_distance_is_two_and_a_half_seconds_of_travel():
@@ -61,11 +55,3 @@ def test_closest_in_direction_keeps_the_edge_of_the_sector():
 def test_closest_in_direction_ignores_what_is_not_finite():
     assert closest_in_direction(np.array([np.nan, np.inf, 3.0]), np.array([0.0, 0.0, 0.0]), 0.0) == pytest.approx(3.0)
     assert closest_in_direction([], [], 0.0) == math.inf
-
-
-def test_energy_level_follows_the_published_scale():
-    assert energy_level(0.2) == 0.0
-    assert energy_level(2.6) == pytest.approx(0.5)
-    assert energy_level(9.0) == 1.0
-    with pytest.raises(ValueError, match="finite"):
-        energy_level(math.nan)
