@@ -12,7 +12,7 @@ from move_base.costmap.grid import Geometry
 from move_base.costmap.sensors import Observation
 from move_base.costmap.static_map import StaticMap
 from move_base.navigation.navigator import Navigator
-from move_base.parameters.parameters import read_parameters
+from move_base.parameters.reader import read_parameters
 from robot_formulas.geometry import Pose, Velocity
 
 CONFIG = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim/config/move_base.yaml"

@@ -8,7 +8,7 @@ from move_base.costmap.costmap import Costmap
 from move_base.costmap.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, occupancy_values
 from move_base.costmap.sensors import Observation
 from move_base.costmap.static_map import MapError, StaticMap
-from move_base.parameters.parameters import read_parameters
+from move_base.parameters.reader import read_parameters
 from robot_formulas.geometry import ORIGIN, Pose
 
 

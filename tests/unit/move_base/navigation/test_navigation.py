@@ -8,8 +8,8 @@ import pytest
 from move_base.control.dwa import DwaController
 from move_base.control.oscillation import OscillationFlags
 from move_base.costmap.grid import LETHAL
-from move_base.navigation.navigator import Outcome
-from move_base.parameters.parameters import read_parameters
+from move_base.navigation.result import Outcome
+from move_base.parameters.reader import read_parameters
 from robot_formulas.geometry import Pose, Velocity
 
 RACK = (0.0, -1.5, 0.8, 6.0, 0.0)

@@ -1,7 +1,8 @@
 """Parameters: published names and defaults, one clear error per mistake."""
 
 import pytest
-from move_base.parameters.parameters import DEFAULT_UPDATE_PERIOD, read_parameters
+from move_base.parameters.parameters import DEFAULT_UPDATE_PERIOD
+from move_base.parameters.reader import read_parameters
 from move_base.parameters.tree import ParameterError
 
 

@@ -5,7 +5,7 @@ import pytest
 from move_base.costmap.costmap import Costmap
 from move_base.costmap.grid import INSCRIBED
 from move_base.costmap.static_map import StaticMap
-from move_base.parameters.parameters import read_parameters
+from move_base.parameters.reader import read_parameters
 from move_base.planning.global_planner import PlanningError, make_plan, path_cost
 from robot_formulas.geometry import Pose
 

@@ -11,8 +11,7 @@ Whatever the state, nothing moves on sensor data that are too old, nor without a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from enum import Enum
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from robot_formulas.geometry import STOP, Pose, Velocity, wrap
@@ -20,7 +19,8 @@ from robot_formulas.geometry import STOP, Pose, Velocity, wrap
 from move_base.control.dwa import DwaController
 from move_base.costmap.grid import LETHAL
 from move_base.costmap.surroundings import Surroundings
-from move_base.navigation.recovery import Recovery
+from move_base.navigation.result import Outcome, Result, State
+from move_base.navigation.work import Work
 from move_base.planning.followed_plan import FollowedPlan
 from move_base.planning.global_planner import Plan, PlanningError, make_plan
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from move_base.control.rollout import Trajectory
     from move_base.costmap.costmap import Snapshot
     from move_base.costmap.sensors import Observation
     from move_base.costmap.static_map import StaticMap
@@ -42,88 +41,6 @@ QUIET_WAIT = 0.5
 """Waiting is worth a warning after this time, s: the first messages after a start take a few tenths."""
 
 
-class State(Enum):
-    """What the navigator is doing."""
-
-    IDLE = "idle"
-    PLANNING = "planning"
-    CONTROLLING = "controlling"
-    RECOVERING = "recovering"
-
-
-class Outcome(Enum):
-    """How a goal ended."""
-
-    SUCCEEDED = "succeeded"
-    ABORTED = "aborted"
-
-
-@dataclass(frozen=True)
-class Result:
-    """What one step decided.
-
-    Attributes:
-        velocity: the command; None where nothing is to be sent.
-        robot: pose in the global frame, if known.
-        outcome: set when the goal has just ended.
-        text: the reason of the outcome.
-        warning: something the operator should know; repeated as long as it holds.
-        new_plan: the plan, where a new one was taken.
-        path: what the controller followed, in the local frame.
-        trajectory: what it chose.
-    """
-
-    velocity: Velocity | None = None
-    robot: Pose | None = None
-    outcome: Outcome | None = None
-    text: str = ""
-    warning: str = ""
-    new_plan: Plan | None = None
-    path: NDArray[np.float64] | None = None
-    trajectory: Trajectory | None = None
-
-
-@dataclass
-class _Work:
-    """What is remembered for one goal; times in s.
-
-    Attributes:
-        planned_well: last time that a plan was found, or that waiting for one began.
-        controlled: the same for a free velocity.
-        anchored: when the robot was at `anchor`, which follows it by steps of the oscillation distance.
-        anchor: see above.
-        planned: when planning was last tried.
-        planning_error: why it failed.
-        failed_plans: how often, since `planned_well`.
-        stale_since: since when sensor data are too old.
-        not_ready_since: since when map or transforms are missing.
-        reached_xy: whether the robot was within the goal's position tolerance.
-        recovery: what was tried against being stuck.
-    """
-
-    planned_well: float
-    controlled: float
-    anchored: float
-    anchor: Pose | None = None
-    planned: float = -math.inf
-    planning_error: str = ""
-    failed_plans: int = 0
-    stale_since: float | None = None
-    not_ready_since: float | None = None
-    reached_xy: bool = False
-    recovery: Recovery = field(default_factory=Recovery)
-
-    @classmethod
-    def begun(cls, now: float) -> _Work:
-        return cls(planned_well=now, controlled=now, anchored=now)
-
-    def restart_patience(self, now: float) -> None:
-        """Start the patience of planner, controller and oscillation anew; also while the robot has to stand still."""
-        self.planned_well = self.controlled = self.anchored = now
-        self.failed_plans = 0
-        self.anchor = None
-
-
 class Navigator:
     """Costmaps, planner, controller and recovery behind one `step`."""
 
@@ -135,7 +52,7 @@ class Navigator:
         self._surroundings = Surroundings(parameters)
         self._global, self._local = self._surroundings.global_area, self._surroundings.local_area
         self._controller = DwaController(parameters)
-        self._work = _Work.begun(0.0)
+        self._work = Work.begun(0.0)
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
         """Take other parameters while the robot drives: goal, plan, obstacles and speed stay.
@@ -181,7 +98,7 @@ class Navigator:
         self._followed = None
         self.state = State.PLANNING
         self._controller.reset()
-        self._work = _Work.begun(now)
+        self._work = Work.begun(now)
 
     def cancel(self) -> None:
         """Drop the goal; the caller stops the robot."""
@@ -196,7 +113,7 @@ class Navigator:
     def reset_time(self, now: float) -> None:
         """Forget all stamps, after the clock was set back; the goal stays."""
         self._surroundings.reset_time()
-        self._work = _Work.begun(now)
+        self._work = Work.begun(now)
 
     # -- the step --------------------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from move_base.parameters.parameters import read_parameters
+from move_base.parameters.reader import read_parameters
 
 if TYPE_CHECKING:
     from move_base.parameters.parameters import CostmapParameters, MoveBaseParameters

@@ -15,7 +15,7 @@ from move_base.ros.messages import occupancy_grid, path_of, polygon_of
 
 if TYPE_CHECKING:
     from move_base.costmap.costmap import Snapshot
-    from move_base.navigation.navigator import Result
+    from move_base.navigation.result import Result
     from move_base.parameters.parameters import CostmapParameters
     from move_base.ros.frames import TfTransformer
 

@@ -16,7 +16,7 @@ from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedb
 from node_kit.io.inbox import Inbox
 from robot_formulas.geometry import Pose
 
-from move_base.navigation.navigator import Outcome
+from move_base.navigation.result import Outcome
 from move_base.navigation.takeover import TakeoverError, decode_parameter
 from move_base.ros.messages import goal_problem, matrix_of, pose_stamped
 

@@ -22,7 +22,7 @@ from std_srvs.srv import Empty, EmptyResponse
 from move_base.costmap.sensors import SensorError, cloud_observation, scan_observation
 from move_base.costmap.static_map import MapError, StaticMap
 from move_base.navigation.navigator import Navigator
-from move_base.parameters.parameters import read_parameters
+from move_base.parameters.reader import read_parameters
 from move_base.parameters.reconfiguration import changed, present_values, servers
 from move_base.parameters.tree import ParameterError
 from move_base.planning.global_planner import PlanningError
