@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import rospkg
+from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.physics.simulation import STEP, Settings, Simulation
 from pybullet_simulator.robot.motion_sensors import REAL
-from pybullet_simulator.world.world_file import read_world
 from robot_formulas.geometry import Pose
 from support.figures import entry
 

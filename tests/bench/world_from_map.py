@@ -10,8 +10,8 @@ from typing import Any
 
 import cv2
 import numpy as np
+from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.physics.simulation import Settings, Simulation
-from pybullet_simulator.world.world_file import read_world
 from robot_formulas.geometry import Pose
 from support.figures import LIMIT, entry
 

@@ -10,10 +10,10 @@ from metacontrol_experiments.lockstep.metacontroller import Cores, Metacontrolle
 from metacontrol_experiments.lockstep.observation import Observers
 from metacontrol_experiments.lockstep.reconfiguration import navigation_parameters, plan_change, restarts
 from metacontrol_experiments.lockstep.system import LockstepError, System, private_parameters
+from pybullet_simulator.io.world_file import read_world
+from pybullet_simulator.messages.state import stamp
 from pybullet_simulator.physics.simulation import Settings as SimulationSettings
 from pybullet_simulator.physics.simulation import Simulation
-from pybullet_simulator.ros.messages import stamp
-from pybullet_simulator.world.world_file import read_world
 from robot_formulas.geometry import Pose
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import RosSystem

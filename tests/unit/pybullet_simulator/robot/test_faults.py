@@ -1,11 +1,8 @@
 """Devices that go wrong while their driver runs on."""
 
-import os
-import signal
-
 import genpy
 import pytest
-from pybullet_simulator.robot.faults import JUMP_S, SIGNALS, Fault, Outlet
+from pybullet_simulator.robot.faults import JUMP_S, Fault, Outlet
 from sensor_msgs.msg import LaserScan
 
 
@@ -36,16 +33,3 @@ def test_every_other_stamp_jumps():
     outlet = Outlet()
     outlet.fault = Fault.JUMP
     assert sent(outlet, 1.0, 1.1, 1.2) == pytest.approx([1.0 + JUMP_S, 1.1, 1.2 + JUMP_S])
-
-
-def test_signals_tell_a_drivers_process():
-    former = {number: signal.getsignal(number) for number in SIGNALS.values()}
-    outlet = Outlet()
-    try:
-        outlet.listen()
-        for fault, number in SIGNALS.items():
-            os.kill(os.getpid(), number)
-            assert outlet.fault is fault
-    finally:
-        for number, handler in former.items():
-            signal.signal(number, handler)

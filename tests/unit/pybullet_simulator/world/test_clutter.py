@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.world.clutter import KEEP_OUT, ClutterError, scatter
 from pybullet_simulator.world.grid import Grid
 from pybullet_simulator.world.obstacles import CLUTTER_SIZE
 from pybullet_simulator.world.world import Box, overlap, rasterise
-from pybullet_simulator.world.world_file import read_world
 from robot_formulas.geometry import Pose
 
 FACTORY = read_world(Path(__file__).parents[4] / "catkin_ws/src/metacontrol_sim/worlds/factory.yaml")

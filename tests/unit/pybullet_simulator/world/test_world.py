@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.world.grid import FREE, OCCUPIED, UNKNOWN
 from pybullet_simulator.world.world import Box, WorldError, rasterise
-from pybullet_simulator.world.world_file import read_world
 
 WORLDS = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_sim/worlds"
 FLOOR = "floor: {x: [-5, 5], y: [-5, 5]}\n"

@@ -15,11 +15,11 @@ from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.pellet.process import make_reasoner
 from node_kit.plugins import PluginError
+from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.physics.simulation import Settings as SimulationSettings
 from pybullet_simulator.physics.simulation import Simulation, SimulationError
 from pybullet_simulator.robot.motion_sensors import REAL
 from pybullet_simulator.world.world import WorldError, rasterise
-from pybullet_simulator.world.world_file import read_world
 from ros_model.errors import ModelError
 from ros_model.io.files import resolve
 from ros_model.io.models import read_system

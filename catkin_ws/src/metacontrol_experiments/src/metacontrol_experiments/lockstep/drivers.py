@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pybullet_simulator.messages.sensors import laser_scan, point_cloud
 from pybullet_simulator.robot.faults import Fault, Outlet
 from pybullet_simulator.robot.sensors import DepthProjector, measure_depth, measure_ranges
-from pybullet_simulator.ros.sensor_messages import laser_scan, point_cloud
 from ros_model.language.metamodel import PortKind
 from sensor_msgs.msg import LaserScan, PointCloud2
 

@@ -14,9 +14,9 @@ import cv2
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import ConfigurationReport, Event, GoalReport, MissionRecord, OccupancyMap
 from metacontrol_msgs.msg import FunctionGrounding, MissionEvent
-from move_base.navigation.navigator import Outcome as GoalOutcome
+from move_base.navigation.result import Outcome as GoalOutcome
+from pybullet_simulator.messages.state import stamp
 from pybullet_simulator.physics.simulation import LOCALISATION_STEPS, MOTION_STEPS
-from pybullet_simulator.ros.messages import stamp
 
 from metacontrol_experiments.contingency.contingency import InjectionError, Kind
 from metacontrol_experiments.lockstep.fault_injection import FaultInjector, check

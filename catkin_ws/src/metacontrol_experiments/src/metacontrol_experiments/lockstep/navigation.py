@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 from move_base.costmap.sensors import cloud_observation, scan_observation
 from move_base.costmap.static_map import StaticMap
 from move_base.navigation.navigator import Navigator
+from pybullet_simulator.messages.grid import occupancy_grid
+from pybullet_simulator.messages.state import stamp
 from pybullet_simulator.physics.simulation import STEP
-from pybullet_simulator.ros.grid_messages import occupancy_grid
-from pybullet_simulator.ros.messages import stamp
 from robot_formulas.geometry import Velocity
 
 if TYPE_CHECKING:
-    from move_base.navigation.navigator import Result
+    from move_base.navigation.result import Result
     from move_base.parameters.parameters import MoveBaseParameters
     from pybullet_simulator.robot.motion_sensors import Odometry
     from pybullet_simulator.world.grid import Grid

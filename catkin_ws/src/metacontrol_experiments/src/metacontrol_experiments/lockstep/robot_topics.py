@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
+from pybullet_simulator.messages.state import BASE, ODOM, OdometryWriter, battery_state, localised_pose
 from pybullet_simulator.physics.simulation import ENERGY_STEPS, LOCALISATION_STEPS, MOTION_STEPS
-from pybullet_simulator.ros.messages import BASE, ODOM, OdometryWriter, battery_state, localised_pose
 from robot_formulas.geometry import quaternion_of
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Float32

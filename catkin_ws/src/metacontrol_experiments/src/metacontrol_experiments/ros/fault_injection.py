@@ -18,8 +18,9 @@ from metacontrol_sim.srv import (
 )
 from nav_msgs.msg import OccupancyGrid
 from node_kit.io.xml_rpc import CallError, Client
-from pybullet_simulator.robot.faults import SIGNALS, Fault
-from pybullet_simulator.ros.grid_messages import GridMessageError, read_grid
+from pybullet_simulator.io.fault_signals import SIGNALS
+from pybullet_simulator.messages.grid import GridMessageError, read_grid
+from pybullet_simulator.robot.faults import Fault
 from pybullet_simulator.world.clutter import ClutterError, scatter
 from robot_formulas.geometry import Pose
 from simulator_msgs.srv import SetLight, SpawnObstacle

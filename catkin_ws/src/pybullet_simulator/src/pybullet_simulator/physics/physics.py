@@ -11,7 +11,7 @@ import numpy as np
 import pybullet
 from robot_formulas.geometry import Pose, quaternion_of, wrap, yaw_of
 
-from pybullet_simulator.robot.robot_file import JOINTS, planar_urdf, robot_file
+from pybullet_simulator.io.robot_file import JOINTS, planar_urdf, robot_file
 from pybullet_simulator.world.walking import HEIGHT, RADIUS
 from pybullet_simulator.world.world import box_mesh
 

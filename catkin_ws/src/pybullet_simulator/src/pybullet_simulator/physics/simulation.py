@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from robot_formulas.geometry import ORIGIN, Pose
-from robot_formulas.power import Battery, PowerMeter, check_factor
-from robot_formulas.quality import braking_distance, closest_in_direction, energy_level, safety_risk
+from robot_formulas.power import Battery, PowerMeter, check_factor, energy_level
+from robot_formulas.safety import braking_distance, closest_in_direction, safety_risk
 
+from pybullet_simulator.io.robot_file import RobotFileError
 from pybullet_simulator.physics.physics import Physics, PhysicsError
 from pybullet_simulator.robot.drive import Drive
 from pybullet_simulator.robot.motion_sensors import PERFECT, Errors, Imu, Localisation, Odometry, Slip
 from pybullet_simulator.robot.robot import Robot
-from pybullet_simulator.robot.robot_file import RobotFileError
 from pybullet_simulator.world.obstacles import Obstacles
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from enum import Enum
 from typing import Any
 
@@ -15,14 +14,6 @@ class Fault(Enum):
 
     REPEAT = "repeat"
     JUMP = "jump"
-
-
-SIGNALS = {Fault.REPEAT: signal.SIGRTMIN + 1, Fault.JUMP: signal.SIGRTMIN + 2, None: signal.SIGCONT}
-"""By which signal a driver's process is told; the last one: nothing is wrong any more.
-
-Handlers of several signals run in the order of their numbers, and that of SIGCONT may wait for a while: so the others'
-numbers are higher.
-"""
 
 
 class Outlet:
@@ -38,11 +29,6 @@ class Outlet:
         self._last: Any = None
         self._ahead = False
 
-    def listen(self) -> None:
-        """Take faults by signals (in a process's main thread only)."""
-        for number in SIGNALS.values():
-            signal.signal(number, self._on_signal)
-
     def pass_on(self, message: Any) -> Any:
         """Return what is sent in place of a message with a header."""
         if self.fault is Fault.REPEAT and self._last is not None:
@@ -54,6 +40,3 @@ class Outlet:
                 stamp = message.header.stamp
                 message.header.stamp = type(stamp)(stamp.secs + int(JUMP_S), stamp.nsecs)
         return message
-
-    def _on_signal(self, number: int, _frame: object) -> None:
-        self.fault = next(fault for fault, known in SIGNALS.items() if known == number)

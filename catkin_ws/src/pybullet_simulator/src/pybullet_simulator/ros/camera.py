@@ -11,10 +11,11 @@ from node_kit.ros.lifetime import Lifetime
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Float32
 
+from pybullet_simulator.io.fault_signals import listen
+from pybullet_simulator.messages.sensors import point_cloud, read_depth
 from pybullet_simulator.robot.faults import Outlet
 from pybullet_simulator.robot.sensors import DepthProjector, SensorError, measure_depth
 from pybullet_simulator.ros.parameters import ParameterError, number, seed
-from pybullet_simulator.ros.sensor_messages import point_cloud, read_depth
 
 
 class CameraNode(rospy.SubscribeListener):
@@ -37,7 +38,7 @@ class CameraNode(rospy.SubscribeListener):
         self._projector: DepthProjector | None = None
         self._depth: rospy.Subscriber | None = None
         self._outlet = Outlet()
-        self._outlet.listen()
+        listen(self._outlet)
         self._lock = threading.Lock()
         self._points = rospy.Publisher("camera/depth/points", PointCloud2, subscriber_listener=self, queue_size=1)
         self._lamp = rospy.Subscriber("simulator/light", Float32, self._on_light, queue_size=1)

@@ -9,6 +9,7 @@ import rospy
 from node_kit.ros.lifetime import Lifetime
 from sensor_msgs.msg import LaserScan
 
+from pybullet_simulator.io.fault_signals import listen
 from pybullet_simulator.robot.faults import Outlet
 from pybullet_simulator.robot.sensors import SensorError, measure_ranges
 from pybullet_simulator.ros.parameters import ParameterError, number, seed
@@ -33,7 +34,7 @@ class LaserNode(rospy.SubscribeListener):
         self._rng = np.random.default_rng([seed(rospy.get_param("~seed", 0)), SIDES[side]])
         self._rays: rospy.Subscriber | None = None
         self._outlet = Outlet()
-        self._outlet.listen()
+        listen(self._outlet)
         self._lock = threading.Lock()
         self._scan = rospy.Publisher(
             f"{side}/scan", LaserScan, subscriber_listener=self, queue_size=1, tcp_nodelay=True

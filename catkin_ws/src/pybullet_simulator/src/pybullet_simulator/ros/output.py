@@ -13,9 +13,9 @@ from std_msgs.msg import Float32, Int32
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
+from pybullet_simulator.messages import sensors, state
+from pybullet_simulator.messages.grid import occupancy_grid
 from pybullet_simulator.physics.simulation import ENERGY_STEPS, LOCALISATION_STEPS, MOTION_STEPS, SAFETY_STEPS, STEP
-from pybullet_simulator.ros import messages, sensor_messages
-from pybullet_simulator.ros.grid_messages import occupancy_grid
 from pybullet_simulator.world.world import rasterise
 
 if TYPE_CHECKING:
@@ -60,11 +60,11 @@ class Output:
         self._depth = rospy.Publisher("simulator/depth", Image, queue_size=1, tcp_nodelay=True)
         self._light = rospy.Publisher("simulator/light", Float32, queue_size=1, latch=True)
         errors = self._simulation.settings.errors
-        self._odometry_writer = messages.OdometryWriter(messages.ODOM, errors.slip)
-        self._state_writer = messages.OdometryWriter(messages.MAP)
-        self._imu_writer = messages.ImuWriter(errors)
-        self._transform_writer = messages.TransformWriter()
-        now = messages.stamp(self._simulation.time_ns)
+        self._odometry_writer = state.OdometryWriter(state.ODOM, errors.slip)
+        self._state_writer = state.OdometryWriter(state.MAP)
+        self._imu_writer = state.ImuWriter(errors)
+        self._transform_writer = state.TransformWriter()
+        now = state.stamp(self._simulation.time_ns)
         self._map = rospy.Publisher("map", OccupancyGrid, queue_size=1, latch=True)
         self._map.publish(occupancy_grid(rasterise(world), now))
         self.tell_light()
@@ -72,7 +72,7 @@ class Output:
     def publish(self, step: int) -> None:
         """Publish what is due after a step, /clock first."""
         simulation = self._simulation
-        now = messages.stamp(simulation.time_ns)
+        now = state.stamp(simulation.time_ns)
         self._clock.publish(now)
         if step % MOTION_STEPS == 0:
             self._publish_motion(now)
@@ -83,14 +83,14 @@ class Output:
             self._safety.publish(simulation.safety)
         if step % LOCALISATION_STEPS == 0:
             deviation = simulation.settings.errors.localisation
-            self._localised.publish(messages.localised_pose(simulation.localised, deviation, now))
+            self._localised.publish(state.localised_pose(simulation.localised, deviation, now))
         if step % ENERGY_STEPS == 0:
             self._energy.publish(simulation.energy)
-            self._battery.publish(messages.battery_state(simulation, now))
+            self._battery.publish(state.battery_state(simulation, now))
         obstacles = simulation.obstacles
         if obstacles.changes != self._changes or (obstacles.walking and step % WALKING_STEPS == 0):
             self._changes = obstacles.changes
-            self._obstacles.publish(messages.obstacle_markers(obstacles.shown(), now))
+            self._obstacles.publish(state.obstacle_markers(obstacles.shown(), now))
 
     def tell_light(self) -> None:
         """Publish the brightness."""
@@ -114,10 +114,10 @@ class Output:
             for publisher, laser in ((self._front, robot.front_laser), (self._rear, robot.rear_laser)):
                 if publisher.get_num_connections() > 0:
                     ranges = self._simulation.scan(laser)
-                    publisher.publish(sensor_messages.laser_scan(laser, ranges, now, self._laser_steps * STEP))
+                    publisher.publish(sensors.laser_scan(laser, ranges, now, self._laser_steps * STEP))
         if step % self._camera_steps == 0 and self._depth.get_num_connections() > 0:
             image = self._simulation.depth_image()
-            self._depth.publish(sensor_messages.depth_image(robot.camera, image, now))
+            self._depth.publish(sensors.depth_image(robot.camera, image, now))
 
     def _report_contacts(self) -> None:
         """Publish the count of contacts, and say what was touched when it has grown."""

@@ -26,6 +26,7 @@ from simulator_msgs.srv import (
 )
 from std_msgs.msg import Float32
 
+from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.physics.pacing import Pacer
 from pybullet_simulator.physics.simulation import STEP, Settings, Simulation, SimulationError
 from pybullet_simulator.robot.motion_sensors import REAL, Errors
@@ -35,7 +36,6 @@ from pybullet_simulator.ros.window import PERIOD_STEPS, WindowView
 from pybullet_simulator.world.obstacles import CLUTTER_MASS, CLUTTER_SIZE, ObstacleError
 from pybullet_simulator.world.walking import SPEED, Walker
 from pybullet_simulator.world.world import Box, WorldError
-from pybullet_simulator.world.world_file import read_world
 
 if TYPE_CHECKING:
     from collections.abc import Callable

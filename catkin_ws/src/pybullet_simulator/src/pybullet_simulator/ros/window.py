@@ -14,6 +14,7 @@ from robot_formulas.geometry import ORIGIN, Pose
 from sensor_msgs.msg import LaserScan, PointCloud2
 from visualization_msgs.msg import Marker
 
+from pybullet_simulator.messages.grid import read_grid
 from pybullet_simulator.physics.window import (
     BLUE,
     GLOBAL_HIGH,
@@ -29,7 +30,6 @@ from pybullet_simulator.physics.window import (
     path_points,
     scan_points,
 )
-from pybullet_simulator.ros.grid_messages import read_grid
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from pybullet_simulator.io.world_file import read_world
+from pybullet_simulator.messages.grid import GridMessageError, occupancy_grid, read_grid
+from pybullet_simulator.messages.state import stamp
 from pybullet_simulator.physics.simulation import Settings, Simulation
-from pybullet_simulator.ros.grid_messages import GridMessageError, occupancy_grid, read_grid
-from pybullet_simulator.ros.messages import stamp
 from pybullet_simulator.world.grid import FREE, OCCUPIED, UNKNOWN, cover
 from pybullet_simulator.world.world import MAPPED_HEIGHT, WorldError, rasterise
-from pybullet_simulator.world.world_file import read_world
 from robot_formulas.geometry import Pose
 
 GOOD = {

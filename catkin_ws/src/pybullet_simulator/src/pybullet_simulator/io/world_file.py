@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from pybullet_simulator.world.map_file import MapError, read_map
+from pybullet_simulator.io.map_file import MapError, read_map
 from pybullet_simulator.world.walking import SPEED, Walker
 from pybullet_simulator.world.world import KINDS, Box, World, WorldError, extrude, way_problem
 

@@ -3,8 +3,8 @@
 import xml.etree.ElementTree as ET
 
 import pytest
+from pybullet_simulator.io.robot_file import RobotFileError, planar_urdf, robot_file
 from pybullet_simulator.robot.robot import Robot
-from pybullet_simulator.robot.robot_file import RobotFileError, planar_urdf, robot_file
 
 URDF = ET.parse(robot_file()).getroot()  # noqa: S314
 JOINTS = {joint.get("name"): joint for joint in URDF.iter("joint")}
