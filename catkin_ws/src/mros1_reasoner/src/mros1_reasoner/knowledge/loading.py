@@ -1,4 +1,4 @@
-"""What changes in an application's ontology when it is loaded beside others: labels, and rules that ours replace."""
+"""Change an application's ontology so that it can be loaded with others: labels, and rules that ours replace."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _log = logging.getLogger(__name__)
 
 
 def renamed(triples: Iterable[Triple], number: int) -> list[Triple]:
-    """Give blank nodes labels of their own, requiredBy its one IRI, and drop what is about the file itself."""
+    """Return triples with unique labels of blank nodes and one IRI of requiredBy, without those about the file."""
 
     def term(text: str) -> str:
         if text.startswith("_:"):

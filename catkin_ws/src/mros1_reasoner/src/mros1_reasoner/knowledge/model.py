@@ -18,11 +18,11 @@ class Direction(enum.Enum):
 
     @property
     def sign(self) -> int:
-        """1 or -1: a level times it is worse the greater it is (`qa_sign` in the vocabulary)."""
+        """1 where a greater level is worse, -1 where it is better (`qa_sign` in the vocabulary)."""
         return 1 if self is Direction.LOWER_IS_BETTER else -1
 
     def excess(self, level: float, limit: float) -> float:
-        """Return by how much a level passes a limit; zero or less where it keeps it."""
+        """Return by how much a level violates a limit; zero or less where it keeps the limit."""
         return self.sign * (level - limit)
 
     def better(self, first: float, second: float) -> float:
@@ -31,7 +31,7 @@ class Direction(enum.Enum):
 
     @property
     def passes(self) -> str:
-        """The comparison that holds between a level and the limit that it does not keep."""
+        """The comparison that holds between a level and a limit that it violates."""
         return ">" if self is Direction.LOWER_IS_BETTER else "<"
 
 
@@ -41,9 +41,9 @@ class Quality:
 
     Attributes:
         direction: which levels are the better ones.
-        reaching_violates: a level that equals the limit does not keep it.
-        low: no level is below; None where that is not known.
-        high: no level is above; None where that is not known.
+        reaching_violates: whether a level that equals the limit violates it.
+        low: the least possible level; None where it is not known.
+        high: the greatest possible level; None where it is not known.
     """
 
     direction: Direction = Direction.LOWER_IS_BETTER
@@ -53,7 +53,7 @@ class Quality:
 
     @classmethod
     def compared_by(cls, operator: str, low: float | None = None, high: float | None = None) -> Quality:
-        """Return the quality whose observed level is in error while the operator holds between it and the limit.
+        """Return the quality whose limit is violated while the operator holds between level and limit.
 
         Raises:
             ValueError: it is none of `>`, `>=`, `<`, `<=`.
@@ -65,27 +65,27 @@ class Quality:
 
     @property
     def operator(self) -> str:
-        """The comparison that holds between a level and a limit that it does not keep."""
+        """The comparison that holds between a level and a limit that it violates."""
         return self.direction.passes + ("=" if self.reaching_violates else "")
 
     def excess(self, level: float, limit: float) -> float:
-        """Return by how much a level passes a limit; less than zero where it keeps it with room to spare."""
+        """Return by how much a level violates a limit; negative where it keeps the limit."""
         return self.direction.excess(level, limit)
 
     def violates(self, level: float, limit: float) -> bool:
-        """Return whether a level does not keep a limit."""
+        """Return whether a level violates a limit."""
         excess = self.excess(level, limit)
         return excess > 0 or (self.reaching_violates and excess == 0)
 
     def holds(self, level: float) -> bool:
-        """Return whether there can be such a level."""
+        """Return whether a level is possible."""
         above = self.low is None or level >= self.low
         return math.isfinite(level) and above and (self.high is None or level <= self.high)
 
 
 @dataclass(frozen=True)
 class Design:
-    """A FunctionDesign: its name is that of the configuration which deploys it.
+    """A FunctionDesign; it has the name of the configuration that deploys it.
 
     Attributes:
         name: local name of the individual.

@@ -1,4 +1,4 @@
-"""What the knowledge base asks of a reasoner, so that one can take another's place."""
+"""The interface of a reasoner, so that another one can replace Pellet."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Assertion(NamedTuple):
 
 
 class Reasoner(Protocol):
-    """Infers property values over an ontology that stays and facts that change."""
+    """Infers property values from an ontology, which stays, and facts, which change."""
 
     def load(self, ontology: str) -> None:
         """Take the ontology, as N-Triples; it stays until the next load.
@@ -36,8 +36,11 @@ class Reasoner(Protocol):
     def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
         """Return every value, asserted or inferred, of the properties, with the facts added to the ontology.
 
-        The facts hold for this call only. Raises ReasonerError or InconsistentError.
+        The facts hold for this call only.
+
+        Raises:
+            ReasonerError: the reasoner failed; InconsistentError: ontology and facts contradict each other.
         """
 
     def close(self) -> None:
-        """Give up what the reasoner holds."""
+        """Release processes and files."""

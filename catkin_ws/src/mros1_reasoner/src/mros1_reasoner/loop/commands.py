@@ -14,7 +14,7 @@ from mros1_reasoner.loop.view import MapeError
 
 
 class Operator:
-    """Does what an operator asks for; the loop's next step heeds it."""
+    """Does what an operator asks for; it takes effect with the loop's next step."""
 
     def __init__(self, state: State, wall: Callable[[], float]) -> None:
         """Change the loop's state.
@@ -26,17 +26,17 @@ class Operator:
         self._state, self._wall = state, wall
 
     def pause(self) -> None:
-        """Decide nothing until `resume`; facts are taken in and analysed, and what is under way is finished."""
+        """Decide nothing until `resume`; facts are still analysed, and a decision under way is still carried out."""
         self._state.pause()
 
     def resume(self) -> None:
-        """Decide again, by what holds then."""
+        """Decide again."""
         self._state.resume()
 
     def lock(self, objective: str = "") -> None:
         """Keep the configuration that an objective has, of all objectives where none is named.
 
-        What would have been done is told as a refusal.
+        What would have been done is published as a refusal.
 
         Raises:
             MapeError: there is no such objective.

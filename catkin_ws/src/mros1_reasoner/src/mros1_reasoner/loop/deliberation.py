@@ -39,7 +39,7 @@ class Deliberation:
         """Decide by what is known.
 
         Args:
-            state: what is known; it keeps what is wanted, what was refused and what was tried in vain.
+            state: what is known; it keeps what is wanted, refused and known to fail.
             utility: of a design.
             distance: how big a change it is from one design to another.
             wall: wall clock that measures durations, s.
@@ -52,7 +52,7 @@ class Deliberation:
         self._count = 0
 
     def decide(self, name: str, timing: Timing) -> Decision | None:
-        """Decide for an objective: another design of its own, else of one that requires it; else tell why not."""
+        """Return the decision for an objective: another design of its own or of one above it, or a refusal."""
         running = self._state.running[name]
         causes = self._causes(name, timing.now)
         if not causes:
@@ -76,8 +76,8 @@ class Deliberation:
     def _choose(self, name: str, now: float, *, climbs: bool) -> tuple[str, Plan]:
         """Return the objective to find another design for, and what to do for it.
 
-        It is the given one where a design of its own helps, else the nearest one above where one helps in full, else
-        the nearest one where a design helps in part.
+        That is the given objective if a design of its own helps in full; else the nearest one above of which a design
+        helps in full; else the nearest one of which a design helps in part.
         """
         outcomes: dict[str, Plan] = {}
         queue = [name]
@@ -137,7 +137,7 @@ class Deliberation:
     def _refuse(
         self, name: str, outcome: Plan, causes: list[Cause], timing: Timing, plan_wall: float
     ) -> Decision | None:
-        """Return the decision to leave things as they are; it is told once."""
+        """Return the decision not to adapt; None where the same was decided before."""
         running = self._state.running[name]
         if not self._state.refuse(name, _gist(causes, outcome)):
             return None

@@ -24,12 +24,12 @@ _TRUE, _FALSE = ("true", "1"), ("false", "0")
 
 @dataclass(frozen=True)
 class Remark:
-    """Something about a status that makes no sense, or concerns nobody.
+    """A line about a status that makes no sense or concerns nobody.
 
     Attributes:
-        kind: statuses of one kind are told of together, however many they are.
+        kind: of the trouble; lines of one kind are limited together.
         text: one line, free of foreign control characters.
-        is_warning: False where it may well be meant for somebody else.
+        is_warning: False where the status may be meant for somebody else.
     """
 
     kind: str
@@ -39,18 +39,18 @@ class Remark:
 
 @dataclass(frozen=True)
 class Reading:
-    """What statuses hold: facts, at most one of each thing, and remarks."""
+    """Facts from statuses, at most one about each subject, and remarks."""
 
     facts: tuple[Fact, ...] = ()
     remarks: tuple[Remark, ...] = ()
 
 
 class DiagnosticsReader:
-    """Reads statuses; what is not meant for the reasoner is left out.
+    """Reads statuses, and leaves out those that are not meant for the reasoner.
 
-    However many statuses come, the facts are bounded by what the model knows: a later one of the same thing replaces an
-    earlier one, of foreign names there are at most `MAX_NAMES`, and what is not in the model yields a remark only, of
-    which there are at most `MAX_REMARKS`.
+    However many statuses come, the number of facts is bounded: a later fact about the same subject replaces an earlier
+    one, and there are at most `MAX_NAMES` facts with names that the model does not hold. What is not in the model
+    otherwise makes a remark, and there are at most `MAX_REMARKS` remarks.
     """
 
     MAX_REMARKS = 20

@@ -1,4 +1,4 @@
-"""What the loop takes in and does, as typed entries of its journal; `entry_text` has their form in messages."""
+"""What the loop takes in and does, as typed entries of its journal; `entry_text` converts them to and from text."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ Content = Fact | Command | Step | Result | Decided
 
 @dataclass(frozen=True)
 class Entry:
-    """Something that was taken in, and the ROS time in s that the loop worked with."""
+    """What the loop took in or did, and the ROS time in s at which it did so."""
 
     now: float
     content: Content

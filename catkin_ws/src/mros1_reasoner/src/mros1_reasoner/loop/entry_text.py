@@ -6,7 +6,7 @@
 | stale | quality |
 | component | component, status, stamp of the diagnostic |
 | binding | grounding, in error |
-| task | objective or its function, failed, stamp, message; any other name stands for the only root objective |
+| task | objective or its function, failed, stamp, message; any other name means the only root objective |
 | active | function, configuration, state |
 | step | whether it is a heartbeat |
 | result | decision, whether it is carried out, message, whether the configuration is to blame |
@@ -16,7 +16,7 @@
 | add_objective | objective, function, then quality and limit of each NFR |
 | remove_objective | objective |
 | set_nfr | objective, quality, limit |
-| decided | decision, objective, configuration: not taken in, but what a step has brought |
+| decided | decision, objective, configuration: the outcome of the entry before it |
 
 Numbers are written so that they read back exactly; yes is 1, no is 0.
 """

@@ -1,4 +1,4 @@
-"""The journal: what the loop has taken in, kept for those who come late, and taken in once more by a replay."""
+"""The journal: what the loop took in, kept for late subscribers, and applied again by a replay."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def apply(core: Mape, entry: Entry) -> list[Decision]:
 
 
 def brought(now: float, decisions: Sequence[Decision]) -> list[Entry]:
-    """Return entries that say what an entry has brought."""
+    """Return the entries about the decisions that an entry led to."""
     return [
         Entry(now, entries.Decided(decision.id, decision.objective, decision.to_configuration))
         for decision in decisions
@@ -69,7 +69,7 @@ def brought(now: float, decisions: Sequence[Decision]) -> list[Entry]:
 
 
 class Journal:
-    """The last entries, numbered from the reasoner's start; of what goes, the state that it left is kept."""
+    """The last entries, numbered from the reasoner's start; of dropped entries, those that still hold are kept."""
 
     def __init__(self, limit: int = 50_000) -> None:
         """Keep at most so many entries, and a few more: some 20 minutes' worth on a busy robot."""
@@ -86,11 +86,11 @@ class Journal:
         return self._count - 1
 
     def snapshot(self) -> tuple[int, list[Entry]]:
-        """Return the number of the first entry and the entries; those kept from before count backwards from there."""
+        """Return the entries, and the number of the first one if they were without a gap."""
         return self._count - len(self._entries), list(self._entries)
 
     def _compact(self) -> None:
-        """Drop the older half, but for the last word on each thing that stays as it is until told otherwise."""
+        """Drop the older half, but for commands and for the last entry about each fact that lasts."""
         old = [self._entries.popleft() for _ in range(len(self._entries) // 2)]
         last = {entries.subject(item.content): item for item in old if isinstance(item.content, _LASTING)}
         others = [item for item in old if isinstance(item.content, _COMMANDS)]
@@ -124,5 +124,5 @@ def _carry_out(core: Mape, now: float, command: entries.Command) -> list[Decisio
 
 
 def _objective(core: Mape, name: str) -> str:
-    """Return the name where it is of an objective or a function; a published observer gives its own."""
+    """Return the name of an objective or a function as it is; empty for others, such as the name of an observer."""
     return name if any(name in (o.name, o.function) for o in core.objectives.values()) else ""

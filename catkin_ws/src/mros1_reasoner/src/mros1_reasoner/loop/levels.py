@@ -37,14 +37,14 @@ class _Ratio:
 
 
 class Levels:
-    """What is known of levels; times in s of ROS time."""
+    """The last level of each quality, and its average ratio to the expected one; times are s of ROS time."""
 
     def __init__(self, window: float, timeout: float, memory: float) -> None:
         """Know nothing yet.
 
         Args:
-            window: a limit must be passed for so long before it counts.
-            timeout: an older level is no longer known.
+            window: how long a limit must be violated before it counts.
+            timeout: how long a level is valid.
             memory: time constant of the average ratio of observed to expected levels.
         """
         self._window, self._timeout, self._memory = window, timeout, memory
@@ -86,7 +86,7 @@ class Levels:
         )
 
     def forget(self, objective: str = "", quality: str = "", now: float | None = None) -> None:
-        """Know levels no longer; how they compared with the expected ones is kept.
+        """Forget levels, but keep how they compared with the expected ones.
 
         Args:
             objective: whose levels; empty: of all.
@@ -101,12 +101,16 @@ class Levels:
             del self._levels[key]
 
     def drop(self, objective: str) -> None:
-        """Know nothing of an objective that is no longer there."""
+        """Forget everything about an objective."""
         self._levels = {key: level for key, level in self._levels.items() if key[0] != objective}
         self._ratios = {key: ratio for key, ratio in self._ratios.items() if key[0] != objective}
 
     def counting(self, now: float, calm_until: Mapping[str, float]) -> dict[Key, float]:
-        """Return the levels that count: one that passes its limit does after the window, and when the calm is over."""
+        """Return the levels that count.
+
+        A level that violates its limit counts once it has done so for the window, and the calm is over. Until then the
+        last level that kept the limit counts.
+        """
         found = {}
         for key, level in self._levels.items():
             if now - level.stamp > self._timeout:
@@ -122,9 +126,9 @@ class Levels:
         return {quality: level.value for (name, quality), level in self._levels.items() if name == objective}
 
     def ratio(self, now: float, key: Key) -> float | None:
-        """Return observed over expected, None where it is not known.
+        """Return observed over expected level, None where it is not known.
 
-        It is the mean since the limit has been passed, where it has for the window; else the average.
+        Once the limit has been violated for the window, it is the mean since then; before that, the average.
         """
         level = self._levels.get(key)
         if level and level.count and self._counts(level, now):

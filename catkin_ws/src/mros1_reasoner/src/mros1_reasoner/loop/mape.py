@@ -1,7 +1,7 @@
 """The loop from facts to decisions: R2 by a reasoner, R3 by the planner; time is an argument.
 
-Facts come in by the `observe_` methods; `step` reasons when they have changed in a way that counts, and says what is to
-be done; `report` takes in how it went. At most one decision is under way. Times are s of ROS time.
+The `observe_` methods take facts. `step` analyses them when they have changed in a way that counts, and returns what is
+to be done. `report` takes the outcome. At most one decision is under way. Times are s of ROS time.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class Mape:
             now: present time.
             quality: name of the quality attribute.
             level: the level.
-            grounding: name of the grounding that it was observed of; where none has that name, it is of all.
+            grounding: name of the grounding that it was observed of; an unknown name means all groundings.
             stamp: of the diagnostic; 0 where it has none.
 
         Raises:
@@ -118,11 +118,11 @@ class Mape:
             self._state.note_level(now, name, quality, level, stamp)
 
     def observe_stale(self, quality: str) -> None:
-        """Take in that a quality can't be observed at present: its levels are no longer known."""
+        """Take in that a quality can't be observed at present, and forget its levels."""
         self._state.forget_levels(quality)
 
     def observe_component(self, now: float, component: str, status: str, stamp: float = 0.0) -> None:
-        """Take in the status of a component; a return without RECOVERED is taken for one with it.
+        """Take in the status of a component; TRUE after FALSE counts as RECOVERED.
 
         Raises:
             MapeError: the component or the status is unknown.
@@ -153,12 +153,12 @@ class Mape:
         raise MapeError(f"binding error of {grounding}: no objective is grounded so: left out")
 
     def observe_task(self, now: float, name: str, failed: bool, stamp: float = 0.0, message: str = "") -> None:
-        """Take in that the task of an objective has failed though nothing else is known to be wrong, or goes on.
+        """Take in that the task of an objective has failed, or continues.
 
         Args:
             now: present time.
-            name: of the objective or of its function; empty where there is but one that nothing else requires.
-            failed: whether it has failed; until the next adaptation, or until it is reported not to have.
+            name: of the objective or of its function; empty: the only root objective.
+            failed: whether it has failed; that holds until the next adaptation or the next report.
             stamp: of the message that said so; 0 where it has none.
             message: why.
 
@@ -190,7 +190,7 @@ class Mape:
     def step(self, now: float, *, heartbeat: bool = False) -> list[Decision]:
         """Reason if what counts has changed, and decide.
 
-        Levels count by the side of the limit that they are on.
+        A level counts when it crosses its limit.
 
         Args:
             now: present time.
@@ -219,7 +219,7 @@ class Mape:
         return [] if self._state.paused else self._decide_all(timing)
 
     def due(self, now: float) -> float | None:
-        """Return the next time at which a step can bring something without a new fact, None where there is none."""
+        """Return when the next step is needed even without a new fact; None where none is."""
         return self._state.due(now)
 
     def feasible(self) -> dict[str, tuple[str, ...]]:
@@ -241,14 +241,14 @@ class Mape:
     # R4
 
     def report(self, now: float, decision_id: str, ok: bool, message: str = "", *, blame: bool = True) -> Decision:
-        """Take in how the pending decision went.
+        """Take in the outcome of the pending decision.
 
         Args:
             now: present time.
             decision_id: its id.
             ok: the wanted configuration runs.
             message: why not.
-            blame: a failure is the configuration's own, so that it goes into the error log.
+            blame: whether the configuration is to blame for the failure; then it goes into the error log.
 
         Returns:
             The decision, EXECUTED or FAILED, to publish.

@@ -12,25 +12,25 @@ class Settings:
     """How the loop behaves; times in s.
 
     Attributes:
-        violation_window: a limit must be passed for so long before it counts.
-        cool_down: so long after an adaptation no limit counts; component failures always do.
-        level_timeout: a level older than this is no longer known.
-        error_log_expiry: so long a design that was tried in vain is not tried again.
+        violation_window: how long a limit must be violated before it counts.
+        cool_down: how long no limit counts after an adaptation; component failures always count.
+        level_timeout: how long a level is valid.
+        error_log_expiry: how long a design that failed is not tried again.
         backoff: wait after a failed reconfiguration; doubled with each further one.
         backoff_limit: the longest such wait.
-        start_grace: so long after the first step the running configuration is waited for.
-        busy_limit: so long a reconfiguration by somebody else is waited for.
+        start_grace: how long the loop waits for a running configuration after its first step.
+        busy_limit: how long the loop waits while somebody else reconfigures.
         utility: quality attribute whose expected level is the utility, or a plug-in with its parameters.
-        desired: configuration that is asked for where none runs.
-        always_improve: adapt also when a clearly better design has become available, because a component works again
-            or the operator has changed a limit; an objective may say otherwise.
-        improvement: utility that such a design must have more.
-        worth: where no design keeps every limit, another one must violate them by so much less, as a share of a limit.
+        desired: the configuration to deploy when none runs.
+        always_improve: adapt also when a clearly better design becomes available, because a component works again
+            or the operator has changed a limit; the setting of an objective takes precedence.
+        improvement: by how much the utility of such a design must be greater.
+        worth: by how much less another design must violate limits, as a share of a limit, when none keeps every limit.
         correct_expected: multiply expected levels by the ratio of observed to expected ones of the deployed design.
-        correction_limit: that ratio at most, or one by it.
-        correction_memory: time constant of the average of that ratio.
-        approval: a decision waits until an operator approves it.
-        dry_run: what would be done is told once, as ADVISED, and not carried out.
+        correction_limit: the greatest ratio; the least is its reciprocal.
+        correction_memory: time constant of the average ratio.
+        approval: whether a decision waits until an operator approves it.
+        dry_run: whether a decision is published once, as ADVISED, and not carried out.
     """
 
     violation_window: float = 2.0

@@ -1,4 +1,4 @@
-"""What the loop knows, and everything that changes it; who only reads takes a `view.View`. Times are s of ROS time."""
+"""What the loop knows, and every change of it; modules that only read take a `view.View`. Times are s of ROS time."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ class State(View):
     # Facts
 
     def note_level(self, now: float, name: str, quality: str, level: float, stamp: float) -> None:
-        """Note the level of a quality that was observed of what runs for an objective; the diagnostic has a stamp."""
+        """Note an observed level of an objective, with the stamp of the diagnostic."""
         limit = self.objectives[name].limits.get(quality)
         passed = limit is not None and self.kb.qualities[quality].violates(level, limit)
         expected = self.kb.designs[self.running[name].design or ""].expected.get(quality)
         self.levels.observe(now, (name, quality), level, passed=passed, stamp=stamp, expected=expected)
 
     def forget_levels(self, quality: str) -> None:
-        """Know the levels of a quality no longer."""
+        """Forget the levels of a quality."""
         self.levels.forget(quality=quality)
 
     def note_component(self, name: str, status: str, stamp: float) -> None:
@@ -69,7 +69,7 @@ class State(View):
         self._run(name, failed_stamp=running.failed_stamp if running.binding_error else now, binding_error=in_error)
 
     def note_task_failure(self, name: str, failure: tuple[float, str] | None) -> None:
-        """Note when the task of an objective has failed, and why; None: it goes on."""
+        """Note when the task of an objective has failed, and why; None: the task continues."""
         self._run(name, task_failure=failure)
 
     def note_active(self, now: float, function: str, configuration: str, state: str) -> None:
@@ -89,7 +89,7 @@ class State(View):
             self._deploy(name, configuration, now)  # while it reconfigures, it may be the old or the new one
 
     def _deploy(self, name: str, design: str, now: float) -> None:
-        """Note that a design runs: what was observed of the one before it says nothing of this one."""
+        """Note that a design runs, and forget what was observed of the design before it."""
         running = self.running[name]
         if running.design is not None and running.design != design:
             self._run(name, calm_until=max(running.calm_until, now + self.settings.cool_down))
@@ -101,13 +101,13 @@ class State(View):
     # Objectives
 
     def ask_for(self, objective: Objective) -> None:
-        """Have one more root objective."""
+        """Add a root objective."""
         self.roots[objective.name] = None
         self._add(objective)
         self.reconsider()
 
     def ask_no_longer(self, name: str) -> None:
-        """Have a root objective no longer; objectives that only it required go with it."""
+        """Remove a root objective, and the objectives that only it required."""
         del self.roots[name]
         self._drop(name)
         self.match_requirements()
@@ -123,7 +123,7 @@ class State(View):
         self.reconsider()
 
     def match_requirements(self) -> None:
-        """Have an objective for every function that is required, and release those that no longer are."""
+        """Add an objective for every function that is required, and remove those that no longer are."""
         while True:  # what runs for a new objective may require further ones
             needed = self.needed(self.deployments(), self.wanted)
             missing = {name: function for name, function in needed.items() if name not in self.objectives}
@@ -135,7 +135,7 @@ class State(View):
             self._drop(name)
 
     def _add(self, objective: Objective) -> None:
-        """Have one more objective; what runs for its function already is taken over."""
+        """Add an objective; what runs for its function already runs for it."""
         self.objectives[objective.name] = objective
         self.running[objective.name] = Running()
         active = self.active.get(objective.function)
@@ -164,7 +164,7 @@ class State(View):
         self.error_log = {key: entry for key, entry in self.error_log.items() if entry[0] > now}
 
     def note_analysis(self, facts: Facts, analysis: Analysis, seen: tuple[object, ...]) -> None:
-        """Keep an analysis; the return of a component counts once for every objective, then it simply works."""
+        """Keep an analysis; a component that is RECOVERED is a chance for every objective once, and then works."""
         self.has_analysed, self.facts, self.analysis, self.seen = True, facts, analysis, seen
         for name, component in self.components.items():
             if component.status != v.RECOVERED or facts.components.get(name) != v.RECOVERED:
@@ -176,7 +176,7 @@ class State(View):
             self.components[name] = Component(v.WORKS, component.stamp)
 
     def reconsider(self) -> None:
-        """Have the next step analyse and decide, whatever counts then."""
+        """Have the next step analyse and decide in any case."""
         self.seen = None
 
     def pause(self) -> None:
@@ -201,7 +201,7 @@ class State(View):
     # Decisions
 
     def rest(self, name: str) -> None:
-        """Forget what was refused and wanted for an objective: nothing asks for an adaptation of it."""
+        """Forget what was refused and wanted for an objective, because it needs no adaptation."""
         self._run(name, refusal=())
         self.wanted.pop(name, None)
 
@@ -210,13 +210,13 @@ class State(View):
         self.wanted.update(designs)
 
     def is_news(self, name: str, outcome: tuple[object, ...]) -> bool:
-        """Keep what came out for an objective instead of an adaptation; return whether that is another outcome."""
+        """Keep the outcome of a deliberation that leads to no adaptation; return whether it is a new one."""
         is_news = outcome != self.running[name].refusal
         self._run(name, refusal=outcome)
         return is_news
 
     def refuse(self, name: str, outcome: tuple[object, ...]) -> bool:
-        """Leave an objective as it is; return whether that is another outcome than before."""
+        """Keep the outcome of a deliberation that refuses to adapt; return whether it is a new one."""
         self.wanted.pop(name, None)
         is_news = self.is_news(name, outcome)
         if is_news:
@@ -228,7 +228,7 @@ class State(View):
         self._run(name, chances={})
 
     def note_in_vain(self, now: float, design: str, objective: str, reason: str) -> None:
-        """Put a design into the error log, for an objective and for as long as the settings say."""
+        """Put a design that failed for an objective into the error log."""
         self.error_log[design, objective] = now + self.settings.error_log_expiry, reason
 
     def propose(self, decision: Decision | None) -> None:

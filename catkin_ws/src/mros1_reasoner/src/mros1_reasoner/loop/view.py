@@ -21,7 +21,7 @@ BUSY = (FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING)
 
 
 class MapeError(Exception):
-    """A fact, a report or a wish does not fit; one line that says why."""
+    """A fact, a report or a command does not fit; one line that says why."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class View:
         has_analysed: whether there was an analysis.
         facts: those of the last analysis.
         analysis: the last one.
-        seen: what counted at the last analysis; None where another one is due anyway.
+        seen: what counted at the last analysis; None where the next step analyses anyway.
     """
 
     kb: KnowledgeBase
@@ -185,12 +185,12 @@ class View:
     # Facts
 
     def is_busy(self, running: Running, now: float) -> bool:
-        """Return whether somebody is still reconfiguring it."""
+        """Return whether a reconfiguration is still going on."""
         since = running.busy_since
         return running.state in BUSY and since is not None and now - since < self.settings.busy_limit
 
     def waits(self, name: str, now: float) -> bool:
-        """Return whether nothing can be asked for an objective at this moment."""
+        """Return whether an objective can't be adapted at this moment."""
         running = self.running[name]
         return self.is_busy(running, now) or now < running.not_before
 
@@ -208,7 +208,7 @@ class View:
         )
 
     def what_counts(self, facts: Facts, now: float) -> tuple[object, ...]:
-        """Return what an analysis and a decision depend on: while it is the same, neither can bring anything new."""
+        """Return what an analysis and a decision depend on; while it is the same, both have the same result."""
         passed = frozenset(
             (name, quality)
             for (name, quality), level in facts.levels.items()
@@ -228,7 +228,7 @@ class View:
         )
 
     def has_waited(self, now: float) -> bool:
-        """Return whether the time is over in which a running configuration is waited for."""
+        """Return whether the loop has waited long enough for a running configuration."""
         return self.started is not None and now - self.started >= self.settings.start_grace
 
     def is_fine(self, name: str) -> bool:
@@ -240,7 +240,7 @@ class View:
         return running.design not in self.analysis.unrealisable and not (result and result.in_error)
 
     def due(self, now: float) -> float | None:
-        """Return the next time at which a step can bring something without a new fact, None where there is none."""
+        """Return when the next step is needed even without a new fact; None where none is."""
         times = [self.started + self.settings.start_grace] if self.started is not None else []
         times += self.levels.due({name: running.calm_until for name, running in self.running.items()})
         for running in self.running.values():

@@ -1,4 +1,4 @@
-"""R3, pure: which design to deploy for an objective, and why each other one was not taken."""
+"""R3: choose the design to deploy for an objective, and say why each other one was not taken."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ class Plan:
 
 @dataclass(frozen=True)
 class Situation:
-    """What planning has to heed beside the designs.
+    """What a plan depends on beside the designs.
 
     Attributes:
         qualities: how the levels of each quality attribute compare.
         unrealisable: components that are missing, by the name of the design that requires them.
         unfulfilled: functions that a design requires and that no design can be deployed for, by the design's name.
         strained: the same for functions that are provided, but not as they should be.
-        tried: why a design was tried in vain, by its name.
+        tried: why a design failed a short while ago, by its name.
         current: name of the deployed design.
-        observed: levels that were observed with it; they count in place of the expected ones.
+        observed: levels that were observed with the deployed design; they replace its expected levels.
         factors: by how much the expected levels of a quality are to be multiplied.
-        worth: by how much less, as a share of a limit, another design must violate limits where none keeps them all.
+        worth: by how much less another design must violate limits, as a share of a limit, when none keeps them all.
     """
 
     qualities: Mapping[str, Quality] = field(default_factory=dict)
@@ -69,11 +69,11 @@ def plan(
     utility: Utility,
     distance: Distance,
 ) -> Plan:
-    """Choose a design that can be deployed, was not just tried in vain and keeps every limit.
+    """Choose a design that can be deployed, did not fail a short while ago and keeps every limit.
 
-    The highest utility wins, a tie goes to the smaller change. Where none keeps every limit, the least violating
-    one is taken, the current one included, which goes only when another one is worth the change; where all were
-    tried in vain, they are tried again.
+    The highest utility wins; of equally useful designs, the smaller change wins. When no design keeps every limit, the
+    least violating one is taken; the deployed design stays unless another one is worth the change. When all have
+    failed, they are tried again.
     """
     running = next((design for design in designs if design.name == situation.current), None)
     candidates = [_judge(objective, design, situation, utility) for design in designs]

@@ -1,4 +1,4 @@
-"""Utility of a design, a plug-in: a function (parameters, qualities) -> (design -> number, the greater the better).
+"""The utility of a design, a plug-in: a function (parameters, qualities) -> (design -> number, the greater the better).
 
 A package adds one with `<export><mros1_reasoner utility="NAME" function="module:function"/></export>` in package.xml.
 """
