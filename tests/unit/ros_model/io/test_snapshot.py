@@ -165,15 +165,6 @@ def test_garbage_is_refused(garbage):
         take_snapshot(uri)
 
 
-def test_master_is_known_by_its_process():
-    with master(getPid=lambda _caller: [1, "", 4711]) as uri:
-        client = MasterClient(uri)
-        assert client.master_pid() == 4711
-        client.close()
-    with master(getPid=lambda _caller: [1, "", "none"]) as uri, pytest.raises(CallError, match="garbage"):
-        MasterClient(uri).master_pid()
-
-
 def test_error_of_the_master_is_passed_on():
     table = answers([]) | {"getTopicTypes": lambda _caller: [-1, "not today", 0]}
     with master(**table) as uri, pytest.raises(CallError, match="not today"):

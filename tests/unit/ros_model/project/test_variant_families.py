@@ -9,7 +9,7 @@ from ros_model.io.project import read_table
 from ros_model.language.metamodel import ConnectionKind, PortPath, compose
 from ros_model.language.reader import parse_system
 from ros_model.project.columns import parse_columns
-from ros_model.project.variants import make_systems, make_variants, without
+from ros_model.project.variants import make_systems, without
 
 BASE = parse_system(
     """RosSystem { Name base
@@ -170,7 +170,7 @@ def test_expected_level_may_stand_in_the_table_itself(systems):
 
 def test_column_may_name_its_parameter_itself(table):
     rows = table("name,nav.speed,nav.group/gain,qa_safety\nv,2,high,0.5\n")
-    (part,) = make_variants(BASE, parse_columns({}), rows)
+    ((_, part),) = make_systems(BASE, parse_columns({}), rows)
     assert values(part, "nav") == {"speed": 2.0, "group/gain": "high"}
     assert part.expected_qas == {"safety": 0.5}
 
@@ -184,7 +184,7 @@ def test_column_may_name_its_parameter_itself(table):
 )
 def test_table_in_yaml_keeps_types(table, text):
     rows = table(text, ".yaml")
-    (part,) = make_variants(BASE, parse_columns({}), rows)
+    ((_, part),) = make_systems(BASE, parse_columns({}), rows)
     found = values(part, "nav")
     assert found == {"speed": 0.5, "sources": ["a", "b"], "on": True, "limits": {"low": 1}, "id": "15"}
     assert rows.rows[0].position.line == 1

@@ -43,18 +43,6 @@ class MasterClient:
         """Close the kept connection; the next call opens a new one."""
         self._client.close()
 
-    def master_pid(self) -> int:
-        """Return the process id of the master, which tells it from another one at its address.
-
-        Raises:
-            GoneError: nobody listens at the master's address.
-            CallError: the master did not answer in time, or answered with garbage or an error.
-        """
-        pid = self._client.call("getPid")
-        if not isinstance(pid, int):
-            raise GarbageError(f"ROS master {self.uri}: answer to getPid is garbage: {pid!r}")
-        return pid
-
     def snapshot(self) -> GraphSnapshot:
         """Take a snapshot in four calls. While nothing has changed, it is the same object as before.
 

@@ -76,13 +76,6 @@ def make_systems(
     return tuple(found)
 
 
-def make_variants(
-    base: RosSystem, columns: Columns, table: Table, levels: Table | None = None
-) -> tuple[RosSystem, ...]:
-    """Return the part of each variant; as make_systems."""
-    return tuple(part for _, part in make_systems(base, columns, table, levels))
-
-
 def _whole(base: RosSystem, columns: Columns, row: Row, expected: list[SystemParameter]) -> RosSystem:
     """Return the whole system that a row makes of the base."""
     rewired = _rewired(without(base, _absent(row, columns)), columns, row)
