@@ -9,7 +9,9 @@ from catkin_pkg.package import parse_package
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "catkin_ws" / "src"
-MANIFESTS = sorted([*SOURCE.glob("*/package.xml"), ROOT / "tests" / "package.xml"])
+MANIFESTS = sorted(
+    [*SOURCE.glob("*/package.xml"), *(ROOT / "examples").glob("*/package.xml"), ROOT / "tests" / "package.xml"]
+)
 PACKAGES = {path.parent.name: parse_package(str(path)) for path in sorted(SOURCE.glob("*/package.xml"))}
 
 
