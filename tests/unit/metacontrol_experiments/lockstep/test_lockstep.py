@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from metacontrol_bags.metrics import summarise
 from metacontrol_experiments.cli import main as cli
 from metacontrol_experiments.contingency.parsing import parse_contingency
-from metacontrol_experiments.io.lockstep_setup import describe_system, set_up
+from metacontrol_experiments.io.lockstep_setup import describe_system, restarts_between, set_up
 from metacontrol_experiments.lockstep.frames import KEPT_S, Frames
 from metacontrol_experiments.lockstep.reconfiguration import navigation_parameters
 from metacontrol_experiments.lockstep.system import LockstepError
@@ -68,6 +68,12 @@ def test_every_variant_has_its_own_parameters(path, system):
         assert [layer.inflation_radius for layer in costmap.layers if layer.kind == "inflation"] == [radius[numbers[2]]]
         kind = "PointCloud2" if path.stem.endswith("_k") else "LaserScan"
         assert [source.data_type for source in costmap.sources] == [kind]
+
+
+def test_only_another_sensor_restarts_navigation():
+    restarts = restarts_between(Settings.launch_package, "metacontrol_sim_reasoner.launch")
+    assert not restarts("f2_v2_r2", "f3_v3_r1") and not restarts("f1_v1_r3_k", "f2_v1_r3_k")
+    assert restarts("f2_v2_r2", "f2_v1_r3_k") and restarts("f1_v3_r1_k", "f1_v3_r1")
 
 
 def test_mission_reaches_its_goal_and_repeats_byte_for_byte(tmp_path):

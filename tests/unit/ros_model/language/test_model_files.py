@@ -1,5 +1,7 @@
 """Names of files: plain paths and package:// names."""
 
+import shutil
+
 import pytest
 from ros_model.errors import ModelError
 from ros_model.file_names import safe_file_name
@@ -20,6 +22,16 @@ def package(tmp_path, monkeypatch):
 
 def test_package_name_is_resolved(package):
     assert resolve("package://arm_models/models/a.rossystem") == package / "models" / "a.rossystem"
+
+
+def test_package_that_is_made_or_moved_later_is_found(package, tmp_path):
+    assert resolve("package://arm_models/a") == package / "a"
+    shutil.copytree(package, tmp_path / "later")
+    manifest = tmp_path / "later" / "package.xml"
+    manifest.write_text(manifest.read_text().replace("arm_models", "gripper_models"))
+    assert resolve("package://gripper_models/a") == tmp_path / "later" / "a"
+    package.rename(tmp_path / "moved")
+    assert resolve("package://arm_models/a") == tmp_path / "moved" / "a"
 
 
 def test_plain_path_is_made_absolute(tmp_path, monkeypatch):

@@ -31,7 +31,7 @@ def simulation_package() -> Path:
         PackageError: it is not there.
     """
     try:
-        return Path(rospkg.RosPack().get_path(SIMULATION))
+        return Path(rospkg.RosPack.get_instance().get_path(SIMULATION))
     except rospkg.ResourceNotFound as error:
         raise PackageError(f"package {SIMULATION} not found; source the workspace's devel/setup.bash first") from error
 

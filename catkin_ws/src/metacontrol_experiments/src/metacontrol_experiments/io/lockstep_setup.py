@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import rospkg
 from mros1_reasoner.io.parameters import ParameterError, Parameters
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
@@ -65,7 +63,6 @@ _UNUSABLE = (
     ReasonerError,
     SimulationError,
     WorldError,
-    rospkg.ResourceNotFound,
 )
 
 
@@ -105,8 +102,7 @@ def describe_system(package: str, launch_file: str, arguments: Sequence[str] = (
         LockstepError: a file cannot be used.
     """
     try:
-        folder = Path(rospkg.RosPack().get_path(package)) / "launch"
-        launched = read_launch_file(folder / launch_file, arguments).system
+        launched = read_launch_file(resolve(f"package://{package}/launch/{launch_file}"), arguments).system
         manipulator = options_from(private_parameters(launched, *_MANIPULATOR))
         monitor = private_parameters(launched, *_MONITOR)
         base = read_system(resolve(monitor["desired_rossystem"]))
