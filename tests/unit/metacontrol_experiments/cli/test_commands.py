@@ -1,0 +1,75 @@
+"""What the command leaves, and what it refuses."""
+
+import fcntl
+import os
+import socket
+
+import pytest
+from click.testing import CliRunner
+from metacontrol_experiments.cli.main import metacontrol
+
+
+def write(path, text):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+def test_summary_and_figure_of_a_bag(mission_bag, tmp_path):
+    bag = mission_bag.write(tmp_path / "mission.bag")
+    result = CliRunner().invoke(metacontrol, ["summary", str(bag)])
+    assert result.exit_code == 0 and '"goal_reached": true' in result.output
+    result = CliRunner().invoke(metacontrol, ["figure", str(bag)])
+    assert result.exit_code == 0 and (tmp_path / "mission.png").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["summary", "nowhere.bag"],
+        ["figure", "nowhere.bag"],
+        ["run", "--route", "r99"],
+        ["run", "--initial-configuration", "f9_v9_r9"],
+        ["run", "--failure", "flux_capacitor"],
+        ["run", "--failure-at", "1.5"],
+        ["run", "--contingency", "explode:front_laser"],
+        ["run", "--contingency", "kill:flux_capacitor"],
+        ["run", "--timeline", "nowhere.yaml"],
+        ["run", "--world", "nowhere.yaml"],
+        ["run", "--routes", "nowhere.yaml"],
+        ["run", "--real-time-factor", "nan"],
+        ["run", "--timeout", "0"],
+        ["run", "--seed", "one"],
+        ["run", "--seed", "-1"],
+    ],
+)
+def test_bad_input_is_refused_with_status_2(arguments, tmp_path):
+    output = ["--output", str(tmp_path / "out")]
+    result = CliRunner().invoke(metacontrol, [*arguments, *output])
+    assert result.exit_code == 2
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    assert not (tmp_path / "out").exists()
+
+
+def test_port_in_use_is_refused_with_one_line(tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        result = CliRunner().invoke(metacontrol, ["run", "--port", str(port), "--output", str(tmp_path)])
+    assert result.exit_code == 2
+    assert f"port {port} is in use" in result.output
+    assert len(result.output.strip().splitlines()) == 1
+
+
+def test_folder_in_which_another_run_is_at_work_is_refused_with_one_line(tmp_path):
+    bag = write(tmp_path / "mission.bag", "the other one's")
+    other = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(other, fcntl.LOCK_EX)
+    try:
+        result = CliRunner().invoke(metacontrol, ["run", "--output", str(tmp_path)])
+    finally:
+        os.close(other)
+    assert result.exit_code == 2
+    assert result.output == f"metacontrol: --output: another run is at work in {tmp_path}: choose another folder\n"
+    assert bag.exists()

@@ -1,0 +1,50 @@
+"""The mission that `metacontrol run` makes of its options."""
+
+from click.testing import CliRunner
+from metacontrol_experiments.cli import run as cli
+from metacontrol_experiments.cli.main import metacontrol
+
+
+def settings_of(monkeypatch, *arguments):
+    """The settings that the command makes of its options."""
+    made = []
+
+    def stop(settings, _display):
+        made.append(settings)
+        raise cli.RunError("enough")
+
+    monkeypatch.setattr(cli, "run_mission", stop)
+    result = CliRunner().invoke(metacontrol, ["run", "--output", "out", *arguments])
+    assert result.output.strip() == "metacontrol: enough"
+    return made[0]
+
+
+def test_without_options_the_laser_is_killed_on_the_way(monkeypatch):
+    (kill,) = settings_of(monkeypatch).contingencies
+    assert str(kill) == "kill:front_laser@share:0.6"
+
+
+def test_other_contingencies_take_the_place_of_the_kill(monkeypatch):
+    settings = settings_of(monkeypatch, "--contingency", "clutter:7", "--contingency", "freeze:camera@time:9")
+    assert list(map(str, settings.contingencies)) == ["clutter:7@time:0", "freeze:camera@time:9"]
+
+
+def test_short_options_add_to_the_others(monkeypatch):
+    arguments = ("--contingency", "clutter:7", "--failure", "camera", "--failure-at", "0.3", "--power-factor", "1.2")
+    settings = settings_of(monkeypatch, *arguments)
+    assert list(map(str, settings.contingencies)) == [
+        "clutter:7@time:0",
+        "kill:camera@share:0.3",
+        "power:1.2@share:0.3",
+    ]
+    assert settings_of(monkeypatch, "--failure", "none").contingencies == ()
+
+
+def test_world_and_routes_of_the_users_own(monkeypatch, tmp_path):
+    (tmp_path / "routes.yaml").write_text("home: {start: [0, 0], goal: [3, 0]}\n")
+    (tmp_path / "hall.yaml").write_text("image: hall.pgm\n")
+    files = ("--world", str(tmp_path / "hall.yaml"), "--routes", str(tmp_path / "routes.yaml"), "--route", "home")
+    settings = settings_of(monkeypatch, *files)
+    assert settings.route.name == "home"
+    assert f"world:={tmp_path / 'hall.yaml'}" in settings.launch_command(4000)
+    assert not any(argument.startswith("world:=") for argument in settings_of(monkeypatch).launch_command(4000))
