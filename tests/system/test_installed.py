@@ -14,6 +14,7 @@ import pytest
 SOURCES = Path(__file__).parents[2] / "catkin_ws" / "src"
 VENV = Path(sys.executable).parent
 LIMIT_S = 600.0
+SIMULATOR_SERVICES = ["DeleteObstacle", "SetLight", "SpawnObstacle"]
 ROUTE = ("--route", "r1", "--failure-at", "0.4")
 
 
@@ -70,6 +71,20 @@ def test_every_module_of_ours_is_imported_from_the_prefix(installed, tmp_path):
     assert [file for file in files if not file.startswith(str(prefix))] == []
     written = {path.name for path in SOURCES.rglob("src/*/**/*.py")}
     assert written - {Path(file).name for file in files} <= {"child.py", "warm_start.py"}
+
+
+def test_services_of_the_simulator_are_installed_as_files_under_both_names(installed, tmp_path):
+    prefix, environment = installed
+    files = [prefix / "share" / "metacontrol_sim" / "srv" / f"{name}.srv" for name in SIMULATOR_SERVICES]
+    assert [file for file in files if file.is_symlink() or not file.is_file()] == []
+    code = (
+        "import metacontrol_sim.srv, simulator_msgs.srv\n"
+        f"for name in {SIMULATOR_SERVICES!r}:\n"
+        "    one, other = getattr(metacontrol_sim.srv, name), getattr(simulator_msgs.srv, name)\n"
+        "    assert one._md5sum == other._md5sum, name\n"
+    )
+    done = run(sys.executable, "-c", code, environment=environment, folder=tmp_path)
+    assert done.returncode == 0, done.stderr[-3000:]
 
 
 def test_mission_in_lockstep_runs_from_the_prefix(installed, tmp_path):
