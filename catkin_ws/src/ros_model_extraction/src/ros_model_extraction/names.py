@@ -31,5 +31,5 @@ def executable_name(file: str) -> str:
 
 
 def is_known_type(type_name: str) -> bool:
-    """Tell whether a topic's type says anything: the master has `*` or nothing where no publisher told."""
+    """Return whether a topic's type says anything: the master has `*` or nothing where no publisher told."""
     return type_name.count("/") == 1 and not type_name.startswith("*")

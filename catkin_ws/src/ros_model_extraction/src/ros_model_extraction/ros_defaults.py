@@ -41,12 +41,12 @@ class Interface(Protocol):
 
 
 def is_plumbing(end: Interface) -> bool:
-    """Tell whether a client library made an interface by itself."""
+    """Return whether a client library made an interface by itself."""
     if end.kind is PortKind.SERVICE_SERVER:
         return end.name in {f"{end.node}/{service}" for service in _SERVICES}
     return (end.kind, end.name) in _TOPICS
 
 
 def is_roslaunch_parameter(name: str) -> bool:
-    """Tell whether roslaunch sets a global parameter (its name without the leading slash) for its own purposes."""
+    """Return whether roslaunch sets a global parameter (its name without the leading slash) for its own purposes."""
     return name.startswith(_ROSLAUNCH[0]) or name in _ROSLAUNCH[1:]

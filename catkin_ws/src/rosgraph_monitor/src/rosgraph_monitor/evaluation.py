@@ -179,7 +179,7 @@ class GraphEvaluator:
         }
 
     def _worded(self, finding: Finding) -> Finding:
-        """Tell a node that has ended from one that never came, and keep the words for one that died before."""
+        """Return the finding with the reason: the node has ended, has died, or never came."""
         if not isinstance(finding, MissingNode):
             return finding
         state, reason = finding.state, finding.reason
@@ -211,7 +211,7 @@ class GraphEvaluator:
         life: Mapping[str, Life],
         topics: Sequence[TopicVerdict],
     ) -> None:
-        """Let what is wrong with topics count for the components that they stand for, or else for their publishers."""
+        """Mark a component as failed whose topic is wrong: the one that is named, or else the publisher's."""
         for verdict in topics:
             topic, component = verdict.spec.name, verdict.spec.component
             nodes = self._publishers(snapshot, topic)

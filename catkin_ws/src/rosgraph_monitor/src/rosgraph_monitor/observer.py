@@ -240,7 +240,7 @@ def _qa_name(observer: str) -> str:
 
 
 def _is_finite(text: str) -> bool:
-    """Say whether a value is a number, or a truth value as the observers of tasks write it."""
+    """Return whether a value is a number, or a truth value as the observers of tasks write it."""
     try:
         return math.isfinite(float(text))
     except ValueError:

@@ -56,7 +56,7 @@ def _component(component: Component, whole: RosSystem, library: Library | None) 
 
 
 def _leads_nowhere(executable: Reference, library: Library | None) -> bool:
-    """Whether a reference is wrong as such, which is found without a launch file."""
+    """Return whether a reference is wrong as such, which is found without a launch file."""
     found = library.node(executable) if library else None
     return isinstance(found, Unknown) and found.severity == ERROR
 

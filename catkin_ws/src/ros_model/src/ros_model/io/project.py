@@ -130,7 +130,7 @@ def _read_library(folder: Path) -> Library:
 
 @contextmanager
 def _ruled(source: Settings) -> Iterator[None]:
-    """Say of errors in what was read that the settings, or a table, are wrong."""
+    """Mark errors in what was read as errors of the settings, or of a table."""
     try:
         yield
     except ModelError as error:

@@ -86,7 +86,7 @@ class Library:
                 self._specs[package.name].setdefault((spec.kind, spec.name), spec)
 
     def __bool__(self) -> bool:
-        """Whether any model is at hand."""
+        """Return whether any model is at hand."""
         return bool(self._nodes)
 
     def node(self, reference: Reference) -> Node | Unknown:
@@ -132,7 +132,7 @@ class Library:
         )
 
     def knows_package(self, name: str) -> bool:
-        """Whether a model declares the package, or it is installed."""
+        """Return whether a model declares the package, or it is installed."""
         return name in self._nodes or self.installed.has_package(name)
 
 

@@ -113,7 +113,7 @@ class Parser:
                 return model
 
     def _syntax_error(self, error: UnexpectedInput, offset: int, text: str, file: str) -> ModelError:
-        """Say what was expected and near what, in one line."""
+        """Return the error that says in one line what was expected, and near what."""
         position = Position(file, *line_and_column(text, offset))
         names = _expected(error)
         hint = ""

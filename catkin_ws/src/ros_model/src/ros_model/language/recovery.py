@@ -39,7 +39,7 @@ class Recovery:
         self._removed: tuple[int, int] | None = None  # the range of tokens that was left out last
 
     def is_consequence(self, offset: int) -> bool:
-        """Whether an error at that offset may come from what was left out last, unless that was a whole statement."""
+        """Return whether an error at that offset may come of what was left out last, if that was no whole statement."""
         if self._removed is None or self._index(offset) != self._removed[1]:
             return False
         start, end = self._removed
@@ -103,7 +103,7 @@ class Recovery:
         return low
 
     def _is_inside(self, index: int) -> bool:
-        """Whether a token is within the first bracket of the text: outside of it, nothing can be left out."""
+        """Return whether a token is within the first bracket of the text: outside of it, nothing can be left out."""
         first = next((number for number, token in enumerate(self._tokens or ()) if token.text in _CLOSED_BY), None)
         return first is not None and first < index < self._partners[first]
 

@@ -61,7 +61,7 @@ class Library:
         return self._modules[name]
 
     def has_message(self, source: str, name: str) -> bool:
-        """Tell whether an installed package defines a message or service: `std_msgs.msg`, `String`."""
+        """Return whether an installed package defines a message or service: `std_msgs.msg`, `String`."""
         package, _, kind = source.partition(".")
         if kind not in ("msg", "srv"):
             return False

@@ -22,7 +22,7 @@ class Evaluation(Protocol):
         """Return what an expression may be."""
 
     def own_budget(self) -> AbstractContextManager[None]:
-        """Let what is found once and kept not depend on what the present question has spent."""
+        """Count the steps inside apart from the present question: what is found there is kept for all questions."""
 
     def unsettle(self) -> None:
         """Keep nothing of what is being found out now: it may be incomplete."""
@@ -187,7 +187,7 @@ def last_name(node: ast.AST) -> str:
 
 
 def _fits(call: ast.Call, function: Scope) -> bool:
-    """Tell whether a call has as many arguments as a method takes."""
+    """Return whether a call has as many arguments as a method takes."""
     spec = getattr(function.node, "args", None)
     if not isinstance(spec, ast.arguments) or spec.vararg:
         return False

@@ -65,11 +65,11 @@ class CallEvaluator(ABC):
 
     @abstractmethod
     def own_budget(self) -> contextlib.AbstractContextManager[None]:
-        """Let what is found once and kept not depend on what the present question has spent."""
+        """Count the steps inside apart from the present question: what is found there is kept for all questions."""
 
     @abstractmethod
     def annotated(self, results: Results, annotation: ast.expr | None, frame: Frame) -> Results:
-        """Let an annotation say what a value is, where nothing else does."""
+        """Return the results, with unknown values replaced by instances of the annotated class."""
 
     def unsettle(self) -> None:
         """Keep nothing of what is being found out now: it may be incomplete."""
@@ -253,7 +253,7 @@ def _default(name: str, spec: ast.arguments) -> ast.expr | None:
 
 
 def _is_on_self(callee: ast.expr, scope: Scope) -> bool:
-    """Tell whether a callee is a method of the object in whose method it is called."""
+    """Return whether a callee is a method of the object in whose method it is called."""
     arguments = getattr(scope.node, "args", None)
     match callee:
         case ast.Attribute(value=ast.Name(id=name)) if isinstance(arguments, ast.arguments) and arguments.args:

@@ -82,7 +82,7 @@ class Evaluator(ExpressionEvaluator):
 
     @contextlib.contextmanager
     def own_budget(self) -> Iterator[None]:
-        """Let what is found once and kept not depend on what the present question has spent."""
+        """Count the steps inside apart from the present question: what is found there is kept for all questions."""
         spent, self._steps = self._steps, 0
         try:
             yield
@@ -226,7 +226,7 @@ class Evaluator(ExpressionEvaluator):
         return [(found, world)] if found else []
 
     def annotated(self, results: Results, annotation: ast.expr | None, frame: Frame) -> Results:
-        """Let an annotation say what a value is, where nothing else does."""
+        """Return the results, with unknown values replaced by instances of the annotated class."""
         if annotation is None or not any(isinstance(value, Unknown) for value, _ in results):
             return results
         owner = self._annotated_class(annotation, frame)

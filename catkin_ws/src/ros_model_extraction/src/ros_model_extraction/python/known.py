@@ -72,12 +72,12 @@ def plain(value: Value | None) -> Any:
 
 
 def is_costly(text: str, arguments: Iterable[Value]) -> bool:
-    """Tell whether a pattern filled in, or a method of a text, might give a huge one: by wide fields, by repetition."""
+    """Return whether a filled-in pattern, or a text's method, might give a huge text: by wide fields, by repetition."""
     return _WIDE.search(text) is not None or len(text) * max(map(weight, arguments), default=1) > _MAX_WORK
 
 
 def knows(name: str) -> bool:
-    """Tell whether `call_function` may have an answer for a function."""
+    """Return whether `call_function` may have an answer for a function."""
     package, _, function = name.rpartition(".")
     return package in ("builtins", "os.path", "posixpath") or name.startswith(_ROS) or function in _MESSAGES
 

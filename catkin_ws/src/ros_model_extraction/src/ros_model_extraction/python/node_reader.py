@@ -282,7 +282,7 @@ def _plain_or_none(value: Value) -> Any:
 
 
 def _may_be_ros(callee: ast.expr, scope: Scope) -> bool:
-    """Tell whether a callee is worth evaluating: a name, a member of something imported, the base's `__init__`."""
+    """Return whether a callee is worth evaluating: a name, a member of something imported, the base's `__init__`."""
     if isinstance(callee, ast.Attribute) and callee.attr == "__init__":
         return True
     root = root_name(callee)
@@ -297,7 +297,7 @@ def _is_super(callee: ast.expr) -> bool:
 
 
 def _is_handed_on(node: ast.expr, module: Module) -> bool:
-    """Tell whether an expression is an argument of a call (of others than isinstance) or an item of a list."""
+    """Return whether an expression is an argument of a call (of others than isinstance) or an item of a list."""
     parent = module.parents.get(node)
     if isinstance(parent, ast.keyword):
         return True

@@ -48,7 +48,7 @@ def _number(node: ast.BinOp, one: float, two: float) -> Value:
 
 
 def is_number(value: object) -> bool:
-    """Tell whether a plain value is a number, which True and False are not."""
+    """Return whether a plain value is a number, which True and False are not."""
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 

@@ -131,7 +131,7 @@ def root_name(node: ast.expr) -> ast.Name | None:
 
 
 def is_static(name: str, scope: Scope) -> bool:
-    """Tell whether a name is bound by imports, definitions, and as another name for such things only."""
+    """Return whether a name is bound by imports, definitions, and as another name for such things only."""
     at: Scope | None = scope
     while at is not None:
         if bindings := at.bindings.get(name):

@@ -45,12 +45,12 @@ def in_node(name: str, node: str) -> str:
 
 
 def is_ignored_node(name: str, patterns: Iterable[str]) -> bool:
-    """Say whether a node may run beside the model: its name is anonymous, or fits a shell pattern."""
+    """Return whether a node may run beside the model: its name is anonymous, or fits a shell pattern."""
     return _ANONYMOUS.fullmatch(name) is not None or any(fnmatch.fnmatchcase(name, p.lstrip("/")) for p in patterns)
 
 
 def is_ignored_port(name: str, node: str, patterns: Iterable[str]) -> bool:
-    """Say whether a node may have an interface beside the model.
+    """Return whether a node may have an interface beside the model.
 
     Args:
         name: resolved name of the topic, service or action.

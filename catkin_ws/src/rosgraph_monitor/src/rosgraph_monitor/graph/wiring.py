@@ -174,7 +174,7 @@ def _is_lazy(snapshot: GraphSnapshot, end: PortPath, kind: PortKind, live: Mappi
 
 
 def _nobody_listens(snapshot: GraphSnapshot, node: NodeState) -> bool:
-    """Say whether a node publishes something of its own, to which nobody listens."""
+    """Return whether a node publishes something of its own, to which nobody listens."""
     own = [topic for topic in node.publications if topic not in COMMON_TOPICS]
     return bool(own) and not any(snapshot.topics[topic].subscribers for topic in own)
 

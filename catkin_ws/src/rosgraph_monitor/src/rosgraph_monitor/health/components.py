@@ -128,7 +128,7 @@ class ComponentTracker:
         return self._waited_for
 
     def has_run(self, name: str) -> bool:
-        """Say whether an expected node was seen alive, as of the last update."""
+        """Return whether an expected node was seen alive, as of the last update."""
         return name in self._seen and self._seen[name].ever_alive
 
     def update(

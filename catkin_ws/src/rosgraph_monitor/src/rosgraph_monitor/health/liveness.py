@@ -68,7 +68,7 @@ class Liveness:
 
 
 def due(state: Liveness, now: float, timing: Timing) -> tuple[Liveness, Action]:
-    """Say what is to be done at this time, and the state after it has been begun."""
+    """Return what is to be done at this time, and the state once that has begun."""
     if state.connecting_since is not None:
         if now - state.connecting_since >= timing.connect_deadline:
             return Liveness(life=Life.UNREACHABLE, next_at=now + timing.retry_period), Action.DROP

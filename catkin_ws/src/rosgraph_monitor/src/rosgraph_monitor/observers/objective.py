@@ -43,7 +43,7 @@ class ObjectiveErrorObserver(Observer):
         return [(OUTPUT, Bool)]
 
     def receive(self, topic: str, msg: Any, now: float) -> None:  # noqa: ARG002 - interface
-        """Take in how an action's goals fare."""
+        """Take the status of an action's goals."""
         action = topic.removesuffix("/status")
         if action not in self._old:
             self._old[action] = frozenset(s.goal_id.id for s in msg.status_list if s.status in _FAILED)

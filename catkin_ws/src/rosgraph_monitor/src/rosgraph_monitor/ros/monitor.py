@@ -179,7 +179,7 @@ class MonitorNode:
         return statuses
 
     def _tell_poll(self, status: Any) -> Any:
-        """Tell how the monitor itself fares."""
+        """Report the times and counts of the monitor itself."""
         polled = self._poller.latest
         if polled is None or polled.duration > self._period:
             status.summary(DiagnosticStatus.WARN, "the master is slow")

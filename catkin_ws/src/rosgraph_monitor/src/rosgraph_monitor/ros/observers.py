@@ -95,7 +95,7 @@ class ObserverHost:
             runner.follow(system)
 
     def supervise(self) -> int:
-        """Say of observers that hang that they do; call it now and then. Returns how many run."""
+        """Report observers that hang as stale, and return how many observers run. Call it regularly."""
         with self._lock:
             runners = tuple(self._runners.values())
         for runner in runners:
