@@ -40,9 +40,9 @@ PERIOD_STEPS = 20
 """Steps between two drawings: 5 Hz."""
 SENSORS = ("front/scan", "camera/depth/points")
 _RED = 0.5
-"""Redness of a text from which on it is an alarm, 0 to 1; other colours are made for RViz's light background."""
+"""A text at least this red (0 to 1) is an alarm and stays red; other colours suit only RViz's light background."""
 STALE_S = 1.0
-"""What a sensor that is silent for so many simulated seconds has seen is no longer shown."""
+"""Sensor data older than this are hidden, s of simulated time."""
 
 
 class WindowView:
