@@ -1,1 +1,1 @@
-"""Files: ontologies, the parameters that name them, bags, the generator `tomasys`; only cli/ touches files, too."""
+"""Files: ontologies, the parameters that name them, bags, and the generator `tomasys`, which writes one."""
