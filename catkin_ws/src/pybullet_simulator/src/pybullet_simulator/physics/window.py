@@ -21,6 +21,7 @@ LOW, GLOBAL_HIGH, LOCAL_HIGH = (0.45, 0.35, 0.70), (0.75, 0.75, 0.95), (1.0, 0.4
 """Colours of low costs, and of the high ones of global and local costmap."""
 _TEXT_HEIGHT = 2.5  # over racks
 _LINE_SPACING = 0.7
+_BESIDE, _BEHIND = 0.8, 0.5  # m from the robot's middle: white is hard to read on the robot's yellow
 _MAX_POINTS = 4000
 _CLOSE_POINT = 0.05
 
@@ -81,7 +82,7 @@ class Window:
             up = _LINE_SPACING * (len(lines) - 1 - number)
             self._items[name] = pybullet.addUserDebugText(
                 lines[number],
-                (place.x + 0.8, place.y + up, _TEXT_HEIGHT),  # the window looks down from the south
+                (place.x + _BESIDE, place.y + _BEHIND + up, _TEXT_HEIGHT),  # the window looks down from the south
                 textColorRGB=RED if alarm else WHITE,
                 textSize=1.6,
                 replaceItemUniqueId=self._items.get(name, -1),
