@@ -10,6 +10,7 @@ from metacontrol_experiments.lockstep.metacontroller import Cores, Metacontrolle
 from metacontrol_experiments.lockstep.observation import Observers
 from metacontrol_experiments.lockstep.reconfiguration import navigation_parameters, plan_change, restarts
 from metacontrol_experiments.lockstep.system import LockstepError, System, private_parameters
+from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.messages.state import stamp
 from pybullet_simulator.physics.simulation import Settings as SimulationSettings
@@ -160,10 +161,16 @@ def test_sensor_of_the_model_feeds_observers():
 
 
 class Loop:
-    """Notes what it is told of the running configuration."""
+    """Notes what it is told."""
 
     def __init__(self):
-        self.active = []
+        self.active, self.components = [], []
+
+    def observe_component(self, now, component, status, stamp):
+        self.components.append((component, status))
+
+    def step(self, now, heartbeat):
+        return []
 
     def observe_active(self, now, function, configuration, state):
         self.active.append((function, configuration, state))
@@ -183,3 +190,21 @@ def test_system_without_model_of_the_variant_is_refused(system):
     cores = Cores(Observers([], {}), None, Loop(), None, 2.0, {})
     with pytest.raises(LockstepError, match=r"no slow\.rossystem"):
         Metacontroller(replace(system, variant=missing), cores, None, "slow", seed=1)
+
+
+class NoDelays:
+    """Everything is at once."""
+
+    def draw(self, kind, rng):
+        return 0.0
+
+
+def test_component_that_the_reasoner_does_not_model_is_seen_but_left_out(system):
+    loop = Loop()
+    cores = Cores(Observers([], {}), DiagnosticsReader([], ["gripper"]), loop, None, 2.0, {})
+    metacontroller = Metacontroller(system, cores, NoDelays(), "slow", seed=1)
+    for component in ("gripper", "wheel"):
+        metacontroller.component_changed(1.0, component, works=False)
+    assert metacontroller.step(1.1, 1, stamp(1_100_000_000)) is None
+    assert [report.component for report in metacontroller.components] == ["gripper", "wheel"]
+    assert loop.components == [("gripper", "FALSE")]

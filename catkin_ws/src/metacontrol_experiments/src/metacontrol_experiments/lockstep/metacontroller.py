@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_bags.decision import DECIDED, Decision
 from metacontrol_bags.messages import diagnostics
 from metacontrol_bags.record import ComponentReport, QualityReport
 from metacontrol_msgs.msg import DiagnosticWords, FunctionGrounding
 from mros1_reasoner.knowledge.reasoner import ReasonerError
-from mros1_reasoner.loop.entries import LevelFact, StaleFact
+from mros1_reasoner.loop.entries import ComponentFact, LevelFact, StaleFact
 from pybullet_simulator.physics.simulation import STEP
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import genpy
-    from diagnostic_msgs.msg import DiagnosticStatus
     from mros1_reasoner.knowledge.reasoner import Reasoner
     from mros1_reasoner.loop.diagnostics import DiagnosticsReader
     from mros1_reasoner.loop.mape import Mape
@@ -159,8 +158,7 @@ class Metacontroller:
         found = [entry for entry in self._due if entry[0] <= now]
         for due in found:
             self._due.remove(due)
-            self._cores.loop.observe_component(now, due[1], due[2], stamp=now)
-            self.components.append(ComponentReport(now, due[1], due[2]))
+            self._take_statuses([_component_status(due[1], due[2])], now, stamp)
         for statuses in self._cores.observers.evaluate(step, now):
             self._take_statuses(statuses, now, stamp)
         if self._pending is not None:
@@ -170,15 +168,19 @@ class Metacontroller:
         return None
 
     def _take_statuses(self, statuses: list[DiagnosticStatus], now: float, stamp: genpy.Time) -> None:
-        """Take in what an observer says as the reasoner's node does."""
+        """Take in what the monitor or an observer says, as the reasoner's node does."""
         array = DiagnosticArray(status=statuses)
         array.header.stamp = stamp
-        self.observed += [report for report in diagnostics(array, now) if isinstance(report, QualityReport)]
+        reports = diagnostics(array, now)
+        self.observed += [report for report in reports if isinstance(report, QualityReport)]
+        self.components += [report for report in reports if isinstance(report, ComponentReport)]
         for fact in self._cores.reader.read(statuses).facts:
             if isinstance(fact, LevelFact):
                 self._cores.loop.observe_level(now, fact.quality, fact.level, fact.grounding, stamp=now)
             elif isinstance(fact, StaleFact):
                 self._cores.loop.observe_stale(fact.quality)
+            elif isinstance(fact, ComponentFact):
+                self._cores.loop.observe_component(now, fact.component, fact.status, stamp=now)
 
     def _reason(self, now: float, *, heartbeat: bool) -> None:
         """Let the reasoner look at what is known.
@@ -224,3 +226,10 @@ class Metacontroller:
         if desired.problem:
             raise LockstepError(desired.problem)
         self._cores.observers.follow(desired.system)
+
+
+def _component_status(component: str, status: str) -> DiagnosticStatus:
+    """Return what the monitor's node publishes of a component."""
+    return DiagnosticStatus(
+        name=component, message=DiagnosticWords.COMPONENT_STATUS, values=[KeyValue(component, status)]
+    )
