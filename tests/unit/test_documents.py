@@ -39,6 +39,14 @@ def test_modules_and_rooms_that_are_named_exist(name):
     ]
 
 
+def test_the_architecture_lists_the_rooms_of_every_package():
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    for source in (ROOT / "catkin_ws" / "src").glob("*/src/*"):
+        rooms = {path.parent.name for path in source.glob("*/__init__.py")}
+        row = next(line for line in text.splitlines() if re.match(rf"\|[^|]*`{source.name}`[^|]*\|.*\|.*\|$", line))
+        assert set(re.findall(r"`(\w+)/`", row)) == rooms, row
+
+
 def test_every_decision_is_in_the_index():
     index = (ROOT / "docs" / "decisions" / "README.md").read_text(encoding="utf-8")
     records = sorted(path.name for path in (ROOT / "docs" / "decisions").glob("[0-9]*.md"))
