@@ -6,7 +6,7 @@ import pytest
 from move_base.costmap.grid import FREE, LETHAL
 from move_base.parameters.reader import read_parameters
 from move_base.parameters.reconfiguration import ServerDescription, changed, present_values, servers
-from move_base.parameters.tree import ParameterError
+from node_kit.parameters import ParameterError
 from robot_formulas.geometry import Pose
 
 

@@ -3,7 +3,8 @@
 import math
 
 import pytest
-from mros1_reasoner.io.parameters import ParameterError, Parameters
+from mros1_reasoner.io.parameters import Parameters
+from node_kit.parameters import ParameterError
 from reasoner_helpers import application
 
 
@@ -59,17 +60,17 @@ def test_nodes_of_components(model):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"nfr_safety": "high"}, "~nfr_safety is 'high': expected a finite number"),
+        ({"nfr_safety": "high"}, "~nfr_safety is 'high': it must be a finite number"),
         ({"nfr_safety": math.nan}, "~nfr_safety is nan"),
         ({"nfr_safety": True}, "~nfr_safety is True"),
-        ({"cool_down": -1}, "~cool_down is -1: expected 0 or more"),
-        ({"dry_run": "perhaps"}, "~dry_run is 'perhaps': expected true or false"),
+        ({"cool_down": -1}, "~cool_down is -1: it must be a finite number, at least 0"),
+        ({"dry_run": "perhaps"}, "~dry_run is 'perhaps': it must be true or false"),
         ({"qa_direction": {"safety": "sideways"}}, "~qa_direction/safety is 'sideways'"),
-        ({"qa_direction": "safety"}, "~qa_direction is 'safety': expected a mapping"),
+        ({"qa_direction": "safety"}, "~qa_direction is 'safety': it must be a mapping"),
         ({"desired_configuration": "fly"}, "~desired_configuration is 'fly': no FunctionDesign"),
-        ({"components": [1]}, r"~components is \[1\]: expected a mapping"),
-        ({"task_actions": "move_base"}, "~task_actions is 'move_base': expected a mapping"),
-        ({"reasoning_rate": 0}, "~reasoning_rate is 0: expected more than 0"),
+        ({"components": [1]}, r"~components is \[1\]: it must be a mapping"),
+        ({"task_actions": "move_base"}, "~task_actions is 'move_base': it must be a mapping"),
+        ({"reasoning_rate": 0}, "~reasoning_rate is 0: it must be a finite number, more than 0"),
         ({"model_file": ""}, "~model_file is not set"),
     ],
 )

@@ -6,12 +6,13 @@ from contextlib import ExitStack
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from mros1_reasoner.io.parameters import ParameterError, Parameters
+from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.pellet.process import make_reasoner
+from node_kit.parameters import ParameterError
 from node_kit.plugins import PluginError
 from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.physics.simulation import Settings as SimulationSettings

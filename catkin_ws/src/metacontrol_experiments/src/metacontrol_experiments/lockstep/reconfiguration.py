@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from move_base.parameters.parameters import MoveBaseParameters
 from move_base.parameters.reader import read_parameters
 from move_base.parameters.reconfiguration import servers
-from move_base.parameters.tree import ParameterError
+from node_kit.parameters import ParameterError
 from rosgraph_manipulator.change import tactics as manipulator
 
 from metacontrol_experiments.lockstep.system import LockstepError, parameter_tree

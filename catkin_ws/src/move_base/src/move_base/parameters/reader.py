@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from node_kit.parameters import ParameterTree
 
 from move_base.parameters.parameters import (
     DEFAULT_UPDATE_PERIOD,
@@ -22,7 +23,6 @@ from move_base.parameters.parameters import (
     ObservationSource,
     RecoveryBehavior,
 )
-from move_base.parameters.tree import ParameterError, ParameterTree
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -54,28 +54,28 @@ def read_parameters(tree: Mapping[str, Any]) -> MoveBaseParameters:
     Raises:
         ParameterError: a value has the wrong type or is out of range.
     """
-    top = ParameterTree(tree, "")
+    top = ParameterTree(tree)
     local = _read_costmap(top.child("local_costmap"), rolling_default=True)
     parameters = MoveBaseParameters(
         controller_frequency=top.number("controller_frequency", 20.0, low=0.1, high=1000.0),
         planner_frequency=top.number("planner_frequency", 0.0, low=0.0, high=1000.0),
         controller_patience=top.number("controller_patience", 15.0, low=0.0),
         planner_patience=top.number("planner_patience", 5.0, low=0.0),
-        max_planning_retries=top.integer("max_planning_retries", -1, low=-1, high=1000),
+        max_planning_retries=top.whole("max_planning_retries", -1, low=-1, high=1000),
         oscillation_timeout=top.number("oscillation_timeout", 0.0, low=0.0),
         oscillation_distance=top.number("oscillation_distance", 0.5, low=0.0),
         conservative_reset_dist=top.number("conservative_reset_dist", 3.0, low=0.0),
-        recovery_behavior_enabled=top.boolean("recovery_behavior_enabled", True),
-        clearing_rotation_allowed=top.boolean(_ROTATION, True),
+        recovery_behavior_enabled=top.flag("recovery_behavior_enabled", True),
+        clearing_rotation_allowed=top.flag(_ROTATION, True),
         recovery_behaviors=_read_recovery(top, local),
-        allow_unknown=top.child("NavfnROS").boolean("allow_unknown", True),
+        allow_unknown=top.child("NavfnROS").flag("allow_unknown", True),
         default_tolerance=top.child("NavfnROS").number("default_tolerance", 0.0, low=0.0),
         controller=_read_controller(top.child("TrajectoryPlannerROS")),
         global_costmap=_read_costmap(top.child("global_costmap"), rolling_default=False),
         local_costmap=local,
     )
     if not local.rolling_window:
-        raise ParameterError("local_costmap/rolling_window: must be true here; correct the file that sets it")
+        raise top.child("local_costmap").error("rolling_window", "must be true here", False)
     return parameters
 
 
@@ -88,7 +88,7 @@ def _read_controller(reader: ParameterTree) -> ControllerParameters:
     min_in_place = reader.number(
         "min_in_place_vel_theta", 0.4, low=0.0, above=True, high=20.0, formerly="min_in_place_rotational_vel"
     )
-    holonomic = reader.boolean("holonomic_robot", True)
+    holonomic = reader.flag("holonomic_robot", True)
     return ControllerParameters(
         odom_topic=reader.text("odom_topic", "odom"),
         acc_lim_x=reader.number("acc_lim_x", 2.5, low=0.0, above=True),
@@ -103,11 +103,11 @@ def _read_controller(reader: ParameterTree) -> ControllerParameters:
         escape_vel=reader.number("escape_vel", -0.1, low=-10.0, high=0.0, formerly="backup_vel"),
         xy_goal_tolerance=reader.number("xy_goal_tolerance", 0.10, low=0.0, above=True),
         yaw_goal_tolerance=reader.number("yaw_goal_tolerance", 0.05, low=0.0, above=True),
-        latch_xy_goal_tolerance=reader.boolean("latch_xy_goal_tolerance", False),
+        latch_xy_goal_tolerance=reader.flag("latch_xy_goal_tolerance", False),
         sim_time=reader.number("sim_time", 1.0, low=0.1, high=20.0),
         sim_granularity=reader.number("sim_granularity", 0.025, low=0.001, high=1.0),
-        vx_samples=reader.integer("vx_samples", 3, low=1, high=200),
-        vtheta_samples=reader.integer("vtheta_samples", 20, low=1, high=500),
+        vx_samples=reader.whole("vx_samples", 3, low=1, high=200),
+        vtheta_samples=reader.whole("vtheta_samples", 20, low=1, high=500),
         path_distance_bias=reader.number("path_distance_bias", 0.6, low=0.0, formerly="pdist_scale"),
         goal_distance_bias=reader.number("goal_distance_bias", 0.8, low=0.0, formerly="gdist_scale"),
         occdist_scale=reader.number("occdist_scale", 0.01, low=0.0),
@@ -121,12 +121,12 @@ def _read_recovery(reader: ParameterTree, local: CostmapParameters) -> tuple[Rec
     if not reader.has("recovery_behaviors"):
         radius = float(np.hypot(*np.array(local.footprint).T).max())
         near = reader.number("conservative_reset_dist", 3.0, low=0.0)
-        rotate = [RecoveryBehavior("rotate_recovery", "rotate")] if reader.boolean(_ROTATION, True) else []
+        rotate = [RecoveryBehavior("rotate_recovery", "rotate")] if reader.flag(_ROTATION, True) else []
         conservative = RecoveryBehavior("conservative_reset", "clear", near)
         return (conservative, *rotate, RecoveryBehavior("aggressive_reset", "clear", 4.0 * radius), *rotate)
     found = []
-    for index, entry in enumerate(reader.sequence("recovery_behaviors", ())):
-        name, kind = reader.plugin(f"recovery_behaviors[{index}]", entry, RECOVERY_TYPES)
+    for index, entry in enumerate(reader.items("recovery_behaviors", ())):
+        name, kind = _plugin(reader, f"recovery_behaviors[{index}]", entry, RECOVERY_TYPES)
         found.append(RecoveryBehavior(name, kind, reader.child(name).number("reset_distance", 3.0, low=0.0)))
     return tuple(found)
 
@@ -147,12 +147,12 @@ def _read_lateral_samples(reader: ParameterTree) -> tuple[float, ...]:
 
 def _read_costmap(reader: ParameterTree, *, rolling_default: bool) -> CostmapParameters:
     parameters = CostmapParameters(
-        global_frame=reader.frame("global_frame", "odom" if rolling_default else "map"),
-        robot_base_frame=reader.frame("robot_base_frame", "base_link"),
+        global_frame=_frame(reader, "global_frame", "odom" if rolling_default else "map"),
+        robot_base_frame=_frame(reader, "robot_base_frame", "base_link"),
         update_frequency=reader.number("update_frequency", 5.0, low=0.0, above=True, high=1000.0),
         publish_frequency=reader.number("publish_frequency", 0.0, low=0.0, high=1000.0),
         transform_tolerance=reader.number("transform_tolerance", 0.3, low=0.0),
-        rolling_window=reader.boolean("rolling_window", rolling_default),
+        rolling_window=reader.flag("rolling_window", rolling_default),
         width=reader.number("width", 10.0, low=0.0, above=True, high=1000.0),
         height=reader.number("height", 10.0, low=0.0, above=True, high=1000.0),
         resolution=reader.number("resolution", 0.05, low=0.005, high=1.0),
@@ -169,8 +169,8 @@ def _read_costmap(reader: ParameterTree, *, rolling_default: bool) -> CostmapPar
 
 def _read_layers(reader: ParameterTree) -> tuple[Layer, ...]:
     layers = []
-    for index, entry in enumerate(reader.sequence("plugins", ())):
-        name, kind = reader.plugin(f"plugins[{index}]", entry, LAYER_TYPES)
+    for index, entry in enumerate(reader.items("plugins", ())):
+        name, kind = _plugin(reader, f"plugins[{index}]", entry, LAYER_TYPES)
         layers.append(_read_layer(reader.child(name), name, kind))
     if not layers:
         raise reader.error("plugins", "must list the layers (load the base navigation parameters first)", None)
@@ -178,15 +178,15 @@ def _read_layers(reader: ParameterTree) -> tuple[Layer, ...]:
 
 
 def _read_layer(reader: ParameterTree, name: str, kind: str) -> Layer:
-    enabled = reader.boolean("enabled", True)
+    enabled = reader.flag("enabled", True)
     if kind == "static":
         return Layer(
             name,
             kind,
             enabled,
             map_topic=reader.text("map_topic", "map"),
-            track_unknown_space=reader.boolean("track_unknown_space", True),
-            lethal_cost_threshold=reader.integer("lethal_cost_threshold", 100, low=1, high=100),
+            track_unknown_space=reader.flag("track_unknown_space", True),
+            lethal_cost_threshold=reader.whole("lethal_cost_threshold", 100, low=1, high=100),
         )
     if kind == "inflation":
         return Layer(
@@ -204,13 +204,13 @@ def _read_layer(reader: ParameterTree, name: str, kind: str) -> Layer:
         kind,
         enabled,
         sources=tuple(_read_source(reader, source) for source in names),
-        footprint_clearing=reader.boolean("footprint_clearing_enabled", True),
+        footprint_clearing=reader.flag("footprint_clearing_enabled", True),
     )
 
 
 def _read_source(layer: ParameterTree, name: str) -> ObservationSource:
     if not layer.has(name):
-        raise layer.error("observation_sources", f"names {name!r}, but {layer.path(name)} has no parameters", name)
+        raise layer.error("observation_sources", f"names {name!r}, but {layer.full_name(name)} has no parameters", name)
     reader = layer.child(name)
     data_type = reader.text("data_type", "PointCloud")
     if data_type not in {"LaserScan", "PointCloud2"}:
@@ -220,15 +220,15 @@ def _read_source(layer: ParameterTree, name: str) -> ObservationSource:
         name=name,
         data_type=data_type,
         topic=reader.text("topic", name),
-        sensor_frame=reader.frame("sensor_frame", ""),
-        marking=reader.boolean("marking", True),
-        clearing=reader.boolean("clearing", False),
+        sensor_frame=_frame(reader, "sensor_frame", ""),
+        marking=reader.flag("marking", True),
+        clearing=reader.flag("clearing", False),
         min_obstacle_height=reader.number("min_obstacle_height", 0.0),
         max_obstacle_height=reader.number("max_obstacle_height", layer.number("max_obstacle_height", 2.0)),
         obstacle_range=reader.number("obstacle_range", layer.number("obstacle_range", 2.5, low=0.0), low=0.0),
         raytrace_range=reader.number("raytrace_range", layer.number("raytrace_range", 3.0, low=0.0), low=0.0),
         expected_update_rate=period or DEFAULT_UPDATE_PERIOD,
-        inf_is_valid=reader.boolean("inf_is_valid", False),
+        inf_is_valid=reader.flag("inf_is_valid", False),
     )
     if source.min_obstacle_height > source.max_obstacle_height:
         raise reader.error("min_obstacle_height", "must not be over max_obstacle_height", source.min_obstacle_height)
@@ -253,3 +253,18 @@ def _read_footprint(reader: ParameterTree) -> tuple[tuple[float, float], ...]:
     if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
         raise reader.error("footprint", "must be a list of at least three finite [x, y] corners", value)
     return tuple((float(x), float(y)) for x, y in corners)
+
+
+def _frame(reader: ParameterTree, name: str, default: str) -> str:
+    """Return a frame's name; tf2 knows no leading slash, published files have some."""
+    return reader.text(name, default).removeprefix("/")
+
+
+def _plugin(reader: ParameterTree, where: str, entry: Any, types: Mapping[str, str]) -> tuple[str, str]:
+    """Return name and kind of an entry `{name, type}` of a list of plug-ins."""
+    if not isinstance(entry, dict) or not isinstance(entry.get("name"), str) or not entry["name"]:
+        raise reader.error(where, "must have a name and a type", entry)
+    kind = types.get(str(entry.get("type")))
+    if kind is None:
+        raise reader.error(where, f"is of an unknown type; known are {', '.join(types)}", entry.get("type"))
+    return entry["name"], kind

@@ -13,6 +13,7 @@ import rospy
 from geometry_msgs.msg import PoseStamped, Twist
 from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.srv import GetPlan, GetPlanResponse
+from node_kit.parameters import ParameterError
 from node_kit.ros.lifetime import Lifetime
 from robot_formulas.geometry import STOP, Pose, Velocity
 from rospy.numpy_msg import numpy_msg
@@ -24,7 +25,6 @@ from move_base.costmap.static_map import MapError, StaticMap
 from move_base.navigation.navigator import Navigator
 from move_base.parameters.reader import read_parameters
 from move_base.parameters.reconfiguration import changed, present_values, servers
-from move_base.parameters.tree import ParameterError
 from move_base.planning.global_planner import PlanningError
 from move_base.ros.display import CostmapDisplay, PathDisplay
 from move_base.ros.frames import TfTransformer

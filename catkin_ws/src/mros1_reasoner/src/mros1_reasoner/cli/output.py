@@ -6,10 +6,10 @@ import sys
 from typing import NoReturn
 
 import click
+from node_kit.parameters import ParameterError
 from rich.console import Console
 from ros_model.errors import ModelError
 
-from mros1_reasoner.io.parameters import ParameterError
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.replay.recording import RecordingError

@@ -13,12 +13,13 @@ import click
 import yaml
 from metacontrol_bags.decision import Decision
 from metacontrol_msgs.msg import FunctionGrounding
+from node_kit.parameters import ParameterError
 from rich.console import Console
 from rich.table import Table
 
 from mros1_reasoner.cli.decision_tables import render
 from mros1_reasoner.cli.output import ERRORS, NAMESPACE, console, refuse
-from mros1_reasoner.io.parameters import ParameterError, Parameters
+from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.io.reasoner_bag import read_recording
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.reasoner import Reasoner

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import rospkg
+from node_kit.parameters import ParameterError, ParameterTree
 from ros_model.io.files import resolve
 
 from mros1_reasoner.io.ontology_files import read_knowledge_base
@@ -23,11 +23,6 @@ _log = logging.getLogger(__name__)
 DEFAULT_ACTION = "rosgraph_manipulator_action_server"
 _NFR = "nfr_"
 _NAMED_OTHERWISE = ("desired", "start_grace", "utility")  # settings whose parameter needs more than its default's type
-_TRUE, _FALSE = (True, 1, "true", "True"), (False, 0, "false", "False")
-
-
-class ParameterError(Exception):
-    """A parameter can't be used; one line with its name, its value and what to do."""
 
 
 @dataclass(frozen=True)
@@ -40,32 +35,33 @@ class Parameters:
     values: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def _tree(self) -> ParameterTree:
+        return ParameterTree(self.values)
+
+    @property
     def period(self) -> float:
         """Period of reasoning while only levels change, s."""
-        value = self._number("reasoning_rate", 2.0)
-        if value <= 0:
-            raise ParameterError(f"parameter ~reasoning_rate is {value:g}: expected more than 0")
-        return value
+        return self._tree.number("reasoning_rate", 2.0, low=0.0, above=True)
 
     @property
     def execution_deadline(self) -> float:
         """A request without a result has failed after so long, s of wall time."""
-        return self._not_negative("execution_deadline", 60.0)
+        return self._tree.number("execution_deadline", 60.0, low=0.0)
 
     @property
     def asks(self) -> bool:
         """Whether a manipulator is asked; else what is decided is taken for done."""
-        return self._flag("use_reconfigure_srv", True)
+        return self._tree.flag("use_reconfigure_srv", True)
 
     @property
     def action(self) -> str:
         """Name of the manipulator's action."""
-        return str(self.values.get("reconfigure_srv_name") or DEFAULT_ACTION)
+        return self._tree.text("reconfigure_srv_name") or DEFAULT_ACTION
 
     @property
     def save_folder(self) -> Path:
         """The folder in which knowledge bases are saved."""
-        given = str(self.values.get("save_folder") or "")
+        given = self._tree.text("save_folder")
         return Path(given or rospkg.get_ros_home()).expanduser().resolve()
 
     @property
@@ -73,14 +69,14 @@ class Parameters:
         """Component by node, from `~components`: {component: {node: name}}."""
         return {
             str(entry["node"]).strip("/"): str(component)
-            for component, entry in self._mapping("components", "component -> {node: name}").items()
+            for component, entry in self._tree.mapping("components", "component -> {node: name}").items()
             if isinstance(entry, dict) and entry.get("node")
         }
 
     @property
     def task_actions(self) -> dict[str, str]:
         """Action that pursues the task of an objective, by the objective's name."""
-        given = self._mapping("task_actions", "objective -> action")
+        given = self._tree.mapping("task_actions", "objective -> action")
         return {str(objective): str(action) for objective, action in given.items() if action}
 
     @property
@@ -105,7 +101,7 @@ class Parameters:
             KnowledgeBaseError, ModelError: a file can't be used.
         """
         directions = {}
-        for quality, direction in self._mapping("qa_direction", "QA -> direction").items():
+        for quality, direction in self._tree.mapping("qa_direction", "QA -> direction").items():
             try:
                 directions[str(quality)] = Direction(direction)
             except ValueError as error:
@@ -132,13 +128,13 @@ class Parameters:
             if quality not in knowledge_base.qualities:
                 _log.warning("parameter ~%s: Unsupported QA TYPE received: %s: left out", name, quality)
                 continue
-            limits[quality] = self._number(name, 0.0)
+            limits[quality] = self._tree.number(name, 0.0)
         return tuple(replace(o, limits={**o.limits, **limits}) for o in objectives)
 
     def settings(self, knowledge_base: KnowledgeBase) -> Settings:
         """Return the loop's settings: each has a parameter of its name, `desired` is `~desired_configuration`."""
         defaults = Settings()
-        desired = str(self.values.get("desired_configuration") or "")
+        desired = self._tree.text("desired_configuration")
         if desired and desired not in knowledge_base.designs:
             raise ParameterError(f"parameter ~desired_configuration is {desired!r}: no FunctionDesign of the model")
         utility = self.values.get("utility", defaults.utility)
@@ -152,40 +148,12 @@ class Parameters:
             if item.name in _NAMED_OTHERWISE:
                 continue
             if isinstance(default, bool):
-                others[item.name] = self._flag(item.name, default)
+                others[item.name] = self._tree.flag(item.name, default)
             elif isinstance(default, float):
-                others[item.name] = self._not_negative(item.name, default)
-        grace = self._not_negative("start_grace", defaults.start_grace)
+                others[item.name] = self._tree.number(item.name, default, low=0.0)
+        grace = self._tree.number("start_grace", defaults.start_grace, low=0.0)
         return Settings(**others, start_grace=grace if self.asks else 0.0, utility=utility, desired=desired)
 
     def _files(self, name: str) -> list[Path]:
         """Return the files that a parameter names: one, several separated by commas, or a list."""
-        value = self.values.get(name, "")
-        names = value if isinstance(value, list) else str(value).split(",")
-        return [resolve(str(name).strip()) for name in names if str(name).strip()]
-
-    def _mapping(self, name: str, expected: str) -> Mapping[str, Any]:
-        value = self.values.get(name) or {}
-        if not isinstance(value, Mapping):
-            raise ParameterError(f"parameter ~{name} is {value!r}: expected a mapping {expected}")
-        return value
-
-    def _flag(self, name: str, default: bool) -> bool:
-        value = self.values.get(name, default)
-        if value in _TRUE:
-            return True
-        if value in _FALSE:
-            return False
-        raise ParameterError(f"parameter ~{name} is {value!r}: expected true or false")
-
-    def _number(self, name: str, default: float) -> float:
-        value = self.values.get(name, default)
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise ParameterError(f"parameter ~{name} is {value!r}: expected a finite number")
-        return float(value)
-
-    def _not_negative(self, name: str, default: float) -> float:
-        value = self._number(name, default)
-        if value < 0:
-            raise ParameterError(f"parameter ~{name} is {value:g}: expected 0 or more")
-        return value
+        return [resolve(path.strip()) for path in self._tree.texts(name) if path.strip()]

@@ -14,11 +14,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_bags.decision import DECIDED, Decision
 from metacontrol_msgs import msg as messages
 from node_kit.io.inbox import Inbox
+from node_kit.parameters import ParameterError
 from node_kit.ros.lifetime import Lifetime
 from ros_model.errors import ModelError
 from std_msgs.msg import Bool
 
-from mros1_reasoner.io.parameters import ParameterError, Parameters
+from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.knowledge import vocabulary
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Facts, Objective

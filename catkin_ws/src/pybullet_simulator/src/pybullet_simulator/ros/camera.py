@@ -7,6 +7,7 @@ import threading
 
 import numpy as np
 import rospy
+from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import Lifetime
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Float32
@@ -15,7 +16,6 @@ from pybullet_simulator.io.fault_signals import listen
 from pybullet_simulator.messages.sensors import point_cloud, read_depth
 from pybullet_simulator.robot.faults import Outlet
 from pybullet_simulator.robot.sensors import DepthProjector, SensorError, measure_depth
-from pybullet_simulator.ros.parameters import ParameterError, number, seed
 
 
 class CameraNode(rospy.SubscribeListener):
@@ -28,12 +28,12 @@ class CameraNode(rospy.SubscribeListener):
             ParameterError: a parameter cannot be used.
         """
         super().__init__()
-        degrees = number(rospy.get_param("~field_of_view", 60.0), "~field_of_view", 1.0, 170.0)
-        self._field_of_view = math.radians(degrees)
-        self._range_min = number(rospy.get_param("~range_min", 0.05), "~range_min", 0.0, 99.0)
-        self._range_max = number(rospy.get_param("~range_max", 8.0), "~range_max", self._range_min + 0.1, 100.0)
-        self._noise = number(rospy.get_param("~noise", 0.001), "~noise", 0.0, 1.0)
-        self._rng = np.random.default_rng([seed(rospy.get_param("~seed", 0)), 8])
+        parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
+        self._field_of_view = math.radians(parameters.number("field_of_view", 60.0, low=1.0, high=170.0))
+        self._range_min = parameters.number("range_min", 0.05, low=0.0, high=99.0)
+        self._range_max = parameters.number("range_max", 8.0, low=self._range_min + 0.1, high=100.0)
+        self._noise = parameters.number("noise", 0.001, low=0.0, high=1.0)
+        self._rng = np.random.default_rng([parameters.whole("seed", 0, low=0), 8])
         self._light = 1.0
         self._projector: DepthProjector | None = None
         self._depth: rospy.Subscriber | None = None

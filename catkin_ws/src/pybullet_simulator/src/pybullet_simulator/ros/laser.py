@@ -6,13 +6,13 @@ import threading
 
 import numpy as np
 import rospy
+from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import Lifetime
 from sensor_msgs.msg import LaserScan
 
 from pybullet_simulator.io.fault_signals import listen
 from pybullet_simulator.robot.faults import Outlet
 from pybullet_simulator.robot.sensors import SensorError, measure_ranges
-from pybullet_simulator.ros.parameters import ParameterError, number, seed
 
 SIDES = {"front": 3, "rear": 7}
 """Sides of the robot with a laser, and the stream of random numbers of each."""
@@ -30,8 +30,9 @@ class LaserNode(rospy.SubscribeListener):
         super().__init__()
         self._frame = f"{side}_laser"
         self._raw = f"simulator/{side}_rays"
-        self._noise = number(rospy.get_param("~noise", 0.01), "~noise", 0.0, 1.0)
-        self._rng = np.random.default_rng([seed(rospy.get_param("~seed", 0)), SIDES[side]])
+        parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
+        self._noise = parameters.number("noise", 0.01, low=0.0, high=1.0)
+        self._rng = np.random.default_rng([parameters.whole("seed", 0, low=0), SIDES[side]])
         self._rays: rospy.Subscriber | None = None
         self._outlet = Outlet()
         listen(self._outlet)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import rospy
 from geometry_msgs.msg import Twist
 from node_kit.io.inbox import Inbox
+from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import Lifetime
 from robot_formulas.geometry import Pose
 from robot_formulas.power import PowerError
@@ -31,7 +32,6 @@ from pybullet_simulator.physics.pacing import Pacer
 from pybullet_simulator.physics.simulation import STEP, Settings, Simulation, SimulationError
 from pybullet_simulator.robot.motion_sensors import REAL, Errors
 from pybullet_simulator.ros.output import Output
-from pybullet_simulator.ros.parameters import ParameterError, file_path, flag, number, seed
 from pybullet_simulator.ros.window import PERIOD_STEPS, WindowView
 from pybullet_simulator.world.obstacles import CLUTTER_MASS, CLUTTER_SIZE, ObstacleError
 from pybullet_simulator.world.walking import SPEED, Walker
@@ -58,10 +58,11 @@ class SimulatorNode:
             WorldError: the world file is missing or wrong.
             SimulationError: the initial pose is not free, or PyBullet cannot start.
         """
-        factor = number(rospy.get_param("~real_time_factor", 1.0), "~real_time_factor", 0.0, 1000.0)
-        world = read_world(_world_path(rospy.get_param("~world", ""), default_world))
-        laser_steps, camera_steps = _steps("~laser_rate", 10.0, 50.0), _steps("~camera_rate", 10.0, 50.0)
-        self._simulation = Simulation(world, _settings())
+        parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
+        factor = parameters.number("real_time_factor", 1.0, low=0.0, high=1000.0)
+        world = read_world(_world_path(parameters, default_world))
+        laser_steps, camera_steps = (_steps(parameters, name) for name in ("laser_rate", "camera_rate"))
+        self._simulation = Simulation(world, _settings(parameters))
         self._pacer = Pacer(STEP / factor if factor > 0.0 else 0.0)
         self._inbox = Inbox()
         self._output = Output(self._simulation, world, laser_steps, camera_steps)
@@ -148,39 +149,38 @@ class SimulatorNode:
             return None, f"the simulation did not answer within {_SERVICE_S:g} s"
 
 
-def _settings() -> Settings:
+def _settings(parameters: ParameterTree) -> Settings:
     """Return the simulation's settings from the node's parameters.
 
     Raises:
         ParameterError: one of them cannot be used.
     """
-    pose = Pose(*(number(rospy.get_param(f"~initial_pose_{key}", 0.0), f"~initial_pose_{key}") for key in "xya"))
     errors = Errors(
-        slip=number(rospy.get_param("~slip", REAL.slip), "~slip", 0.0, 0.1),
-        odometry_drift=number(rospy.get_param("~odometry_drift", REAL.odometry_drift), "~odometry_drift", -0.5, 0.5),
-        imu=number(rospy.get_param("~imu_noise", REAL.imu), "~imu_noise", 0.0, 10.0),
-        gyro=number(rospy.get_param("~gyro_noise", REAL.gyro), "~gyro_noise", 0.0, 1.0),
-        localisation=number(
-            rospy.get_param("~localisation_noise", REAL.localisation), "~localisation_noise", 0.0, 10.0
-        ),
+        slip=parameters.number("slip", REAL.slip, low=0.0, high=0.1),
+        odometry_drift=parameters.number("odometry_drift", REAL.odometry_drift, low=-0.5, high=0.5),
+        imu=parameters.number("imu_noise", REAL.imu, low=0.0, high=10.0),
+        gyro=parameters.number("gyro_noise", REAL.gyro, low=0.0, high=1.0),
+        localisation=parameters.number("localisation_noise", REAL.localisation, low=0.0, high=10.0),
     )
     return Settings(
-        pose,
-        seed(rospy.get_param("~seed", 0)),
+        Pose(*(parameters.number(f"initial_pose_{key}", 0.0) for key in "xya")),
+        parameters.whole("seed", 0, low=0),
         errors,
-        number(rospy.get_param("~battery_charge", 1.0), "~battery_charge", 0.0, 1.0),
-        flag(rospy.get_param("~gui", False), "~gui"),
+        parameters.number("battery_charge", 1.0, low=0.0, high=1.0),
+        parameters.flag("gui", False),
     )
 
 
-def _steps(name: str, default: float, fastest: float) -> int:
+def _steps(parameters: ParameterTree, name: str) -> int:
     """Return the steps between two messages of a device whose rate (Hz) is a parameter."""
-    return round(1.0 / STEP / number(rospy.get_param(name, default), name, 1.0, fastest))
+    return round(1.0 / STEP / parameters.number(name, 10.0, low=1.0, high=50.0))
 
 
-def _world_path(value: Any, default: Path | None) -> Path:
+def _world_path(parameters: ParameterTree, default: Path | None) -> Path:
     """Return the path of the world file; empty stands for the default."""
-    return default if value == "" and default is not None else file_path(value, "~world")
+    if default is not None and parameters.value("world", "") == "":
+        return default
+    return parameters.path("world")
 
 
 def main(default_world: Path | None = None) -> None:

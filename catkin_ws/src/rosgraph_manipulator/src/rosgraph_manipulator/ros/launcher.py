@@ -14,9 +14,9 @@ import rospy
 from metacontrol_msgs.msg import LauncherState, Phase
 from metacontrol_msgs.srv import ChangeConfiguration, ChangeConfigurationRequest, ChangeConfigurationResponse
 from node_kit.io.inbox import ClosedError, Inbox
+from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import LONGEST_END, Lifetime
 
-from rosgraph_manipulator.configuration.parameters import SettingError, boolean, number
 from rosgraph_manipulator.io.launcher import Launcher, LauncherError
 from rosgraph_manipulator.launching.options import LauncherOptions
 from rosgraph_manipulator.launching.report import LauncherReport
@@ -117,26 +117,26 @@ def read_options() -> LauncherOptions:
     """Read the node's parameters.
 
     Raises:
-        SettingError: one can't be used.
+        ParameterError: one can't be used.
     """
-    get = rospy.get_param
+    parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
     default, policy = LauncherOptions(mark=""), RestartPolicy()
     return LauncherOptions(
         mark=f"{rosgraph.get_master_uri()}{rospy.get_name()}",
-        run_id=str(get("/run_id", "")),
-        shutdown_timeout=number("~shutdown_timeout", get("~shutdown_timeout", default.shutdown_timeout), low=0.0),
-        sigint_timeout=number("~sigint_timeout", get("~sigint_timeout", default.sigint_timeout), low=0.0),
-        standby=boolean("~standby", get("~standby", default.standby)),
+        run_id=str(rospy.get_param("/run_id", "")),
+        shutdown_timeout=parameters.number("shutdown_timeout", default.shutdown_timeout, low=0.0),
+        sigint_timeout=parameters.number("sigint_timeout", default.sigint_timeout, low=0.0),
+        standby=parameters.flag("standby", default.standby),
         policy=RestartPolicy(
-            intensity=int(number("~restart_intensity", get("~restart_intensity", policy.intensity), low=0)),
-            period=number("~restart_period", get("~restart_period", policy.period), low=0.1),
-            first_delay=number("~restart_delay", get("~restart_delay", policy.first_delay), low=0.0),
+            intensity=int(parameters.number("restart_intensity", policy.intensity, low=0)),
+            period=parameters.number("restart_period", policy.period, low=0.1),
+            first_delay=parameters.number("restart_delay", policy.first_delay, low=0.0),
         ),
     )
 
 
 def main() -> None:
     """Run the node; exit status 2 when it can't start."""
-    with Lifetime("rosgraph_launcher", SettingError) as life:
+    with Lifetime("rosgraph_launcher", ParameterError) as life:
         life.start()
         LauncherNode(read_options(), life).spin()

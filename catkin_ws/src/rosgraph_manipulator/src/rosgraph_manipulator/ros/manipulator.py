@@ -19,6 +19,7 @@ from metacontrol_msgs.msg import (
 from node_kit.io.inbox import Inbox
 from node_kit.io.master_watch import MasterWatch
 from node_kit.io.xml_rpc import CallError
+from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.plugins import PluginError
 from node_kit.ros.lifetime import Lifetime
 
@@ -41,7 +42,6 @@ from rosgraph_manipulator.configuration.configurations import (
     ConfigurationError,
     ManipulatorOptions,
 )
-from rosgraph_manipulator.configuration.parameters import SettingError, choice, number
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.master import set_parameters
 from rosgraph_manipulator.launching.report import FAILED
@@ -57,20 +57,20 @@ class Manipulator:
     """The action server. One thread carries out everything, one thing after the other."""
 
     def __init__(self, options: ManipulatorOptions, tactics: Mapping[str, Tactic], initial: str) -> None:
-        get = rospy.get_param
+        parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
         self._options = options
         self._tactics = tactics
-        policy = choice("~concurrency", get("~concurrency", Policy.WAIT.value), [policy.value for policy in Policy])
+        policy = parameters.choice("concurrency", Policy.WAIT.value, [policy.value for policy in Policy])
         self._inbox = Inbox()
         self._requests = RequestQueue(Policy(policy))
         self._handles: dict[str, actionlib.ServerGoalHandle] = {}
         self._lock = threading.Lock()  # requests, handles, interruption
         self._interruption: CancelledError | None = None
-        self._deployments = DeployedConfigurations(number("~probation", get("~probation", 5.0), low=0.0))
+        self._deployments = DeployedConfigurations(parameters.number("probation", 5.0, low=0.0))
         self._journal = Journal()
         self._journal_lock = threading.Lock()
         self._announcer = Announcer()
-        self._resumption = self._find_resumption(initial, number("~launcher_timeout", get("~launcher_timeout", 10.0)))
+        self._resumption = self._find_resumption(initial, parameters)
         self._server = actionlib.ActionServer(
             options.reconfiguration_action_name,
             MvpReconfigurationAction,
@@ -79,10 +79,10 @@ class Manipulator:
             auto_start=False,
         )
 
-    def _find_resumption(self, initial: str, launcher_timeout: float) -> Resumption:
+    def _find_resumption(self, initial: str, parameters: ParameterTree) -> Resumption:
         """Look what the launcher runs and what an earlier manipulator has left, and begin to follow both."""
-        get = rospy.get_param
-        journal = parse_journal(get("~journal", None))
+        launcher_timeout = parameters.number("launcher_timeout", 10.0)
+        journal = parse_journal(parameters.value("journal"))
         try:
             state = rospy.wait_for_message("rosgraph_launcher/state", LauncherState, launcher_timeout)
         except rospy.ROSException:
@@ -102,8 +102,8 @@ class Manipulator:
         self._executor = RosExecutor(
             self._options,
             goal,
-            ready_timeout=number("~ready_timeout", get("~ready_timeout", 15.0), low=0.1),
-            settle_time=number("~settle_time", get("~settle_time", 0.5), low=0.0),
+            ready_timeout=parameters.number("ready_timeout", 15.0, low=0.1),
+            settle_time=parameters.number("settle_time", 0.5, low=0.0),
             launcher_timeout=launcher_timeout,
             on_report=lambda: self._inbox.put(self._follow_launcher),
         )
@@ -318,7 +318,7 @@ def read_parameters(arguments: list[str]) -> dict[str, Any]:
 
 def main() -> None:
     """Run the node; exit status 2 when its configuration cannot be used."""
-    with Lifetime("rosgraph_manipulator", ConfigurationError, PluginError, SettingError) as life:
+    with Lifetime("rosgraph_manipulator", ConfigurationError, ParameterError, PluginError) as life:
         life.start()
         options = options_from(read_parameters(rospy.myargv()[1:]))
         initial = str(rospy.get_param("~initial_configuration", ""))

@@ -15,6 +15,7 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.master import PATIENCE
+from node_kit.parameters import ParameterError
 from node_kit.ros.lifetime import Lifetime
 from ros_model.errors import ModelError
 from ros_model.file_names import safe_file_name
@@ -72,7 +73,7 @@ class MonitorNode:
         self._events = threading.Event()
         self._polled = threading.Event()
         self._connections = NodeConnections(self._on_life, parameters_node.timing(), rospy.get_name())
-        self._period = 1.0 / parameters_node.number("~rate", 2.0)
+        self._period = 1.0 / parameters_node.number("rate", 2.0)
         self._poller = GraphPoller(
             MasterClient(rosgraph.get_master_uri(), rospy.get_name(), _MASTER_TIMEOUT),
             self._connections,
@@ -85,21 +86,21 @@ class MonitorNode:
         self._connections.start()
         self._poller.start()
         self._namespace = rospy.get_namespace()
-        self._variants = parameters_node.text("~variants")
+        self._variants = parameters_node.text("variants")
         components = parameters_node.components()
         self._topic_specs = merged(components.topics, parameters_node.topics())
         patience = parameters_node.patience()
         self._monitor = GraphEvaluator(
             components.of_node, scope=parameters_node.scope(self._topic_specs), patience=patience
         )
-        base = parameters_node.text("~desired_rossystem")
+        base = parameters_node.text("desired_rossystem")
         self._model = DesiredModel(read_system(resolve(base)) if base else None, self._read_variant)
-        self._metacontrol = parameters_node.names("~metacontrol_nodes", _METACONTROL_NODES)
+        self._metacontrol = parameters_node.names("metacontrol_nodes", _METACONTROL_NODES)
         self._meter = UsageMeter(alone=frozenset({_LAUNCHER}))
         self._usage_due = 0.0
         self._running_observers = 0
         self._evaluation = 0.0
-        observers = dict.fromkeys((*parameters_node.names("~observers", []), *load))
+        observers = dict.fromkeys((*parameters_node.names("observers", []), *load))
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
         self._updater = diagnostic_updater.Updater()
         self._updater.setHardwareID("none")
@@ -252,9 +253,9 @@ def command(load: tuple[str, ...], more: tuple[str, ...]) -> None:
         raise click.UsageError(f"unexpected argument {more[0]!r}: name observers after --load")
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))  # a connection to each node
-    with Lifetime(NAME, parameters_node.ParameterError, ModelError) as life:
+    with Lifetime(NAME, ParameterError, ModelError) as life:
         life.start()
-        life.watch.patience = parameters_node.number("~master_patience", PATIENCE)
+        life.watch.patience = parameters_node.number("master_patience", PATIENCE)
         MonitorNode((*load, *more)).run()
 
 

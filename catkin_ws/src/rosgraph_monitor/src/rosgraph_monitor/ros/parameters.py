@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import rospy
+from node_kit.parameters import ParameterError, ParameterTree
 from ros_model.io.files import resolve
 
 from rosgraph_monitor.evaluation import Patience
@@ -20,32 +20,19 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 
-class ParameterError(Exception):
-    """A parameter of the node is not usable; the message names it."""
-
-
 def number(name: str, default: float) -> float:
     """Return a positive number."""
-    value = rospy.get_param(name, default)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
-        raise ParameterError(f"parameter {rospy.resolve_name(name)}: {value!r} is no positive number")
-    return float(value)
+    return _own().number(name, default, low=0.0, above=True)
 
 
 def text(name: str) -> str:
     """Return a text, "" where it is not set."""
-    value = rospy.get_param(name, "")
-    if not isinstance(value, str):
-        raise ParameterError(f"parameter {rospy.resolve_name(name)}: {value!r} is no text")
-    return value
+    return _own().text(name)
 
 
 def names(name: str, default: list[str]) -> list[str]:
     """Return a list of names."""
-    value = rospy.get_param(name, default)
-    if not isinstance(value, list) or not all(isinstance(entry, str) for entry in value):
-        raise ParameterError(f"parameter {rospy.resolve_name(name)}: {value!r} is no list of names")
-    return value
+    return _own().texts(name, default)
 
 
 def components() -> ComponentMap:
@@ -67,17 +54,17 @@ def topics() -> Mapping[str, TopicSpec]:
 def timing() -> Timing:
     """Return periods and deadlines of probes."""
     return Timing(
-        probe_period=number("~probe_period", Timing.probe_period),
-        probe_deadline=number("~probe_deadline", Timing.probe_deadline),
+        probe_period=number("probe_period", Timing.probe_period),
+        probe_deadline=number("probe_deadline", Timing.probe_deadline),
     )
 
 
 def patience() -> Patience:
     """Return for how long changes are waited for."""
     return Patience(
-        startup=number("~startup_grace", Patience.startup),
-        restart=number("~restart_patience", Patience.restart),
-        ports=number("~port_patience", Patience.ports),
+        startup=number("startup_grace", Patience.startup),
+        restart=number("restart_patience", Patience.restart),
+        ports=number("port_patience", Patience.ports),
     )
 
 
@@ -89,12 +76,16 @@ def scope(specs: Mapping[str, TopicSpec]) -> Scope:
         ModelError: a `.ros` model can't be read.
     """
     return Scope(
-        ignored_nodes=(*IGNORED_NODES, *names("~ignore", [])),
-        ignored_ports=(*IGNORED_PORTS, *names("~ignore_ports", [])),
-        types=_port_types(names("~ros_models", [])),
+        ignored_nodes=(*IGNORED_NODES, *names("ignore", [])),
+        ignored_ports=(*IGNORED_PORTS, *names("ignore_ports", [])),
+        types=_port_types(names("ros_models", [])),
         topic_types={name: spec.type for name, spec in specs.items() if spec.type},
         namespace=rospy.get_namespace(),
     )
+
+
+def _own() -> ParameterTree:
+    return ParameterTree(rospy.get_param("~", {}), rospy.get_name())
 
 
 def _port_types(paths: list[str]) -> PortTypes:
