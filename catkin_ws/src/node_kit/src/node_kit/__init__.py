@@ -1,1 +1,1 @@
-"""How our nodes start, watch the ROS master and end."""
+"""Parts that all nodes share: parameters, work for one thread, calls with a deadline, plug-ins, start and end."""

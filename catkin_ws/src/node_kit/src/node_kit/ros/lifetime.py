@@ -30,6 +30,7 @@ LONGEST_END = 3.0
 LONGEST_END_WITHOUT_MASTER = 0.5
 """The same where nobody is left to say goodbye to."""
 
+_show_thread_error = threading.excepthook  # Python 3.8 has no threading.__excepthook__
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -144,7 +145,7 @@ class Lifetime:
     def _on_thread_error(self, failure: threading.ExceptHookArgs) -> None:
         """Leave out what comes of the end, or of the master's loss, in other threads, such as those of rospy."""
         if not self.is_ending and (failure.thread is self.watch.thread or self.watch.confirm()):
-            threading.__excepthook__(failure)
+            _show_thread_error(failure)
 
     def _tell(self, view: View) -> None:
         if not self.is_ending:
