@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from metacontrol_experiments.cli.display import refusing
 from metacontrol_experiments.io import comparison_runs
 from metacontrol_experiments.io.comparison_runs import ComparisonError
+from metacontrol_experiments.io.display import refusing
 from metacontrol_experiments.io.processes import RunError
 from metacontrol_experiments.mission.settings import SUMMARY_NAME
 

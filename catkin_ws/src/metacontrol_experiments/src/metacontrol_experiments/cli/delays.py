@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from metacontrol_experiments.cli.display import refusing, tell
 from metacontrol_experiments.io.comparison_runs import ComparisonError, read_summary
+from metacontrol_experiments.io.display import refusing, tell
 from metacontrol_experiments.io.tables import write_delays
 from metacontrol_experiments.lockstep.delays import KINDS, DelayError, delays_of
 from metacontrol_experiments.lockstep.system import LockstepError

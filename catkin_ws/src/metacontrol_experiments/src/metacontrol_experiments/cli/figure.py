@@ -9,7 +9,7 @@ import click
 from metacontrol_bags.bag import BagError, read_record
 from metacontrol_bags.metrics import MetricsError
 
-from metacontrol_experiments.cli.display import refusing
+from metacontrol_experiments.io.display import refusing
 from metacontrol_experiments.mission.settings import FIGURE_NAME
 
 if TYPE_CHECKING:

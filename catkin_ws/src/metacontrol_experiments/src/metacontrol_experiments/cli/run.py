@@ -13,7 +13,6 @@ from metacontrol_bags.decision import DECIDED
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S, MetricsError, summarise
 from metacontrol_bags.timeline import Timeline
 
-from metacontrol_experiments.cli.display import Display, refusing
 from metacontrol_experiments.cli.figure import draw_figure
 from metacontrol_experiments.cli.summary import write_summary
 from metacontrol_experiments.contingency.contingency import Contingency, Kind, Moment
@@ -25,6 +24,7 @@ from metacontrol_experiments.contingency.parsing import (
     parse_contingency,
 )
 from metacontrol_experiments.io.commit import current_commit
+from metacontrol_experiments.io.display import Display, refusing
 from metacontrol_experiments.io.input_files import (
     PackageError,
     read_components,

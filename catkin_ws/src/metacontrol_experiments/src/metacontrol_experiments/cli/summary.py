@@ -10,7 +10,7 @@ import click
 from metacontrol_bags.bag import BagError, read_record
 from metacontrol_bags.metrics import MetricsError, summarise
 
-from metacontrol_experiments.cli.display import refusing
+from metacontrol_experiments.io.display import refusing
 
 
 @click.command()

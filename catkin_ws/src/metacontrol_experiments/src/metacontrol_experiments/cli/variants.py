@@ -8,7 +8,7 @@ import click
 
 from metacontrol_experiments.campaign.calibration import CalibrationError
 from metacontrol_experiments.cli.calibrate import runs_option
-from metacontrol_experiments.cli.display import refusing
+from metacontrol_experiments.io.display import refusing
 from metacontrol_experiments.io.tables import read_runs
 
 

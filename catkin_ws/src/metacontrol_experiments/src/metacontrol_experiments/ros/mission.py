@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
     from metacontrol_bags.timeline import Report
 
-    from metacontrol_experiments.cli.display import Display
     from metacontrol_experiments.contingency.contingency import Contingency
+    from metacontrol_experiments.io.display import Display
     from metacontrol_experiments.io.processes import ProcessTree
     from metacontrol_experiments.mission.mission import State
     from metacontrol_experiments.mission.settings import Settings

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from metacontrol_experiments.cli.display import Display
+    from metacontrol_experiments.io.display import Display
     from metacontrol_experiments.mission.mission import State
     from metacontrol_experiments.mission.settings import Settings
 
