@@ -23,9 +23,9 @@ from ros_model.io.master import take_snapshot
 from ros_model.io.models import read_system
 from ros_model.language.metamodel import PortKind
 from ros_model_extraction import ros_defaults as plumbing
-from ros_model_extraction.found import FoundPort
 from ros_model_extraction.io.live_nodes import ask_nodes
 from ros_model_extraction.names import resolve
+from ros_model_extraction.node_facts import FoundPort
 from ros_model_extraction.packages.catkin_package import find_packages
 from ros_model_extraction.packages.package_source import ExtractedPackage, extract_package
 from ros_model_extraction.running.details import Details

@@ -8,7 +8,7 @@ from ros_model.cli.rosmodel import main
 from ros_model.io.files import resolve
 from ros_model.io.models import read_system
 from ros_model.io.project import load_project
-from ros_model.language.writer import write_system
+from ros_model.language.system_writer import write_system
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 

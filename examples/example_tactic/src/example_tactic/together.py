@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rosgraph_manipulator.change.tactics import RESTART_COST, ChangeProcesses, Plan, RunningNodes
-from rosgraph_manipulator.configuration.description import Difference
+from rosgraph_manipulator.configuration.difference import Difference
 
 COST = RESTART_COST - 0.1
 """Seconds by which plans are compared. Less than `restart`, so that this tactic comes first where it has a plan."""

@@ -1,7 +1,7 @@
 """The commit of the code that runs."""
 
 import pytest
-from metacontrol_experiments.io.commit import current_commit
+from metacontrol_experiments.io.code_version import current_commit
 
 HASH = "0123456789abcdef0123456789abcdef01234567"
 

@@ -29,8 +29,8 @@ from mros1_reasoner.loop.entries import (
 from mros1_reasoner.loop.entry_text import kind_of, read_entry, values_of
 from mros1_reasoner.loop.journal import Journal, apply, brought
 from mros1_reasoner.loop.mape import Mape
+from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.loop.view import MapeError
 from reasoner_helpers import OBJECTIVE
 
 WRITTEN = [  # as bags have them

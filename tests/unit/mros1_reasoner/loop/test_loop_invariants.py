@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from metacontrol_bags.decision import DECIDED
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.mape import Mape
+from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.loop.view import MapeError
 
 DESIGNS = {**D1, "FD3": ("F3", 0.5, ("F2",)), "FD3.0": ("F3", 0.4, ())}
 ROOTS = (Objective("o_build", "F0", {"error": 0.5}), Objective("o_look", "F3"))

@@ -7,8 +7,8 @@ from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop.mape import Mape
+from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.loop.view import MapeError
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
 

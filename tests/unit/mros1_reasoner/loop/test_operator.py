@@ -9,8 +9,8 @@ from mros1_reasoner.io.ontology_files import read_knowledge_base, save_knowledge
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.loop.mape import Mape
+from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.loop.view import MapeError
 from reasoner_helpers import DESIGNS, OBJECTIVE
 
 

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 from pybullet_simulator.robot.motion_sensors import Errors, Imu, Localisation, Odometry, Slip
-from pybullet_simulator.robot.noise import Normals, Wander
+from pybullet_simulator.robot.random_errors import Normals, Wander
 from robot_formulas.geometry import Pose
 
 

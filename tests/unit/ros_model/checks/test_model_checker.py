@@ -8,7 +8,7 @@ from ros_model.checks.systems import check_system
 from ros_model.errors import ModelError
 from ros_model.generators.launch import launch_file
 from ros_model.language.metamodel import Reference
-from ros_model.language.reader import parse_system
+from ros_model.language.system_reader import parse_system
 
 TALK = """RosSystem { Name talk RosComponents (
     ComponentInterface { name talker RosPublishers { RosPublisher out { RefPublisher 'p.t.t.out' } } }

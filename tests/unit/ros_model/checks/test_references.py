@@ -12,7 +12,7 @@ from ros_model.cli.rosmodel import main
 from ros_model.io.installed import InstalledPackages
 from ros_model.language.library import Library
 from ros_model.language.packages_reader import parse_packages
-from ros_model.language.reader import parse_system
+from ros_model.language.system_reader import parse_system
 
 CORPUS = os.environ.get("MROS_CORPUS")
 

@@ -9,7 +9,7 @@ import cv2
 import pytest
 from ros_model.cli.rosmodel import main
 from ros_model.io.drawing import dot
-from ros_model.language.reader import parse_system
+from ros_model.language.system_reader import parse_system
 
 SYSTEM = """RosSystem { Name robot RosComponents (
     ComponentInterface { name laser NameSpace front FromRosNode 'p.laser.laser'

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ros_model.cli.format import formatted_text
 from ros_model.cli.rosmodel import main
-from ros_model.language.either import parse_all
+from ros_model.language.any_language import parse_all
 
 SYSTEM = """// The robot.
 /* Drawn up by hand. */

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ros_model.language.metamodel import PortKind
 from ros_model.language.packages_reader import parse_packages
-from ros_model.language.reader import parse_system
+from ros_model.language.system_reader import parse_system
 
 SYSTEM = """RosSystem { Name robot
     RosComponents (

@@ -4,7 +4,7 @@ import pytest
 from ros_model.cli.rosmodel import main
 from ros_model.language.difference import differences
 from ros_model.language.packages_reader import parse_packages
-from ros_model.language.reader import parse_system
+from ros_model.language.system_reader import parse_system
 
 SYSTEM = """RosSystem { Name x RosComponents (
     ComponentInterface { name arm NameSpace left FromRosNode 'p.arm.arm'

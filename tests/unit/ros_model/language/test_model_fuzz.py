@@ -22,8 +22,8 @@ from ros_model.language.metamodel import MAX_SIZE
 from ros_model.language.packages import PackageSet
 from ros_model.language.packages_reader import parse_packages
 from ros_model.language.packages_writer import write_packages
-from ros_model.language.reader import parse_system
-from ros_model.language.writer import write_system
+from ros_model.language.system_reader import parse_system
+from ros_model.language.system_writer import write_system
 
 CORPUS = os.environ.get("MROS_CORPUS")
 GRAMMARS = Path(ros_model.language.parser.__file__).parent / "grammar"

@@ -18,8 +18,8 @@ from ros_model.language.metamodel import (
     RosParameter,
     SystemParameter,
 )
-from ros_model.language.reader import parse_system
-from ros_model.language.writer import write_system
+from ros_model.language.system_reader import parse_system
+from ros_model.language.system_writer import write_system
 
 CORPUS = os.environ.get("MROS_CORPUS")
 

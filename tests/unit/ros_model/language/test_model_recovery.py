@@ -5,7 +5,7 @@ import re
 import pytest
 from ros_model.errors import ModelError
 from ros_model.language.packages_reader import parse_packages
-from ros_model.language.reader import parse_system
+from ros_model.language.system_reader import parse_system
 
 SYSTEM = """RosSystem {
     Name x

@@ -20,8 +20,8 @@ from ros_model.language.metamodel import (
     RosSystem,
     SystemParameter,
 )
-from ros_model.language.reader import parse_system
-from ros_model.language.writer import write_system
+from ros_model.language.system_reader import parse_system
+from ros_model.language.system_writer import write_system
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
 NAME = st.one_of(

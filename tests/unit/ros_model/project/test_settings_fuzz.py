@@ -13,7 +13,7 @@ from ros_model.generators.launch import launch_file
 from ros_model.io.project import load_project, problems_of
 from ros_model.language.metamodel import compose
 from ros_model.language.packages_writer import write_packages
-from ros_model.language.writer import write_system
+from ros_model.language.system_writer import write_system
 from ros_model.project.observers import described_observers, observer_packages
 
 BASE = """RosSystem { Name base

@@ -7,7 +7,7 @@ from ros_model.checks.systems import check_system
 from ros_model.errors import ModelError
 from ros_model.io.project import read_table
 from ros_model.language.metamodel import ConnectionKind, PortPath, compose
-from ros_model.language.reader import parse_system
+from ros_model.language.system_reader import parse_system
 from ros_model.project.columns import parse_columns
 from ros_model.project.variants import make_systems, without
 

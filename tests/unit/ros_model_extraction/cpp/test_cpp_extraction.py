@@ -6,8 +6,8 @@ import textwrap
 from pathlib import Path
 
 import pytest
-from ros_model_extraction.found import NodeSource, SourceError
 from ros_model_extraction.io.cpp_files import read_cpp_node
+from ros_model_extraction.node_facts import NodeSource, SourceError
 
 WORKER = """
     #pragma once

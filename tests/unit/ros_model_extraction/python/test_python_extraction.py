@@ -10,8 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ros_model.language.metamodel import PortKind
-from ros_model_extraction.found import NodeSource, SourceError
 from ros_model_extraction.io.python_modules import Library
+from ros_model_extraction.node_facts import NodeSource, SourceError
 from ros_model_extraction.packages.package_source import ExtractedPackage, extract_package
 from ros_model_extraction.python.node_reader import read_python_node
 

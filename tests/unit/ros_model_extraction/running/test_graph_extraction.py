@@ -9,8 +9,8 @@ import pytest
 from ros_model.checks.systems import check_system
 from ros_model.graph.snapshot import GraphSnapshot, build_snapshot
 from ros_model.language.metamodel import ConnectionKind, PortKind, RosSystem
-from ros_model.language.reader import parse_system
-from ros_model.language.writer import write_system
+from ros_model.language.system_reader import parse_system
+from ros_model.language.system_writer import write_system
 from ros_model_extraction.io.live_nodes import executable_of
 from ros_model_extraction.names import as_seen_from, resolve
 from ros_model_extraction.running.details import Details, Origin

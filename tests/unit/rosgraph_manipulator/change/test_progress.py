@@ -3,7 +3,8 @@
 import pytest
 from rosgraph_manipulator.change.progress import Awaited, ChangeProgress
 from rosgraph_manipulator.configuration.configurations import Configuration
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription, compare
+from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
+from rosgraph_manipulator.configuration.difference import compare
 from rosgraph_manipulator.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 
 NEW = Configuration("new", "f", "new.launch", topics=("plan",))

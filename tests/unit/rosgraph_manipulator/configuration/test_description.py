@@ -1,7 +1,8 @@
 """What differs between two configurations."""
 
 import pytest
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription, compare, same_value
+from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
+from rosgraph_manipulator.configuration.difference import compare, same_value
 
 
 def node(name, package="p", executable="x", **parameters):

@@ -4,7 +4,7 @@ import os
 
 import pytest
 from ros_model.io.files import resolve
-from rosgraph_manipulator.configuration.description import compare
+from rosgraph_manipulator.configuration.difference import compare
 from rosgraph_manipulator.io.launch_files import (
     LaunchFileError,
     command_line,

@@ -1,1 +1,1 @@
-"""Missions, metrics and reports."""
+"""Missions and campaigns of missions, on ROS and in lockstep."""

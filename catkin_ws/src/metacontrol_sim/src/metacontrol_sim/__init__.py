@@ -1,1 +1,1 @@
-"""PyBullet world, robot and drivers of the demonstrators."""
+"""Nodes of the demonstrators: power meter, goal sender, text over the robot."""

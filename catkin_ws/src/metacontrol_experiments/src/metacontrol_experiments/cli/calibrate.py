@@ -10,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from metacontrol_experiments.campaign.calibration import CalibrationError, missing_runs, plan
 from metacontrol_experiments.io.calibration_runs import drive
-from metacontrol_experiments.io.commit import current_commit
+from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.display import CONSOLE, refusing, tell
 from metacontrol_experiments.io.input_files import PackageError, read_route, route_names, simulation_package
 from metacontrol_experiments.io.tables import append_runs, read_runs, write_levels

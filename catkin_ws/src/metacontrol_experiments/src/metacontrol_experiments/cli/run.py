@@ -23,7 +23,7 @@ from metacontrol_experiments.contingency.parsing import (
     node_of,
     parse_contingency,
 )
-from metacontrol_experiments.io.commit import current_commit
+from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.display import Display, refusing
 from metacontrol_experiments.io.input_files import (
     PackageError,

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pybullet_simulator.messages.sensors import laser_scan, point_cloud
 from pybullet_simulator.robot.faults import Fault, Outlet
-from pybullet_simulator.robot.sensors import DepthProjector, measure_depth, measure_ranges
+from pybullet_simulator.robot.laser_and_camera import (
+    DEPTH_NOISE,
+    LASER_NOISE,
+    DepthProjector,
+    measure_depth,
+    measure_ranges,
+)
 from ros_model.language.metamodel import PortKind
 from sensor_msgs.msg import LaserScan, PointCloud2
 
@@ -18,9 +24,6 @@ if TYPE_CHECKING:
 
     from pybullet_simulator.physics.simulation import Simulation
     from ros_model.language.metamodel import RosSystem
-
-LASER_NOISE, DEPTH_NOISE = 0.01, 0.001
-"""Defaults of the driver nodes."""
 
 
 class Drivers:

@@ -55,7 +55,9 @@ class FaultInjector:
         if kind is Kind.LIGHT:
             self._simulation.set_light(value)
             return {"light": f"{value:g}"}
-        return self._clutter(contingency)
+        if kind is Kind.CLUTTER:
+            return self._clutter(contingency)
+        raise InjectionError(f"{contingency}: lockstep can't let a contingency of kind {kind.value} happen")
 
     def _clutter(self, contingency: Contingency) -> dict[str, str]:
         places = tuple(Pose(x, y, 0.0) for x, y in contingency.places)

@@ -80,11 +80,13 @@ class FaultInjector:
                 )(contingency.value)
             if contingency.kind is Kind.LIGHT:
                 return self._call("simulator/set_light", SetLight, light=f"{contingency.value:g}")(contingency.value)
-            return self._clutter(contingency, way)
+            if contingency.kind is Kind.CLUTTER:
+                return self._clutter(contingency, way)
         except (CallError, OSError, rospy.ROSException, ValueError) as error:
             raise InjectionError(f"{contingency}: {' '.join(str(error).split())}") from error
         except (rospy.ServiceException, ComponentError, ClutterError, GridMessageError) as error:
             raise InjectionError(f"{contingency}: {error}") from error
+        raise InjectionError(f"{contingency}: nothing lets a contingency of kind {contingency.kind.value} happen")
 
     def _signal(self, contingency: Contingency) -> dict[str, str]:
         """Send a component's node the signal of a kind."""

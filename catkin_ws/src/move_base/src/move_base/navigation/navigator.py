@@ -19,8 +19,8 @@ from robot_formulas.geometry import STOP, Pose, Velocity, wrap
 from move_base.control.dwa import DwaController
 from move_base.costmap.grid import LETHAL
 from move_base.costmap.surroundings import Surroundings
+from move_base.navigation.goal_memory import Work
 from move_base.navigation.result import Outcome, Result, State
-from move_base.navigation.work import Work
 from move_base.planning.followed_plan import FollowedPlan
 from move_base.planning.global_planner import Plan, PlanningError, make_plan
 

@@ -6,7 +6,7 @@ from metacontrol_bags.decision import Cause
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Objective
-from mros1_reasoner.loop.view import Running, View
+from mros1_reasoner.loop.readable_state import Running, View
 
 RECOVERY = "compRecov"
 """The rule by which the return of a component is a cause."""

@@ -9,8 +9,8 @@ from dataclasses import replace
 from metacontrol_bags.decision import DECIDED, FAILED, Decision
 
 from mros1_reasoner.knowledge.model import Objective
+from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.state import State
-from mros1_reasoner.loop.view import MapeError
 
 
 class Operator:

@@ -10,8 +10,8 @@ from metacontrol_bags.decision import ADVISED, DECIDED, FAILED, Cause, Decision
 
 from mros1_reasoner.knowledge.model import Design, Direction, Objective
 from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance
+from mros1_reasoner.loop.readable_state import Running
 from mros1_reasoner.loop.state import State
-from mros1_reasoner.loop.view import Running
 from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan
 
 

@@ -19,9 +19,9 @@ from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Reasoner
 from mros1_reasoner.loop.commands import Operator
 from mros1_reasoner.loop.deliberation import Deliberation, Timing
+from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.loop.state import State
-from mros1_reasoner.loop.view import MapeError
 from mros1_reasoner.planning.planner import Distance, Utility, difference, feasible_designs
 from mros1_reasoner.planning.utility import make_utility
 

@@ -15,8 +15,8 @@ from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
 from mros1_reasoner.loop.causes import OPERATOR
 from mros1_reasoner.loop.levels import Levels
+from mros1_reasoner.loop.readable_state import BUSY, Component, Running, View
 from mros1_reasoner.loop.settings import Settings
-from mros1_reasoner.loop.view import BUSY, Component, Running, View
 
 
 class State(View):

@@ -19,7 +19,7 @@ from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.entries import ActiveFact, Approve, Decided, Entry, Reject, Result, Step
 from mros1_reasoner.loop.entry_text import kind_of
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.loop.view import MapeError
+from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.replay.recording import Recording
 
 DEFAULT_DURATION = 1.0  # s of ROS time, of a reconfiguration, where the bag has none

@@ -30,7 +30,7 @@ from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark, 
 from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Result, StaleFact, Step, TaskFact
 from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.loop.view import MapeError
+from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.pellet.process import make_reasoner
 from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic

@@ -15,7 +15,7 @@ from mros1_reasoner.io.ontology_files import save_knowledge_base
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop import entries
-from mros1_reasoner.loop.view import MapeError
+from mros1_reasoner.loop.readable_state import MapeError
 
 if TYPE_CHECKING:
     from mros1_reasoner.ros.reasoner import ReasonerNode

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from sensor_msgs.msg import Image, LaserScan, PointCloud2, PointField
 
-from pybullet_simulator.robot.sensors import SensorError
+from pybullet_simulator.robot.laser_and_camera import SensorError
 
 if TYPE_CHECKING:
     import genpy

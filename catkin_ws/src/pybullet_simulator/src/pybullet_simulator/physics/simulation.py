@@ -1,6 +1,6 @@
 """The simulation: a world and a robot in PyBullet, stepped at 100 Hz, with the robot's sensors and the ground truth.
 
-One seed gives one run: every source of chance is a generator seeded from it (see `noise`).
+One seed gives one run: every source of chance is a generator seeded from it (see `robot.random_errors`).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from robot_formulas.geometry import ORIGIN, Pose, wrap
 
-from pybullet_simulator.robot.noise import Normals, Wander
+from pybullet_simulator.robot.random_errors import Normals, Wander
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

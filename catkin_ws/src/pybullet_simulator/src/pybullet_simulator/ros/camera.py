@@ -15,7 +15,7 @@ from std_msgs.msg import Float32
 from pybullet_simulator.io.fault_signals import listen
 from pybullet_simulator.messages.sensors import point_cloud, read_depth
 from pybullet_simulator.robot.faults import Outlet
-from pybullet_simulator.robot.sensors import DepthProjector, SensorError, measure_depth
+from pybullet_simulator.robot.laser_and_camera import DEPTH_NOISE, DepthProjector, SensorError, measure_depth
 
 
 class CameraNode(rospy.SubscribeListener):
@@ -32,7 +32,7 @@ class CameraNode(rospy.SubscribeListener):
         self._field_of_view = math.radians(parameters.number("field_of_view", 60.0, low=1.0, high=170.0))
         self._range_min = parameters.number("range_min", 0.05, low=0.0, high=99.0)
         self._range_max = parameters.number("range_max", 8.0, low=self._range_min + 0.1, high=100.0)
-        self._noise = parameters.number("noise", 0.001, low=0.0, high=1.0)
+        self._noise = parameters.number("noise", DEPTH_NOISE, low=0.0, high=1.0)
         self._rng = np.random.default_rng([parameters.whole("seed", 0, low=0), 8])
         self._light = 1.0
         self._projector: DepthProjector | None = None

@@ -12,7 +12,7 @@ from sensor_msgs.msg import LaserScan
 
 from pybullet_simulator.io.fault_signals import listen
 from pybullet_simulator.robot.faults import Outlet
-from pybullet_simulator.robot.sensors import SensorError, measure_ranges
+from pybullet_simulator.robot.laser_and_camera import LASER_NOISE, SensorError, measure_ranges
 
 SIDES = {"front": 3, "rear": 7}
 """Sides of the robot with a laser, and the stream of random numbers of each."""
@@ -31,7 +31,7 @@ class LaserNode(rospy.SubscribeListener):
         self._frame = f"{side}_laser"
         self._raw = f"simulator/{side}_rays"
         parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
-        self._noise = parameters.number("noise", 0.01, low=0.0, high=1.0)
+        self._noise = parameters.number("noise", LASER_NOISE, low=0.0, high=1.0)
         self._rng = np.random.default_rng([parameters.whole("seed", 0, low=0), SIDES[side]])
         self._rays: rospy.Subscriber | None = None
         self._outlet = Outlet()

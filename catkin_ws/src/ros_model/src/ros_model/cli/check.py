@@ -16,7 +16,7 @@ from ros_model.errors import ModelError
 from ros_model.findings import ERROR, WARNING, Finding
 from ros_model.io.installed import InstalledPackages
 from ros_model.io.models import files_in, models_at, read_all, read_packages
-from ros_model.language.either import PACKAGES
+from ros_model.language.any_language import PACKAGES
 from ros_model.language.library import Library
 from ros_model.language.metamodel import compose
 from ros_model.language.packages import PackageSet

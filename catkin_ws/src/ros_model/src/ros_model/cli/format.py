@@ -9,11 +9,11 @@ import click
 from ros_model.errors import ModelError
 from ros_model.io.files import read_text
 from ros_model.io.models import models_at
+from ros_model.language.any_language import parse_all
 from ros_model.language.comments import with_comments
-from ros_model.language.either import parse_all
 from ros_model.language.packages import PackageSet
 from ros_model.language.packages_writer import write_packages
-from ros_model.language.writer import write_system
+from ros_model.language.system_writer import write_system
 
 
 @click.command("format")

@@ -130,7 +130,7 @@ def _tell_of_observers(project: Project, package: Path) -> None:
 def _generate_launch_file(path: Path, output: Path) -> None:
     from ros_model.generators.launch import launch_file
     from ros_model.io.models import read_library, read_system
-    from ros_model.language.either import PACKAGES
+    from ros_model.language.any_language import PACKAGES
 
     system, library = read_system(path), read_library(sorted(path.parent.glob(f"*{PACKAGES}")))
     name = safe_file_name(system.name, f"{system.position}: system")

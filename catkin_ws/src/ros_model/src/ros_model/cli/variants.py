@@ -14,7 +14,7 @@ from ros_model.generators import write_files
 from ros_model.generators.family import origin
 from ros_model.io.models import read_system
 from ros_model.io.project import locate, read_settings, read_table
-from ros_model.language.writer import write_system
+from ros_model.language.system_writer import write_system
 from ros_model.project.columns import Columns, parse_columns
 from ros_model.project.schema_check import dotted, load_schema, violations
 from ros_model.project.settings import FILE_NAME

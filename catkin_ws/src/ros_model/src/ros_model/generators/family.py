@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ros_model.file_names import safe_file_name
 from ros_model.generators import write_files
-from ros_model.language.writer import write_system
+from ros_model.language.system_writer import write_system
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

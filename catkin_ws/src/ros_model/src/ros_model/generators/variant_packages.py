@@ -12,7 +12,7 @@ from catkin_pkg.package import InvalidPackage, parse_package
 
 from ros_model.errors import ModelError
 from ros_model.generators import write_files
-from ros_model.language.writer import write_system
+from ros_model.language.system_writer import write_system
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

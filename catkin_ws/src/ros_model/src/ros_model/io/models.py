@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 from ros_model.errors import ModelError
 from ros_model.io.files import read_text
 from ros_model.io.installed import InstalledPackages
-from ros_model.language.either import PACKAGES, SYSTEM, parse_all
+from ros_model.language.any_language import PACKAGES, SYSTEM, parse_all
 from ros_model.language.library import Library
 from ros_model.language.packages_reader import parse_packages
-from ros_model.language.reader import parse_system
+from ros_model.language.system_reader import parse_system
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -14,7 +14,7 @@ from ros_model_extraction.cpp.declarations import File, Place
 from ros_model_extraction.cpp.handles import Handles, in_namespace
 from ros_model_extraction.cpp.program import Program
 from ros_model_extraction.cpp.syntax import arguments_of, parameter_types, template_arguments, text, type_text
-from ros_model_extraction.found import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
+from ros_model_extraction.node_facts import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
 from ros_model_extraction.python.values import Const, Text
 from ros_model_extraction.ros_api import CPP_FIXED, RECONFIGURE_SERVER
 

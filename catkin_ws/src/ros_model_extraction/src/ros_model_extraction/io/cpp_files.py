@@ -18,8 +18,8 @@ from ros_model_extraction.cpp.syntax import (
     text,
     walk,
 )
-from ros_model_extraction.found import NodeSource, Remark, SourceError
 from ros_model_extraction.io.source_files import read_source
+from ros_model_extraction.node_facts import NodeSource, Remark, SourceError
 
 _LANGUAGE = Language(tree_sitter_cpp.language())
 _HEADERS = (".h", ".hpp", ".hh", ".hxx")

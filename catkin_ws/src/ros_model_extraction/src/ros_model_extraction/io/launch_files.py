@@ -14,10 +14,10 @@ from ros_model.errors import ModelError
 from ros_model.language.metamodel import PortKind, Reference
 
 from ros_model_extraction import ros_defaults as plumbing
-from ros_model_extraction.found import NodeSource, SourceError
 from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.io.source_files import read_xml
 from ros_model_extraction.names import executable_name, resolve, split_name
+from ros_model_extraction.node_facts import NodeSource, SourceError
 from ros_model_extraction.packages.catkin_package import CatkinPackage, read_package
 from ros_model_extraction.packages.package_source import named, read_executable
 from ros_model_extraction.running.graph import End, Instance, Models, assemble, label_of, share_out

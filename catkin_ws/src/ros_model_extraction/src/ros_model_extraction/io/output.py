@@ -20,7 +20,7 @@ def write_models(models: Models, folder: str | Path, name: str) -> tuple[Path, P
     Raises:
         ModelError: the name can't name a file, or the folder can't be written.
     """
-    from ros_model.language.writer import write_system
+    from ros_model.language.system_writer import write_system
 
     path = _path(folder, name, ".rossystem")
     text = write_system(models.system)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import rospkg
 from ros_model.language.metamodel import Position
 
-from ros_model_extraction.found import Remark, SourceError
 from ros_model_extraction.io.source_files import read_source
+from ros_model_extraction.node_facts import Remark, SourceError
 from ros_model_extraction.python.bindings import index
 from ros_model_extraction.python.modules import Module
 

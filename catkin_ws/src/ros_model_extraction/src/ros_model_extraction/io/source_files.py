@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
 
-from ros_model_extraction.found import Remark, SourceError
+from ros_model_extraction.node_facts import Remark, SourceError
 
 if TYPE_CHECKING:
     from pathlib import Path

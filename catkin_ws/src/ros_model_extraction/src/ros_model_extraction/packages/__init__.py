@@ -1,1 +1,1 @@
-"""Packages and launch files."""
+"""Packages: their executables, messages, and models made of their source."""

@@ -13,8 +13,8 @@ from catkin_pkg.package import InvalidPackage, parse_package_string
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
 
-from ros_model_extraction.found import Remark, SourceError
 from ros_model_extraction.io.source_files import read_source, read_xml
+from ros_model_extraction.node_facts import Remark, SourceError
 from ros_model_extraction.packages.cmake import Command, commands, sections
 
 MANIFEST = "package.xml"

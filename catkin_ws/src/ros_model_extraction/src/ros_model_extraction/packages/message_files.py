@@ -9,8 +9,8 @@ from pathlib import Path
 from ros_model.language.metamodel import Position
 from ros_model.language.packages import EXTENSIONS, PARTS, MessageField, Spec, SpecKind
 
-from ros_model_extraction.found import Remark, SourceError
 from ros_model_extraction.io.source_files import read_source
+from ros_model_extraction.node_facts import Remark, SourceError
 
 _FIELD = re.compile(r"(?P<type>[A-Za-z][\w/]*(?:\[\d*\])?)\s+(?P<name>\w+)\s*(?:=(?P<constant>.*))?")
 _SEPARATOR = "---"

@@ -10,9 +10,9 @@ from typing import Any
 from ros_model.language.metamodel import Position
 from ros_model.language.packages import Artifact, Package, PackageSet
 
-from ros_model_extraction.found import NodeSource, Remark, SourceError, unique
 from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.names import executable_name
+from ros_model_extraction.node_facts import NodeSource, Remark, SourceError, unique
 from ros_model_extraction.packages.catkin_package import CatkinPackage, Executable, read_package
 from ros_model_extraction.packages.message_files import read_specs
 

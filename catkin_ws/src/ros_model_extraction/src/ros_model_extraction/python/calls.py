@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from ros_model_extraction.python import known as python_known
+from ros_model_extraction.python import known_functions as python_known
 from ros_model_extraction.python.callers import Callers, root_frame
 from ros_model_extraction.python.modules import Binding, Scope
 from ros_model_extraction.python.values import (

@@ -12,7 +12,7 @@ import contextlib
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ros_model_extraction.python import known as python_known
+from ros_model_extraction.python import known_functions as python_known
 from ros_model_extraction.python.callers import root_frame, skipped
 from ros_model_extraction.python.calls import MAX_VALUES
 from ros_model_extraction.python.expressions import ExpressionEvaluator

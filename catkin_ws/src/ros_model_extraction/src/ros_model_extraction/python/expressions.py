@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from typing import ClassVar
 
-from ros_model_extraction.python import known as python_known
+from ros_model_extraction.python import known_functions as python_known
 from ros_model_extraction.python.calls import MAX_VALUES, Given
 from ros_model_extraction.python.members import MemberEvaluator
 from ros_model_extraction.python.operations import is_number, operated

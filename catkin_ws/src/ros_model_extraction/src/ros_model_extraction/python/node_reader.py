@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from ros_model.language.metamodel import Position
 
-from ros_model_extraction.found import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
+from ros_model_extraction.node_facts import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
 from ros_model_extraction.python.callers import last_name, root_frame
 from ros_model_extraction.python.calls import Arguments, Given
 from ros_model_extraction.python.evaluator import Evaluator
-from ros_model_extraction.python.known import plain
+from ros_model_extraction.python.known_functions import plain
 from ros_model_extraction.python.modules import Module, Scope
-from ros_model_extraction.python.reached import Reached, is_static, root_name
+from ros_model_extraction.python.reachable_code import Reached, is_static, root_name
 from ros_model_extraction.python.values import (
     Class,
     Const,

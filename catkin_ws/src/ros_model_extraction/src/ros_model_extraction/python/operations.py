@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 
-from ros_model_extraction.python.known import is_costly, plain
+from ros_model_extraction.python.known_functions import is_costly, plain
 from ros_model_extraction.python.values import Const, Hole, Items, Text, Unknown, Value, joined, text_of
 
 

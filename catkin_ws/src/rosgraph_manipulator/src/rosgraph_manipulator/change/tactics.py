@@ -15,7 +15,8 @@ from typing import Any, Protocol
 
 from node_kit.plugins import find
 
-from rosgraph_manipulator.configuration.description import Difference, SystemDescription, compare
+from rosgraph_manipulator.configuration.description import SystemDescription
+from rosgraph_manipulator.configuration.difference import Difference, compare
 
 PACKAGE = "rosgraph_manipulator"
 

@@ -7,7 +7,8 @@ from ros_model.io.files import resolve
 
 from rosgraph_manipulator.change.tactics import NoRunningNodes, load_tactics, plan_change
 from rosgraph_manipulator.cli.invocation import HELP, run
-from rosgraph_manipulator.configuration.description import SystemDescription, compare
+from rosgraph_manipulator.configuration.description import SystemDescription
+from rosgraph_manipulator.configuration.difference import compare
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.launch_files import read_launch_file, read_model
 from rosgraph_manipulator.ros.client import ClientError, join, manipulator_parameters

@@ -1,9 +1,9 @@
-"""The nodes and parameters of a configuration, and how two configurations differ."""
+"""The nodes and parameters of a configuration."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 QUALITY_PREFIX = "qa_"  # of the global parameters that hold a system's expected quality levels; no node reads them
@@ -60,85 +60,3 @@ class SystemDescription:
             f"{name}/{key}": value for name, node in self.nodes.items() for key, value in node.parameters.items()
         }
         return {**self.parameters, **private}
-
-
-@dataclass(frozen=True)
-class Difference:
-    """What differs between two configurations. Names are in the order of the wanted one.
-
-    Attributes:
-        running: the configuration that runs.
-        wanted: the configuration to deploy.
-        starts: nodes that only the wanted configuration has.
-        stops: nodes that only the running configuration has.
-        replaced: nodes of both that differ in more than the values of parameters.
-        parameters: the private parameters with a new value, for each node of both that is not replaced.
-        shared: parameters outside the nodes' namespaces that get a new value, by full name.
-    """
-
-    running: SystemDescription
-    wanted: SystemDescription
-    starts: tuple[str, ...]
-    stops: tuple[str, ...]
-    replaced: tuple[str, ...]
-    parameters: Mapping[str, Mapping[str, Any]]
-    shared: Mapping[str, Any]
-
-    @property
-    def touches_nodes(self) -> bool:
-        """Whether any node must be started, stopped or replaced, or gets new parameters."""
-        return bool(self.starts or self.stops or self.replaced or self.parameters)
-
-
-def compare(running: SystemDescription, wanted: SystemDescription) -> Difference:
-    """Return what differs.
-
-    A shared parameter that changes replaces all nodes, because any node may have read it at its start. Expected quality
-    levels are an exception: no node reads them. A node is also replaced where the wanted configuration lacks one of
-    its parameters, because a running node does not notice that a parameter was deleted.
-    """
-    both = [name for name in wanted.nodes if name in running.nodes]
-    shared = _changed(running.parameters, wanted.parameters)
-    gone = set(running.parameters) - set(wanted.parameters)
-    all_affected = any(not _is_quality(name) for name in (*shared, *gone))
-    replaced = tuple(
-        name for name in both if all_affected or _needs_new_process(running.nodes[name], wanted.nodes[name])
-    )
-    parameters = {
-        name: changed
-        for name in both
-        if name not in replaced and (changed := _changed(running.nodes[name].parameters, wanted.nodes[name].parameters))
-    }
-    return Difference(
-        running,
-        wanted,
-        starts=tuple(name for name in wanted.nodes if name not in running.nodes),
-        stops=tuple(name for name in running.nodes if name not in wanted.nodes),
-        replaced=replaced,
-        parameters=parameters,
-        shared=shared,
-    )
-
-
-def _needs_new_process(running: NodeDescription, wanted: NodeDescription) -> bool:
-    lost = set(running.parameters) - set(wanted.parameters)
-    return bool(lost) or replace(running, parameters={}) != replace(wanted, parameters={})
-
-
-def _changed(running: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in wanted.items() if key not in running or not same_value(running[key], value)}
-
-
-def same_value(one: Any, other: Any) -> bool:
-    """Tell whether two values of a parameter are the same: 1 and 1.0 are, 1 and true are not."""
-    if isinstance(one, bool) != isinstance(other, bool):
-        return False
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(same_value(one[key], other[key]) for key in one)
-    if isinstance(one, (list, tuple)) and isinstance(other, (list, tuple)):
-        return len(one) == len(other) and all(map(same_value, one, other))
-    return bool(one == other)
-
-
-def _is_quality(name: str) -> bool:
-    return name.rpartition("/")[2].startswith(QUALITY_PREFIX)

@@ -22,7 +22,7 @@ from node_kit.io.xml_rpc import CallError
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.tactics import Adjustable
-from rosgraph_manipulator.configuration.description import same_value
+from rosgraph_manipulator.configuration.difference import same_value
 from rosgraph_manipulator.io.master import NodeApi, services_of
 
 DESCRIPTION_TIMEOUT = 1.0  # s, wall, for all servers of a node to describe themselves

@@ -7,7 +7,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from ros_model.language.packages_reader import parse_packages
-from ros_model.language.reader import parse_system
+from ros_model.language.system_reader import parse_system
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import RosSystem

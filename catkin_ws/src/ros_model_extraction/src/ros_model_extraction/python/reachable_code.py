@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ros_model_extraction.found import Remark
+from ros_model_extraction.node_facts import Remark
 from ros_model_extraction.python.callers import last_name, root_frame
 from ros_model_extraction.python.evaluator import Evaluator
 from ros_model_extraction.python.modules import Binding, Module, Scope

@@ -6,8 +6,14 @@ import genpy
 import numpy as np
 import pytest
 from pybullet_simulator.messages.sensors import depth_image, laser_scan, point_cloud, read_depth
+from pybullet_simulator.robot.laser_and_camera import (
+    FULL_LIGHT,
+    DepthProjector,
+    SensorError,
+    measure_depth,
+    measure_ranges,
+)
 from pybullet_simulator.robot.robot import Robot
-from pybullet_simulator.robot.sensors import FULL_LIGHT, DepthProjector, SensorError, measure_depth, measure_ranges
 
 NOW = genpy.Time(1)
 
@@ -92,7 +98,7 @@ def test_cloud_and_scan_describe_themselves():
 
 
 def test_drivers_do_not_load_the_simulation():
-    modules = "pybullet_simulator.messages.sensors, pybullet_simulator.robot.sensors"
+    modules = "pybullet_simulator.messages.sensors, pybullet_simulator.robot.laser_and_camera"
     code = f"import sys, {modules}; print('pybullet' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

@@ -10,6 +10,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 
+LASER_NOISE = 0.01
+"""Standard deviation of a range, m."""
+DEPTH_NOISE = 0.001
+"""Standard deviation of a depth of 1 m, m; it grows with the depth's square."""
+
+
 class SensorError(ValueError):
     """Raw data that make no sense."""
 
