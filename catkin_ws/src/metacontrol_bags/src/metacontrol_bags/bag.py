@@ -73,7 +73,7 @@ class BagError(ValueError):
 
 
 def read_record(path: Path) -> MissionRecord:
-    """Return what a mission's bag holds.
+    """Return the record of a mission from its bag.
 
     Raises:
         BagError: the file is missing, no bag, not closed, or holds messages that do not fit their definition.

@@ -1,4 +1,4 @@
-"""A decision of the reasoner, explained: the one record of it that all packages share."""
+"""A decision of the reasoner with its explanation, as a record that all packages share."""
 
 from __future__ import annotations
 

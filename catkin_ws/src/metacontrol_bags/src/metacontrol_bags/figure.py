@@ -36,7 +36,7 @@ def draw(record: MissionRecord, path: Path) -> None:
     """Draw a mission into a PNG file of 1600 x 2000 pixels.
 
     Raises:
-        MetricsError: an event of the record says what cannot be.
+        MetricsError: an event of the record has impossible content.
         OSError: the file cannot be written.
     """
     summary = summarise(record)
@@ -52,7 +52,7 @@ def draw(record: MissionRecord, path: Path) -> None:
 
 
 def configuration_spans(record: MissionRecord) -> list[tuple[float, float, str]]:
-    """Return from when to when (stamps in s) each configuration was in force; a change counts from STABLE on."""
+    """Return the start and end (stamps in s) of each configuration; a configuration starts when it is STABLE."""
     start, end = record.start_stamp, record.end_stamp
     stable = [
         report for report in record.configurations if report.state == FunctionGrounding.STABLE and report.stamp < end

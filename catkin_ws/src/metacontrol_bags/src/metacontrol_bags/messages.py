@@ -1,4 +1,4 @@
-"""From ROS messages to reports and decisions, for messages of a bag (rosbags) and for live ones (rospy).
+"""Converts ROS messages to reports and decisions: messages of a bag (rosbags) and live ones (rospy).
 
 The two differ only in how they write a time. Messages are read by their fields; no message class is imported.
 """
@@ -75,7 +75,7 @@ def configurations(message: Any, received: float) -> tuple[ConfigurationReport, 
 
 
 def decision(message: Any, received: float) -> Decision:
-    """Return what a metacontrol_msgs/Decision says; what an older definition lacks is empty."""
+    """Return what a metacontrol_msgs/Decision says; fields that an older definition lacks are empty."""
     return Decision(
         id=str(message.id),
         state=str(message.state),

@@ -39,7 +39,7 @@ TIMEOUT_S = 250.0
 
 
 class MetricsError(ValueError):
-    """An event of a mission says what cannot be; one line that names the event and the value."""
+    """An event of a mission has impossible content; one line that names the event and the value."""
 
 
 DEFAULT_THRESHOLDS = {"safety": 0.6, "energy": 0.62}
@@ -120,7 +120,7 @@ def thresholds(record: MissionRecord) -> dict[str, float]:
 
 
 def mission_goals(record: MissionRecord) -> dict[str, GoalStatus | None]:
-    """Return the goals sent during the mission, by id, with how they ended; None where they did not end.
+    """Return the goals sent during the mission, by id, and how each ended; None if it did not end.
 
     A goal that the manipulator sends again keeps its id, so it does not count as another goal. A goal that was
     reached after a bad result counts as reached.
@@ -170,7 +170,7 @@ def _reconfiguration(record: MissionRecord, decided: Decision, closed: Decision)
 
 
 def _cause(record: MissionRecord, decided: Decision) -> tuple[float | None, float | None]:
-    """Return when the cause of an adaptation set in and when it was first reported; None where that is not known."""
+    """Return when the cause of an adaptation began, and when it was first reported; None if that is unknown."""
     kind, _, name = decided.trigger.partition(":")
     if kind == "component":
         return _component_cause(record, name, decided)
@@ -253,7 +253,7 @@ def _places(text: str) -> list[list[float]]:
 
 
 def _observed(record: MissionRecord, name: str, limit: float, start: float, end: float) -> dict[str, float | None]:
-    """Return what the observers saw of a QA: mean, share above the threshold, and for how many s it was stale."""
+    """Return what the observers saw of a QA: mean, share above the threshold, and the s for which it was stale."""
     reports = tuple(report for report in record.observed if report.name == name)
     levels = tuple((r.stamp, np.nan if r.level is None else r.level) for r in reports)
     values, durations = held(levels, start, end)

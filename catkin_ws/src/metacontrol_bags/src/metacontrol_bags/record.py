@@ -1,4 +1,4 @@
-"""What a bag holds of a mission, as plain data; the summary and the figure are made of it.
+"""The record of a mission from its bag, as plain data, from which the summary and the figure are made.
 
 Stamps are simulated seconds on the mission's own clock (`/clock`), as in the bag.
 """
@@ -126,12 +126,12 @@ class MissionRecord:
 
     @property
     def start_stamp(self) -> float:
-        """When the mission started: the stamp of the first message where no event says it."""
+        """When the mission started; the stamp of the first message if no event says it."""
         event = self.event(MissionEvent.MISSION_START)
         return event.stamp if event else self.first_stamp
 
     @property
     def end_stamp(self) -> float:
-        """When the mission ended: the stamp of the last message where no event says it."""
+        """When the mission ended; the stamp of the last message if no event says it."""
         event = self.event(MissionEvent.MISSION_END)
         return event.stamp if event else self.last_stamp

@@ -1,4 +1,4 @@
-"""Figures of series over time: a sample holds until the next one; stamps are s."""
+"""Figures of series over time. A sample holds until the next one; stamps are in s."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def mean(samples: Samples, start: float, end: float) -> float | None:
 
 
 def quantile(samples: Samples, share: float, start: float, end: float) -> float | None:
-    """Return the level that was not exceeded for a share of the time; None without any sample."""
+    """Return the level that the series did not exceed for a share of the time; None without any sample."""
     levels, durations = held(samples, start, end)
     total = float(durations.sum())
     if total <= 0:

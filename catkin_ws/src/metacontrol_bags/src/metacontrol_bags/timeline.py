@@ -42,7 +42,7 @@ class Entry:
 
 
 class Timeline:
-    """Makes lines of reports, and keeps what was reported last."""
+    """Turns reports into lines, and remembers the last report on each subject."""
 
     def __init__(self, thresholds: dict[str, float]) -> None:
         """Know the threshold of each QA."""
@@ -53,7 +53,7 @@ class Timeline:
         self._configurations: dict[str, ConfigurationReport] = {}
 
     def tell(self, report: Report) -> tuple[Entry, ...]:
-        """Return the lines that a report makes; none where it brings nothing new."""
+        """Return the lines for a report; none if it says nothing new."""
         match report:
             case ComponentReport():
                 return self._component(report)

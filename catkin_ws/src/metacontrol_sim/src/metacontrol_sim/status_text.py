@@ -1,4 +1,4 @@
-"""What stands over the robot in RViz and in PyBullet's window: configuration, quality levels, failed components."""
+"""The text over the robot in RViz and in PyBullet's window: configuration, quality levels, failed components."""
 
 from __future__ import annotations
 

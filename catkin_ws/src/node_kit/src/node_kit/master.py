@@ -1,4 +1,4 @@
-"""What a node thinks of its ROS master: the decision only, from what came of each question and when."""
+"""Decides from the master's answers, and from their times, whether the ROS master is there."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Silence:
 
 
 class Standing(Enum):
-    """How it is with the master."""
+    """The state of the master, as the node sees it."""
 
     UNKNOWN = "unknown"
     THERE = "there"
@@ -57,7 +57,7 @@ LOST = frozenset({Standing.GONE, Standing.ANOTHER, Standing.MUTE})
 
 @dataclass(frozen=True)
 class View:
-    """What is thought of the master after all that came of the questions so far."""
+    """The node's view of the master after all answers so far."""
 
     standing: Standing = Standing.UNKNOWN
     pid: int | None = None
@@ -69,16 +69,16 @@ class View:
 
     @property
     def lost(self) -> bool:
-        """Tell whether the node has to end: it would not be registered again."""
+        """Tell whether the node has to end, because a new master would not know it."""
         return self.standing in LOST
 
     @property
     def pause(self) -> float:
-        """Return the time to the next question, wall s."""
+        """Return the wall s until the next question."""
         return SECOND_LOOK if self.standing is Standing.REFUSED else PERIOD
 
     def timeout(self, now: float, patience: float = PATIENCE) -> float:
-        """Return the time for an answer to a question that is put now, wall s."""
+        """Return the wall s in which a question that is asked now must be answered."""
         if self.silent_since is None:
             return TIMEOUT
         return max(_SHORTEST_TIMEOUT, min(LONG_TIMEOUT, self.silent_since + patience - now))
@@ -106,7 +106,7 @@ class View:
         return replace(self, standing=standing, reason=came.reason, refused_at=None, silent_since=since)
 
     def text(self, uri: str, consequence: str, patience: float = PATIENCE) -> str:
-        """Return the line that tells of a master which does not answer or is lost."""
+        """Return the line that says that the master does not answer or is lost."""
         if self.standing is Standing.SILENT:
             return f"ROS master {uri} does not answer ({self.reason}): it ends if that lasts for {patience:g} s"
         if self.standing is Standing.MUTE:

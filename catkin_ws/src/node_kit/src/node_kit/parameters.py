@@ -1,7 +1,8 @@
-"""Values of parameters, checked: what each kind of value is, once for all nodes.
+"""Checks of parameter values. Each kind of value has one definition for all nodes.
 
 The functions check one value. `ParameterTree` checks values of a mapping, as the parameter server, a launch file or a
-bag holds it, by their names. What can't be used raises a ParameterError with the full name, the value and the remedy.
+bag holds it, by their names. A value that can't be used raises a ParameterError with the full name, the value and the
+remedy.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def flag(value: object, name: str) -> bool:
 
 
 def text(value: object, name: str) -> str:
-    """Return a text; nothing is the empty one. A number is taken as its digits, as which YAML reads some names.
+    """Return a text; no value is the empty text. A number becomes its digits, because YAML reads some names as numbers.
 
     Raises:
         ParameterError: it is none.
@@ -134,7 +135,7 @@ def texts(value: object, name: str) -> list[str]:
 
 
 def numbers(value: object, name: str) -> list[float]:
-    """Return a list of finite numbers; a text such as `[0.1, 0.3]` is one, as base_local_planner has it.
+    """Return a list of finite numbers. A text such as `[0.1, 0.3]` is a list, too, as in base_local_planner.
 
     Raises:
         ParameterError: it is neither.
@@ -173,7 +174,7 @@ def mapping(value: object, name: str, content: str = "") -> Mapping[str, Any]:
 
 
 class ParameterTree:
-    """One level of a tree of parameters. A default is checked as a given value is, but may be an infinite number."""
+    """One level of a tree of parameters. Defaults are checked like given values, but may be infinite."""
 
     def __init__(self, values: object, place: str = PRIVATE) -> None:
         """Take the values.
@@ -191,7 +192,7 @@ class ParameterTree:
         self.values: Mapping[str, Any] = values
 
     def full_name(self, name: str) -> str:
-        """Return a parameter's name with that of the level."""
+        """Return the full name of a parameter of this level."""
         return f"{self._place}{'' if self._place.endswith((PRIVATE, '/')) else '/'}{name}"
 
     def child(self, name: str) -> ParameterTree:
@@ -220,7 +221,7 @@ class ParameterTree:
         above: bool = False,
         formerly: str = "",
     ) -> float:
-        """Return a number within its range; `formerly` is the name that older files have for it."""
+        """Return a number within its range; `formerly` is its name in older files."""
         if formerly and not self.has(name) and self.has(formerly):
             name = formerly
         if not self.has(name) and math.isinf(default):

@@ -1,4 +1,4 @@
-"""Plug-ins, the ROS way: what packages on ROS_PACKAGE_PATH export in their package.xml.
+"""Finds and loads plug-ins, which packages on ROS_PACKAGE_PATH export in their package.xml.
 
     <export><rosgraph_manipulator tactic="NAME" function="MODULE:FUNCTION"/></export>
 
@@ -28,7 +28,7 @@ class PluginError(Exception):
 
 @dataclass(frozen=True)
 class Plugin:
-    """One export. Nothing of it is imported before `load`."""
+    """One export of a package. Only `load` imports its code."""
 
     package: str
     """The package that exports it; "" where somebody names the target directly."""
@@ -57,7 +57,7 @@ class Plugin:
 
     @contextlib.contextmanager
     def guard(self, *passing: type[Exception]) -> Iterator[None]:
-        """Turn what the plug-in's code raises in the `with` into a PluginError.
+        """Turn any exception of the plug-in's code in the `with` block into a PluginError.
 
         Args:
             passing: errors that are raised as they are, since they blame the plug-in's input.
@@ -82,7 +82,7 @@ class Plugin:
 def find(tag: str, kind: str, target: str = "function") -> dict[str, Plugin]:
     """Return the exports of one kind, by name, in the order of the packages' names.
 
-    A name that is exported more than once has an entry that can't be loaded: none of them is taken.
+    If several exports have the same name, the entry of that name can't be loaded.
 
     Args:
         tag: name of the export's element.
@@ -104,7 +104,7 @@ def find(tag: str, kind: str, target: str = "function") -> dict[str, Plugin]:
 
 
 def named(tag: str, kind: str, target: str) -> Plugin | None:
-    """Return the plug-in that somebody names by its target instead of its name; None where that is no target."""
+    """Return the plug-in of a target such as `module:Class`; None if the text is not a target."""
     match = _TARGET.fullmatch(target)
     return Plugin("", tag, kind, match["attribute"], target) if match else None
 
@@ -116,7 +116,7 @@ def _misfit(target: str) -> str:
 def _exported(tag: str) -> Iterator[tuple[str, Mapping[str, str]]]:
     """Yield (package, attributes) of every `<export><TAG .../></export>`, in the order of the packages' names.
 
-    A package.xml that can't be read is passed over: somebody else's broken package is no reason to do nothing.
+    A package.xml that can't be read is skipped: somebody else's broken package must not stop us.
     """
     packages = rospkg.RosPack()
     for package in sorted(packages.list()):

@@ -56,7 +56,7 @@ class Pose:
         return Pose(-cos * self.x - sin * self.y, sin * self.x - cos * self.y, wrap(-self.yaw))
 
     def apply(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return points (N, 2), given in this pose's frame, in the frame that this pose is given in."""
+        """Return points (N, 2) of this pose's frame, converted to the frame in which this pose is given."""
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         return points @ np.array([[cos, sin], [-sin, cos]]) + (self.x, self.y)
 

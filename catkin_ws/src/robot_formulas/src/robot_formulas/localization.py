@@ -1,4 +1,4 @@
-"""How uncertain a position is."""
+"""The uncertainty of a position."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ BATTERY_CAPACITY_WH = 2400.0
 
 
 class PowerError(ValueError):
-    """A value that the power model refuses."""
+    """The power model refuses a value."""
 
 
 def power_load(
@@ -110,7 +110,7 @@ class PowerMeter:
         self._commands += 1
 
     def tick(self, now: float) -> float | None:
-        """Return the load since the last tick and start anew; None where no time has passed (or it ran backwards)."""
+        """Return the load since the last tick, and start anew; None if no time has passed or time ran backwards."""
         elapsed = now - self._since
         if elapsed <= 0.0:
             self._start(now)
@@ -140,12 +140,12 @@ class Battery:
         self.charge = charge
 
     def drain(self, load: float, duration: float) -> None:
-        """Take out what a load (model's scale) consumes in a time (s)."""
+        """Remove the charge that a load (model's scale) consumes in a time (s)."""
         self.charge = max(self.charge - load * WATTS_PER_LOAD * duration / 3600.0 / BATTERY_CAPACITY_WH, 0.0)
 
     @property
     def voltage(self) -> float:
-        """Open-circuit voltage in V: 22 V empty to 26 V full, linear, as of a lead-acid pack of 24 V."""
+        """Open-circuit voltage in V: linear from 22 V (empty) to 26 V (full), like a lead-acid pack of 24 V."""
         return 22.0 + 4.0 * self.charge
 
     def current(self, load: float) -> float:

@@ -15,7 +15,7 @@ BRAKING_GAIN = 0.40
 
 
 def braking_distance(speed: float, gain: float = BRAKING_GAIN) -> float:
-    """Return the distance in which the robot counts as able to stop, as published: speed / gain.
+    """Return the published braking distance: speed / gain.
 
     Args:
         speed: magnitude of the velocity in m/s; the sign is ignored.
@@ -49,7 +49,7 @@ def physical_braking_distance(speed: float, max_deceleration: float, reaction_ti
 
 
 def safety_risk(obstacle_distance: float, d_break: float) -> float:
-    """Return 0 where the obstacle is at least the braking distance away, else 1 - distance / braking distance.
+    """Return 0 if the obstacle is at least the braking distance away, else 1 - distance / braking distance.
 
     Args:
         obstacle_distance: distance in m of the closest obstacle in the direction of motion; inf where there is none.

@@ -1,1 +1,1 @@
-"""R1: what runs, what should run, and how well."""
+"""R1: watches what runs, what should run, and the levels of quality attributes."""

@@ -29,7 +29,7 @@ _ENDED = "ended", "ended: it has unregistered from the master"
 
 @dataclass(frozen=True)
 class Patience:
-    """Wall seconds for which something that may be about to change is not reported.
+    """How long the monitor waits, in wall s, before it reports something that may still change.
 
     Attributes:
         startup: in which an expected node may come up for the first time, and complete its interfaces.
@@ -45,7 +45,7 @@ class Patience:
 
 @dataclass
 class _Told:
-    """What was found of the nodes so far."""
+    """What is known about the nodes so far."""
 
     gone: dict[str, tuple[str, str]] = field(default_factory=dict)
     alive_since: dict[tuple[str, str], float] = field(default_factory=dict)
@@ -53,7 +53,7 @@ class _Told:
 
 
 class GraphEvaluator:
-    """Judges the graph, evaluation after evaluation."""
+    """Evaluates the graph, and remembers earlier evaluations."""
 
     def __init__(
         self,
@@ -120,7 +120,7 @@ class GraphEvaluator:
         return statuses
 
     def excused_topics(self, snapshot: GraphSnapshot, desired: Desired, topics: Iterable[str]) -> frozenset[str]:
-        """Return those of the topics that only nodes under reconfiguration publish."""
+        """Return the topics that only nodes under reconfiguration publish."""
         if not desired.excused:
             return frozenset()
         modelled: dict[str, set[str]] = {}
@@ -154,7 +154,7 @@ class GraphEvaluator:
     def _compared(
         self, snapshot: GraphSnapshot, system: RosSystem, dead: dict[str, tuple[str, str]], excused: frozenset[str]
     ) -> tuple[Finding, ...]:
-        """Compare, unless all is as it was the last time: most of the time, nothing changes."""
+        """Compare the graph if something has changed since the last time: mostly, nothing has."""
         if self._last is not None:
             (last_snapshot, last_system, *last), findings = self._last
             if last_snapshot is snapshot and last_system is system and last == [dead, excused]:
@@ -164,7 +164,7 @@ class GraphEvaluator:
         return findings
 
     def _settled(self, findings: Sequence[PortFinding], now: float) -> set[PortFinding]:
-        """Return the findings that have lasted, on nodes that have had the time to start."""
+        """Return the findings that have lasted, and whose nodes have had time to start."""
         since = {finding: self._told.ports_since.get(finding, now) for finding in findings}
         self._told.ports_since = since
         young = {
@@ -211,7 +211,7 @@ class GraphEvaluator:
         life: Mapping[str, Life],
         topics: Sequence[TopicVerdict],
     ) -> None:
-        """Mark a component as failed whose topic is wrong: the one that is named, or else the publisher's."""
+        """Mark the component of a bad topic as failed: the component that is named, else that of the publisher."""
         for verdict in topics:
             topic, component = verdict.spec.name, verdict.spec.component
             nodes = self._publishers(snapshot, topic)

@@ -28,7 +28,7 @@ _ARRIVALS = 20
 
 
 class StaleInputError(Exception):
-    """Raised by an observer whose input is too old or does not suffice; the message says which and why."""
+    """The input of an observer is too old or not sufficient; the message says which input and why."""
 
 
 class Observer:
@@ -66,7 +66,7 @@ class Observer:
 
     @property
     def topics(self) -> Topics:
-        """Topics to which it listens now; asked before each evaluation, so it may change."""
+        """Topics to which it listens now. It may change: the monitor asks before each evaluation."""
         return []
 
     @property
@@ -95,7 +95,7 @@ class Observer:
                 self.settings[key] = value
 
     def follow(self, system: RosSystem | None) -> None:
-        """Learn which system is active, whenever that changes; None where no model says so."""
+        """Take the active system whenever it changes; None if no model tells it."""
 
     def receive(self, topic: str, msg: Any, now: float) -> None:
         """Take a message. `now` is ROS time in s."""
@@ -110,12 +110,12 @@ class Observer:
     def generate_diagnostics(self, now: float) -> list[DiagnosticStatus]:
         """Override: return the statuses of this evaluation, or raise StaleInputError.
 
-        An override in the published form does without `now`.
+        An override in the published form has no `now`.
         """
         raise NotImplementedError
 
     def evaluate(self, now: float) -> list[DiagnosticStatus]:
-        """Evaluate at ROS time `now` in s, and turn stale input and values that are no numbers into "QA stale"."""
+        """Evaluate at ROS time `now` in s. Stale input, or a value that is not a number, becomes "QA stale"."""
         try:
             timed = inspect.signature(self.generate_diagnostics).parameters
             statuses = self.generate_diagnostics(now) if timed else self.generate_diagnostics()  # type: ignore[call-arg]
@@ -124,7 +124,7 @@ class Observer:
             return [self.stale(str(error))]
 
     def stale(self, reason: str) -> DiagnosticStatus:
-        """Return the status that says that the quality attribute is not known now."""
+        """Return the status that says that the quality attribute is unknown now."""
         return DiagnosticStatus(
             level=DiagnosticStatus.STALE,
             name=self._id,
@@ -183,7 +183,7 @@ class TopicObserver(Observer):
         self._arrivals.clear()
 
     def rate(self, topic: str, now: float) -> float:
-        """Return the rate of a topic in Hz, over its last messages; it falls while none come."""
+        """Return the rate of a topic in Hz over its last messages; it falls while no message comes."""
         arrivals = self._arrivals.get(topic) or deque[float]()
         if len(arrivals) < 2:
             return 0.0
@@ -209,12 +209,12 @@ class TopicObserver(Observer):
         raise NotImplementedError
 
     def generate_diagnostics(self, now: float) -> list[DiagnosticStatus]:
-        """Return what `calculate_attr` makes of the latest messages."""
+        """Return the status that `calculate_attr` computes from the latest messages."""
         return [self.calculate_attr([self.latest(topic, now) for topic, _ in self.topics])]
 
 
 class ServiceObserver(Observer):
-    """An observer of what a service without arguments answers. While there is no such service, it is stale."""
+    """An observer of the answers of a service without arguments. It is stale while the service is missing."""
 
     client: Callable[[], Any]
     """Calls the service; set by who runs the observer."""
@@ -229,12 +229,12 @@ class ServiceObserver(Observer):
         raise NotImplementedError
 
     def generate_diagnostics(self, now: float) -> list[DiagnosticStatus]:  # noqa: ARG002 - interface
-        """Return what `diagnostics_from_response` makes of a new answer."""
+        """Return the statuses that `diagnostics_from_response` computes from a new answer."""
         return self.diagnostics_from_response(self.client())
 
 
 def _qa_name(observer: str) -> str:
-    """Return `safety` for `SafetyQualityObserver`, as the published names go."""
+    """Return `safety` for `SafetyQualityObserver`, following the published names."""
     stem = re.sub(r"(Quality)?Observer$", "", observer) or observer
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", stem).lower()
 

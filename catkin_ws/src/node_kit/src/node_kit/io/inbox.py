@@ -1,4 +1,4 @@
-"""Work for one thread, left by others.
+"""A queue of work that other threads leave for one thread.
 
 No queue.SimpleQueue: in CPython 3.7 to 3.11 its timed get can wait for ever. After a signal it computes the time that
 is left (`_queue_SimpleQueue_get_impl` in Modules/_queuemodule.c), and where the deadline has passed, that is negative,
@@ -36,7 +36,7 @@ class ClosedError(Exception):
 
 
 class Inbox:
-    """Threads leave work; one thread does it, in the order in which it came."""
+    """A queue of calls: any thread adds one, and one thread makes them in their order."""
 
     def __init__(self, wake: Callable[[], object] | None = None) -> None:
         """Make an empty inbox.
@@ -57,7 +57,7 @@ class Inbox:
     # From any thread
 
     def put(self, work: Callable[[], object], at_most: float = math.inf) -> bool:
-        """Leave work. What it raises comes up where it is done.
+        """Leave work. If it raises an exception, the thread that does it gets that.
 
         Args:
             work: what is to be done.
@@ -120,7 +120,7 @@ class Inbox:
                 self._calls.discard(future)
 
     def close(self, reason: str) -> None:
-        """Let whoever waits in a call, and who calls from now on, get a ClosedError with a reason."""
+        """Raise a ClosedError with a reason in all calls that wait, and in all later calls."""
         with self._news:
             self._closed = self._closed or reason
             calls = list(self._calls)
@@ -131,19 +131,19 @@ class Inbox:
     # From the thread that does the work
 
     def wait(self, longest_s: float) -> bool:
-        """Wait until there is work, so many wall s at most; return whether there is."""
+        """Wait until there is work, for a given number of wall s at most; return whether there is."""
         with self._news:
             return self._news.wait_for(lambda: bool(self._work), longest_s)
 
     def do_next(self, wait_s: float = 0.0) -> bool:
-        """Do the first piece of work, for which it is waited so many wall s; return whether there was one."""
+        """Wait for work, for a given number of wall s at most; do the first piece, and return whether there was one."""
         if not self._work and not (wait_s and self.wait(wait_s)):
             return False
         self._work.popleft()()
         return True
 
     def drain(self, wait_s: float = 0.0) -> None:
-        """Do what waits now; where that is nothing, wait for it so many wall s. Work that comes meanwhile is left."""
+        """Do the work that waits now; if there is none, wait for some. Later work stays in the queue."""
         if not self._work and wait_s:
             self.wait(wait_s)
         for _ in range(len(self._work)):

@@ -15,7 +15,7 @@ _log = logging.getLogger(__name__)
 
 
 class MasterWatch:
-    """Tells when the master falls silent, and when it is lost; then it ends."""
+    """A watch that reports when the master falls silent and when it is lost. It ends with the loss."""
 
     def __init__(self, tell: Callable[[View], None], on_loss: Callable[[View], None]) -> None:
         """Prepare to watch.

@@ -22,7 +22,7 @@ _SHORTEST_TIMEOUT = 0.001
 
 
 class CallError(Exception):
-    """A call has failed; one line that says who was called, with what, and what came of it."""
+    """A call has failed; one line that names the callee, the call and the failure."""
 
     def __init__(self, message: str, reason: str = "") -> None:
         super().__init__(message)
@@ -43,13 +43,13 @@ class GarbageError(CallError):
 
 
 class DeniedError(CallError):
-    """The answer is that it can't be done."""
+    """The callee answers that it can't do the call."""
 
 
 class Client:
-    """Calls one API over a connection that is kept from call to call. Not for several threads at once.
+    """A client of one API. It keeps its connection from call to call. Only one thread at a time may use it.
 
-    Looking up a host's name has no deadline: the system's resolver has its own.
+    The lookup of a host name has no deadline: the system's resolver has a timeout of its own.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class Client:
         return value
 
     def call_all(self, calls: Sequence[tuple[Any, ...]]) -> list[tuple[bool, Any]]:
-        """Make many calls (method, argument, ...) in one request; return of each whether it succeeded, and its value.
+        """Make many calls (method, argument, ...) in one request. Return for each whether it succeeded, and its value.
 
         Raises:
             GoneError, SilentError, GarbageError: the request has failed.
@@ -156,10 +156,10 @@ def _outcome(answer: Any) -> tuple[bool, Any]:
 
 
 class _Transport(xmlrpc.client.Transport):
-    """A transport whose calls end by a deadline, be the answer slow to begin or slow to come.
+    """A transport whose calls end at a deadline, even if the answer arrives slowly.
 
-    Answers are not asked for compressed: that takes both sides longer than it saves on a robot, and makes the same
-    answer look different.
+    It does not ask for compressed answers. On a robot, compression takes both sides longer than it saves, and it makes
+    equal answers look different.
     """
 
     accept_gzip_encoding = False
@@ -201,14 +201,14 @@ class _Connection(http.client.HTTPConnection):
     deadline = 0.0
 
     def connect(self) -> None:
-        """Connect within what is left of the time."""
+        """Connect within the remaining time."""
         self.timeout = max(self.deadline - time.monotonic(), _SHORTEST_TIMEOUT)
         super().connect()
         plain = self.sock
         self.sock = _DeadlineSocket(plain.family, plain.type, plain.proto, fileno=plain.detach())
 
     def send(self, data: Any) -> None:
-        """Send, after connecting where that is still to be done; the answer has the same deadline."""
+        """Connect if there is no connection yet, and send. The answer has the same deadline."""
         if self.sock is None:
             self.connect()
         if isinstance(self.sock, _DeadlineSocket):
@@ -217,17 +217,17 @@ class _Connection(http.client.HTTPConnection):
 
 
 class _DeadlineSocket(socket.socket):
-    """A socket on which all that is sent and received must be done by a deadline, however small the pieces."""
+    """A socket with one deadline for all that it sends and receives, however small the pieces are."""
 
     deadline = 0.0
 
     def recv_into(self, *arguments: Any, **options: Any) -> int:
-        """Receive within what is left of the time."""
+        """Receive within the remaining time."""
         self._hurry()
         return super().recv_into(*arguments, **options)
 
     def sendall(self, *arguments: Any, **options: Any) -> None:
-        """Send within what is left of the time."""
+        """Send within the remaining time."""
         self._hurry()
         super().sendall(*arguments, **options)
 

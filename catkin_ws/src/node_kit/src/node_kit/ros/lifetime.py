@@ -1,4 +1,4 @@
-"""A node's life: joined to the master, ended by a signal, a request, an error or with its master, always in time."""
+"""The life of a node: it starts, and ends in time by a signal, a request, an error or the loss of its master."""
 
 from __future__ import annotations
 
@@ -25,41 +25,41 @@ BAD_START = 2
 """Exit status of a start that failed. The loss of the master ends a node with 0: it has done all it could."""
 
 LONGEST_END = 3.0
-"""Wall s, after which a node that is to end is cut off: rospy asks the master without a deadline."""
+"""Wall s for a node to end; then its process is cut off, because rospy calls the master without a deadline."""
 
 LONGEST_END_WITHOUT_MASTER = 0.5
-"""The same where nobody is left to say goodbye to."""
+"""The same when there is no master at which to unregister."""
 
 _show_thread_error = threading.excepthook  # Python 3.8 has no threading.__excepthook__
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Lifetime:
-    """What a node does is within the `with` of its lifetime, in the main thread; the process ends there.
+    """The life of a node, for a `with` block in the main thread. The process ends with the block.
 
         with Lifetime("camera", ParameterError) as life:
             life.start()
             CameraNode()
             rospy.spin()
 
-    An error there that comes of the master's loss gives the one line of that, no traceback.
+    If the loss of the master causes an error in the block, the node writes one line about the loss, and no traceback.
     """
 
     def __init__(self, name: str, *refusals: type[Exception]) -> None:
         """Prepare.
 
         Args:
-            name: the node's name, until it may have been given another one.
-            refusals: errors that are no defect but input that can't be used: told in one line, exit status 2.
+            name: the node's name; rospy may give it another one at the start.
+            refusals: errors that mean unusable input: the node writes one line and ends with status 2.
         """
         self.on_end: Callable[[str], None] = self.end
-        """Called with a reason when a signal or the loss of the master is to end the node; has to call `end`."""
+        """Called with a reason when a signal or the loss of the master ends the node; it must call `end`."""
         self.consequence = "it ends, start it again with the master"
-        """What the line about the loss of the master says of the node."""
+        """What the line about the loss of the master says about the node."""
         self.longest_end = LONGEST_END
-        """Wall s after which the end is cut short."""
+        """Wall s after which the process ends in any case."""
         self.longest_end_without_master = LONGEST_END_WITHOUT_MASTER
-        """The same where the master is lost; more for a node that has something else to end."""
+        """The same after the loss of the master. A node that has to end other processes sets more."""
         self.watch = MasterWatch(self._tell, self._on_loss)
         self._name = name
         self._refusals = (*refusals, _StartError)
@@ -68,7 +68,7 @@ class Lifetime:
         self._shutting_down: int | None = None  # the thread in which rospy shuts down
 
     def __enter__(self) -> Lifetime:
-        """Have signals end the process from now on, whatever it is at."""
+        """Have signals end the process from now on, whatever it does."""
         _on_signal(lambda number: self.on_end(f"signal {number}"))
         threading.excepthook = self._on_thread_error
         rospy.on_shutdown(self._on_shutdown)
@@ -105,17 +105,17 @@ class Lifetime:
 
     @property
     def is_ending(self) -> bool:
-        """Tell whether the node is to end."""
+        """Tell whether the node is about to end."""
         return self._claim.locked() or self._shutting_down is not None
 
     def say(self, line: str) -> None:
-        """Write a line on stderr: rospy's log asks the master for a parameter, and would wait for it."""
+        """Write a line to stderr. rospy's log would ask the master for a parameter, and might wait for it."""
         with contextlib.suppress(OSError, ValueError):  # nobody reads any more
             sys.stderr.write(f"{self._name}: {line}\n")
             sys.stderr.flush()
 
     def end(self, reason: str, status: int = 0) -> NoReturn:
-        """Say goodbye to the master and end the process, in time. Whoever calls it while it ends waits for the end."""
+        """Unregister at the master and end the process, in time. A second caller waits for the end."""
         if self._claim.acquire(blocking=False):
             self._status = status
             self.cut_off(self.longest_end_without_master if self.watch.lost else self.longest_end)
@@ -126,7 +126,7 @@ class Lifetime:
             time.sleep(LONGEST_END)
 
     def cut_off(self, patience: float) -> None:
-        """End the process after so many wall s, whatever it waits for."""
+        """End the process after `patience` wall s, whatever it waits for."""
 
         def wait() -> None:
             time.sleep(patience)
@@ -143,7 +143,7 @@ class Lifetime:
             self._leave()
 
     def _on_thread_error(self, failure: threading.ExceptHookArgs) -> None:
-        """Leave out what comes of the end, or of the master's loss, in other threads, such as those of rospy."""
+        """Hide errors of other threads that follow from the end or from the master's loss."""
         if not self.is_ending and (failure.thread is self.watch.thread or self.watch.confirm()):
             _show_thread_error(failure)
 
@@ -158,7 +158,7 @@ class Lifetime:
             self.on_end("the master is lost")
 
     def _leave(self) -> NoReturn:
-        """End the process: threads of rospy and actionlib would keep it, and the closed server of its API spins."""
+        """End the process at once: threads of rospy and actionlib would keep it alive, and its API server spins."""
         try:
             logging.shutdown()
             sys.stdout.flush()
@@ -172,10 +172,10 @@ class _StartError(Exception):
 
 
 def _on_signal(act: Callable[[int], object]) -> None:
-    """Have the first signal that asks for an end call a function with its number, in a thread of its own.
+    """Call a function with the number of the first signal that asks for an end, in a thread of its own.
 
-    A handler of Python's runs inside whatever the main thread is at, and waits there for locks that this may hold. Here
-    the C part of the signal handling wakes a thread.
+    A Python handler interrupts the main thread, which may hold the very locks that the handler needs. So here the C
+    part of the signal handling wakes another thread.
     """
     signals, wake = os.pipe()
     os.set_blocking(wake, False)

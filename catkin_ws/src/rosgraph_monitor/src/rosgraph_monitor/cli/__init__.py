@@ -1,1 +1,1 @@
-"""Commands that are no ROS nodes."""
+"""Commands that are not ROS nodes."""

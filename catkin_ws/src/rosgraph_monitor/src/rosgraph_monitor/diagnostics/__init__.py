@@ -1,1 +1,1 @@
-"""What is said on /diagnostics, and how it is shown. Pure."""
+"""The statuses on /diagnostics, and how they are shown. Pure."""

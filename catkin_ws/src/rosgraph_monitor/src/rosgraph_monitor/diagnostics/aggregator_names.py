@@ -1,7 +1,7 @@
-"""Names for the diagnostic aggregator, which knows a status by its name alone.
+"""Names for the diagnostic aggregator, which identifies a status by its name alone.
 
-The published forms use one name for many things: the name of a node for its absence, its parameters and its CPU, and
-none at all for a quality attribute. Here each thing gets a name of its own, which begins with its group.
+The published forms use one name for many things: the name of a node stands for its absence, its parameters and its CPU.
+A quality attribute has no name at all. Here each thing gets a name of its own, which begins with its group.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _OF_USAGE = (Words.CPU_USAGE, Words.MEMORY_USAGE)
 
 
 def unique_name(status: Any) -> str:
-    """Return a name that no other thing has; statuses of other origin keep theirs.
+    """Return a name that nothing else has; statuses of other nodes keep their names.
 
     Args:
         status: with the fields of diagnostic_msgs/DiagnosticStatus.

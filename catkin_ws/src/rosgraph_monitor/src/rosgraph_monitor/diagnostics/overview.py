@@ -1,4 +1,4 @@
-"""What diagnostics say of nodes, qualities and findings at present, as tables for a terminal. Pure."""
+"""Tables for a terminal: the present state of nodes, qualities and findings, from diagnostics. Pure."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ _IN_CHANGE = frozenset({FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOV
 
 @dataclass(frozen=True)
 class Grounding:
-    """A function, the configuration that provides it, and the state of that (as in FunctionGrounding messages)."""
+    """A function, the configuration that provides it, and its state (as in FunctionGrounding messages)."""
 
     function: str
     configuration: str

@@ -1,4 +1,4 @@
-"""What the comparison of the graph with the model finds, and how it is said on /diagnostics."""
+"""The findings of the comparison of graph and model, and their form on /diagnostics."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class WrongType:
 
 @dataclass(frozen=True)
 class MissingConnection:
-    """Two running nodes that the model connects, and that share no such topic or action."""
+    """Two running nodes that the model connects, but that share no such topic or action."""
 
     name: str
     source: str
@@ -93,12 +93,12 @@ Finding = MissingNode | AdditionalNode | WrongParameter | PortFinding
 
 
 def concerned(finding: PortFinding) -> tuple[str, ...]:
-    """Return the nodes that a finding concerns."""
+    """Return the nodes to which a finding applies."""
     return finding.nodes if isinstance(finding, MissingConnection) else (finding.node,)
 
 
 def finding_statuses(findings: Iterable[Finding]) -> list[Status]:
-    """Return the findings as statuses, one each; but the wrong parameters of one node share a status.
+    """Return one status for each finding; only the wrong parameters of one node share a status.
 
     The values of "Wrong param configuration" are (parameter, actual value), and then (`expected/PARAMETER`, value).
     Other findings have the values `expected` and `actual`.

@@ -38,19 +38,19 @@ def relative(name: str, namespace: str = "/") -> str | None:
 
 
 def in_node(name: str, node: str) -> str:
-    """Return the name in the graph that a node means, given the node's resolved name: `~` is the node itself."""
+    """Return the name in the graph for a name that a node uses, given the node's resolved name: `~` is the node."""
     if name.startswith("~"):
         return f"{node}/{name[1:].lstrip('/')}"
     return resolved(name, node.rpartition("/")[0] or "/")
 
 
 def is_ignored_node(name: str, patterns: Iterable[str]) -> bool:
-    """Return whether a node may run beside the model: its name is anonymous, or fits a shell pattern."""
+    """Return whether a node may run that the model lacks: its name is anonymous or fits a shell pattern."""
     return _ANONYMOUS.fullmatch(name) is not None or any(fnmatch.fnmatchcase(name, p.lstrip("/")) for p in patterns)
 
 
 def is_ignored_port(name: str, node: str, patterns: Iterable[str]) -> bool:
-    """Return whether a node may have an interface beside the model.
+    """Return whether a node may have an interface that the model lacks.
 
     Args:
         name: resolved name of the topic, service or action.
@@ -62,7 +62,7 @@ def is_ignored_port(name: str, node: str, patterns: Iterable[str]) -> bool:
 
 
 def instance(name: str, nodes: Collection[str]) -> str | None:
-    """Return the node that a resolved name of the model stands for: itself, else the first anonymous instance of it."""
+    """Return the running node for a resolved name of the model: the same name, else its first anonymous instance."""
     if name in nodes:
         return name
     stem = _stem(name)

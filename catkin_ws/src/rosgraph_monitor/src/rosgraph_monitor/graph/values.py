@@ -43,7 +43,7 @@ def _same_scalar(expected: object, actual: object) -> bool:
 
 
 def _converted(text: str) -> object:
-    """Return what roslaunch makes of the text of a parameter without a type."""
+    """Return the value to which roslaunch converts the text of a parameter without a type."""
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
     try:

@@ -1,4 +1,4 @@
-"""Interfaces, types and connections: what the model says of them against what the master lists. Pure."""
+"""Compares interfaces, types and connections of the model with those that the master lists. Pure."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def port_types(models: Iterable[PackageSet]) -> PortTypes:
 
 @dataclass(frozen=True)
 class Live:
-    """A component that runs: its model, and its node in the graph."""
+    """A component that runs, with its model and its node in the graph."""
 
     component: Component
     node: NodeState
@@ -67,8 +67,8 @@ def compare_ports(
 ) -> Iterator[PortFinding]:
     """Compare the interfaces of the components that run, given by their names, with the model.
 
-    A component without any port in the model is not judged: its model says nothing of interfaces. A node to which
-    nobody listens may leave out subscriptions, as lazy publishers do. Services' clients are not known to the master.
+    A component that has no port in the model is not judged: its model says nothing about interfaces. If nobody listens
+    to a node, it may lack subscriptions, as lazy publishers do. The master does not know the clients of services.
 
     Yields:
         Missing ports, wrong types, additional ports, missing connections. Names are relative to the namespace.
@@ -92,7 +92,7 @@ _Wanted = dict[tuple[PortKind, str], tuple["Port", frozenset[str]]]
 def _wanted(called: Mapping[tuple[str, str], Iterable[str]], entry: Live) -> _Wanted:
     """Return what a component should have, given the connections' names by component and port.
 
-    A port is called as its connection, as itself, or as in the node's code: which one depends on the launch file.
+    A port has the name of its connection, its own name, or the name in the node's code. The launch file decides which.
     """
     component, node = entry.component, entry.node.name
     wanted = {}
@@ -163,7 +163,7 @@ def _connection(
 def _names_of(
     end: PortPath, kind: PortKind, live: Mapping[str, Live], wanted: Mapping[str, _Wanted]
 ) -> frozenset[str] | None:
-    """Return the names under which an end is in the graph; None where it can't be judged."""
+    """Return the names that an end may have in the graph; None if it can't be judged."""
     if end.component not in live or (kind, end.port) not in wanted[end.component]:
         return None
     return wanted[end.component][kind, end.port][1] & _has(live[end.component].node, kind)
@@ -174,7 +174,7 @@ def _is_lazy(snapshot: GraphSnapshot, end: PortPath, kind: PortKind, live: Mappi
 
 
 def _nobody_listens(snapshot: GraphSnapshot, node: NodeState) -> bool:
-    """Return whether a node publishes something of its own, to which nobody listens."""
+    """Return whether a node has topics of its own to which nobody listens."""
     own = [topic for topic in node.publications if topic not in COMMON_TOPICS]
     return bool(own) and not any(snapshot.topics[topic].subscribers for topic in own)
 
@@ -212,7 +212,7 @@ def _listed(node: NodeState) -> dict[PortKind, tuple[str, ...]]:
 
 
 def _covered(kind: PortKind, names: Iterable[str], listed: PortKind) -> Iterable[str]:
-    """Return the names of another kind that a port accounts for: a topic of an action stands for the action."""
+    """Return the names of another kind that a port covers: a topic of an action stands for the action."""
     if kind is listed:
         return names
     if listed in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT):

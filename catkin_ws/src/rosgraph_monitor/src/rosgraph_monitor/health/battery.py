@@ -24,7 +24,7 @@ class BatterySpec:
 
 
 def charge_of(percentage: float, charge: float, capacity: float) -> float | None:
-    """Return the charge, 0..1, from the fields of a BatteryState, None where they do not tell.
+    """Return the charge, 0..1, from the fields of a BatteryState; None if they do not tell it.
 
     Args:
         percentage: 0..1, NaN where it is not measured.

@@ -1,4 +1,4 @@
-"""Status of components: what the state of nodes and topics means for them, over time. Pure; time is an argument."""
+"""Status of components over time, from the state of nodes and topics. Pure; time is an argument."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ComponentStatus(enum.Enum):
 
 
 class NodeCondition(enum.Enum):
-    """What is known of a node at this moment. FAILED: it runs, but does not do what it should."""
+    """The present condition of a node. FAILED: it runs, but does not work as it should."""
 
     ALIVE = "alive"
     GONE = "gone"
@@ -45,7 +45,7 @@ class _Seen:
 
 @dataclass(frozen=True)
 class ComponentMap:
-    """What stands for components.
+    """Which nodes, topics and batteries stand for components.
 
     Attributes:
         of_node: component by name of the node, relative to the system's namespace.
@@ -103,7 +103,7 @@ def _battery(component: str, topic: str, settings: dict[str, Any]) -> BatterySpe
 
 
 class ComponentTracker:
-    """Follows nodes, and says what becomes of their components.
+    """Follows nodes, and derives the status of their components.
 
     A node that ran and went has failed at once, unless somebody may restart it (it has patience then); one that never
     ran, after a grace; one that runs but does not do what it should, at once. A node that is excused (being
@@ -185,7 +185,7 @@ class ComponentTracker:
 
 
 def component_statuses(components: Iterable[tuple[str, ComponentStatus]]) -> list[Status]:
-    """Return the components' statuses in the published form."""
+    """Return the statuses of components in the published form."""
     return [
         Status(
             Level.ERROR if status is ComponentStatus.FALSE else Level.OK,

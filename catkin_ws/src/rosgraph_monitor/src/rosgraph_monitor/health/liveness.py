@@ -1,10 +1,11 @@
 """Liveness of one node, decided from events on a connection to its own API. Pure; time is an argument.
 
-A connection is held open to each node. When a process dies, the kernel closes its end at once: measured with rospy,
-an idle connection stays open for minutes and closes 3 ms after a SIGKILL. A closed connection alone proves nothing,
-since a server may close it after an answer (HTTP/1.0): so the node is called again, and is dead when it refuses. A
-process that is stopped or stuck keeps its connection, and its kernel goes on confirming what arrives, but getPid stays
-unanswered until a deadline. A host that is lost confirms nothing, which the kernel on this side tells before that.
+The monitor holds a connection open to each node. When a process dies, the kernel closes its end at once: measured with
+rospy, an idle connection stays open for minutes and closes 3 ms after a SIGKILL. A closed connection alone proves
+nothing, since a server may close it after an answer (HTTP/1.0). So the monitor connects again: if the connection is
+refused, the node is dead. A process that is stopped or stuck keeps its connection, and its kernel still confirms
+packets. But it does not answer getPid before the deadline. A lost host confirms no packet; the kernel on this side
+reports that earlier.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from dataclasses import dataclass, replace
 
 
 class Life(enum.Enum):
-    """What is known of a node."""
+    """What is known about a node's life."""
 
     UNKNOWN = "not asked yet"
     ALIVE = "alive"
@@ -26,7 +27,7 @@ class Life(enum.Enum):
 
 
 class Action(enum.Enum):
-    """What the holder of the socket is to do now."""
+    """What the holder of the socket must do now."""
 
     NONE = "none"
     CONNECT = "connect"
@@ -51,13 +52,13 @@ class Timing:
 
     @property
     def confirmation_deadline(self) -> float:
-        """Wall seconds in which the other host must confirm what it is sent: sooner than a process must answer."""
+        """Wall s in which the other host must confirm a packet: less than a process has for an answer."""
         return 0.6 * self.probe_deadline
 
 
 @dataclass(frozen=True)
 class Liveness:
-    """State of one node: what is known, and what goes on on its connection since when."""
+    """State of one node: what is known about it, what happens on its connection, and since when."""
 
     life: Life = Life.UNKNOWN
     connecting_since: float | None = None
@@ -68,7 +69,7 @@ class Liveness:
 
 
 def due(state: Liveness, now: float, timing: Timing) -> tuple[Liveness, Action]:
-    """Return what is to be done at this time, and the state once that has begun."""
+    """Return what to do now, and the state after that has begun."""
     if state.connecting_since is not None:
         if now - state.connecting_since >= timing.connect_deadline:
             return Liveness(life=Life.UNREACHABLE, next_at=now + timing.retry_period), Action.DROP
@@ -84,7 +85,7 @@ def due(state: Liveness, now: float, timing: Timing) -> tuple[Liveness, Action]:
 
 
 def due_at(state: Liveness, timing: Timing) -> float:
-    """Return when `due` will have something to do, if nothing happens before."""
+    """Return when `due` will have something to do if no event comes first."""
     if state.connecting_since is not None:
         return state.connecting_since + timing.connect_deadline
     if state.asked_at is None:
@@ -93,9 +94,9 @@ def due_at(state: Liveness, timing: Timing) -> float:
 
 
 def on_connected(state: Liveness, now: float) -> Liveness:
-    """Return the state once the connection stands: ask at once.
+    """Return the state after the connection is made: probe at once.
 
-    Being accepted is no sign of life yet: the kernel does that.
+    An accepted connection is no sign of life, because the kernel accepts it.
     """
     return replace(state, connecting_since=None, connected=True, asked_at=None, next_at=now)
 
@@ -106,9 +107,9 @@ def on_answer(state: Liveness, now: float, timing: Timing) -> Liveness:
 
 
 def on_closed(state: Liveness, now: float, timing: Timing) -> Liveness:
-    """Return the state after the other end closed the connection: try again before judging, at once if that helps.
+    """Return the state after the other end closed the connection: connect again before judging, at once if useful.
 
-    A server that goes on closing without an answer is no better than one that hangs.
+    A server that always closes without an answer counts as one that hangs.
     """
     fruitless = state.fruitless + 1
     if fruitless < _FRUITLESS_LIMIT:
@@ -122,14 +123,14 @@ def on_broken(state: Liveness, error: int, now: float, timing: Timing) -> Livene
 
 
 def on_no_socket(state: Liveness, now: float, timing: Timing) -> Liveness:
-    """Return the state after this process could not make a socket, which says nothing of the node."""
+    """Return the state after this process could not make a socket, which says nothing about the node."""
     return replace(state, connecting_since=None, next_at=now + timing.retry_period)
 
 
 def on_connect_error(state: Liveness, error: int, now: float, timing: Timing) -> Liveness:
     """Return the state after an attempt to connect failed with this errno.
 
-    A process that ends in the middle of it resets the connection: the host was reached, so that counts as closed.
+    If a process ends during the attempt, it resets the connection. The host was reached, so this counts as closed.
     """
     if error == errno.ECONNREFUSED:
         return on_refused(state, now, timing)
@@ -139,7 +140,7 @@ def on_connect_error(state: Liveness, error: int, now: float, timing: Timing) ->
 
 
 def on_refused(_state: Liveness, now: float, timing: Timing) -> Liveness:
-    """Return the state after an attempt to connect was refused: nobody is there."""
+    """Return the state after an attempt to connect was refused: no process listens."""
     return Liveness(life=Life.DEAD, next_at=now + timing.retry_period)
 
 

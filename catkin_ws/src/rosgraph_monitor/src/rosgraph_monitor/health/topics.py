@@ -28,7 +28,7 @@ _LIMITS = ("min_rate", "max_age", "stuck_after")
 
 @dataclass(frozen=True)
 class TopicSpec:
-    """What is expected of a topic; 0 or "" where nothing is.
+    """What is expected of a topic; 0 or "" means no expectation.
 
     Attributes:
         name: relative to the system's namespace, or absolute.
@@ -56,7 +56,7 @@ class TopicSpec:
 
 @dataclass(frozen=True)
 class TopicVerdict:
-    """What is wrong with a topic: nothing where the message is empty. `heard`: whether it is known at all."""
+    """What is wrong with a topic; an empty message means nothing. `heard`: whether its state is known."""
 
     spec: TopicSpec
     message: str = ""
@@ -113,7 +113,7 @@ def model_topics(system: RosSystem) -> dict[str, TopicSpec]:
 
 
 def merged(*layers: Mapping[str, TopicSpec]) -> dict[str, TopicSpec]:
-    """Return the expectations of several sources; of one topic, those of a later source go first."""
+    """Return the expectations of several sources; for one topic, a later source takes precedence."""
     found: dict[str, TopicSpec] = {}
     for layer in layers:
         for name, spec in layer.items():
@@ -123,7 +123,7 @@ def merged(*layers: Mapping[str, TopicSpec]) -> dict[str, TopicSpec]:
 
 
 def verdict_statuses(verdicts: Iterable[TopicVerdict]) -> list[Status]:
-    """Return a status for each topic with which something is wrong."""
+    """Return a status for each topic that has a problem."""
     return [
         Status(
             Level.ERROR,
@@ -149,7 +149,7 @@ class _Seen:
 
 
 class TopicHealth:
-    """Follows topics: tell it of each message, ask it for verdicts."""
+    """Follows topics: takes note of each message, and returns verdicts."""
 
     def __init__(self, grace: float = 10.0) -> None:
         """Start with nothing to follow.
@@ -184,9 +184,9 @@ class TopicHealth:
             seen.arrivals.append(now)
 
     def judge(self, ros: float, wall: float, excused: Collection[str] = ()) -> list[TopicVerdict]:
-        """Return a verdict on each topic; an excused one is fine, and begins anew when the excuse ends.
+        """Return a verdict on each topic. An excused topic is fine, and begins anew when the excuse ends.
 
-        All begin anew when ROS time has jumped back, or has begun: it is 0 until a simulation's first clock.
+        All topics begin anew when ROS time jumps back or begins: it is 0 until a simulation's first clock message.
         """
         jumped = ros < self._last_ros - _JUMP
         self._last_ros = ros
@@ -245,7 +245,7 @@ def _rate(arrivals: deque[float], min_rate: float, last: float, now: float) -> f
 
 
 def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Mapping[str, Any]]]:
-    """Yield (topic, settings): the parameter server takes a topic's slashes for levels of a tree."""
+    """Yield (topic, settings); the parameter server reads the slashes in a topic as levels of a tree."""
     settings = {key: value for key, value in tree.items() if not isinstance(value, dict)}
     if settings:
         if not prefix:

@@ -1,4 +1,4 @@
-"""Polls the graph in a thread of its own, so that a slow master holds up nothing else."""
+"""Polls the graph in a thread of its own, so that a slow master delays nothing else."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class GraphPoller:
         self._thread.start()
 
     def request(self) -> None:
-        """Poll soon, and not only when it is due."""
+        """Poll soon, before the next poll is due."""
         self._requested.set()
 
     def close(self) -> None:

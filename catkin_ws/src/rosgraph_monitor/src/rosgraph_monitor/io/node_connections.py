@@ -49,7 +49,7 @@ class _Target:
 
 
 class NodeConnections:
-    """Watches the nodes that it is told to. Start it once, close it at the end; all methods may be called anywhere."""
+    """Watches given nodes. Start it once, and close it at the end. Any thread may call its methods."""
 
     def __init__(self, on_change: Callable[[], None], timing: Timing = Timing(), caller_id: str = "/watcher") -> None:  # noqa: B008 - frozen
         """Prepare.
@@ -294,7 +294,7 @@ class NodeConnections:
             return  # full: it will wake anyway; closed: there is nobody to wake
 
     def _resolve(self, host: str) -> None:
-        """Look a host's address up in a thread of its own: a name server that doesn't answer holds up nobody else."""
+        """Look up a host's address in a thread of its own, so that a silent name server delays nothing else."""
         with self._lock:
             if host in self._resolving:
                 return

@@ -1,4 +1,4 @@
-"""Localization: how uncertain the robot is of where it stands."""
+"""Localization: the uncertainty of the robot's position."""
 
 from __future__ import annotations
 

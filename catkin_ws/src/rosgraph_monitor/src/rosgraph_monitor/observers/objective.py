@@ -21,7 +21,7 @@ _FAILED = frozenset({GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.LOST})
 class ObjectiveErrorObserver(Observer):
     """Publishes true on `obj_error` when the newest goal of an action fails, and false when another goal is on its way.
 
-    Goals that had failed before the observer heard of the action are not its concern.
+    It ignores goals that had failed before its first message from the action.
     """
 
     defaults: Mapping[str, Any] = {"actions": ["move_base"]}
@@ -60,7 +60,7 @@ class ObjectiveErrorObserver(Observer):
         self._told = None
 
     def take_outputs(self) -> list[tuple[str, Any]]:
-        """Return whether a goal has failed, where that is new."""
+        """Return whether a goal has failed, if that has changed."""
         failed = any(failed for _, failed, _ in self._newest.values())
         if failed == bool(self._told):
             return []
@@ -68,7 +68,7 @@ class ObjectiveErrorObserver(Observer):
         return [(OUTPUT, Bool(failed))]
 
     def generate_diagnostics(self, now: float) -> list[DiagnosticStatus]:  # noqa: ARG002 - interface
-        """Return how the newest goal of each action fares."""
+        """Return the state of the newest goal of each action."""
         return [
             DiagnosticStatus(
                 level=DiagnosticStatus.ERROR if failed else DiagnosticStatus.OK,

@@ -58,8 +58,9 @@ Points = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
 class SafetyQualityObserver(TopicObserver):
     """Publishes `safety` (a risk) and the distance of the closest obstacle at 10 Hz.
 
-    It reads the sensor that the active configuration navigates by: what a connection brings to a component, or what
-    `observation_sources` name. Where no configuration says so, the laser, and the point cloud when the laser is silent.
+    It reads the sensor with which the active configuration navigates: the one that a connection brings to a component,
+    or that `observation_sources` name. Where no configuration says so, the laser, and the point cloud when the laser is
+    silent.
     """
 
     qa_name = "safety"
@@ -90,7 +91,7 @@ class SafetyQualityObserver(TopicObserver):
         return [(DISTANCE, Float32)]
 
     def follow(self, system: RosSystem | None) -> None:
-        """Choose the sensor that the active system navigates by."""
+        """Choose the sensor with which the active system navigates."""
         self._chosen = (
             None
             if system is None
@@ -106,7 +107,7 @@ class SafetyQualityObserver(TopicObserver):
             super().receive(topic, msg, now)
 
     def take_outputs(self) -> list[tuple[str, Any]]:
-        """Return the distance, the sensor's range where nothing is seen, nothing while it is not known."""
+        """Return the distance: the sensor's range if nothing is seen; no message while the distance is unknown."""
         if math.isnan(self._distance):
             return []
         return [(DISTANCE, Float32(min(self._distance, self.settings["max_distance"])))]
@@ -169,9 +170,9 @@ class SafetyQualityObserver(TopicObserver):
 
 
 def navigation_sensor(system: RosSystem, scan_topic: str = SCAN, cloud_topic: str = CLOUD) -> str | None:
-    """Return which of the two sensors' topics a system navigates by, or None where the model does not say.
+    """Return the topic of the sensor with which a system navigates, or None if the model does not say.
 
-    `observation_sources` decide, as they are what costmaps read; without them, a connection named like the topic.
+    `observation_sources` decide, because costmaps read them; without them, a connection with the topic's name decides.
     """
     sources = {
         word

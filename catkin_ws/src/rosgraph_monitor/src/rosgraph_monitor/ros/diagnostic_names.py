@@ -1,4 +1,4 @@
-"""ROS shell of the names for the aggregator: passes diagnostics on, each under a name of its own."""
+"""ROS shell of the names for the aggregator: publishes each diagnostic again under a name of its own."""
 
 from __future__ import annotations
 

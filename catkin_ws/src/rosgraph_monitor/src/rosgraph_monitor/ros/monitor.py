@@ -118,7 +118,7 @@ class MonitorNode:
         )
 
     def run(self) -> None:
-        """Evaluate after every poll, and whenever a node or topic fails or returns, until node or master end."""
+        """Evaluate after every poll, and whenever a node or topic fails or returns, until the node ends."""
         while not self._ending:
             polled = self._poller.latest
             if polled:
@@ -134,7 +134,7 @@ class MonitorNode:
         self._events.set()
 
     def _on_life(self) -> None:
-        """Poll after a node died or came back: it may have unregistered, or have another address. Then evaluate."""
+        """Poll, then evaluate, after a node died or came back: it may be unregistered or have another address."""
         self._polled.clear()
         self._poller.request()
         self._events.set()
@@ -226,7 +226,7 @@ class MonitorNode:
         self._events.set()
 
     def _follow_topics(self) -> None:
-        """Watch the topics of which the settings or the active model expect something; settings go first."""
+        """Watch the topics for which the settings or the active model have expectations; settings take precedence."""
         system = self._model.current.system
         self._topics.follow(merged(model_topics(system) if system else {}, self._topic_specs))
 

@@ -40,7 +40,7 @@ _BASE = "Observer"
 
 
 class ObserverHost:
-    """Loads, runs and unloads observers; offers the four services. One that fails never stops another."""
+    """Loads, runs and unloads observers, and offers the four services. A failing observer never stops another."""
 
     def __init__(self, diagnostics: rospy.Publisher) -> None:
         """Publish statuses with this publisher of DiagnosticArray."""
@@ -56,7 +56,7 @@ class ObserverHost:
         )
 
     def load(self, name: str) -> bool:
-        """Start an observer; False, with a line that says why, if that fails or it runs already."""
+        """Start an observer. Return False, with a line that says why, if that fails or the observer runs already."""
         with self._lock:
             if name in self._runners:
                 rospy.logwarn("observer %s runs already", name)
@@ -117,8 +117,8 @@ class ObserverHost:
 class _Runner:
     """Runs one observer until it is stopped.
 
-    The observer is touched by its own thread alone: whatever it does there, callbacks of topics that it shares with
-    others, and those who tell it something, only leave things for it to pick up.
+    Only its own thread touches the observer. Callbacks of topics and other threads only leave data for it, so they
+    never wait for the observer.
     """
 
     def __init__(self, observer: Observer, diagnostics: rospy.Publisher) -> None:
@@ -149,7 +149,7 @@ class _Runner:
         self._news.append(system)
 
     def hangs_for(self) -> float:
-        """Return for how many wall s its evaluation has been going on beyond all patience; 0 where it has not."""
+        """Return the wall s of the present evaluation if it is overdue, else 0."""
         since = self._busy_since
         lasted = 0.0 if since is None else time.monotonic() - since
         return lasted if lasted > max(_PATIENCE, _PATIENCE_PERIODS / self.observer.rate_hz) else 0.0
@@ -235,9 +235,9 @@ class _Runner:
         self.observer.receive(topic, unpacked(msg, message_class), received)
 
     def _warn(self, error: BaseException) -> None:
-        """Log an error, one of the same kind only now and then.
+        """Log an error; repeat errors of the same kind only rarely.
 
-        rospy's own throttling mixes up observers that fail in turns.
+        rospy's own throttling confuses observers that fail alternately.
         """
         kind, now = type(error).__name__, time.monotonic()
         if kind != self._warned[0] or now - self._warned[1] >= _WARNING_PERIOD:

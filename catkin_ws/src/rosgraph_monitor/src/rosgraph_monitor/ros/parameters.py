@@ -60,7 +60,7 @@ def timing() -> Timing:
 
 
 def patience() -> Patience:
-    """Return for how long changes are waited for."""
+    """Return how long the monitor waits before it reports a change."""
     return Patience(
         startup=number("startup_grace", Patience.startup),
         restart=number("restart_patience", Patience.restart),

@@ -31,7 +31,7 @@ _SEQ_AND_STAMP = 12
 def packed(msg: Any) -> bytes:
     """Return a message as it was sent.
 
-    rospy has one subscription to a topic for a whole process, and hands out messages of the class that came first.
+    rospy has one subscription to a topic for a whole process. All callbacks get messages of the class that came first.
     """
     if isinstance(msg, rospy.AnyMsg):
         return bytes(msg._buff)
