@@ -65,7 +65,7 @@ def _candidates(decision: Decision) -> Table:
 
 
 def _level(candidate: Candidate, quality: str) -> str:
-    """Return the level that counted, and where another one was expected, that too."""
+    """Return the level that counted, and the expected level if it differs."""
     expected = candidate.expected.get(quality)
     counted = candidate.levels.get(quality, expected)
     if expected is None or counted is None:

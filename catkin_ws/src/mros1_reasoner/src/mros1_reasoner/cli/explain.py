@@ -17,7 +17,7 @@ from mros1_reasoner.io.reasoner_bag import read_decisions
 @click.option("--wait", default=3.0, show_default=True, help="For a decision of a running reasoner, s.")
 @NAMESPACE
 def explain(bag: Path | None, topic: str, wait: float, namespace: str | None) -> None:
-    """Explain all decisions in a BAG, without one the last decision of the running reasoner."""
+    """Explain all decisions in a BAG, or the last decision of the running reasoner if no BAG is given."""
     out = console()
     if bag is None:
         from mros1_reasoner.ros.decisions import last_decision  # the only part that needs ROS

@@ -1,4 +1,4 @@
-"""What the commands have in common: the console, an option, and how bad input is refused."""
+"""What the commands share: the console, an option, and the refusal of bad input."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _WIDTH = 150  # characters, where the output is no terminal
 
 
 def console() -> Console:
-    """Return the console; a file or a pipe is as wide as a table needs."""
+    """Return the console; for a file or a pipe, it is as wide as a table needs."""
     return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
 
 

@@ -54,7 +54,7 @@ def replay(
     verbose: bool,
     namespace: str | None,
 ) -> None:
-    """Let the loop decide again on what a BAG holds, and print its decisions beside the recorded ones.
+    """Run the loop again over a BAG, and print its decisions beside the recorded ones.
 
     Without changes they are the same. With other limits, parameters or models they tell what it would have done.
     Exit status: 0, 1 where nothing was changed but decisions differ, 2 bad input.
@@ -114,7 +114,7 @@ def _replay_run(
 
 
 def _knowledge_base(parameters: Parameters, run: Run, models: Sequence[Path]) -> KnowledgeBase:
-    """Return the knowledge base of the models given, else of the text in the bag, else of the parameters' files."""
+    """Return the knowledge base of the given models, else of the text in the bag, else of the parameters' files."""
     if models or not run.files:
         return parameters.knowledge_base(list(models) or None)
     with tempfile.TemporaryDirectory() as folder:

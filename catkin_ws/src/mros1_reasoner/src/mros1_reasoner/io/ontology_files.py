@@ -1,4 +1,4 @@
-"""Ontologies in files: models with their imports, which are looked for beside them and never on the network."""
+"""Reads and writes ontology files. It looks for imports beside the models, never on the network."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _read_ontologies(own: Sequence[Path], others: Sequence[Path]) -> tuple[list[
 
 
 def _find_import(iri: str, importer: Path) -> Path | None:
-    """Return the file beside the importing one that bears the last part of the IRI as its name, else the IRI itself."""
+    """Return the file beside the importing one whose name is the last part of the IRI, else the IRI itself."""
     name = local_name(iri)
     folder = importer.resolve().parent
     for file_name in (name, f"{name}.owl", f"{name}.rdf"):

@@ -1,4 +1,4 @@
-"""The node's parameters: from a mapping, as the parameter server or a bag holds it, to what the loop needs."""
+"""Converts the node's parameters, from a mapping of the parameter server or a bag, to the loop's settings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _NAMED_OTHERWISE = ("desired", "start_grace", "utility")  # settings whose param
 class Parameters:
     """The private parameters of the node reasoner; the package's README tells what they mean.
 
-    Every property and method raises ParameterError where a value can't be used.
+    Every property and method raises ParameterError if a value can't be used.
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -45,12 +45,12 @@ class Parameters:
 
     @property
     def execution_deadline(self) -> float:
-        """A request without a result has failed after so long, s of wall time."""
+        """Time after which a request without a result has failed, s of wall time."""
         return self._tree.number("execution_deadline", 60.0, low=0.0)
 
     @property
     def asks(self) -> bool:
-        """Whether a manipulator is asked; else what is decided is taken for done."""
+        """Whether the node asks a manipulator; if not, each decision counts as carried out."""
         return self._tree.flag("use_reconfigure_srv", True)
 
     @property
@@ -95,7 +95,7 @@ class Parameters:
     def knowledge_base(
         self, models: Sequence[Path] | None = None, vocabularies: Sequence[Path] | None = None
     ) -> KnowledgeBase:
-        """Return the knowledge base of the parameters' files, or of those given.
+        """Return the knowledge base of the parameters' files, or of the given files.
 
         Raises:
             KnowledgeBaseError, ModelError: a file can't be used.
@@ -111,7 +111,7 @@ class Parameters:
         return read_knowledge_base(models, self.vocabulary_files if vocabularies is None else vocabularies, directions)
 
     def objectives(self, knowledge_base: KnowledgeBase) -> tuple[Objective, ...]:
-        """Return the model's objectives, else one for each function that no design requires, with the NFRs given."""
+        """Return the model's objectives, or one for each function that no design requires, with the given NFRs."""
         objectives = knowledge_base.objectives
         if not objectives:
             required = {function for design in knowledge_base.designs.values() for function in design.requires}

@@ -1,4 +1,4 @@
-"""Read from a bag, without ROS, what it holds of a reasoner: journal and decisions, or at least what it heard."""
+"""Reads a reasoner's journal and decisions from a bag, without ROS; if there is no journal, its inputs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _UNREADABLE = (ReaderError, TypesysError, AttributeError, IndexError, UnicodeDec
 
 
 def read_decisions(path: Path, namespace: str | None = None) -> list[Decision]:
-    """Return the decisions in a bag, each as its last message tells it.
+    """Return the decisions in a bag, each from its last message.
 
     Raises:
         RecordingError: the bag can't be read, or holds several reasoners and no namespace is given.
@@ -90,7 +90,7 @@ def _add_journal(path: Path, recording: Recording, message: Any) -> None:
 
 @contextmanager
 def _open(path: Path) -> Iterator[Reader]:
-    """Open a bag; whatever is wrong with it becomes a RecordingError."""
+    """Open a bag; any error becomes a RecordingError."""
     if not path.is_file():
         raise RecordingError(f"{path}: no such bag")
     try:
@@ -102,7 +102,7 @@ def _open(path: Path) -> Iterator[Reader]:
 
 
 def _topic(path: Path, reader: Reader, name: str, namespace: str | None) -> str:
-    """Return the topic of that name in the namespace, or in the only one; empty where there is none."""
+    """Return the topic of that name in the namespace, or in the only namespace; empty if there is none."""
     if namespace is not None:
         return f"/{namespace.strip('/')}/{name}".replace("//", "/")
     found = sorted({c.topic for c in reader.connections if c.topic == f"/{name}" or c.topic.endswith(f"/{name}")})

@@ -21,7 +21,7 @@ _STRING = v.XSD + "string"
 
 
 class KnowledgeBase:
-    """What the models say. It does not change once it is made; what changes are the facts given to `analyse`.
+    """The content of the models. It never changes; only the facts that `analyse` gets change.
 
     Attributes:
         functions: names of all functions.
@@ -158,7 +158,7 @@ class KnowledgeBase:
         return world
 
     def rdf_xml(self, facts: Facts | None = None, analysis: Analysis | None = None) -> bytes:
-        """Return everything as RDF/XML that loads again as a model."""
+        """Return models, facts and statuses as RDF/XML that loads again as a model."""
         world, text = self.world(facts, analysis), io.BytesIO()
         try:
             world.get_ontology(v.RUNTIME).save(text, format="rdfxml")

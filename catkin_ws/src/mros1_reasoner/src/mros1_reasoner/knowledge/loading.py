@@ -1,4 +1,4 @@
-"""Change an application's ontology so that it can be loaded with others: labels, and rules that ours replace."""
+"""Changes an application's ontology so that it loads with others: labels, and rules that ours replace."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def renamed(triples: Iterable[Triple], number: int) -> list[Triple]:
 
 
 def without_concluding_rules(triples: list[Triple], where: str) -> list[Triple]:
-    """Set aside the rules that conclude a derived status: two values of one would contradict each other.
+    """Leave out the rules that conclude a derived status, because two values of a status contradict each other.
 
     A warning names them and the file `where` they are.
     """
@@ -40,7 +40,7 @@ def without_concluding_rules(triples: list[Triple], where: str) -> list[Triple]:
         by_subject[triple[0]].append(triple)
 
     def reach(node: str) -> set[str]:
-        """Return the node and the nodes of its lists and atoms, which belong to it alone."""
+        """Return the node with the nodes of its lists and atoms, which belong to no other node."""
         nodes, waiting = {node}, [node]
         while waiting:
             for _, _, value in by_subject[waiting.pop()]:

@@ -11,18 +11,18 @@ from mros1_reasoner.knowledge.vocabulary import IN_ERROR_COMPONENT, IN_ERROR_NFR
 
 
 class Direction(enum.Enum):
-    """Which levels of a quality attribute are the better ones."""
+    """Whether lower or higher levels of a quality attribute are better."""
 
     LOWER_IS_BETTER = "lower_is_better"
     HIGHER_IS_BETTER = "higher_is_better"
 
     @property
     def sign(self) -> int:
-        """1 where a greater level is worse, -1 where it is better (`qa_sign` in the vocabulary)."""
+        """1 if a greater level is worse, -1 if it is better (`qa_sign` in the vocabulary)."""
         return 1 if self is Direction.LOWER_IS_BETTER else -1
 
     def excess(self, level: float, limit: float) -> float:
-        """Return by how much a level violates a limit; zero or less where it keeps the limit."""
+        """Return by how much a level violates a limit; zero or less if it keeps the limit."""
         return self.sign * (level - limit)
 
     def better(self, first: float, second: float) -> float:
@@ -53,7 +53,7 @@ class Quality:
 
     @classmethod
     def compared_by(cls, operator: str, low: float | None = None, high: float | None = None) -> Quality:
-        """Return the quality whose limit is violated while the operator holds between level and limit.
+        """Return a quality whose limit is violated when the operator holds between level and limit.
 
         Raises:
             ValueError: it is none of `>`, `>=`, `<`, `<=`.
@@ -69,7 +69,7 @@ class Quality:
         return self.direction.passes + ("=" if self.reaching_violates else "")
 
     def excess(self, level: float, limit: float) -> float:
-        """Return by how much a level violates a limit; negative where it keeps the limit."""
+        """Return by how much a level violates a limit; negative if it keeps the limit."""
         return self.direction.excess(level, limit)
 
     def violates(self, level: float, limit: float) -> bool:
@@ -121,7 +121,7 @@ class Objective:
 
 @dataclass(frozen=True)
 class Facts:
-    """Everything that is known at one moment, as an analysis takes it.
+    """Everything that is known at one moment: the input of an analysis.
 
     Attributes:
         objectives: what is needed now.
@@ -144,7 +144,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class ObjectiveAnalysis:
-    """What reasoning says of an objective.
+    """The result of reasoning about an objective.
 
     Attributes:
         status: its o_status, derived from the causes.
@@ -160,7 +160,7 @@ class ObjectiveAnalysis:
 
     @property
     def in_error(self) -> bool:
-        """Whether it is not fulfilled as it should be."""
+        """Whether the objective is not fulfilled as it should be."""
         return bool(self.causes & {IN_ERROR_NFR, IN_ERROR_COMPONENT})
 
 

@@ -136,7 +136,7 @@ class _Reader:
         }
 
     def _names(self, classes: Iterable[str], also: Iterable[str]) -> dict[str, str]:
-        """Return local name -> IRI of the individuals of the classes and of those that properties show to be one."""
+        """Return local name -> IRI of the individuals that classes or properties show to belong to a kind."""
         iris = {iri for name in classes for iri in self._graph.instances(name)} | set(also)
         result: dict[str, str] = {}
         for iri in sorted(iris):
@@ -148,7 +148,7 @@ class _Reader:
         return result
 
     def _quality(self, name: str) -> Quality:
-        """Return how levels of a quality compare: as given, else as the model says, else lower is better."""
+        """Return how levels of a quality compare: by the given direction, else by the model, else lower is better."""
         iri = self._quality_types[name]
         low, high = (self._bound(iri, predicate) for predicate in (v.QA_MIN, v.QA_MAX))
         operators = set(self._graph.literals_of(iri, v.QA_COMPARISON_OPERATOR))
@@ -231,7 +231,7 @@ class _Reader:
         return levels
 
     def _check_requirements(self, designs: Mapping[str, Design]) -> None:
-        """Refuse requirements that nothing can fulfil; tell of functions that no design solves."""
+        """Refuse requirements that nothing can fulfil, and warn of functions that no design solves."""
         solving: dict[str, list[Design]] = {function: [] for function in sorted(self._functions)}
         for design in designs.values():
             solving[design.function].append(design)

@@ -11,7 +11,7 @@ class ReasonerError(Exception):
 
 
 class InconsistentError(ReasonerError):
-    """The ontology contradicts itself; the message names what does."""
+    """The ontology contradicts itself; the message names the contradiction."""
 
 
 class Assertion(NamedTuple):
@@ -24,10 +24,10 @@ class Assertion(NamedTuple):
 
 
 class Reasoner(Protocol):
-    """Infers property values from an ontology, which stays, and facts, which change."""
+    """Infers property values from an ontology that stays and facts that change."""
 
     def load(self, ontology: str) -> None:
-        """Take the ontology, as N-Triples; it stays until the next load.
+        """Load the ontology, as N-Triples; it stays until the next load.
 
         Raises:
             ReasonerError: it can't be read; InconsistentError: it contradicts itself.

@@ -1,1 +1,1 @@
-"""The loop from facts to decisions: state, causes, deliberation, an operator's commands, the journal."""
+"""The loop from facts to decisions: state, causes, deliberation, operator's commands, journal."""

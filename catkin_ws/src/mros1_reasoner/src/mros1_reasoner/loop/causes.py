@@ -1,4 +1,4 @@
-"""Causes: what asks for an adaptation of an objective, errors and chances to do better."""
+"""Causes of an adaptation: errors of an objective, and chances for a better design."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def is_chance(cause: Cause) -> bool:
 
 
 def errors(view: View, name: str, now: float) -> list[Cause]:
-    """Return what is wrong with an objective itself, the earliest first."""
+    """Return the errors of an objective itself, the earliest first."""
     running, result = view.running[name], view.analysis.objectives.get(name)
     if running.design is None:
         return _nothing_runs(view, name, now)
@@ -39,13 +39,13 @@ def errors(view: View, name: str, now: float) -> list[Cause]:
 
 
 def heeds_chances(view: View, name: str) -> bool:
-    """Return whether a better design is taken for an objective when nothing is wrong with the one that runs."""
+    """Return whether an objective takes a better design when nothing is wrong with the running one."""
     always = view.objectives[name].always_improve
     return view.running[name].degraded or (view.settings.always_improve if always is None else always)
 
 
 def chances(view: View, name: str, now: float) -> list[Cause]:
-    """Return why a better design may have become available for an objective, the earliest first."""
+    """Return the reasons why an objective may have a better design now, the earliest first."""
     found = [
         Cause(min(stamp, now), trigger, words, "" if trigger == OPERATOR else RECOVERY)
         for trigger, (stamp, words) in view.running[name].chances.items()

@@ -1,4 +1,4 @@
-"""What an operator asks for: pause, lock, approve, other objectives and limits."""
+"""The commands of an operator: pause, lock, approve, other objectives and limits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mros1_reasoner.loop.state import State
 
 
 class Operator:
-    """Does what an operator asks for; it takes effect with the loop's next step."""
+    """Applies the operator's commands; they take effect with the loop's next step."""
 
     def __init__(self, state: State, wall: Callable[[], float]) -> None:
         """Change the loop's state.
@@ -34,9 +34,9 @@ class Operator:
         self._state.resume()
 
     def lock(self, objective: str = "") -> None:
-        """Keep the configuration that an objective has, of all objectives where none is named.
+        """Keep the configuration of an objective; of all objectives if none is named.
 
-        What would have been done is published as a refusal.
+        The loop publishes the adaptation that it would have done as a refusal.
 
         Raises:
             MapeError: there is no such objective.
@@ -52,7 +52,7 @@ class Operator:
         self._state.unlock(self._state.named(objective))
 
     def approve(self, decision_id: str) -> Decision:
-        """Approve the proposed decision; it is now DECIDED, to be published and carried out.
+        """Approve the proposed decision. It is DECIDED now; the caller publishes it and has it carried out.
 
         Raises:
             MapeError: no decision of that id waits for approval.

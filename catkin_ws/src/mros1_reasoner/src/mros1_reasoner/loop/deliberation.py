@@ -1,4 +1,4 @@
-"""R3 for objectives that may require others: the objective to find another design for, and explained decisions."""
+"""R3 for objectives that may require others: chooses the objective to change, and explains the decision."""
 
 from __future__ import annotations
 
@@ -76,8 +76,8 @@ class Deliberation:
     def _choose(self, name: str, now: float, *, climbs: bool) -> tuple[str, Plan]:
         """Return the objective to find another design for, and what to do for it.
 
-        That is the given objective if a design of its own helps in full; else the nearest one above of which a design
-        helps in full; else the nearest one of which a design helps in part.
+        That is the given objective if one of its designs helps in full. Else it is the nearest objective above with a
+        design that helps in full. Else it is the nearest objective with a design that helps in part.
         """
         outcomes: dict[str, Plan] = {}
         queue = [name]
@@ -99,7 +99,7 @@ class Deliberation:
     def _adapt(
         self, name: str, level: str, outcome: Plan, causes: list[Cause], timing: Timing, began: float
     ) -> Decision | None:
-        """Return the decision for the first thing to be done towards an outcome: the deepest requirement first."""
+        """Return the decision for the first step towards an outcome: the deepest requirement comes first."""
         if level != name:
             climbed = {"component": "S6b"}
             causes = [replace(c, rules=f"{c.rules}, {climbed.get(c.trigger.split(':')[0], 'S6a')}") for c in causes]
@@ -137,7 +137,7 @@ class Deliberation:
     def _refuse(
         self, name: str, outcome: Plan, causes: list[Cause], timing: Timing, plan_wall: float
     ) -> Decision | None:
-        """Return the decision not to adapt; None where the same was decided before."""
+        """Return the decision not to adapt; None if the last decision was the same."""
         running = self._state.running[name]
         if not self._state.refuse(name, _gist(causes, outcome)):
             return None
@@ -173,7 +173,7 @@ class Deliberation:
         )
 
     def _missing(self, name: str, outcome: Plan, now: float) -> list[tuple[str, Plan]]:
-        """Return what is to be deployed for an outcome, the deepest requirement first, the objective itself last."""
+        """Return what to deploy for an outcome, the deepest requirement first and the objective itself last."""
         steps: list[tuple[str, Plan]] = []
         for function in self._state.kb.designs[outcome.choice or ""].requires:
             provider = self._state.provider(function)
@@ -188,7 +188,7 @@ class Deliberation:
         return [*steps, (name, outcome)]
 
     def _note_failure(self, name: str, now: float) -> None:
-        """Put the running design into the error log where it is known not to do."""
+        """Put the running design into the error log if it has failed."""
         running = self._state.running[name]
         if (running.design or "", name) in self._state.analysis.tried:
             reason = "did not keep a limit while deployed"
@@ -199,7 +199,7 @@ class Deliberation:
             self._state.note_in_vain(now, running.design, name, "did not run")
 
     def _causes(self, name: str, now: float) -> list[Cause]:
-        """Return everything that asks for an adaptation of an objective itself, errors first, chances after them."""
+        """Return all causes for an adaptation of an objective itself: errors first, then chances."""
         found = errors(self._state, name, now)
         running = self._state.running[name]
         if running.design is None:
@@ -218,7 +218,7 @@ class Deliberation:
         return not running.degraded and outcome.candidates[0].utility >= now + self._state.settings.improvement
 
     def _plan(self, name: str, now: float, function: str = "") -> Plan:
-        """Return what to deploy for an objective, or for a function that none asks for yet."""
+        """Return what to deploy for an objective, or for a function that no objective needs yet."""
         objective = self._state.objectives.get(name) or Objective(name, function)
         running = self._state.running.get(name) or Running()
         designs: tuple[Design, ...] = self._state.kb.solving(objective.function)
@@ -253,7 +253,7 @@ class Deliberation:
         return plan(objective, designs, situation, self._utility, self._distance)
 
     def factors(self, name: str, now: float) -> dict[str, float]:
-        """Return by how much the expected levels of qualities are to be multiplied: never towards the better."""
+        """Return the factors for the expected levels of qualities; a factor never makes a level look better."""
         objective = self._state.objectives.get(name)
         if not self._state.settings.correct_expected or objective is None:
             return {}
@@ -277,6 +277,6 @@ class Deliberation:
 
 
 def _gist(causes: list[Cause], outcome: Plan) -> tuple[object, ...]:
-    """Return what makes an outcome another one than before."""
+    """Return the part of an outcome that distinguishes it from another one."""
     wrong = tuple(cause.trigger for cause in causes if not is_chance(cause))
     return wrong, outcome.choice, outcome.degraded

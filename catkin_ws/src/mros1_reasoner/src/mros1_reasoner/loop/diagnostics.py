@@ -1,4 +1,4 @@
-"""What the statuses of a DiagnosticArray and of an action say: levels, statuses of components, failures of tasks."""
+"""Reads facts from diagnostics and action statuses: levels, statuses of components, failures of tasks."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _TRUE, _FALSE = ("true", "1"), ("false", "0")
 
 @dataclass(frozen=True)
 class Remark:
-    """A line about a status that makes no sense or concerns nobody.
+    """A line about a status that makes no sense or is not meant for the reasoner.
 
     Attributes:
         kind: of the trouble; lines of one kind are limited together.
@@ -165,12 +165,12 @@ def newest_goal(statuses: Any) -> tuple[str, bool] | None:
 
 
 def shown(text: str) -> str:
-    """Return foreign text in quotes, cut, on one line."""
+    """Return foreign text in quotes, shortened, on one line."""
     return repr(text if len(text) <= _SHOWN else text[:_SHOWN] + "...")
 
 
 def _plain(text: str) -> str:
-    """Return foreign text as it is where it is short and printable, else as `shown`."""
+    """Return foreign text unchanged if it is short and printable, else as `shown`."""
     return text if len(text) <= _SHOWN and text.isprintable() else shown(text)
 
 

@@ -1,4 +1,4 @@
-"""What the loop takes in and does, as typed entries of its journal; `entry_text` converts them to and from text."""
+"""Inputs and results of the loop, as typed entries of its journal; `entry_text` converts them to and from text."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class LevelFact:
 
 @dataclass(frozen=True)
 class StaleFact:
-    """A quality attribute can't be observed at present; the journal is without the reason."""
+    """A quality attribute can't be observed at present; the journal lacks the reason."""
 
     quality: str
     reason: str = field(default="", compare=False)
@@ -95,14 +95,14 @@ class Resume:
 
 @dataclass(frozen=True)
 class Lock:
-    """Keep the configuration of an objective; of all objectives where none is named."""
+    """Keep the configuration of an objective; of all objectives if none is named."""
 
     objective: str = ""
 
 
 @dataclass(frozen=True)
 class Unlock:
-    """Take a lock back; all locks where no objective is named."""
+    """Release a lock; all locks if no objective is named."""
 
     objective: str = ""
 
@@ -123,7 +123,7 @@ class Reject:
 
 @dataclass(frozen=True)
 class AddObjective:
-    """Ask for a function, with a limit by quality attribute."""
+    """Ask for a function, with limits of quality attributes."""
 
     name: str
     function: str
@@ -139,7 +139,7 @@ class RemoveObjective:
 
 @dataclass(frozen=True)
 class SetNfr:
-    """Give an objective another limit; all objectives where none is named."""
+    """Give an objective another limit; all objectives if none is named."""
 
     objective: str
     quality: str
@@ -153,7 +153,7 @@ Command = Pause | Resume | Lock | Unlock | Approve | Reject | AddObjective | Rem
 
 @dataclass(frozen=True)
 class Step:
-    """Reason and decide; on a heartbeat also where merely a level has changed."""
+    """Reason and decide; on a heartbeat, also if only a level has changed."""
 
     heartbeat: bool
 
@@ -177,7 +177,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Decided:
-    """What an entry has brought, written after it: the id of a decision, its objective and configuration."""
+    """The decision to which the entry before has led: its id, objective and configuration."""
 
     decision: str
     objective: str
@@ -189,14 +189,14 @@ Content = Fact | Command | Step | Result | Decided
 
 @dataclass(frozen=True)
 class Entry:
-    """What the loop took in or did, and the ROS time in s at which it did so."""
+    """An input or an action of the loop, with its ROS time in s."""
 
     now: float
     content: Content
 
 
 def subject(fact: Fact) -> tuple[str, ...]:
-    """Return what a fact is about: a later fact about the same takes its place."""
+    """Return the subject of a fact: a later fact about the same subject replaces it."""
     match fact:
         case LevelFact():
             return ("level", fact.quality, fact.grounding)

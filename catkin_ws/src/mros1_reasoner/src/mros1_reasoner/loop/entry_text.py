@@ -95,7 +95,7 @@ def read_entry(now: float, kind: str, values: Sequence[str]) -> entries.Entry:
 
 
 def _written(content: type[entries.Content]) -> list[tuple[str, str]]:
-    """Return name and type of the fields that are written: those by which contents are compared."""
+    """Return name and type of the written fields: the fields that are used to compare contents."""
     return [(item.name, str(item.type)) for item in fields(content) if item.compare]
 
 

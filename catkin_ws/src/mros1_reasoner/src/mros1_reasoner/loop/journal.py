@@ -1,4 +1,4 @@
-"""The journal: what the loop took in, kept for late subscribers, and applied again by a replay."""
+"""The journal of the loop's inputs. Late subscribers get it, and a replay applies it again."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def brought(now: float, decisions: Sequence[Decision]) -> list[Entry]:
 
 
 class Journal:
-    """The last entries, numbered from the reasoner's start; of dropped entries, those that still hold are kept."""
+    """The last entries, numbered from the reasoner's start, and older entries that still hold."""
 
     def __init__(self, limit: int = 50_000) -> None:
         """Keep at most so many entries, and a few more: some 20 minutes' worth on a busy robot."""
@@ -86,11 +86,11 @@ class Journal:
         return self._count - 1
 
     def snapshot(self) -> tuple[int, list[Entry]]:
-        """Return the entries, and the number of the first one if they were without a gap."""
+        """Return the entries, and the number that the first one would have if there were no gaps."""
         return self._count - len(self._entries), list(self._entries)
 
     def _compact(self) -> None:
-        """Drop the older half, but for commands and for the last entry about each fact that lasts."""
+        """Drop the older half, except commands and the last entry about each lasting fact."""
         old = [self._entries.popleft() for _ in range(len(self._entries) // 2)]
         last = {entries.subject(item.content): item for item in old if isinstance(item.content, _LASTING)}
         others = [item for item in old if isinstance(item.content, _COMMANDS)]
@@ -124,5 +124,5 @@ def _carry_out(core: Mape, now: float, command: entries.Command) -> list[Decisio
 
 
 def _objective(core: Mape, name: str) -> str:
-    """Return the name of an objective or a function as it is; empty for others, such as the name of an observer."""
+    """Return the name of an objective or a function unchanged; empty for others, such as an observer's name."""
     return name if any(name in (o.name, o.function) for o in core.objectives.values()) else ""

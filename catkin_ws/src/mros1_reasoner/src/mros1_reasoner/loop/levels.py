@@ -1,4 +1,4 @@
-"""Observed levels of qualities: since when a limit is passed, and how they compare with what was expected."""
+"""Observed levels of qualities: since when they violate a limit, and their ratio to expected levels."""
 
 from __future__ import annotations
 
@@ -108,8 +108,8 @@ class Levels:
     def counting(self, now: float, calm_until: Mapping[str, float]) -> dict[Key, float]:
         """Return the levels that count.
 
-        A level that violates its limit counts once it has done so for the window, and the calm is over. Until then the
-        last level that kept the limit counts.
+        A level that violates its limit counts after it has done so for the violation window, and after the cool-down.
+        Until then, the last level that kept the limit counts.
         """
         found = {}
         for key, level in self._levels.items():
@@ -126,7 +126,7 @@ class Levels:
         return {quality: level.value for (name, quality), level in self._levels.items() if name == objective}
 
     def ratio(self, now: float, key: Key) -> float | None:
-        """Return observed over expected level, None where it is not known.
+        """Return the ratio of observed to expected level; None if it is unknown.
 
         Once the limit has been violated for the window, it is the mean since then; before that, the average.
         """
@@ -137,7 +137,7 @@ class Levels:
         return average.value if average else None
 
     def due(self, calm_until: Mapping[str, float]) -> Iterator[float]:
-        """Yield the times at which a level begins or ceases to count."""
+        """Yield the times at which a level begins or stops to count."""
         for (objective, _), level in self._levels.items():
             if level.passed_since is not None:
                 yield max(level.passed_since + self._window, calm_until[objective])

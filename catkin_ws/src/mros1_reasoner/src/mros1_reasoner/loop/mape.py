@@ -1,7 +1,7 @@
 """The loop from facts to decisions: R2 by a reasoner, R3 by the planner; time is an argument.
 
-The `observe_` methods take facts. `step` analyses them when they have changed in a way that counts, and returns what is
-to be done. `report` takes the outcome. At most one decision is under way. Times are s of ROS time.
+The `observe_` methods take facts. `step` analyses them when they have changed in a way that counts, and returns what to
+do. `report` takes the outcome. At most one decision is under way. Times are s of ROS time.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Mape:
 
     @property
     def objectives(self) -> Mapping[str, Objective]:
-        """Every objective by name, those included that designs require."""
+        """Every objective by name, including those that designs require."""
         return self._state.objectives
 
     @property
@@ -118,7 +118,7 @@ class Mape:
             self._state.note_level(now, name, quality, level, stamp)
 
     def observe_stale(self, quality: str) -> None:
-        """Take in that a quality can't be observed at present, and forget its levels."""
+        """Note that a quality can't be observed at present, and forget its levels."""
         self._state.forget_levels(quality)
 
     def observe_component(self, now: float, component: str, status: str, stamp: float = 0.0) -> None:
@@ -141,10 +141,10 @@ class Mape:
             self._state.note_component(component, status, stamp or now)
 
     def observe_binding(self, now: float, grounding: str, in_error: bool) -> None:
-        """Take in that a binding of a grounding is in error, or no longer is.
+        """Note whether a binding of a grounding is in error.
 
         Raises:
-            MapeError: no objective is grounded so.
+            MapeError: no objective has this grounding.
         """
         for name, running in self._state.running.items():
             if running.design and self._kb.grounding(name, running.design) == grounding:
@@ -175,7 +175,7 @@ class Mape:
                 self._state.note_task_failure(objective, None)
 
     def observe_active(self, now: float, function: str, configuration: str, state: str) -> None:
-        """Take in what runs for a function, as the manipulator says (ActiveConfiguration).
+        """Note what runs for a function, as the manipulator reports it (ActiveConfiguration).
 
         Raises:
             MapeError: the model does not hold the configuration, or not for that function.
@@ -219,7 +219,7 @@ class Mape:
         return [] if self._state.paused else self._decide_all(timing)
 
     def due(self, now: float) -> float | None:
-        """Return when the next step is needed even without a new fact; None where none is."""
+        """Return when the next step is needed even without a new fact; None if none is."""
         return self._state.due(now)
 
     def feasible(self) -> dict[str, tuple[str, ...]]:
@@ -278,7 +278,7 @@ class Mape:
         return max(now, self._clock()) if self._clock else now
 
     def _decide_all(self, timing: Timing) -> list[Decision]:
-        """Decide for every objective in trouble, from the roots down, until something is to be done."""
+        """Decide for every objective in error, from the roots down, until there is something to do."""
         decisions: list[Decision] = []
         chosen = None
         # What a root's design requires is released where the root takes another one.
@@ -293,7 +293,7 @@ class Mape:
         return found
 
     def _put_forward(self, decision: Decision | None, now: float) -> list[Decision]:
-        """Have a decision carried out, or approved first; a proposal that no longer holds is withdrawn."""
+        """Have a decision carried out, after approval if needed; withdraw a proposal that no longer holds."""
         former, waits = self._state.proposal, self._state.settings.approval
         target = (decision.objective, decision.to_configuration) if decision else None
         if former and (former.objective, former.to_configuration) == target:

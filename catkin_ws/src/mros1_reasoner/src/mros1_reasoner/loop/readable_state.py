@@ -1,4 +1,4 @@
-"""What the loop knows, to read: objectives, what runs for each of them, facts, and what was tried in vain.
+"""The loop's knowledge, for reading only: objectives, running designs, facts, and failed attempts.
 
 Only `state.State` changes it. Times are s of ROS time.
 """
@@ -71,7 +71,7 @@ class Running:
 
 
 class View:
-    """What is known and asked for at this moment.
+    """All facts and objectives at this moment.
 
     Attributes:
         kb: the models.
@@ -120,7 +120,7 @@ class View:
     # Objectives, and those that designs require
 
     def named(self, objective: str) -> set[str]:
-        """Return the objective of a name; all objectives where the name is empty.
+        """Return the objective of a name; all objectives if the name is empty.
 
         Raises:
             MapeError: there is no such objective.
@@ -130,7 +130,7 @@ class View:
         return {objective} if objective else set(self.objectives)
 
     def pursuing(self, name: str) -> list[str]:
-        """Return the objectives of that name or that function; for no name the only root objective.
+        """Return the objectives of that name or function; without a name, the only root objective.
 
         Raises:
             MapeError: there is none.
@@ -143,13 +143,13 @@ class View:
         return names
 
     def grounded_by(self, grounding: str) -> list[str]:
-        """Return the objectives that have a grounding of that name; all that have one where none has that name."""
+        """Return the objectives with a grounding of that name; if there is none, all grounded objectives."""
         grounded = [name for name, running in self.running.items() if running.design]
         named = [n for n in grounded if self.kb.grounding(n, self.running[n].design or "") == grounding]
         return named or grounded
 
     def provider(self, function: str) -> str:
-        """Return the name of the objective by which a function is provided to the designs that require it."""
+        """Return the name of the objective that provides a function to the designs that require it."""
         root = next((name for name in self.roots if self.objectives[name].function == function), None)
         if root:
             return root
@@ -195,7 +195,7 @@ class View:
         return self.is_busy(running, now) or now < running.not_before
 
     def facts_at(self, now: float) -> Facts:
-        """Return what is known now, for an analysis."""
+        """Return the present facts, for an analysis."""
         grounded = {name: running for name, running in self.running.items() if running.design}
         return Facts(
             objectives=tuple(self.objectives.values()),
@@ -208,7 +208,7 @@ class View:
         )
 
     def what_counts(self, facts: Facts, now: float) -> tuple[object, ...]:
-        """Return what an analysis and a decision depend on; while it is the same, both have the same result."""
+        """Return all that an analysis and a decision depend on: while it stays the same, so do both results."""
         passed = frozenset(
             (name, quality)
             for (name, quality), level in facts.levels.items()

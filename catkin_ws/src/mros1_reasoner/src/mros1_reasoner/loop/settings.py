@@ -1,4 +1,4 @@
-"""How the loop behaves."""
+"""The settings of the loop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the loop knows, and every change of it; modules that only read take a `view.View`. Times are s of ROS time."""
+"""The loop's knowledge, with every way to change it; modules that only read take a `View`. Times are s of ROS time."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class State(View):
         self._run(name, task_failure=failure)
 
     def note_active(self, now: float, function: str, configuration: str, state: str) -> None:
-        """Note what runs for a function, as the manipulator says."""
+        """Note what runs for a function, as the manipulator reports it."""
         self.active[function] = configuration, state
         for name in [o.name for o in self.objectives.values() if o.function == function]:
             self._take_active(name, configuration, state, now)
@@ -164,7 +164,7 @@ class State(View):
         self.error_log = {key: entry for key, entry in self.error_log.items() if entry[0] > now}
 
     def note_analysis(self, facts: Facts, analysis: Analysis, seen: tuple[object, ...]) -> None:
-        """Keep an analysis; a component that is RECOVERED is a chance for every objective once, and then works."""
+        """Keep an analysis. A RECOVERED component is a chance for every objective once; then it counts as working."""
         self.has_analysed, self.facts, self.analysis, self.seen = True, facts, analysis, seen
         for name, component in self.components.items():
             if component.status != v.RECOVERED or facts.components.get(name) != v.RECOVERED:
@@ -189,7 +189,7 @@ class State(View):
         self.reconsider()
 
     def lock(self, names: Iterable[str]) -> None:
-        """Have objectives keep their configuration."""
+        """Make objectives keep their configuration."""
         self.locked |= set(names)
         self.reconsider()
 
@@ -201,7 +201,7 @@ class State(View):
     # Decisions
 
     def rest(self, name: str) -> None:
-        """Forget what was refused and wanted for an objective, because it needs no adaptation."""
+        """Forget refusals and wanted designs of an objective, because it needs no adaptation."""
         self._run(name, refusal=())
         self.wanted.pop(name, None)
 

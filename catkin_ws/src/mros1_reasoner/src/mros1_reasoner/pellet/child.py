@@ -1,4 +1,4 @@
-"""A process of its own that keeps Pellet warm in a JVM and serves analyses over stdin and stdout.
+"""A child process that keeps Pellet ready in a JVM, and serves analyses over stdin and stdout.
 
 Pellet is AGPL-3: it stays on this side of the process boundary. A frame is a line with the count of bytes that follow,
 then JSON. Requests: {"op": "load", "ontology": N-Triples}, {"op": "infer", "facts": [...], "properties": [...]}.
@@ -51,7 +51,7 @@ def write_frame(stream: BinaryIO, message: dict[str, Any]) -> None:
 
 
 class Pellet:
-    """Pellet in this process's JVM: one ontology that stays, facts that are added to a copy for each analysis."""
+    """Pellet in this process's JVM. It keeps one ontology, and adds the facts of each analysis to a copy."""
 
     def __init__(self, jvm: str, jars: list[str], heap_mb: int) -> None:
         import jpype
@@ -142,7 +142,7 @@ def serve(pellet: Pellet, requests: BinaryIO, answers: BinaryIO) -> None:
 
 
 def main() -> None:
-    """Serve the process that started this one; arguments: its pid, the JVM's library, the folder of the jars, MB."""
+    """Serve the parent process. Arguments: its pid, the JVM's library, the folder of the jars, memory in MB."""
     parent, jvm, folder, heap_mb = int(sys.argv[1]), sys.argv[2], Path(sys.argv[3]), int(sys.argv[4])
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:

@@ -1,4 +1,4 @@
-"""Equivalent individuals: an ontology says the same of them, so Pellet reasons about one of them only, which is quick.
+"""Equivalent individuals: an ontology says the same about them, so Pellet reasons about one of them only.
 
 When every statement about one individual also holds for another one, the two can be exchanged without a change of the
 ontology. So what follows for one follows for the other, until a fact distinguishes them.
@@ -22,7 +22,7 @@ _NOTES = (v.RDFS_LABEL, "http://www.w3.org/2000/01/rdf-schema#comment")
 
 @dataclass(frozen=True)
 class Expansion:
-    """Expands what was inferred about the deputy of each group to the others: (deputy, others)."""
+    """Copies the conclusions about the deputy of each group to the other members: (deputy, others)."""
 
     groups: tuple[tuple[str, tuple[str, ...]], ...]
 
@@ -39,7 +39,7 @@ class Expansion:
 
 
 class EquivalentIndividuals:
-    """Groups of individuals of which an ontology says the same.
+    """Groups of individuals about which an ontology says the same.
 
     Attributes:
         reduced: the ontology with the first one of each group only.

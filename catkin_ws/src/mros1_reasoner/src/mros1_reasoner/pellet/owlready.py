@@ -1,4 +1,4 @@
-"""Call Pellet through owlready2, slowly: a new JVM for every analysis (1.1 to 3 s)."""
+"""Calls Pellet through owlready2. This is slow: every analysis starts a new JVM (1.1 to 3 s)."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _datatype(iri: str) -> str:
 
 
 def run_pellet(world: owlready2.World) -> None:
-    """Run owlready2's call of Pellet over a world, which takes the inferences in.
+    """Run owlready2's call of Pellet over a world; the conclusions are added to it.
 
     Raises:
         InconsistentError: the ontology contradicts itself.

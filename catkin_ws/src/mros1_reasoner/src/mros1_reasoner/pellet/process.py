@@ -36,7 +36,7 @@ class NoJavaError(ReasonerError):
 
 
 class ChildLostError(ReasonerError):
-    """The child could not be kept running, though it was started again."""
+    """The child failed again after a restart."""
 
 
 def find_jvm() -> Path:
@@ -134,7 +134,7 @@ class PelletReasoner:
         os.set_blocking(self._process.stdin.fileno(), False)  # type: ignore[union-attr]
 
     def _ask_twice(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Ask the child; when it dies or hangs, start a new one and ask that."""
+        """Ask the child. If it dies or hangs, start a new one and ask again."""
         try:
             return self._ask(request)
         except _ChildError as error:
@@ -202,7 +202,7 @@ class PelletReasoner:
 
 
 class PelletWithFallback:
-    """Pellet in its child process; a slower reasoner while the child can't be kept running."""
+    """Pellet in its child process, or a slower reasoner while the child keeps failing."""
 
     def __init__(
         self,
@@ -254,7 +254,7 @@ class PelletWithFallback:
 
 
 def make_reasoner(deadline: float = 20.0) -> Reasoner:
-    """Return Pellet in a warm child process; with a warning owlready2's slow call where the child can't run.
+    """Return Pellet in a child process. If the child can't run, warn, and return owlready2's slow call.
 
     Raises:
         NoJavaError: there is no Java runtime, without which neither runs.
@@ -269,7 +269,7 @@ def make_reasoner(deadline: float = 20.0) -> Reasoner:
 
 
 class _ChildError(Exception):
-    """The child does not do its part; the text goes on from "Pellet's process"."""
+    """The child has failed; the text continues a sentence that begins with "Pellet's process"."""
 
 
 def _jar_folder() -> Path:

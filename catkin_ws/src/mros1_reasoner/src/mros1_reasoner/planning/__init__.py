@@ -1,1 +1,1 @@
-"""R3: choose a design, and say why each other design was not taken."""
+"""R3: chooses a design, and says why it rejected each other one."""

@@ -12,7 +12,7 @@ _STATES = {
 
 
 def line(decision: Decision) -> str:
-    """Return a decision as one line for a log: what, by how much, by which rule, the ranking, durations."""
+    """Return a decision as one line for a log: the violation, its amount and rule, the ranking, durations."""
     parts = [decision.explanation]
     rules = list(dict.fromkeys(cause.rules for cause in decision.reasons if cause.rules))
     excesses = [f"{cause.quality} by {cause.excess:.0%}" for cause in decision.reasons if cause.quality]

@@ -1,4 +1,4 @@
-"""R3: choose the design to deploy for an objective, and say why each other one was not taken."""
+"""R3: chooses the design to deploy for an objective, and says why it rejected each other one."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Situation:
-    """What a plan depends on beside the designs.
+    """All that a plan depends on, except the designs.
 
     Attributes:
         qualities: how the levels of each quality attribute compare.
@@ -58,7 +58,7 @@ class Situation:
     worth: float = 0.0
 
     def can_deploy(self, design: str) -> bool:
-        """Return whether a design can be deployed, however well it does."""
+        """Return whether a design can be deployed, whatever its levels are."""
         return not self.unrealisable.get(design) and not self.unfulfilled.get(design)
 
 
@@ -69,7 +69,7 @@ def plan(
     utility: Utility,
     distance: Distance,
 ) -> Plan:
-    """Choose a design that can be deployed, did not fail a short while ago and keeps every limit.
+    """Choose a design that can be deployed, has not failed recently and keeps every limit.
 
     The highest utility wins; of equally useful designs, the smaller change wins. When no design keeps every limit, the
     least violating one is taken; the deployed design stays unless another one is worth the change. When all have
@@ -140,7 +140,7 @@ def feasible_designs(
 
 
 def difference(first: Design, second: Design) -> float:
-    """Return how big a change it is from one design to the other: components first, then expected levels."""
+    """Return the size of the change from one design to another: components first, then expected levels."""
     components = len(first.components ^ second.components)
     shared = sorted(set(first.expected) & set(second.expected))
     return components + math.dist([first.expected[q] for q in shared], [second.expected[q] for q in shared])
@@ -148,7 +148,7 @@ def difference(first: Design, second: Design) -> float:
 
 @dataclass(frozen=True)
 class _Judged:
-    """A design as it compares with the others.
+    """A design with all that is needed to rank it.
 
     Attributes:
         design: the design.
@@ -165,11 +165,11 @@ class _Judged:
     levels: Mapping[str, float]
 
     def chosen(self) -> Candidate:
-        """Return the candidate that is taken."""
+        """Return the design as the chosen candidate."""
         return Candidate(self.design.name, self.design.expected, self.levels, self.utility, chosen=True)
 
     def lost(self, because: str) -> Candidate:
-        """Return the candidate that is not taken."""
+        """Return the design as a rejected candidate."""
         return Candidate(
             self.design.name,
             self.design.expected,
@@ -217,7 +217,7 @@ def _factor(factor: float) -> str:
 
 
 def _loss(candidate: _Judged, best: _Judged, degraded: bool) -> str:
-    """Return why a candidate was not taken."""
+    """Return why a candidate was rejected."""
     if candidate.refused_because:
         worse = f"; violates limits by {candidate.violation:.2g}, the choice by {best.violation:.2g}"
         return candidate.refused_because + (worse if degraded and math.isfinite(candidate.violation) else "")

@@ -1,4 +1,4 @@
-"""The utility of a design, a plug-in: a function (parameters, qualities) -> (design -> number, the greater the better).
+"""The utility of a design, by a plug-in: a function (parameters, qualities) -> (design -> number; greater is better).
 
 A package adds one with `<export><mros1_reasoner utility="NAME" function="module:function"/></export>` in package.xml.
 """
@@ -46,7 +46,7 @@ _Levels = Mapping[str, float]
 
 
 class UtilityError(Exception):
-    """A utility function can't be made as it is asked for; one line that says why."""
+    """A utility function can't be made as requested; one line that says why."""
 
 
 def make_utility(wanted: str | Mapping[str, Any], qualities: Mapping[str, Quality]) -> Utility:
@@ -81,7 +81,7 @@ def make_utility(wanted: str | Mapping[str, Any], qualities: Mapping[str, Qualit
 
 
 def quality(name: Any, qualities: Mapping[str, Quality]) -> Utility:
-    """Return the utility that is the expected level of one quality; 0 of a design of which none is expected."""
+    """Return the utility that is the expected level of one quality, or 0 for a design without that level."""
     if name not in qualities:
         _log.warning("utility: no quality is called %r: every design is as useful as another", name)
     sign = -qualities.get(name, Quality(Direction.HIGHER_IS_BETTER)).direction.sign
@@ -104,10 +104,10 @@ def weights(parameters: Any, qualities: Mapping[str, Quality]) -> Utility:
 
 
 def expression(parameters: Any, qualities: Mapping[str, Quality]) -> Utility:
-    """Return the utility that an expression over expected levels says.
+    """Return the utility that an expression computes from expected levels.
 
     It takes numbers, names of qualities, + - * / **, comparisons, `a if condition else b`, and min, max, abs, sqrt,
-    exp, log. A design of which a level is not expected, or for which the expression has no value, is of least use.
+    exp, log. A design is the least useful if it lacks an expected level, or if the expression has no value for it.
 
     Raises:
         UtilityError: the expression holds something else, or a quality that is unknown.

@@ -1,4 +1,4 @@
-"""Recorded decisions beside those of a replay."""
+"""Compares recorded decisions with those of a replay."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ class Pair:
 
 
 def pairs(recording: Recording, replayed: Replayed) -> list[Pair]:
-    """Put each recorded decision beside the replayed one of the same time, in the order of time.
+    """Pair each recorded decision with the replayed one of the same time, in the order of time.
 
-    Those that do the same are put together first, then those that have the same reason.
+    Decisions that do the same are paired first, then those with the same reason.
     """
     recorded = [record for _, record in first_messages(recording.decisions) if record.state != EXECUTED]
     own = [record for _, record in first_messages(replayed.decisions)]

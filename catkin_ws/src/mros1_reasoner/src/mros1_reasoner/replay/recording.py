@@ -1,4 +1,4 @@
-"""What a bag holds of a reasoner, as plain data; `io.reasoner_bag` reads it."""
+"""A reasoner's data from a bag, as plain data; `io.reasoner_bag` reads them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Statuses:
 
 @dataclass
 class Recording:
-    """What a bag holds of one reasoner; times are s of ROS time.
+    """The data of one reasoner in a bag; times are s of ROS time.
 
     Attributes:
         start: of the bag.

@@ -1,8 +1,8 @@
-"""What the loop would decide on a recorded run: the same core over the journal of a bag, with other parameters.
+"""Runs the same core over the journal of a bag, with other parameters, to see what it would decide.
 
-While it decides as it did then, it takes in what was recorded. Once it decides otherwise, what the manipulator did then
-says nothing any more: each request counts as carried out after the usual time. Levels and components stay as they were
-observed then.
+While its decisions equal the recorded ones, it follows the recording. Once they differ, the recorded acts of the
+manipulator are no longer valid. From then on, each request counts as carried out after the usual time, while levels and
+components stay as they were observed.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _CAME_OF_DECISIONS = ActiveFact | Result | Approve | Reject | Decided  # tells w
 
 @dataclass(frozen=True)
 class Replayed:
-    """What a replay has brought.
+    """The result of a replay.
 
     Attributes:
         decisions: as they were made, with the moment in s of ROS time.
@@ -42,7 +42,7 @@ class Replayed:
 
 
 def rerun(core: Mape, entries: Sequence[Entry], duration: float = DEFAULT_DURATION, *, follow: bool = True) -> Replayed:
-    """Have a loop take in the entries of a journal.
+    """Apply the entries of a journal to a loop.
 
     Args:
         core: a new loop; its decisions' ids begin as the recorded ones.
@@ -91,7 +91,7 @@ class _Rerun:
         return decisions
 
     def _go_on_with(self, decisions: list[Decision]) -> None:
-        """Approve what is proposed, and have what is decided carried out after a while."""
+        """Approve a proposed decision; carry out a decision after a while."""
         for decision in decisions:
             if decision.state == PROPOSED:
                 self._go_on_with(self._apply(Entry(self._now, Approve(decision.id))))
@@ -100,7 +100,7 @@ class _Rerun:
             self._request = self._now + self._duration, pending.id
 
     def _advance(self, until: float) -> None:
-        """Bring about what happens by itself before the next entry."""
+        """Do what happens by itself before the next entry."""
         while True:
             due = self._core.due(self._now)
             carried_out = self._request[0] if self._request else None
@@ -119,7 +119,7 @@ def _targets(decisions: Sequence[Decision]) -> list[tuple[str, str]]:
 
 
 def _brought(entries: Sequence[Entry], index: int) -> list[tuple[str, str]]:
-    """Return objective and configuration of what an entry has brought then."""
+    """Return objective and configuration of the decision to which an entry led."""
     if isinstance(entries[index].content, Decided):
         return []
     found = []
@@ -139,7 +139,7 @@ def usual_duration(decisions: Sequence[tuple[float, Decision]]) -> float:
 def without_journal(
     recording: Recording, reader: DiagnosticsReader, initial: Sequence[tuple[float, ActiveFact]] = ()
 ) -> list[Entry]:
-    """Make a journal, for a replay without `follow`, of the diagnostics that a bag without one holds.
+    """Make a journal from diagnostics, for a bag that has none and a replay without `follow`.
 
     Args:
         recording: of the bag.

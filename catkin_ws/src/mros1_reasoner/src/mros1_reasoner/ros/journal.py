@@ -17,7 +17,7 @@ from mros1_reasoner.loop.journal import Journal
 
 
 class JournalTopic:
-    """Publishes what the loop takes in; a new subscriber gets what was before.
+    """Publishes the inputs of the loop; a new subscriber gets the earlier ones, too.
 
     The loop's thread appends and flushes; subscribers come in rospy's threads.
     """

@@ -1,4 +1,4 @@
-"""What the node reasoner logs; however much goes wrong, it is a few lines."""
+"""The log of the node reasoner: only a few lines, even if many things go wrong."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Log:
         rospy.loginfo(_PREFIX, text)
 
     def warn(self, kind: str, text: str) -> None:
-        """Warn of trouble of a kind, unless much of that kind was told just now."""
+        """Warn of a problem, unless many problems of the same kind were just logged."""
         said = self._warnings.admit(time.monotonic(), kind, text)
         if said:
             is_published = text.startswith("Unsupported QA TYPE received: ")  # tools wait for that line as it is
@@ -44,7 +44,7 @@ class Log:
         self.tell(f"{objective.name} needs {objective.function} with {limits or 'no limits'}")
 
     def tell_level(self, fact: LevelFact) -> None:
-        """Tell a level as published tools expect it."""
+        """Log a level in the form that published tools expect."""
         text = f"QA value received!\tTYPE: {fact.quality}\tVALUE: {fact.text}"
         if self._levels.admit(time.monotonic(), fact.quality, text):
             rospy.loginfo(text)
@@ -58,7 +58,7 @@ class Log:
             self.tell(remark.text)
 
     def tell_decision(self, decision: Decision) -> None:
-        """Tell what was decided, or how it went."""
+        """Log a decision or its outcome."""
         if decision.state == EXECUTED:
             rospy.loginfo("Exited timer_cb after successful reconfiguration")
             took = f"{decision.objective} has {decision.to_configuration} after {decision.execute_wall_s:.2f} s"
@@ -70,7 +70,7 @@ class Log:
 
 
 def log_core() -> None:
-    """Have what the core logs told on rosout as the node's own."""
+    """Pass the core's log on to rosout, as the node's own."""
     logger = logging.getLogger("mros1_reasoner")
     logger.setLevel(logging.INFO)
     logger.propagate = False

@@ -1,4 +1,4 @@
-"""Keep warnings few: a flood of bad messages must not become a flood of lines."""
+"""Limits warnings, so that a flood of bad messages does not become a flood of lines."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class _Kind:
-    """What was said of one kind of trouble in the present period."""
+    """The texts of one kind of problem in the present period."""
 
     since: float
     said: set[str] = field(default_factory=set)
@@ -15,7 +15,7 @@ class _Kind:
 
 
 class LogThrottle:
-    """Let a text pass once in a period, and few texts of one kind; the next line says how many were held back."""
+    """Lets each text pass once in a period, and few texts of a kind; the next line says how many were dropped."""
 
     def __init__(self, period: float = 10.0, burst: int = 5) -> None:
         """Take the period in s and the number of different texts of one kind that may pass in it."""

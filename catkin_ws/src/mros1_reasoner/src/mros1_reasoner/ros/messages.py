@@ -1,4 +1,4 @@
-"""Messages of what the loop decides; the classes are given, so that they may be rospy's or rosbags'."""
+"""Converts decisions to messages. The caller gives the message classes: those of rospy or of rosbags."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ _T = TypeVar("_T")
 
 
 class ReasonerNode:
-    """Takes facts in from topics, lets the core decide, publishes decisions and has them carried out.
+    """Reads facts from topics, lets the core decide, publishes decisions and has them carried out.
 
     Callbacks only queue what they get; everything else happens in the thread that calls `run`.
     """
@@ -115,7 +115,7 @@ class ReasonerNode:
             self._inbox.wait(max(0.0, until - time.monotonic()))
 
     def _next_look(self) -> float:
-        """Return the wall time at which to look whether the moment has come for which the core or a request waits."""
+        """Return the wall time of the next look at what the core or a request waits for."""
         ros_now, request = rospy.get_time(), self._requests.next_look if self._requests else math.inf
         due = self.core.due(ros_now)
         if due is None:
@@ -125,7 +125,7 @@ class ReasonerNode:
     # What comes in
 
     def ask(self, work: Callable[[], _T]) -> _T:
-        """Have the loop's thread do something; wait for what it returns.
+        """Have the loop's thread do some work, and return its result.
 
         Raises:
             TimeoutError: the loop is busy for too long.
@@ -134,7 +134,7 @@ class ReasonerNode:
         return self._inbox.call(work, _ANSWER_DEADLINE)
 
     def command(self, command: entries.Command) -> None:
-        """Take in what an operator asks for, in the loop's thread.
+        """Apply an operator's command in the loop's thread.
 
         Raises:
             MapeError, ReasonerError: it does not fit.
@@ -159,7 +159,7 @@ class ReasonerNode:
         self._inbox.put(lambda: self._take(TaskFact("", message.data, message="reported on obj_error")))
 
     def _on_task_status(self, objective: str, action: str, statuses: GoalStatusArray) -> None:
-        """Take in how the newest goal of an objective's action fares, where that is new."""
+        """Note the state of the newest goal of an objective's action, if it has changed."""
         newest = newest_goal(statuses)
         if newest is None or self._goals.get(objective) == newest:
             return
@@ -167,7 +167,7 @@ class ReasonerNode:
         self._inbox.put(lambda: self._take(TaskFact(objective, newest[1], message=f"a goal of {action} was aborted")))
 
     def _take(self, content: entries.Content) -> bool:
-        """Take something in and announce what follows; say what is wrong where it does not fit."""
+        """Apply an input and announce what follows; log what is wrong if the input does not fit."""
         try:
             self._announce(self._applied(content))
         except (MapeError, KnowledgeBaseError) as error:
@@ -208,7 +208,7 @@ class ReasonerNode:
     # What goes out
 
     def _announce(self, decisions: list[Decision]) -> None:
-        """Tell of decisions and have those carried out that are to be."""
+        """Publish decisions, and have carried out those that need it."""
         for decision in decisions:
             self._decisions.publish(decision)
             self._log.tell_decision(decision)
@@ -220,7 +220,7 @@ class ReasonerNode:
                 self._report(decision.id, True)
 
     def _report(self, decision: str, ok: bool, message: str = "", *, blame: bool = True) -> None:
-        """Take in how a decision went."""
+        """Note the outcome of a decision."""
         self._take(Result(decision, ok, message, blame))
         self._inbox.put(lambda: None)  # look at once at what happened meanwhile
 
@@ -235,7 +235,7 @@ def main() -> None:
 
 
 def _warm_up(knowledge_base: KnowledgeBase, reasoner: Reasoner, objectives: tuple[Objective, ...]) -> None:
-    """Let the JVM compile what an analysis runs, with every kind of fact."""
+    """Make the JVM compile the code of an analysis, by one with every kind of fact."""
     facts = Facts(
         objectives=objectives,
         groundings={o.name: d.name for o in objectives for d in knowledge_base.solving(o.function)[:1]},

@@ -1,4 +1,4 @@
-"""What the node reasoner asks of the manipulator, one request at a time, and how it tells of its failures."""
+"""Sends the node reasoner's requests to the manipulator, one at a time, and reports failures."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class _Request:
 
 
 class Requests:
-    """Asks the manipulator for configurations. All but what actionlib calls happens in the loop's thread."""
+    """Asks the manipulator for configurations. Only callbacks of actionlib run outside the loop's thread."""
 
     def __init__(
         self, action: str, deadline: float, queue: Callable[[Callable[[], object]], object], report: Callable[..., None]
@@ -50,12 +50,12 @@ class Requests:
         self._failures, self._trouble = 0, ""
 
     def ask(self, decision: str, configuration: str) -> None:
-        """Ask for a configuration; `report` is called once it runs, does not, or nobody has answered in time."""
+        """Ask for a configuration; call `report` when it runs, has failed, or nobody has answered in time."""
         self._request = _Request(decision, configuration, time.monotonic() + _SERVER_WAIT)
         self.look()
 
     def look(self) -> None:
-        """Send what could not be sent before; give up what takes too long."""
+        """Send a request that could not be sent before; give up one that takes too long."""
         request = self._request
         if request is None:
             return
@@ -80,7 +80,7 @@ class Requests:
         return self._request.ends if self._request.handle is not None else time.monotonic() + _SERVER_LOOK
 
     def _finds_server(self) -> bool:
-        """Tell, without waiting, whether the manipulator is connected; actionlib can't look before a clock runs."""
+        """Tell at once whether the manipulator is connected; actionlib can't look before the clock runs."""
         return not rospy.get_rostime().is_zero() and bool(self._client.wait_for_server(_ONE_LOOK))
 
     def _on_transition(self, request: _Request, handle: Any) -> None:
@@ -106,7 +106,7 @@ class Requests:
             self.tell_trouble(is_over=ok)
 
     def tell_trouble(self, *, is_over: bool = False) -> None:
-        """Publish the state of reconfigurations as a diagnostic while they fail, and once when they no longer do."""
+        """Publish a diagnostic while reconfigurations fail, and one more when they succeed again."""
         if not self._trouble and not is_over:
             return
         status = DiagnosticStatus(

@@ -1,4 +1,4 @@
-"""The services of the node reasoner: what an operator or mission logic asks of it."""
+"""The services of the node reasoner, for operators and mission logic."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SAVED = "knowledge_base.owl"
 
 
 class Services:
-    """Offers the services; each does its work in the loop's thread and answers with why it could not."""
+    """Offers the services. Each works in the loop's thread; if it fails, the answer says why."""
 
     def __init__(self, node: ReasonerNode, save_folder: Path) -> None:
         """Offer them from now on.
@@ -112,7 +112,7 @@ class Services:
         return services.SaveKnowledgeBaseResponse(ok, saved[0] if ok else message)
 
     def _answer(self, work: Callable[[], None]) -> tuple[bool, str]:
-        """Have the loop's thread work; return whether it went well, and why not."""
+        """Have the loop's thread do some work; return whether it succeeded, and if not, why."""
         try:
             self._node.ask(work)
         except _ERRORS as error:
