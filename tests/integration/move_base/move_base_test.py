@@ -376,7 +376,8 @@ class MoveBaseTest(unittest.TestCase):
             check=False,
         )
         self.assertEqual(process.returncode, 2)
-        self.assertIn("~controller_frequency: must be a number, is 'fast'", process.stdout + process.stderr)
+        said = process.stdout + process.stderr
+        self.assertIn("parameter ~controller_frequency is 'fast': it must be a finite number", said)
         self.assertNotIn("Traceback", process.stderr)
 
 

@@ -193,7 +193,7 @@ class MonitorMasterTest(unittest.TestCase):
             "rate": -1.0,
             "components": ["front_laser"],
             "desired_rossystem": "/nowhere/base.rossystem",
-            "observers": "SafetyQualityObserver",
+            "observers": 7,
             "topics": {"front/scan": {"min_rate": "fast"}},
             "ros_models": ["/nowhere/laser.ros"],
         }
