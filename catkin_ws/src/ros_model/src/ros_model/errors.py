@@ -1,4 +1,4 @@
-"""What is raised when a model, or a file that belongs to it, can't be used."""
+"""The error of a model, or of a file that belongs to it, that can't be used."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class ModelError(Exception):
 
 
 def printable(text: str) -> str:
-    """Return a text on one line: what is quoted may span lines, command a terminal, or be no character at all."""
+    """Return a text on one line, safe for a terminal: quoted text may have line breaks or control characters."""
     if text.isprintable():
         return text
     return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in text)
@@ -64,7 +64,7 @@ def _place(error: ModelError) -> tuple[str, int, int]:
 
 
 class Gathered:
-    """Gathers errors of steps that do not need each other, to tell all of them at once."""
+    """Gathers errors of independent steps, to report all of them at once."""
 
     def __init__(self) -> None:
         self._errors: list[ModelError] = []

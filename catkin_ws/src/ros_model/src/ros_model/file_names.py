@@ -1,4 +1,4 @@
-"""Names that are fit to name files."""
+"""Names that can be file names."""
 
 from __future__ import annotations
 

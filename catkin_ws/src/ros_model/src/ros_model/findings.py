@@ -1,4 +1,4 @@
-"""What a check finds: what is wrong, where, and by which rule."""
+"""The findings of a check: what is wrong, where, and by which rule."""
 
 from __future__ import annotations
 
@@ -59,6 +59,6 @@ class Finding:
 
 
 def sorted_by_place(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return findings in the order of their files' lines, without those that say the same of the same place."""
+    """Return findings in the order of files and lines, without repetitions."""
     unique = dict.fromkeys(findings)
     return tuple(sorted(unique, key=lambda f: (f.position.line, f.position.column) if f.position else (0, 0)))

@@ -1,4 +1,4 @@
-"""Models from what is there already: the running graph, the source code of packages, launch files.
+"""Makes models from what exists already: the running graph, the source code of packages, launch files.
 
-What can't be known is said in the model, with its place: a name or type is never guessed, and nothing is dropped.
+The model marks what can't be known, with its place: it never guesses a name or type, and drops nothing.
 """

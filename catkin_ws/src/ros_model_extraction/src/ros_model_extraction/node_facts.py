@@ -1,4 +1,4 @@
-"""What is found in source code, whatever its language: a node, its interfaces and parameters, what is not known."""
+"""The facts found in source code, in either language: a node, its interfaces and parameters, and the unknowns."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class FoundParameter:
 
 @dataclass(frozen=True)
 class NodeSource:
-    """What the code of one executable makes of it. `name` is "" where it calls nothing that starts a node."""
+    """The node that the code of one executable makes. `name` is "" if no call starts a node."""
 
     name: str
     ports: tuple[FoundPort, ...] = ()

@@ -85,7 +85,7 @@ class Run:
 
     @property
     def reached(self) -> bool:
-        """Whether the goal was."""
+        """Whether the goal was reached."""
         return self.outcome == "reached"
 
 
@@ -103,7 +103,7 @@ class Level:
 
 
 def plan(variants: Sequence[str], routes: Sequence[str], seeds: int) -> list[Job]:
-    """Return the missions with seeds 1 to `seeds`, seed by seed: a part of them says something, too."""
+    """Return the missions with seeds 1 to `seeds`, seed by seed, so that the first part is of use, too."""
     return [Job(*job) for job in ((v, r, s) for s, v, r in itertools.product(range(1, seeds + 1), variants, routes))]
 
 
@@ -135,7 +135,7 @@ def run_of(job: Job, record: MissionRecord, thresholds: Mapping[str, float], com
 
 
 def missing_runs(runs: Sequence[Run], variants: Sequence[str]) -> list[Job]:
-    """Return what is missing for all variants to have driven the same routes with the same seeds."""
+    """Return the missions that are missing until all variants have driven the same routes with the same seeds."""
     driven = {run.job for run in runs}
     asked = sorted({(run.seed, run.route) for run in runs})
     wanted = [Job(variant, route, seed) for seed, route in asked for variant in variants]

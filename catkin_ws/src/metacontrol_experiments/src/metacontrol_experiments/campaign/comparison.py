@@ -25,7 +25,7 @@ class Pair:
 
 
 def _delay(name: str) -> Callable[[Mapping[str, Any]], float | None]:
-    """Return the figure that is the mean of a delay over a mission's reconfigurations."""
+    """Return a figure: the mean of a delay over a mission's reconfigurations."""
 
     def of(summary: Mapping[str, Any]) -> float | None:
         known = [change[name] for change in summary["reconfigurations"] if change[name] is not None]
@@ -69,7 +69,7 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """What the difference says."""
+        """The difference in words."""
         if not math.isfinite(self.difference.half):
             return "needs more seeds"
         if not self.differs:
@@ -121,7 +121,7 @@ def _table(compared: Sequence[Row]) -> Iterator[str]:
 
 
 def _conclusion(pairs: Sequence[Pair], compared: Sequence[Row]) -> str:
-    """Return what follows, in words."""
+    """Return the conclusion in words."""
     same = sum(_chosen(pair.ros) == _chosen(pair.lockstep) for pair in pairs)
     told = f"Both engines deployed the same configurations in the same order with {same} of {len(pairs)} seeds."
     if len(pairs) < 2:

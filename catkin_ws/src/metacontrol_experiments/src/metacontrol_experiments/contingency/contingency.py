@@ -1,4 +1,4 @@
-"""Contingencies: what goes wrong in a mission, and when. How far the mission is, the caller tells."""
+"""Contingencies: what goes wrong in a mission, and when. The caller tells how far the mission is."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PLACE_RADIUS = 1.0
 
 
 class InjectionError(RuntimeError):
-    """A contingency that could not happen; the message says why."""
+    """A contingency could not happen; the message says why."""
 
 
 class Kind(Enum):
@@ -39,7 +39,7 @@ class Kind(Enum):
 
     @property
     def spoils_data(self) -> bool:
-        """Whether the component's node runs on with something wrong in its data."""
+        """Whether the component's node keeps running, with wrong data."""
         return self in (Kind.REPEAT, Kind.JUMP)
 
 
@@ -68,7 +68,7 @@ class Moment:
         return self.time == 0.0 or self.share == 0.0
 
     def has_come(self, share: float, elapsed: float, x: float, y: float) -> bool:
-        """Tell whether it has come, for a mission that is so far (share, s, position in m)."""
+        """Tell whether the moment has come, given a mission's share of the way, time in s and position in m."""
         return (
             (self.share is not None and share >= self.share)
             or (self.time is not None and elapsed >= self.time)
@@ -134,7 +134,7 @@ class Contingency:
 def contingencies_due(
     contingencies: tuple[Contingency, ...], injected: frozenset[int], share: float, elapsed: float, x: float, y: float
 ) -> tuple[int, ...]:
-    """Return the indices of those that have not injected and whose moment has come."""
+    """Return the indices of the contingencies that are not injected yet and whose moment has come."""
     return tuple(
         index
         for index, contingency in enumerate(contingencies)
@@ -143,5 +143,5 @@ def contingencies_due(
 
 
 def with_seed(contingencies: tuple[Contingency, ...], seed: int) -> tuple[Contingency, ...]:
-    """Return them with a seed for those that have none of their own."""
+    """Return the contingencies, each with a seed: its own, else the given one."""
     return tuple(replace(entry, seed=seed) if entry.seed is None else entry for entry in contingencies)

@@ -23,7 +23,7 @@ class ContingencyError(ValueError):
 
 
 class ComponentError(ValueError):
-    """A component that nobody knows; the message names those that are known."""
+    """A component is unknown; the message names the known ones."""
 
 
 def make(kind: str, what: Any, when: Moment | None, where: str) -> Contingency:

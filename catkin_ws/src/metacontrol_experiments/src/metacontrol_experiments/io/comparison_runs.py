@@ -22,7 +22,7 @@ class ComparisonError(RuntimeError):
 
 
 def claim(folder: Path, options: Sequence[str]) -> None:
-    """Take a folder for the missions of these options, and remember that.
+    """Reserve a folder for the missions of these options, by a file in it.
 
     Raises:
         ComparisonError: it holds those of others.

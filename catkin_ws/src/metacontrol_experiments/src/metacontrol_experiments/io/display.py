@@ -1,4 +1,4 @@
-"""What commands show on the terminal: notes and errors; of a mission its progress, timeline and closing tables."""
+"""Terminal output of the commands: notes, errors, and a mission's progress, timeline and closing tables."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def tell(text: str, style: str = "") -> None:
 
 @contextmanager
 def refusing(*kinds: type[Exception]) -> Iterator[None]:
-    """End a command with one line where such an error, an error of the file system, or Ctrl-C ends the body."""
+    """End a command with one line if one of these errors, a file system error or Ctrl-C ends the body."""
     refused: tuple[type[Exception], ...] = (*kinds, OSError)
     try:
         yield

@@ -156,7 +156,7 @@ def _robot(settings: Settings, base: RosSystem) -> Robot:
 
 
 def _cores(launched: SystemDescription, drivers: Drivers) -> Cores:
-    """Return what decides in the meta-controller's nodes, with the parameters of these nodes."""
+    """Return the deciding parts of the meta-controller's nodes, with the parameters of these nodes."""
     observers = Observers(_observers(private_parameters(launched, *_MONITOR)), drivers.topics)
     tactics = load_tactics()
     parameters = Parameters(private_parameters(launched, *_REASONER))

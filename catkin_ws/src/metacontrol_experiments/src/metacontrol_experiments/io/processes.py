@@ -54,7 +54,7 @@ def is_free(port: int) -> bool:
 
 
 def wait_until(condition: Callable[[], bool], deadline_s: float) -> bool:
-    """Wait, and tell whether a condition came true within so many wall seconds."""
+    """Wait for a condition; tell whether it came true within a time in wall s."""
     end = time.monotonic() + deadline_s
     while not condition():
         if time.monotonic() > end:
@@ -132,7 +132,7 @@ class ProcessTree:
 
 @contextmanager
 def signals_as_interrupts() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP end the body as Ctrl-C does."""
+    """Make SIGTERM and SIGHUP end the body as Ctrl-C does."""
 
     def interrupt(_number: int, _frame: object) -> None:
         raise KeyboardInterrupt

@@ -70,7 +70,7 @@ def read_runs(path: Path) -> list[Run]:
 
 
 def append_runs(path: Path, runs: Iterable[Run]) -> Iterator[Run]:
-    """Write each run to the end of a file as it comes, and yield it: an interrupted calibration can go on."""
+    """Append each run to a file at once, and yield it, so that an interrupted calibration can continue."""
     path.parent.mkdir(parents=True, exist_ok=True)
     text = path.read_text(encoding="utf-8") if path.exists() else ""
     with path.open("w", encoding="utf-8", newline="") as file:

@@ -1,4 +1,4 @@
-"""The sensors' drivers in lockstep, and what can be wrong with them. Which of them runs, the base model says."""
+"""The drivers of the sensors in lockstep, and their faults. The base model says which drivers run."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Drivers:
         self._outlets = {component: Outlet() for component in self.components}
 
     def inject(self, kind: Kind, component: str) -> None:
-        """Let something happen to a driver; only what was frozen thaws."""
+        """Inject a fault into a driver; only a frozen driver thaws."""
         if kind.spoils_data:
             self._outlets[component].fault = Fault(kind.value)
         elif kind is not Kind.THAW:

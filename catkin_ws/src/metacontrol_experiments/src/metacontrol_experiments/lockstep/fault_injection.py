@@ -40,7 +40,7 @@ class FaultInjector:
         self.obstacles: list[tuple[float, float]] = []  # places of all clutter so far, m
 
     def inject(self, contingency: Contingency) -> dict[str, str]:
-        """Let a contingency happen now; return what is worth telling of it.
+        """Make a contingency happen now; return a description of it.
 
         Raises:
             InjectionError: it cannot.

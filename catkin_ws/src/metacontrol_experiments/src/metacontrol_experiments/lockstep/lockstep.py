@@ -50,7 +50,7 @@ _OCCUPIED = 50
 
 @dataclass(frozen=True)
 class Outcome:
-    """What is left of a run.
+    """The results of a run.
 
     Attributes:
         state: the mission's last state.
@@ -198,7 +198,7 @@ class Lockstep:
             self._follow(now)
 
     def _sense(self, now: float) -> None:
-        """Let those drivers measure that somebody listens to, and hand their messages on."""
+        """Make the drivers that have listeners measure, and pass on their messages."""
         heard = self._navigation.topics
         if self._metacontroller is not None:
             heard |= self._metacontroller.wanted_topics
@@ -211,7 +211,7 @@ class Lockstep:
             self._navigation.receive(topic, message, now)
 
     def _manage(self, now: float) -> None:
-        """Let the meta-controller do its part, and deploy what it has decided."""
+        """Step the meta-controller, and deploy its decision."""
         if self._metacontroller is None:
             return
         time = _stamp(now)
@@ -272,7 +272,7 @@ class Lockstep:
                 self._recorder.event(event)
 
     def _inject(self, contingency: Contingency) -> dict[str, str]:
-        """Let a contingency happen now; return what is worth telling of it.
+        """Make a contingency happen now; return a description of it.
 
         Raises:
             InjectionError: it cannot.

@@ -86,7 +86,7 @@ class _Pending:
 
 
 class Metacontroller:
-    """Observes and decides; what it decides is carried out after a while.
+    """Observes and decides; carries out its decisions after a while.
 
     Attributes:
         configuration: name of the one in force.
@@ -137,7 +137,7 @@ class Metacontroller:
         self._cores.observers.listen(simulation, step, now, stamp)
 
     def component_changed(self, now: float, component: str, works: bool) -> None:
-        """Take in that a component's node died or came back; the monitor finds out after a while."""
+        """Note that a component's node died or came back; the monitor detects it after a while."""
         status = DiagnosticWords.COMPONENT_RECOVERED if works else DiagnosticWords.COMPONENT_FALSE
         self._due.append((now + self._delays.draw("detect", self._rng), component, status))
 
@@ -183,7 +183,7 @@ class Metacontroller:
                 self._cores.loop.observe_component(now, fact.component, fact.status, stamp=now)
 
     def _reason(self, now: float, *, heartbeat: bool) -> None:
-        """Let the reasoner look at what is known.
+        """Let the reasoner analyse the present facts.
 
         Raises:
             LockstepError: the analysis failed, or what was decided cannot be deployed.
@@ -202,7 +202,7 @@ class Metacontroller:
                 self.decisions.append(replace(decision, stamp=now))
 
     def _carry_out(self, now: float) -> Change | None:
-        """Begin what is decided by now, and report what is done by now."""
+        """Begin decisions that are due, and report those that are done."""
         pending = self._pending
         if pending is None:
             return None

@@ -1,4 +1,4 @@
-"""What a mission in lockstep leaves: the record that a bag would tell, and the lines of its log."""
+"""The record of a mission in lockstep, as a bag would hold it, and the lines of its log."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Recorder:
         self._contacts: list[tuple[float, float]] = []
 
     def take_from(self, metacontroller: Metacontroller) -> None:
-        """Keep what the meta-controller has said."""
+        """Keep the reports of the meta-controller."""
         self.decisions, self.observed = metacontroller.decisions, metacontroller.observed
         self.components = metacontroller.components
 

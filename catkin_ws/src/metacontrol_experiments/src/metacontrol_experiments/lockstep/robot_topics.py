@@ -1,4 +1,4 @@
-"""What the simulated robot tells observers: the topics of the simulator's node, at the rates that it has on ROS."""
+"""The simulated robot's topics for observers: those of the simulator's node, at the same rates as on ROS."""
 
 from __future__ import annotations
 

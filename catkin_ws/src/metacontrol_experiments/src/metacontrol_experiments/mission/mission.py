@@ -50,7 +50,7 @@ class Action(Enum):
 
 @dataclass(frozen=True)
 class Inject:
-    """The caller has to let one of the plan's contingencies happen now."""
+    """The caller must make one of the plan's contingencies happen now."""
 
     index: int
 
@@ -225,7 +225,7 @@ def abort(state: State, now_s: float, reason: str) -> State:
 
 
 def _inject(plan: Plan, state: State, now_s: float) -> Step:
-    """Let the contingencies happen that are due."""
+    """Make the contingencies that are due happen."""
     due = contingencies_due(plan.contingencies, state.injected, state.share, now_s - state.started_s, state.x, state.y)
     if not due:
         return state, ()

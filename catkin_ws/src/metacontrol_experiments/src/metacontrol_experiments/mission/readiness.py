@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Readiness:
-    """What has been heard so far.
+    """The reports of the system so far.
 
     Attributes:
         located: a pose of the robot.
@@ -44,7 +44,7 @@ class Readiness:
         self.failed = f"the manipulator could not deploy {broken[0].configuration}" if broken else None
 
     def conditions(self, qualities: Iterable[str]) -> Iterator[Condition]:
-        """Yield what must come true one after the other, each with what is waited for.
+        """Yield the conditions that must become true, in their order, each with its description.
 
         Args:
             qualities: quality attributes of which a level must come in.

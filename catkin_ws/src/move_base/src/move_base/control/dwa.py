@@ -57,7 +57,7 @@ ESCAPE_DISTANCE = 0.3
 
 @dataclass(frozen=True)
 class _Scene:
-    """What trajectories are judged by: the path ahead (N, 2), the costmap, and the shape to keep free."""
+    """The criteria for trajectories: the path ahead (N, 2), the costmap, and the shape to keep free."""
 
     path: NDArray[np.float64]
     snapshot: Snapshot
@@ -118,7 +118,7 @@ class DwaController:
         return best
 
     def turn(self, robot: Pose, angle: float, snapshot: Snapshot) -> Trajectory | None:
-        """Return a turn on the spot by up to `angle` (rad, signed), or None where it is not free.
+        """Return a turn on the spot by up to `angle` (rad, signed), or None if it is not free.
 
         The speed falls with the angle left, so that the turn ends without overshoot.
         """
@@ -132,7 +132,7 @@ class DwaController:
         return rollout.trajectory(0, 0.0)
 
     def _back_off(self, robot: Pose, scene: _Scene) -> Trajectory | None:
-        """Go on backing off where that has begun, the robot has not come far enough, and the way is free."""
+        """Keep backing off if that has begun, the robot has not come far enough, and the way is free."""
         if self._backing_from is None:
             return None
         if robot.distance(self._backing_from) < ESCAPE_DISTANCE:
@@ -143,7 +143,7 @@ class DwaController:
         return None
 
     def _align_angle(self, velocity: Velocity, scene: _Scene) -> float:
-        """Return by how much the robot may be off the path's direction when it drives, rad."""
+        """Return the largest deviation from the path's direction with which the robot may drive, rad."""
         if velocity.x > 1.5 * self.parameters.min_vel_x:
             return ALIGN_ANGLE
         near = scene.path[np.hypot(*(scene.path - scene.path[0]).T) <= NARROW_AHEAD]

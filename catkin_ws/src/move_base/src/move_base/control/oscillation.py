@@ -15,7 +15,7 @@ TURN, STRAFE = 2, 1
 
 
 class OscillationFlags:
-    """Who turns (or strafes) back after having turned the other way may not do so again before having moved."""
+    """If the robot has turned (or strafed) to one side and back, it must move before it may use that side again."""
 
     def __init__(self) -> None:
         self._last = {TURN: 0.0, STRAFE: 0.0}

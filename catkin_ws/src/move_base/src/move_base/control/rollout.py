@@ -1,4 +1,4 @@
-"""Velocities rolled out: where the base gets to over a horizon, and whether its footprint keeps off obstacles."""
+"""Rolls out velocities: where the base moves over a horizon, and whether its footprint stays free of obstacles."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class Footprint:
         self.circumscribed = float(np.hypot(*corners.T).max())
 
     def is_free(self, rollout: Rollout, snapshot: Snapshot) -> NDArray[np.bool_]:
-        """Whether each trajectory keeps the footprint off obstacles (C,); outside the costmap nothing is free.
+        """Whether each trajectory keeps the footprint free of obstacles (C,); outside the costmap nothing is free.
 
         The clearance of the robot's centre decides most poses; the edge is looked at only in between.
         """

@@ -67,7 +67,7 @@ class Costmap:
         self._obstacles = np.zeros(self.geometry.shape, dtype=np.uint8)
 
     def reconfigure(self, parameters: CostmapParameters) -> None:
-        """Take another inflation, padding or rates. Obstacles stay; size, frame and other layers can't change."""
+        """Change inflation, padding or rates. Obstacles stay; size, frame and other layers can't change."""
         self.parameters = parameters
         self._clears_footprint = any(layer.footprint_clearing for layer in parameters.layers_of("obstacle"))
         padded = parameters.padded_footprint()
@@ -82,7 +82,7 @@ class Costmap:
         return self._static_layer is not None and self._static is None
 
     def set_map(self, static: StaticMap) -> None:
-        """Take a new static map; a costmap that does not roll takes on its size and resolution."""
+        """Take a new static map. A costmap that does not roll takes its size and resolution from the map."""
         if self._static_layer is None:
             return
         self._static = static

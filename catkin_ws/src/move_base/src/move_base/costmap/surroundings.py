@@ -1,4 +1,4 @@
-"""What the robot knows of its surroundings: both costmaps, filled at their rates from the map and the sensors.
+"""The robot's knowledge of its surroundings: both costmaps, updated at their rates from the map and the sensors.
 
 It also tells what keeps them from being current: a missing map or transform, a sensor that is silent.
 """
@@ -40,7 +40,7 @@ class Transformer(Protocol):
 
 @dataclass
 class _Sensor:
-    """What is known of one source."""
+    """The data of one source."""
 
     source: ObservationSource
     recent: list[Observation] = field(default_factory=list)
@@ -59,7 +59,7 @@ class _Sensor:
     def trouble(self, now: float) -> str:
         """Return why no current data of it are in a costmap, or an empty text.
 
-        The age that counts is that of the newest measurement in a costmap, not of one that can't be transformed.
+        The age is that of the newest measurement in a costmap; a measurement that can't be transformed does not count.
         """
         period = self.source.expected_update_rate
         if now - self.used <= period:

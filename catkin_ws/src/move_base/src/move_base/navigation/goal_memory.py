@@ -1,4 +1,4 @@
-"""What is remembered while the navigator works on one goal."""
+"""The navigator's memory of one goal."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Work:
         return cls(planned_well=now, controlled=now, anchored=now)
 
     def restart_patience(self, now: float) -> None:
-        """Start the patience of planner, controller and oscillation anew; also while the robot has to stand still."""
+        """Restart the patience of planner, controller and oscillation, also while the robot has to stand still."""
         self.planned_well = self.controlled = self.anchored = now
         self.failed_plans = 0
         self.anchor = None

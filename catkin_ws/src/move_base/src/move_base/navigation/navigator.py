@@ -5,7 +5,7 @@
                | v           v
               RECOVERING <----
 
-Whatever the state, nothing moves on sensor data that are too old, nor without a map or a transform.
+In no state does the robot move on sensor data that are too old, or without a map or a transform.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class Navigator:
         return self._surroundings.observe(observation, now)
 
     def set_goal(self, goal: Pose, now: float) -> None:
-        """Start on a goal in the global frame, in place of the present one."""
+        """Pursue a goal in the global frame, in place of the present one."""
         self.goal = goal
         self._followed = None
         self.state = State.PLANNING
@@ -170,7 +170,7 @@ class Navigator:
         return Result(velocity=STOP, robot=robot, warning=f"Waiting: {reason}" if waited > QUIET_WAIT else "")
 
     def _hold(self, now: float, robot: Pose, reason: str) -> Result:
-        """Stand still on old data: neither drive nor turn. No other patience runs meanwhile."""
+        """Stand still while data are too old: neither drive nor turn. All other patience pauses meanwhile."""
         if self._work.stale_since is None:
             self._work.stale_since = now
         waited = now - self._work.stale_since
@@ -253,7 +253,7 @@ class Navigator:
     # -- planning --------------------------------------------------------------------------------------------------
 
     def _plan_if_due(self, now: float, robot: Pose) -> Plan | None:
-        """Plan at planner_frequency, and at once where there is no plan; return a plan that was newly taken."""
+        """Plan at planner_frequency, or at once if there is no plan; return a newly accepted plan."""
         p = self.parameters
         period = 1.0 / p.planner_frequency if p.planner_frequency > 0.0 else math.inf
         if self._followed is None or now - self._work.controlled > 1.0:  # the controller is stuck: look for another way

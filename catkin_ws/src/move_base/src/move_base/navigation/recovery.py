@@ -49,7 +49,7 @@ class Recovery:
         return self.behaviour
 
     def follow(self, robot: Pose) -> None:
-        """Start the sequence afresh where the robot has got away."""
+        """Restart the sequence if the robot has moved away."""
         if self._where is not None and robot.distance(self._where) > AFRESH_DISTANCE:
             self._tried, self._where = 0, None
 

@@ -1,4 +1,4 @@
-"""What the navigator is doing, and what one of its steps has decided."""
+"""The state of the navigator, and the result of one step."""
 
 from __future__ import annotations
 

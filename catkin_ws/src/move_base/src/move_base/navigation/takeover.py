@@ -1,7 +1,8 @@
-"""Taking over the goal that a former instance of the node was working on.
+"""Takes over the goal of an earlier instance of the node.
 
-Who restarts move_base sets the parameter `~resume_goal` to `{type: "move_base_msgs/MoveBaseActionGoal", data: BASE64}`,
-the serialised action goal. The new server then knows the goal before its first status message; the client sees no gap.
+The program that restarts move_base sets the parameter `~resume_goal` to `{type: "move_base_msgs/MoveBaseActionGoal",
+data: BASE64}`, the serialised action goal. The new server then knows the goal before its first status message; the
+client sees no gap.
 """
 
 from __future__ import annotations

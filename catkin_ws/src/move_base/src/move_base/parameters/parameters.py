@@ -1,4 +1,4 @@
-"""What move_base is told: its parameters, typed and checked (`reader` makes them from the parameter server's tree)."""
+"""The parameters of move_base, typed and checked (`reader` makes them from the parameter server's tree)."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ class RecoveryBehavior:
 
 @dataclass(frozen=True)
 class MoveBaseParameters:
-    """Everything that move_base is told; frequencies in Hz, times in s, lengths in m.
+    """All parameters of move_base; frequencies in Hz, times in s, lengths in m.
 
     `max_planning_retries` is -1 where only `planner_patience` limits them; `default_tolerance` is how far a plan may
     end from a blocked goal.

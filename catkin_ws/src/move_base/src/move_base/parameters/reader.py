@@ -46,7 +46,7 @@ _ROTATION = "clearing_rotation_allowed"
 
 
 def read_parameters(tree: Mapping[str, Any]) -> MoveBaseParameters:
-    """Read and checks the parameters of move_base.
+    """Read and check the parameters of move_base.
 
     Args:
         tree: the node's private namespace, nested as the parameter server returns it.
@@ -256,7 +256,7 @@ def _read_footprint(reader: ParameterTree) -> tuple[tuple[float, float], ...]:
 
 
 def _frame(reader: ParameterTree, name: str, default: str) -> str:
-    """Return a frame's name; tf2 knows no leading slash, published files have some."""
+    """Return a frame's name without the leading slash that some published files have; tf2 refuses it."""
     return reader.text(name, default).removeprefix("/")
 
 

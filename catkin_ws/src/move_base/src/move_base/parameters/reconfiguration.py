@@ -1,4 +1,4 @@
-"""Parameters that change while move_base runs: which server has which, and what they have as values now.
+"""Parameters that change while move_base runs: their servers and their present values.
 
 The servers and the names of their parameters are those of ROS Navigation; the definitions are in cfg/.
 """
@@ -47,7 +47,7 @@ def servers(parameters: MoveBaseParameters) -> list[ServerDescription]:
 def present_values(
     parameters: MoveBaseParameters, tree: Mapping[str, Any], server: ServerDescription, names: Iterable[str]
 ) -> dict[str, Any]:
-    """Return what a server's parameters have as values now; those that nothing limits are left out."""
+    """Return the present values of a server's parameters, without infinite values."""
     name, _, layer = server.namespace.partition("/")
     source: object = parameters
     if name == "TrajectoryPlannerROS":

@@ -1,4 +1,4 @@
-"""The plan that the robot is on, and how far along it is."""
+"""The plan that the robot follows, and how far the robot has come."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class FollowedPlan:
         return path_cost(points, snapshot, allow_unknown=allow_unknown)
 
     def is_better_than(self, new: Plan, robot: Pose, snapshot: Snapshot, *, allow_unknown: bool) -> bool:
-        """Whether the robot stays on this plan although there is a new one."""
+        """Whether the robot keeps this plan although there is a new one."""
         if self.plan.goal != new.goal:
             return False
         kept = self.cost_left(robot, snapshot, allow_unknown=allow_unknown)

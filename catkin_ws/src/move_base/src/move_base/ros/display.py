@@ -1,4 +1,4 @@
-"""What others can look at: plans, trajectories, costmaps and footprints, published while somebody listens."""
+"""Publishes plans, trajectories, costmaps and footprints while somebody listens."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class PathDisplay:
-    """Topics of the plan, of the part that the controller has, and of the trajectory that it has chosen."""
+    """Topics of the plan, of the controller's part of it, and of the chosen trajectory."""
 
     def __init__(self, global_frame: str, local_frame: str) -> None:
         self._global_frame = global_frame

@@ -1,4 +1,4 @@
-"""The action server: one goal at a time, from its arrival to the answer that its client gets."""
+"""The action server, with one goal at a time, from its arrival to the answer for its client."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ FEEDBACK_PERIOD = 0.2
 
 
 class _TakingOverActionServer(actionlib.ActionServer):
-    """An action server that may start with a goal already at work."""
+    """An action server that may start with an active goal."""
 
     def __init__(self, *arguments: Any, resumed: MoveBaseActionGoal | None = None, **options: Any) -> None:
         super().__init__(*arguments, auto_start=False, **options)
@@ -93,7 +93,7 @@ class GoalServer:
         self._server.start()
 
     def take_requests(self, now: float) -> None:
-        """Deal with the goals and cancellations that have come; `now` in s."""
+        """Process the goals and cancellations that have arrived; `now` in s."""
         self._requests.drain()
         if self._waiting is not None:
             self._resolve_waiting(now)

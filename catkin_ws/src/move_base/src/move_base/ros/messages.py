@@ -1,4 +1,4 @@
-"""Messages of ROS made from what the core holds, and the other way round; no node is needed for it."""
+"""Converts data of the core to ROS messages and back; no node is needed for it."""
 
 from __future__ import annotations
 

@@ -30,9 +30,9 @@ def offer(descriptions: Sequence[ServerDescription], present: Present, take: Tak
 
 
 class _Server(Server):
-    """A server that starts from what the node has, and writes to the parameter server only what is changed.
+    """A server that starts with the node's values, and writes only changed values to the parameter server.
 
-    The base class reads and writes every parameter in a call of its own: a second's work for six servers.
+    The base class reads and writes each parameter in a call of its own, which takes a second for six servers.
     """
 
     def __init__(self, description: ServerDescription, present: Present, take: Take) -> None:

@@ -1,4 +1,4 @@
-"""Signals by which a driver's process is told what goes wrong with its device."""
+"""Signals that tell a driver's process to simulate a fault of its device."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def read_world(path: Path) -> World:
-    """Read and check a world file: what has the key `image` is a map, anything else a list of boxes.
+    """Read and check a world file: a file with the key `image` is a map, any other a list of boxes.
 
     Raises:
         WorldError: the file is missing, not YAML, or one of its entries is wrong; names the file and the entry.
@@ -104,7 +104,7 @@ def _walker(entry: Any, where: str) -> Walker:
 
 
 def _check(world: World, path: Path) -> None:
-    """Check what concerns boxes and people together."""
+    """Check boxes and people against each other."""
     seen: set[str] = set()
     for name in (*(box.name for box in world.boxes), *(walker.name for walker in world.walkers)):
         if name in seen:

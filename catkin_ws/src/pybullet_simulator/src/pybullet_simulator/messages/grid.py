@@ -37,7 +37,7 @@ def read_grid(message: OccupancyGrid) -> Grid:
     """Return the grid of a map.
 
     Raises:
-        GridMessageError: its size is not that of its data, or its place is not finite.
+        GridMessageError: its size does not fit its data, or its origin is not finite.
     """
     info, origin = message.info, message.info.origin
     yaw = yaw_of(origin.orientation.z, origin.orientation.w)

@@ -1,6 +1,6 @@
 """ROS messages from the simulation's state. No rospy: these are plain conversions.
 
-A writer keeps its message and changes only what moves, which is much cheaper at 100 Hz than building it anew.
+A writer keeps its message and sets only the fields that change. At 100 Hz this is much cheaper than a new message.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def battery_state(simulation: Simulation, now: genpy.Time) -> BatteryState:
 
 
 def obstacle_markers(shown: Iterable[Shown], now: genpy.Time) -> MarkerArray:
-    """Return the obstacles that no map shows, after one marker that takes away what was shown before."""
+    """Return the obstacles that no map shows, after one marker that deletes all earlier ones."""
     markers = [Marker(action=Marker.DELETEALL)]
     for obstacle in shown:
         marker = Marker(ns=obstacle.name)

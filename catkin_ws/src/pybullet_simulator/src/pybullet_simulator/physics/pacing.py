@@ -7,7 +7,7 @@ class Pacer:
     """Keeps a schedule of steps.
 
     Steps are due on a fixed grid, so that small delays do not add up to a drift. After a delay the steps follow each
-    other faster, but never at less than `catch_up` of the period: no burst. A delay above `max_lag` is given up and
+    other faster, but never at less than `catch_up` of the period. So there is no burst. After a delay above `max_lag`,
     the schedule starts anew.
     """
 

@@ -43,7 +43,7 @@ _FLOOR = (0.40, 0.42, 0.40, 1.0)
 
 
 class PhysicsError(RuntimeError):
-    """PyBullet cannot start as it was asked to."""
+    """PyBullet cannot start with the requested settings."""
 
 
 class Physics:
@@ -108,7 +108,7 @@ class Physics:
         return {point[2] for point in points if point[9] > 0.0}
 
     def sweep(self, start: Pose, height: float, angles: NDArray[np.float64], length: float) -> NDArray[np.float64]:
-        """Return the distances that level rays get: (n,) m, inf where nothing is hit. Neither robot nor floor is seen.
+        """Return the lengths of level rays: (n,) m, inf if a ray hits nothing. Rays ignore the robot and the floor.
 
         Args:
             start: of the rays, on the map; its yaw does not matter.
@@ -154,7 +154,7 @@ class Physics:
         )
 
     def add_person(self, x: float, y: float) -> int:
-        """Put a person on the floor, who goes where `move` says."""
+        """Put a person on the floor; `move` moves the person."""
         cylinder = pybullet.GEOM_CYLINDER
         visual = {"radius": RADIUS, "length": HEIGHT}
         shape = {"radius": RADIUS, "height": HEIGHT}
@@ -215,7 +215,7 @@ class Physics:
         pybullet.setCollisionFilterGroupMask(floor, -1, _FLOOR_GROUP, _WORLD_GROUP, physicsClientId=self.client)
 
     def _add_map(self, boxes: list[Box]) -> tuple[int, ...]:
-        """Put the boxes of a map on the floor, thousands of them to a body: each as a body would slow every step."""
+        """Put the boxes of a map on the floor, thousands in one body: a body for each would slow every step."""
         bodies = []
         for first in range(0, len(boxes), _BOXES_PER_MESH):
             vertices, indices = box_mesh(boxes[first : first + _BOXES_PER_MESH])

@@ -234,7 +234,7 @@ class Simulation:
         return self.physics.depth_image(camera or self.robot.camera, self.pose)
 
     def touching(self) -> tuple[str, ...]:
-        """Return the names of what the robot touched in the last step, sorted."""
+        """Return the sorted names of the bodies that the robot touched in the last step."""
         bodies = (body for body, last in self._last_touch.items() if last == self._steps)
         return tuple(sorted(self._names.get(body) or self.obstacles.name_of(body) or "something" for body in bodies))
 
@@ -243,7 +243,7 @@ class Simulation:
         self.physics.close()
 
     def _drive(self) -> None:
-        """Hand the motors the velocity that is left of the wheels' when they slip."""
+        """Give the motors the velocity of the wheels, changed by their slip."""
         wheels = self._base.advance(self.time_ns, STEP)
         forward, left, turn = (value * grip for value, grip in zip(wheels, self._slip.factors, strict=True))
         cos, sin = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
@@ -286,7 +286,7 @@ class Simulation:
         self.map_to_odom = self.localised @ self.odometry.filtered.inverse()
 
     def _safety_risk(self) -> float:
-        """Return the risk by the closest thing, seen from the front laser, within 90 degrees of the way it moves."""
+        """Return the risk from the closest obstacle within 90 deg of the motion, seen from the front laser."""
         velocity_x, velocity_y = self._world_velocity
         speed = math.hypot(velocity_x, velocity_y)
         if speed <= SAFETY_MIN_SPEED:

@@ -1,4 +1,4 @@
-"""What PyBullet's window shows beside the world: scan, cloud, costmaps, plans, goal, and a text over the robot."""
+"""Draws into PyBullet's window: scan, cloud, costmaps, plans, goal, and a text over the robot."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Window:
             )
 
     def _remove(self, name: str) -> None:
-        """Take away what was drawn under a name."""
+        """Remove all that was drawn under a name."""
         if name in self._items:
             pybullet.removeUserDebugItem(self._items.pop(name), physicsClientId=self.client)
 
@@ -120,7 +120,7 @@ def cost_points(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the points of a costmap's cells that cost something, and their colours: both (n, 3).
 
-    Where these are too many to be drawn, squares of cells are drawn as one, which has the highest of their costs.
+    If there are too many cells, each square of cells becomes one point with the highest of their costs.
 
     Args:
         costs: (rows, columns) as of an OccupancyGrid.

@@ -1,4 +1,4 @@
-"""The controller of the base: what its wheels make of velocity commands."""
+"""The controller of the base, which turns velocity commands into motion of the wheels."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Drive:
         self._command_ns = now_ns
 
     def advance(self, now_ns: int, duration: float) -> Velocity:
-        """Return the velocity that the wheels turn for after so many seconds more."""
+        """Return the velocity of the wheels after a further time in s."""
         robot = self._robot
         expired = self._command_ns is None or now_ns - self._command_ns > robot.command_timeout * 1e9
         target = _REST if expired else self._target

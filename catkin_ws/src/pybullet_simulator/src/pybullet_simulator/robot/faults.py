@@ -1,4 +1,4 @@
-"""Devices that go wrong while their driver runs on: data that repeat, stamps that jump."""
+"""Faults of devices while their driver keeps running: data that repeat, stamps that jump."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Fault(Enum):
 
 
 class Outlet:
-    """What a driver's messages pass through.
+    """The outlet of a driver's messages, which applies the fault.
 
     Attributes:
         fault: REPEAT: the last message is sent again and again. JUMP: every other stamp is ahead of its time.
@@ -30,7 +30,7 @@ class Outlet:
         self._ahead = False
 
     def pass_on(self, message: Any) -> Any:
-        """Return what is sent in place of a message with a header."""
+        """Return the message to send in place of a message with a header."""
         if self.fault is Fault.REPEAT and self._last is not None:
             return self._last
         self._last = message

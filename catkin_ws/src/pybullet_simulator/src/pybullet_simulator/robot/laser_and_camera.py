@@ -1,4 +1,4 @@
-"""What the sensor drivers do with raw data: noise and range limits of a laser, points of a depth image."""
+"""Processing of raw data in the sensor drivers: noise and range limits of a laser, points of a depth image."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DEPTH_NOISE = 0.001
 
 
 class SensorError(ValueError):
-    """Raw data that make no sense."""
+    """Raw data make no sense."""
 
 
 def measure_ranges(

@@ -1,4 +1,4 @@
-"""What the robot measures of its own motion: wheel odometry, IMU, the filter over both, and localisation."""
+"""The sensors of the robot's own motion: wheel odometry, IMU, the filter over both, and localisation."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Odometry:
         self.turn_rate = 0.0
 
     def advance(self, moved: Pose, velocity: Sequence[float], factors: Sequence[float], duration: float) -> None:
-        """Take what the base has truly done since the last time.
+        """Take the true motion of the base since the last time.
 
         Args:
             moved: the new pose in the frame of the last one.

@@ -41,7 +41,7 @@ class Wander:
         self.error = deviation * normals.next()
 
     def advance(self, duration: float) -> float:
-        """Return the error after so many seconds more."""
+        """Return the error after a further time in s."""
         kept = math.exp(-duration / self._correlation)
         self.error = kept * self.error + math.sqrt(1.0 - kept * kept) * self._deviation * self._normals.next()
         return self.error

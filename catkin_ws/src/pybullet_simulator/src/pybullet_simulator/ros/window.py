@@ -102,7 +102,7 @@ class WindowView:
             self._text = message
 
     def _frame(self, name: str) -> Pose:
-        """Return where a frame lies on the map, as things truly are."""
+        """Return the true pose of a frame on the map."""
         simulation = self._simulation
         robot = simulation.robot
         if name.lstrip("/") == "map":

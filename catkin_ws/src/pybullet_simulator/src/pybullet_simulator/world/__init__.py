@@ -1,1 +1,1 @@
-"""What stands, lies and walks on the floor. Pure."""
+"""Boxes, obstacles and people on the floor. Pure."""

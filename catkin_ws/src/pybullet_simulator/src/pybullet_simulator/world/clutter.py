@@ -1,4 +1,4 @@
-"""Clutter: seeded random places for obstacles on a map, such that the robot can still get where it has to go."""
+"""Clutter: seeded random places for obstacles on a map, which leave the robot a way to its goal."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _TRIES = 200
 
 
 class ClutterError(ValueError):
-    """Clutter that the map has no room for."""
+    """The map has no room for the clutter."""
 
 
 def scatter(grid: Grid, start: Pose, goal: Pose, count: int, seed: int) -> tuple[Pose, ...]:
     """Return random places for obstacles, the same for the same arguments.
 
-    Off both ends of the way, clear of walls and of each other; a passage from start to goal is left.
+    The places keep clear of start, goal, walls and each other, and leave a passage from start to goal.
 
     Args:
         grid: the map.
@@ -79,7 +79,7 @@ def _clearance(free: NDArray[np.bool_], resolution: float) -> NDArray[np.float32
 
 
 def _far_from(grid: Grid, places: tuple[Pose, ...], distance: float) -> NDArray[np.bool_]:
-    """Tell which cells lie at least so far (m) from all places."""
+    """Tell which cells lie at least a distance (m) from all places."""
     rows, columns = grid.cells.shape
     along = (np.arange(columns) + 0.5) * grid.resolution
     across = (np.arange(rows) + 0.5) * grid.resolution

@@ -1,4 +1,4 @@
-"""What stands or walks on the floor and no map shows: clutter and people, put there and taken away at run time."""
+"""Clutter and people on the floor, which no map shows, and which come and go at run time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MAX_SIZE = 10.0
 
 
 class ObstacleError(ValueError):
-    """An obstacle that cannot be put where it was asked for, or is not there; the message says why."""
+    """An obstacle cannot be placed as requested, or does not exist; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class Obstacles:
         return body
 
     def advance(self, robot: Pose, duration: float) -> None:
-        """Let people walk for so many seconds; who would come too close to the robot waits."""
+        """Let people walk for a time in s; a person who would come too close to the robot waits."""
         for entry in self._walkers.values():
             here = entry.walker.place(entry.walked)
             walked = entry.walked + entry.walker.speed * duration

@@ -36,7 +36,7 @@ class Walker:
         return sum(math.dist(*leg) for leg in zip(self.waypoints, self.waypoints[1:], strict=False))
 
     def place(self, walked: float) -> tuple[float, float]:
-        """Return where the person is (m, map frame) after so many metres on their feet."""
+        """Return where the person is (m, map frame) after a walk of a given length in m."""
         length = self.length
         if length <= 0.0:
             return self.waypoints[0]

@@ -1,1 +1,1 @@
-"""What is wrong with models that read well."""
+"""Checks of models that have no syntax error."""

@@ -1,4 +1,4 @@
-"""What is wrong with connections: their ends, and the types of these."""
+"""Checks of connections: their ends, and the types of the ends."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _end(end: PortPath, kind: PortKind, whole: RosSystem) -> tuple[str, str] | N
 
 
 def wrong_types(connection: Connection, whole: RosSystem, library: Library) -> Iterator[Finding]:
-    """Yield the ends that their nodes do not declare, and those whose type is not that of the first end with one."""
+    """Yield ends that their nodes do not declare, and ends whose type differs from that of the first typed end."""
     first: tuple[PortPath, str] | None = None
     for ends, kind in zip((connection.sources, connection.targets), ENDS[connection.kind], strict=True):
         for end in ends:

@@ -1,4 +1,4 @@
-"""What is wrong with variants of one family, side by side."""
+"""Checks that compare the variants of one family."""
 
 from __future__ import annotations
 

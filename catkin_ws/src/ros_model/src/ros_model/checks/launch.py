@@ -1,4 +1,4 @@
-"""What no launch file can say of a system that reads well: names that ROS does not have, texts it would evaluate."""
+"""Checks what no launch file can express: names that ROS does not allow, texts that roslaunch would evaluate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with packages that read well: names that stand twice, types that nobody declares, values."""
+"""Checks of packages: names that are declared twice, types that nobody declares, values."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _spec(spec: Spec, package: str, library: Library) -> Iterator[Finding]:
 
 
 def _told(fields: Iterable[MessageField], package: str) -> list[tuple[str, str]]:
-    """Return what must be the same in two definitions: fields in their order, after the constants."""
+    """Return the parts that two equal definitions share: the constants, then the fields in their order."""
     told = [(full_type(field.type, package), field.name, field.constant) for field in fields]
     constants = sorted((kind, name) for kind, name, constant in told if constant is not None)
     return [*constants, *((kind, name) for kind, name, constant in told if constant is None)]

@@ -1,4 +1,4 @@
-"""What is wrong with a project that reads well: names that lead nowhere or mean two things, levels out of range."""
+"""Checks of a project: names that refer to nothing or to two things, levels out of range."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def wrong_levels(project: Project) -> Iterator[ModelError]:
 
 
 def levels_of_nothing(project: Project, tables: Iterable[Table]) -> Iterator[ModelError]:
-    """Yield rows of expected levels, which families may share, that are no variant's."""
+    """Yield rows of expected levels that belong to no variant; families may share a table of levels."""
     known = {variant.name for variant in project.variants}
     for table in tables:
         for row in table.rows:

@@ -1,4 +1,4 @@
-"""What is wrong with references: they are incomplete, or lead nowhere or to something of another kind."""
+"""Checks of references: a reference may be incomplete, or refer to nothing or to something of another kind."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _incomplete_reference(reference: Reference, complete: bool, more: str, posit
 
 
 def not_followed(system: RosSystem) -> Iterator[Finding]:
-    """Yield once that no `.ros` model is known, where the system has references."""
+    """Yield one finding that no `.ros` model is known, if the system has references."""
     for component in system.components:
         if component.executable:
             text = "no .ros model is known, so references are not followed: give the folder of some with --path"
@@ -58,7 +58,7 @@ def not_followed(system: RosSystem) -> Iterator[Finding]:
 
 
 def followed(system: RosSystem, library: Library) -> Iterator[Finding]:
-    """Yield the references that lead nowhere, or to something of another kind; of one fault in a node only one."""
+    """Yield references to nothing or to something of another kind; only one for each fault in a node."""
     for component in system.components:
         told: set[str] = set()
         if component.node and component.node.node:

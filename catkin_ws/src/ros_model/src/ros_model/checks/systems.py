@@ -1,4 +1,4 @@
-"""What is wrong with a system that reads well: in itself, and by what is known of its packages."""
+"""Checks of a system: in itself, and against its packages."""
 
 from __future__ import annotations
 

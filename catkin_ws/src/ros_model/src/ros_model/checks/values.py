@@ -1,4 +1,4 @@
-"""What is wrong with values and defaults: they do not fit their declared types."""
+"""Checks that values and defaults fit their declared types."""
 
 from __future__ import annotations
 

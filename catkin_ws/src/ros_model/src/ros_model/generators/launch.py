@@ -1,4 +1,4 @@
-"""Generates launch files: launch/variants/NAME.launch starts what a variant brings, the base runs already."""
+"""Generates launch files: launch/variants/NAME.launch starts a variant's nodes; the base runs already."""
 
 from __future__ import annotations
 

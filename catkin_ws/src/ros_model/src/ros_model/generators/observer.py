@@ -76,7 +76,7 @@ def write_observers(observers: Iterable[ObserverModel], output: Path) -> list[Pa
 
 
 def _check_numbers(observer: ObserverModel) -> None:
-    """Refuse what no Python source can say, or what no level follows from."""
+    """Refuse numbers that Python source cannot express, or that give no level."""
     rate, lowest, highest = observer.rate, observer.lowest, observer.highest
     if not (0 < rate < math.inf and -math.inf < lowest < highest < math.inf):
         raise ModelError(
@@ -101,7 +101,7 @@ def plugin_path(observer: ObserverModel, output: Path) -> Path:
 
 
 def outdated(observers: Iterable[ObserverModel], output: Path) -> list[str]:
-    """Return the plug-ins that are not as they would be generated now, each with what differs."""
+    """Return the plug-ins that differ from what would be generated now, each with the differences."""
     found = []
     for observer in observers:
         path = plugin_path(observer, output)

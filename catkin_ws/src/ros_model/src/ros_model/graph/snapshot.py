@@ -1,4 +1,4 @@
-"""A snapshot of a running ROS graph, as plain frozen data, and how it is made of a master's answers."""
+"""A snapshot of a running ROS graph as plain frozen data, made from the master's answers."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class ActionState:
     """An action, folded from its five topics. The type is that of the action, e.g. `move_base_msgs/MoveBaseAction`.
 
     A server listens to goals and cancellations, and publishes status, feedback and result; a client does the reverse.
-    Who does less only watches, or helps out: it has ends of topics, and none of the action.
+    A node that does less than that is no end of the action, only of its topics.
     """
 
     name: str

@@ -70,7 +70,7 @@ class Builder(Transformer):
 
     @property
     def doubtful(self) -> list[ModelError]:
-        """What is wrong so far, unless it comes of what was left out."""
+        """The errors so far, except those that may follow from a part that was left out."""
         return _reading.get().doubtful
 
     # Fields
@@ -218,7 +218,7 @@ class Builder(Transformer):
             self.errors.append(ModelError(message, self.at(token)))
 
     def _doubt(self, message: str, token: Token) -> None:
-        """Note an error that is none where something was left out."""
+        """Note an error that counts only if nothing was left out."""
         if len(self.doubtful) < MAX_ERRORS:
             self.doubtful.append(ModelError(message, self.at(token)))
 

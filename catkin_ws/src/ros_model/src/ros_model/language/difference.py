@@ -46,7 +46,7 @@ class Difference:
 
 
 def differences(first: RosSystem | PackageSet, second: RosSystem | PackageSet) -> tuple[Difference, ...]:
-    """Return what is to be done to the first model to have the second; an element's parts are not told with it.
+    """Return the changes that turn the first model into the second; for a whole element, its parts are not listed.
 
     Names are compared without a slash in front, numbers by their value; a connection is its ends, whatever its name.
     """

@@ -1,4 +1,4 @@
-"""What is known of packages: the `.ros` models at hand, and what somebody tells of installed packages."""
+"""The known packages: those of the given `.ros` models, and the installed ones."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _TYPE = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)", re.ASCII)
 
 @dataclass(frozen=True)
 class Unknown:
-    """That something is not known, how that is told, and how bad it is."""
+    """A thing that is unknown, with the message and its severity."""
 
     message: str
     severity: str = ERROR

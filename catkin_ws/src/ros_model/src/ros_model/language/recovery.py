@@ -25,7 +25,7 @@ class _Token(NamedTuple):
 
 
 class Recovery:
-    """Leaves out one wrong statement of a text after the other.
+    """Leaves out the wrong statements of a text, one after the other.
 
     What is left out grows from the rest of a statement over the statement to the block that holds it, as long as the
     error that comes next is at its end and so may only be its consequence. Where the brackets of the text do not match
@@ -39,7 +39,7 @@ class Recovery:
         self._removed: tuple[int, int] | None = None  # the range of tokens that was left out last
 
     def is_consequence(self, offset: int) -> bool:
-        """Return whether an error at that offset may come of what was left out last, if that was no whole statement."""
+        """Return whether an error at that offset may follow from the part left out last, if that was a fragment."""
         if self._removed is None or self._index(offset) != self._removed[1]:
             return False
         start, end = self._removed

@@ -1,4 +1,4 @@
-"""Whether values are of their declared types, and how what is wrong is told."""
+"""Checks whether values have their declared types, and words the errors."""
 
 from __future__ import annotations
 

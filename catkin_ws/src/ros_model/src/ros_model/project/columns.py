@@ -71,7 +71,7 @@ class Columns:
 
     @property
     def names(self) -> frozenset[str]:
-        """All columns that are spoken of."""
+        """All columns that are mapped."""
         return self.ignored.union(self.parameters, self.wires, self.presence, self.expected)
 
     @property
@@ -138,10 +138,10 @@ def parse_columns(section: Mapping[str, Any], where: Where = _nowhere) -> Column
 
 
 def with_implied(columns: Columns, table: Table, base: RosSystem) -> Columns:
-    """Return the columns with those that speak for themselves: `COMPONENT.PARAMETER`, and `qa_NAME`.
+    """Return the columns, with those that need no mapping: `COMPONENT.PARAMETER` and `qa_NAME`.
 
     Raises:
-        ModelError: a column is neither spoken of nor such a one, or one that is spoken of is missing.
+        ModelError: a column is neither mapped nor of this form, or a mapped column is missing.
     """
     parameters, expected = dict(columns.parameters), dict(columns.expected)
     first_line = Position(str(table.path), 1, 1)
@@ -163,7 +163,7 @@ def with_implied(columns: Columns, table: Table, base: RosSystem) -> Columns:
 
 
 def check_columns(columns: Columns, base: RosSystem) -> None:
-    """Check that what the columns speak of is there in the base.
+    """Check that the base has all that the columns name.
 
     Raises:
         ModelError: a component is not there or names no node, or a connection does not begin at a publisher or server.

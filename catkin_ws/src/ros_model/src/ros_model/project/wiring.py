@@ -1,4 +1,4 @@
-"""What a variant requires of the rest of its system: by its wiring, or by the values of its parameters."""
+"""The components that a variant requires, by its wiring or by the values of its parameters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def required_components(base: RosSystem, variant: RosSystem) -> frozenset[str]:
     """Return the components of the base that feed the variant's, directly or through others.
 
     The search stops at a component that the variant itself drives: that one is the plant (a robot's base takes
-    the velocity and gives the odometry). It is needed, but the variant doesn't depend on whatever else acts on it.
+    the velocity and gives the odometry). The variant requires it, but not the other components that act on it.
     """
     system = compose(base, variant)
     own = {component.name for component in variant.components}

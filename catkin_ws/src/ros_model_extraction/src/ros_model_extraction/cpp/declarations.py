@@ -1,4 +1,4 @@
-"""Files, places in them, and what declarations there declare."""
+"""Source files, places in them, and the variables that declarations declare."""
 
 from __future__ import annotations
 

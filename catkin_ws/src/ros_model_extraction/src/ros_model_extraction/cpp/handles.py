@@ -1,4 +1,4 @@
-"""What namespaces the node handles of a C++ program stand for, as far as that shows."""
+"""Finds the namespaces of node handles in a C++ program, as far as its source tells."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _POINTERS = ("_ptr", "Ptr")
 
 
 class Handles:
-    """Finds what node handles are made with; of a handle whose making is not known, the namespace is a hole."""
+    """Finds how node handles are made; if that is unknown, the namespace is a hole."""
 
     def __init__(self, program: Program) -> None:
         self._program = program

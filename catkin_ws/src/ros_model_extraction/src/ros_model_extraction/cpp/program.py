@@ -1,4 +1,4 @@
-"""The C++ sources of a program: what they declare and call, and what texts in them are worth, as far as that shows."""
+"""The C++ sources of a program: their declarations, their calls, and the values of texts as far as the source tells."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the master does not know about its nodes and is asked of them: types of services, the programs they run."""
+"""Asks nodes what the master does not know: types of services, and the programs that the nodes run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A ROS package as its folder tells: name, dependencies, executables and what they are made of."""
+"""Reads a ROS package from its folder: name, dependencies, executables and their sources."""
 
 from __future__ import annotations
 

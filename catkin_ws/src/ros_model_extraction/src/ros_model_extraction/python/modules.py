@@ -1,4 +1,4 @@
-"""Python modules as syntax trees, with what an evaluator asks of them: scopes, names and what binds them, parents."""
+"""Python modules as syntax trees, with indexes for an evaluator: scopes, names and their bindings, parents."""
 
 from __future__ import annotations
 

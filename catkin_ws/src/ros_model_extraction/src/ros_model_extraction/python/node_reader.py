@@ -1,4 +1,4 @@
-"""rospy nodes from their source: what the code that an executable may reach makes of interfaces and parameters."""
+"""Reads rospy nodes from source: the interfaces and parameters of the code that an executable can reach."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def read_python_node(
 
 
 class _Reader:
-    """Looks at every call of reached code, and keeps what those of ROS make."""
+    """Looks at every call of reached code, and keeps the interfaces that calls of ROS make."""
 
     def __init__(self, evaluator: Evaluator) -> None:
         self.ports: list[FoundPort] = []

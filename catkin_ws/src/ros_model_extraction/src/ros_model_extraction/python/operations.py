@@ -1,4 +1,4 @@
-"""What operators make of values: sums, texts put together, patterns filled in."""
+"""Results of operators: sums, joined texts, patterns filled in."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What expressions of a program may be worth, as far as its text tells, and in which circumstances."""
+"""The values that expressions of a program may have, as far as its text tells, and in which cases."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ class World:
         return World({**self.choices, key: index}, self.notes)
 
     def noting(self, note: str) -> World:
-        """Return the world in which something is to be said about what follows."""
+        """Return the world with a note about what follows."""
         return self if note in self.notes else World(self.choices, (*self.notes, note))
 
 

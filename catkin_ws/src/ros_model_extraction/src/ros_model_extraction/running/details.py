@@ -1,4 +1,4 @@
-"""What the nodes of a running system tell, beside what their master lists."""
+"""Facts that the nodes of a running system tell, in addition to the master's list."""
 
 from __future__ import annotations
 

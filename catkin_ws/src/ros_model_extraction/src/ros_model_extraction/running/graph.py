@@ -1,4 +1,4 @@
-"""From a snapshot of the running graph to the models of its packages and of the system."""
+"""Makes models of the packages and of the system from a snapshot of the running graph."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ def _order(end: End) -> tuple[int, str]:
 
 
 def _connections(instances: Mapping[str, Instance]) -> Iterator[Connection]:
-    """Connect what bears the same name: publishers and subscribers, action servers and clients."""
+    """Connect interfaces of the same name: publishers and subscribers, action servers and clients."""
     for kind, source_kind, target_kind in (
         (ConnectionKind.TOPIC, PortKind.PUBLISHER, PortKind.SUBSCRIBER),
         (ConnectionKind.ACTION, PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT),

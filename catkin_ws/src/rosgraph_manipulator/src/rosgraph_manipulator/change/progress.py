@@ -1,4 +1,4 @@
-"""How far the change under way has come, by what the launcher reports.
+"""The progress of the change under way, from the launcher's reports.
 
 The shell asks the nodes and waits. What it waits for, and when a change has failed, is decided here. Times are
 arguments, in seconds of one clock that never goes back.
@@ -82,7 +82,7 @@ class ChangeProgress:
         return self._wanted
 
     def begin(self, wanted: Configuration, now: float) -> None:
-        """Begin the way to a configuration."""
+        """Begin the change to a configuration."""
         self._wanted, self._begun = wanted, now
         self._started, self._number = (), None
         self._death = None  # the launcher may be a new one, which counts its changes from the start
@@ -117,7 +117,7 @@ class ChangeProgress:
         self._uncertain.clear()
 
     def failure(self) -> str | None:
-        """Return how a node died since the launcher has made the change; None where none did."""
+        """Return how a node has died since the launcher made the change; None if none has."""
         return self._death[1] if self._death and self._death[0] == self._number else None
 
     def awaited(self, between_servers: bool) -> Awaited:

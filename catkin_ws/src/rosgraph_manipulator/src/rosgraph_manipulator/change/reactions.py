@@ -59,7 +59,7 @@ class DeployedConfigurations:
         self._running, self._last_good = running, running or last_good
 
     def fallback(self, wanted: Configuration) -> Configuration | None:
-        """Return the configuration to restore where the wanted one does not come up; None: there is none."""
+        """Return the configuration to restore if the wanted one does not come up; None: there is none."""
         return self._last_good if self._last_good and self._last_good != wanted else self._running
 
     def refused(self, wanted: Configuration, reason: str) -> Outcome:

@@ -1,4 +1,4 @@
-"""What the relay of an action does with a goal while the server behind it is replaced.
+"""Decides what the relay of an action does with a goal while the server behind it is replaced.
 
 A client sees one goal from the beginning to the end, whichever server pursues it.
 """

@@ -1,4 +1,4 @@
-"""What the launcher is told at its start."""
+"""The launcher's options, which it reads at its start."""
 
 from __future__ import annotations
 

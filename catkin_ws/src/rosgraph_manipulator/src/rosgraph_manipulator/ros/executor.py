@@ -29,7 +29,7 @@ DELIVERY_TIMEOUT = 5.0  # s, wall, for the new server to have the pending goal
 
 
 def wait_until(condition: Callable[[], bool], timeout: float) -> bool:
-    """Wait for a condition; return whether it came to hold within `timeout` (s, wall)."""
+    """Wait for a condition; return whether it became true within `timeout` (s, wall)."""
     deadline = time.monotonic() + timeout
     while not condition():
         if time.monotonic() > deadline or rospy.is_shutdown():
@@ -123,7 +123,7 @@ class RosExecutor:
     # -- steps ----------------------------------------------------------------------------------------------------
 
     def begin(self, wanted: Configuration, plan: Plan) -> None:
-        """Begin the way to a configuration by a plan; nothing is touched."""
+        """Begin the change to a configuration by a plan; nothing is touched yet."""
         self.check()
         rospy.loginfo("%s: %s", wanted.name, " ".join(str(plan).split()))
         self._progress.begin(wanted, time.monotonic())

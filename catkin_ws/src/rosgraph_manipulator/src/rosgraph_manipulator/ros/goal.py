@@ -94,7 +94,7 @@ class PendingGoal:
             self._cancel_publisher.publish(GoalID(id=goal_id))
 
     def deliver(self) -> bool:
-        """Send the goal where it is time for that; return whether the server has it, or no goal is pending."""
+        """Send the goal if it is time; return whether the server has it or no goal is pending."""
         with self._lock:
             goal = self._keeper.to_send(time.monotonic())
             if goal is not None:
