@@ -57,7 +57,7 @@ class FaultInjector:
             return {"light": f"{value:g}"}
         if kind is Kind.CLUTTER:
             return self._clutter(contingency)
-        raise InjectionError(f"{contingency}: lockstep can't let a contingency of kind {kind.value} happen")
+        raise InjectionError(f"{contingency}: lockstep can't inject a contingency of kind {kind.value}")
 
     def _clutter(self, contingency: Contingency) -> dict[str, str]:
         places = tuple(Pose(x, y, 0.0) for x, y in contingency.places)

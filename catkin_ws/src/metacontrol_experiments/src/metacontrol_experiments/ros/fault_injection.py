@@ -86,17 +86,17 @@ class FaultInjector:
             raise InjectionError(f"{contingency}: {' '.join(str(error).split())}") from error
         except (rospy.ServiceException, ComponentError, ClutterError, GridMessageError) as error:
             raise InjectionError(f"{contingency}: {error}") from error
-        raise InjectionError(f"{contingency}: nothing lets a contingency of kind {contingency.kind.value} happen")
+        raise InjectionError(f"{contingency}: no injector knows contingencies of kind {contingency.kind.value}")
 
     def _signal(self, contingency: Contingency) -> dict[str, str]:
         """Send a component's node the signal of a kind."""
         node = rospy.resolve_name(node_of(contingency.target, self._components))
         pid = self._pids.get(node) or self._pid_of(node)
         if not self._owns(pid):
-            raise InjectionError(f"{node} (pid {pid}) is not a process that may be struck from here")
+            raise InjectionError(f"{node} (pid {pid}) is not a process that the fault injector may signal")
         number = _SIGNALS[contingency.kind]
         if contingency.kind.spoils_data and not _handles(pid, number):
-            raise InjectionError(f"{node} (pid {pid}) is no driver whose data can be spoilt")
+            raise InjectionError(f"{node} (pid {pid}) is not a driver that can simulate wrong data")
         os.kill(pid, number)
         if contingency.kind is Kind.FREEZE:
             self._pids[node] = pid

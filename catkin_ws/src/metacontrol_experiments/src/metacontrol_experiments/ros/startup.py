@@ -50,7 +50,7 @@ class Startup:
                 return False
 
         if not wait_until(met, START_S):
-            raise StartError(f"waited {START_S:g} s in vain for {what}")
+            raise StartError(f"waited {START_S:g} s for {what}, which did not come")
 
     def wait_for_master(self) -> None:
         """Wait for the master and simulated time: before rospy's node begins.

@@ -59,7 +59,7 @@ class Quality:
             ValueError: it is none of `>`, `>=`, `<`, `<=`.
         """
         if operator not in (">", ">=", "<", "<="):
-            raise ValueError(f"{operator!r} is no comparison: expected >, >=, < or <=")
+            raise ValueError(f"{operator!r} is not a comparison: expected >, >=, < or <=")
         direction = Direction.LOWER_IS_BETTER if operator[0] == ">" else Direction.HIGHER_IS_BETTER
         return cls(direction, operator.endswith("="), low, high)
 

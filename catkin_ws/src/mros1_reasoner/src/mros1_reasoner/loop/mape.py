@@ -168,7 +168,7 @@ class Mape:
         for objective in self._state.pursuing(name):
             running = self._state.running[objective]
             if running.design is None and failed:
-                raise MapeError(f"task of {objective} is said to have failed, but nothing is deployed for it: left out")
+                raise MapeError(f"task of {objective} was reported as failed, but nothing is deployed for it: left out")
             if failed and running.task_failure is None:
                 self._state.note_task_failure(objective, (stamp or now, message))
             elif not failed:

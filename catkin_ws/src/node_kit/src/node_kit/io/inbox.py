@@ -114,7 +114,7 @@ class Inbox:
             if future.done():  # just now, or that was an error of the work
                 return future.result()
             future.cancel()
-            raise TimeoutError(f"it was not done within {patience_s:g} s") from None
+            raise TimeoutError(f"the call got no answer within {patience_s:g} s") from None
         finally:
             with self._news:
                 self._calls.discard(future)

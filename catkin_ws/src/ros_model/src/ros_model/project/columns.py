@@ -158,7 +158,7 @@ def with_implied(columns: Columns, table: Table, base: RosSystem) -> Columns:
                 f"nothing says what column {column!r} sets: map it, or name it COMPONENT.PARAMETER", first_line
             )
     if absent := sorted(columns.names - columns.ignored - set(table.columns)):
-        raise ModelError(f"column {absent[0]!r} is missing, which is mapped: add it, or don't map it", first_line)
+        raise ModelError(f"the mapped column {absent[0]!r} is missing: add it, or remove its mapping", first_line)
     return replace(columns, parameters=parameters, expected=expected)
 
 

@@ -58,7 +58,7 @@ class LauncherClient:
         try:
             answer = self._ask(request, found)
         except (rospy.ServiceException, rospy.ROSException, TransportException) as error:
-            raise DeploymentError(f"rosgraph_launcher did not do its part ({error}); is it running?") from error
+            raise DeploymentError(f"rosgraph_launcher has failed ({error}): check that it runs") from error
         if not answer.ok:
             raise DeploymentError(answer.message)
         return answer
