@@ -50,7 +50,12 @@ class FaultsTest(PairTest):
     def test_what_cannot_be_started_leaves_the_running_nodes_untouched(self):
         Path(self.configurations["vanishes"]["launch"]).unlink()
         before = pid_of("/wait_server")
-        for name, words in (("malformed", "well-formed"), ("no_node", "no_such_node"), ("vanishes", "vanishes")):
+        for name, words in (
+            ("malformed", "well-formed"),
+            ("undefined", "'no_such_argument' is not defined"),
+            ("no_node", "no_such_node"),
+            ("vanishes", "vanishes"),
+        ):
             with self.subTest(name):
                 self.assertEqual(self.request(name), 0)
                 self.assertIn(words, self.text)

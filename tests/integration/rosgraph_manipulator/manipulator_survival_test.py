@@ -117,6 +117,19 @@ class SurvivalTest(PairTest):
                 self.wait_until_it_serves()
                 self.forget_goals()
 
+    def test_change_in_which_the_manipulator_dies_again_and_again_is_given_up(self):
+        self.client.send_goal(MvpReconfigurationGoal("hangs"))
+        for _ in range(2):
+            wait_for(lambda: self.is_in("hangs", "RECONFIGURING"), "the change is under way")
+            self.manipulator.end(signal.SIGKILL)
+            self.states.clear()
+            self.restart_manipulator()
+        refusal = "hangs is not deployed again: the manipulator has died 2 times"
+        wait_for(lambda: self.states and refusal in self.states[-1].message, "the change is refused")
+        self.assertTrue(self.is_in("slow", "STABLE"), self.states[-1])
+        self.wait_until_it_serves()
+        self.assertEqual(self.request("fast"), 1)
+
     def test_killed_pair_brings_the_mission_back(self):
         goal_id, _ = self.send_goal()
         server = self.server

@@ -1,11 +1,12 @@
 """How a manipulator begins, by what the one before it has left."""
 
 import pytest
-from rosgraph_manipulator.change.journal import Journal, Resumption, parse_journal, resume
+from rosgraph_manipulator.change.journal import MAX_ATTEMPTS, Journal, Resumption, parse_journal, resume
 
 NOW = 1000.0
 STEADY = Journal("good", "", alive=NOW - 1.0)
-CHANGING = Journal("good", "better", alive=NOW - 1.0)
+CHANGING = Journal("good", "better", alive=NOW - 1.0, attempts=1)
+BROKEN = CHANGING.broken("NameError: name 'x' is not defined", NOW - 1.0)
 
 
 def test_what_runs_is_taken_over_with_its_goal():
@@ -14,13 +15,82 @@ def test_what_runs_is_taken_over_with_its_goal():
 
 def test_change_that_was_under_way_is_finished():
     assert resume(CHANGING, "better", False, "first", NOW) == Resumption(
-        deploy="better", last_good="good", keep_goal=True
+        deploy="better", last_good="good", keep_goal=True, attempts=1
     )
 
 
 def test_killed_pair_brings_the_mission_back():
     assert resume(STEADY, "", False, "first", NOW) == Resumption(deploy="good", keep_goal=True)
-    assert resume(CHANGING, "", False, "first", NOW) == Resumption("better", last_good="good", keep_goal=True)
+    assert resume(CHANGING, "", False, "first", NOW) == Resumption(
+        "better", last_good="good", keep_goal=True, attempts=1
+    )
+
+
+def die(journal):
+    """Return the journal of a manipulator that begins as `journal` says, and dies while it deploys."""
+    begun = resume(journal, "good", False, "first", NOW)
+    return Journal(wanted=begun.deploy, attempts=begun.attempts).noted(begun.last_good, NOW, wanted=begun.deploy)
+
+
+@pytest.mark.parametrize("launched", ["good", ""])
+def test_change_that_ended_the_manipulator_by_an_error_is_not_begun_again(launched):
+    resumption = resume(BROKEN, launched, False, "first", NOW)
+    assert resumption.refused == "better"
+    assert "NameError: name 'x' is not defined" in resumption.reason
+    assert (resumption.running or resumption.deploy) == "good"
+    assert resumption.keep_goal
+
+
+def test_change_during_which_manipulators_die_without_an_error_is_begun_a_few_times_only():
+    journal = Journal().noted("good", NOW, wanted="better")
+    for _ in range(MAX_ATTEMPTS - 1):
+        assert resume(journal, "good", False, "first", NOW).deploy == "better"
+        journal = die(journal)
+    resumption = resume(journal, "good", False, "first", NOW)
+    assert (resumption.running, resumption.refused) == ("good", "better")
+    assert f"{MAX_ATTEMPTS} times" in resumption.reason
+
+
+def test_refused_change_that_the_launcher_has_made_is_taken_back():
+    resumption = resume(BROKEN, "better", False, "first", NOW)
+    assert (resumption.running, resumption.deploy) == ("", "good")
+
+
+def test_refused_change_without_an_earlier_configuration_leaves_what_runs():
+    journal = Journal("", "better", alive=NOW, error="x")
+    assert resume(journal, "better", False, "first", NOW).running == "better"
+
+
+@pytest.mark.parametrize(("initial", "deployed"), [("first", "first"), ("better", ""), ("", "")])
+def test_refused_change_is_not_begun_again_as_the_initial_configuration(initial, deployed):
+    journal = Journal("", "better", alive=NOW, error="x")
+    resumption = resume(journal, "", False, initial, NOW)
+    assert (resumption.running, resumption.deploy, resumption.refused) == ("", deployed, "better")
+
+
+def test_refused_restoration_is_not_begun_again():
+    journal = Journal("good", "good", alive=NOW, error="x")
+    assert resume(journal, "", False, "", NOW).deploy == ""
+
+
+def test_refused_change_that_the_launcher_gave_up_is_not_taken_over():
+    assert resume(BROKEN, "better", True, "first", NOW).deploy == "good"
+
+
+def test_refusal_of_another_time_is_not_believed():
+    resumption = resume(BROKEN, "good", False, "first", NOW + 3600.0)
+    assert resumption == Resumption(running="good")
+
+
+def test_error_is_kept_when_the_manipulator_ends_of_it():
+    assert BROKEN.noted("good", NOW, ended=True) == BROKEN
+
+
+def test_change_that_has_ended_leaves_no_attempts():
+    ended = Journal().noted("good", NOW, wanted="better").noted("better", NOW, wanted="")
+    assert (ended.attempts, ended.refusal) == (0, "")
+    again = ended.noted("better", NOW, wanted="better")
+    assert (again.attempts, again.refusal) == (1, "")
 
 
 def test_configuration_that_the_launcher_gave_up_is_not_taken_over():
@@ -40,9 +110,19 @@ def test_system_that_was_ended_starts_anew():
 
 
 def test_journal_survives_the_parameter_server():
-    assert parse_journal(CHANGING.as_parameter()) == CHANGING
+    assert parse_journal(BROKEN.as_parameter()) == BROKEN
 
 
-@pytest.mark.parametrize("value", [None, 3, {}, {**STEADY.as_parameter(), "alive": "yes"}, {"configuration": "x"}])
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        3,
+        {},
+        {**STEADY.as_parameter(), "alive": "yes"},
+        {**STEADY.as_parameter(), "attempts": True},
+        {"configuration": "x"},
+    ],
+)
 def test_parameter_of_another_form_is_no_journal(value):
     assert parse_journal(value) == Journal()

@@ -60,6 +60,75 @@ def test_files_that_cannot_be_used_are_refused_in_one_line(tmp_path, body, words
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [
+        ("no_such_name", "NameError: name 'no_such_name' is not defined"),
+        ("1/0", "ZeroDivisionError: division by zero"),
+        ("1 +", "SyntaxError: "),
+        ("pi.nothing", "AttributeError: 'float' object has no attribute 'nothing'"),
+        ("'x'[3]", "IndexError: "),
+        ("9.0**999", "OverflowError: "),
+    ],
+)
+@pytest.mark.parametrize("body", ['<group if="{}">{}/></group>', '<param name="x" value="{}"/>{}/>'])
+def test_expression_that_fails_is_named_with_file_and_remedy(tmp_path, body, expression, words):
+    path = write(tmp_path, body.format(f"$(eval {expression})", NODE))
+    with pytest.raises(LaunchFileError) as error:
+        read_launch_file(path)
+    assert f"{path}: '$(eval {expression})' fails: {words}" in str(error.value)
+    assert str(error.value).endswith("correct the expression")
+    assert "\n" not in str(error.value)
+
+
+def test_expression_of_an_included_file_is_named_with_that_file(tmp_path):
+    included = tmp_path / "included.launch"
+    included.write_text(f'<launch><group unless="$(eval 1/0)">{NODE}/></group></launch>')
+    with pytest.raises(LaunchFileError, match=f"{included}: .*division by zero"):
+        read_launch_file(write(tmp_path, f'<include file="{included}"/>'))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b'<?xml version="1.0" encoding="no-such-encoding"?><launch/>',
+        b'<?xml version="1.0" encoding="utf-32"?><launch/>',
+        b'<?xml version="1.0" encoding="base64"?><launch/>',
+        b"<launch>\xff\xfe</launch>",
+        b"<launch>\x00</launch>",
+        b"\x00\x01\x02",
+        b"",
+        b"<launch><node></launch>",
+    ],
+)
+def test_file_that_is_no_xml_is_refused_with_a_remedy(tmp_path, content):
+    path = tmp_path / "x.launch"
+    path.write_bytes(content)
+    with pytest.raises(LaunchFileError, match=r"not well-formed XML: .*UTF-8") as error:
+        read_launch_file(path)
+    assert str(error.value).startswith(f"{path}: ")
+    assert "\n" not in str(error.value)
+
+
+def test_file_that_includes_itself_is_refused(tmp_path):
+    with pytest.raises(LaunchFileError, match="recursion"):
+        read_launch_file(write(tmp_path, f'<include file="{tmp_path}/x.launch"/>'))
+
+
+@pytest.mark.parametrize("failure", [RuntimeError("a\nb"), SystemExit(3), AssertionError(), MemoryError()])
+def test_whatever_roslaunch_raises_refuses_the_file_in_one_line(tmp_path, monkeypatch, failure):
+    def fail(*_arguments, **_options):
+        raise failure
+
+    path = write(tmp_path, f"{NODE}/>")
+    monkeypatch.setattr("roslaunch.xmlloader.XmlLoader._node_tag", fail)
+    with pytest.raises(LaunchFileError) as error:
+        read_launch_file(path)
+    assert str(error.value).startswith(f"{path}: {type(failure).__name__}: ")
+    assert str(error.value).endswith(": correct the launch file")
+    assert "\n" not in str(error.value)
+
+
 def test_missing_file_is_refused():
     with pytest.raises(LaunchFileError, match=r"/no/such\.launch"):
         read_launch_file("/no/such.launch")

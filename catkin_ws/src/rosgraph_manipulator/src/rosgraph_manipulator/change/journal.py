@@ -15,6 +15,10 @@ MAX_AGE = 30.0
 
 HEARTBEAT_PERIOD = 2.0  # s, wall
 
+MAX_ATTEMPTS = 2
+"""How often a change is begun that ends with the manipulator's death and without an error. A manipulator may be killed
+by anybody, so the change is begun once more; twice in a row, the change is the likely cause."""
+
 
 @dataclass(frozen=True)
 class Journal:
@@ -24,32 +28,55 @@ class Journal:
         configuration: the last good configuration; empty: there is none.
         wanted: the configuration that is being deployed; empty: no change is under way.
         alive: wall time of the last heartbeat, s since the epoch.
-        ended: whether the manipulator has ended by itself.
+        ended: whether the manipulator has ended because it was told to.
+        attempts: how often the wanted configuration was begun, by this manipulator and those before it.
+        error: the error of the change under way that has ended the manipulator; empty: none has.
     """
 
     configuration: str = ""
     wanted: str = ""
     alive: float = 0.0
     ended: bool = False
+    attempts: int = 0
+    error: str = ""
 
     def noted(self, configuration: str, now: float, wanted: str | None = None, ended: bool = False) -> Journal:
-        """Return the journal as it is at `now`; one that has ended does not change any more.
+        """Return the journal as it is at `now`; one that has ended or has an error does not change any more.
 
         Args:
             configuration: the last good configuration; empty: there is none.
             now: wall time, s since the epoch.
             wanted: the configuration that is being deployed; empty: none is; None: as before.
-            ended: whether the manipulator ends by itself.
+            ended: whether the manipulator ends because it was told to.
         """
-        if self.ended:
+        if self.ended or self.error:
             return self
+        attempts = self.attempts
+        if wanted is not None:  # a change begins, or has ended
+            attempts = (self.attempts if wanted == self.wanted else 0) + 1 if wanted else 0
         return replace(
             self,
             configuration=configuration,
             wanted=self.wanted if wanted is None else wanted,
             alive=now,
             ended=ended,
+            attempts=attempts,
         )
+
+    def broken(self, error: str, now: float) -> Journal:
+        """Return the journal of a manipulator that an error of the change under way ends."""
+        return replace(self, alive=now, error=error)
+
+    @property
+    def refusal(self) -> str:
+        """Why the change under way is not begun again; empty: it may be."""
+        if not self.wanted or self.ended:
+            return ""
+        if self.error:
+            return f"it has ended the manipulator: {self.error}"
+        if self.attempts >= MAX_ATTEMPTS:
+            return f"the manipulator has died {self.attempts} times while it deployed it"
+        return ""
 
     def needs_heartbeat(self, now: float) -> bool:
         """Tell whether the last heartbeat is so old that another one is due."""
@@ -62,6 +89,8 @@ class Journal:
             "wanted": self.wanted,
             "alive": self.alive,
             "ended": self.ended,
+            "attempts": self.attempts,
+            "error": self.error,
         }
 
 
@@ -69,11 +98,11 @@ def parse_journal(value: object) -> Journal:
     """Read the parameter; return an empty journal where it has another form."""
     if not isinstance(value, Mapping):
         return Journal()
-    texts = [value.get(key) for key in ("configuration", "wanted")]
-    alive, ended = value.get("alive"), value.get("ended")
-    if not all(isinstance(text, str) for text in texts) or not isinstance(alive, float) or not isinstance(ended, bool):
+    journal = Journal(**{key: value.get(key) for key in Journal().as_parameter()})  # type: ignore[arg-type]
+    kinds = {key: type(default) for key, default in Journal().as_parameter().items()}
+    if not all(type(found) is kinds[key] for key, found in journal.as_parameter().items()):
         return Journal()
-    return Journal(str(texts[0]), str(texts[1]), alive, ended)
+    return journal
 
 
 @dataclass(frozen=True)
@@ -85,12 +114,18 @@ class Resumption:
         running: the configuration that runs already and is left as it is; empty: none.
         last_good: the configuration to restore if `deploy` fails; empty: none.
         keep_goal: whether the pending goal that an earlier manipulator left is kept.
+        attempts: how often `deploy` was begun before.
+        refused: the configuration whose change was under way and is not begun again; empty: there is none.
+        reason: why it is not.
     """
 
     deploy: str = ""
     running: str = ""
     last_good: str = ""
     keep_goal: bool = False
+    attempts: int = 0
+    refused: str = ""
+    reason: str = ""
 
 
 def resume(journal: Journal, launched: str, failed: bool, initial: str, now: float) -> Resumption:
@@ -104,14 +139,31 @@ def resume(journal: Journal, launched: str, failed: bool, initial: str, now: flo
         now: wall time, s since the epoch.
     """
     fresh = 0.0 <= now - journal.alive <= MAX_AGE
+    if fresh and journal.refusal:
+        return _without_the_change(journal, "" if failed else launched, initial)
     if launched and not failed:
         if fresh and journal.wanted:  # it was killed during a change: finish that
-            return Resumption(deploy=journal.wanted, last_good=journal.configuration, keep_goal=True)
+            return Resumption(
+                deploy=journal.wanted,
+                last_good=journal.configuration,
+                keep_goal=True,
+                attempts=journal.attempts,
+            )
         return Resumption(running=launched, keep_goal=fresh)
     if fresh and not journal.ended and (journal.wanted or journal.configuration):  # manipulator and launcher died
         return Resumption(
             deploy=journal.wanted or journal.configuration,
             last_good=journal.configuration if journal.wanted else "",
             keep_goal=True,
+            attempts=journal.attempts,
         )
     return Resumption(deploy=initial)
+
+
+def _without_the_change(journal: Journal, launched: str, initial: str) -> Resumption:
+    """Decide how to begin when the change under way is refused: with what runs, or with what ran before."""
+    former = journal.configuration if journal.configuration != journal.wanted else ""
+    begun = Resumption(keep_goal=True, refused=journal.wanted, reason=journal.refusal)
+    if launched and not (former and launched == journal.wanted):
+        return replace(begun, running=launched)
+    return replace(begun, deploy=former or (initial if initial != journal.wanted else ""))

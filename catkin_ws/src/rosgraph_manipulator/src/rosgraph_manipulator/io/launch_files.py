@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import xml.parsers.expat
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,12 +50,10 @@ def read_launch_file(path: str | Path, args: Sequence[str] = ()) -> LaunchFile:
     Raises:
         LaunchFileError: the file is missing or malformed, starts no node, or has nodes for another machine.
     """
-    config = roslaunch.config.ROSLaunchConfig()
-    try:
+    with _refusing(str(path)):
+        config = roslaunch.config.ROSLaunchConfig()
         _Loader().load(str(path), config, argv=list(args), verbose=False)
-    except _ERRORS as error:
-        raise LaunchFileError(f"{path}: {_one_line(error)}") from error
-    return _checked(path, config)
+        return _checked(path, config)
 
 
 def read_model(path: Path) -> LaunchFile:
@@ -64,12 +62,10 @@ def read_model(path: Path) -> LaunchFile:
     Raises:
         LaunchFileError: the model can't be read, or its launch file can't be used.
     """
-    config = roslaunch.config.ROSLaunchConfig()
-    try:
+    with _refusing(str(path)):
+        config = roslaunch.config.ROSLaunchConfig()
         _Loader().load_string(launch_file(read_system(path)), config, verbose=False)
-    except (ModelError, *_ERRORS) as error:
-        raise LaunchFileError(f"{path}: {_one_line(error)}") from error
-    return _checked(path, config)
+        return _checked(path, config)
 
 
 def command_line(node: NodeDescription) -> tuple[list[str], int]:
@@ -79,34 +75,58 @@ def command_line(node: NodeDescription) -> tuple[list[str], int]:
         LaunchFileError: there is no such package or executable.
     """
     prefix = node.launch_prefix or ""
-    try:
+    with _refusing(f"node {node.name}"):
         words = roslaunch.node_args.create_local_process_args(_roslaunch_node(node), roslaunch.core.local_machine())
-    except (roslaunch.node_args.NodeParamsException, rospkg.ResourceNotFound, ValueError) as error:
-        raise LaunchFileError(f"node {node.name}: {_one_line(error)}") from error
-    bare = roslaunch.node_args._launch_prefix_args(_roslaunch_node(node)) if prefix else []
-    return list(words), len(bare)
+        bare = roslaunch.node_args._launch_prefix_args(_roslaunch_node(node)) if prefix else []
+        return list(words), len(bare)
 
 
 def process_environment(node: NodeDescription, environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the whole environment of a node's process."""
-    return dict(
-        roslaunch.core.setup_env(
-            _roslaunch_node(node), roslaunch.core.local_machine(), rosgraph.get_master_uri(), env=dict(environment)
+    """Return the whole environment of a node's process.
+
+    Raises:
+        LaunchFileError: it can't be made.
+    """
+    with _refusing(f"node {node.name}"):
+        return dict(
+            roslaunch.core.setup_env(
+                _roslaunch_node(node), roslaunch.core.local_machine(), rosgraph.get_master_uri(), env=dict(environment)
+            )
         )
-    )
 
 
-_ERRORS = (
+_EXPLAINED = (
+    ModelError,
     roslaunch.core.RLException,
-    roslaunch.xmlloader.XmlParseException,
+    roslaunch.node_args.NodeParamsException,
     roslaunch.loader.LoadException,
     roslaunch.substitution_args.SubstitutionException,
     rospkg.ResourceNotFound,
     OSError,
-    ValueError,
-    KeyError,
-    TypeError,  # roslaunch does not catch it for values that are no text
 )
+"""Errors whose message says what is wrong. Any other one is named by its class, too."""
+
+
+@contextmanager
+def _refusing(what: str) -> Iterator[None]:
+    """Turn whatever the body raises into a LaunchFileError about `what`.
+
+    A launch file evaluates expressions, runs commands and names files of any content, so that reading it may raise
+    anything. None of it may end the node that reads.
+    """
+    try:
+        yield
+    except LaunchFileError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise LaunchFileError(f"{what}: {_reason(error).removeprefix(f'{what}: ')}") from error
+
+
+def _reason(error: BaseException) -> str:
+    text = " ".join(str(error).split())
+    if isinstance(error, _EXPLAINED) and text:
+        return text
+    return f"{type(error).__name__}: {text or 'no reason given'}: correct the launch file"
 
 
 class _StableNames(dict[str, str]):
@@ -134,11 +154,31 @@ class _Loader(roslaunch.xmlloader.XmlLoader):
         if context is not None:
             context.resolve_dict["anon"] = _StableNames()
 
-    def _parse_launch(self, filename: str, verbose: bool) -> Any:  # noqa: ARG002
+    def resolve_args(self, args: str, context: Any) -> Any:
+        """Return an attribute with its `$(...)` replaced.
+
+        Raises:
+            XmlParseException: an expression fails; roslaunch's own error would not name it.
+        """
         try:
-            document = _Builder().parseString(Path(filename).read_bytes())
-        except xml.parsers.expat.ExpatError as error:
-            raise roslaunch.xmlloader.XmlParseException(f"{filename}: not well-formed XML: {error}") from error
+            return super().resolve_args(args, context)
+        except (*_EXPLAINED, RecursionError):  # the latter comes of a file that includes itself
+            raise
+        except (Exception, SystemExit) as error:
+            raise roslaunch.xmlloader.XmlParseException(
+                f"{context.filename}: '{args}' fails: {type(error).__name__}: {error}: correct the expression"
+            ) from error
+
+    def _parse_launch(self, filename: str, verbose: bool) -> Any:  # noqa: ARG002
+        content = Path(filename).read_bytes()
+        try:
+            document = _Builder().parseString(content)
+        except (roslaunch.xmlloader.XmlParseException, RecursionError):
+            raise
+        except Exception as error:  # also of the codec that an unknown encoding has no match for
+            raise roslaunch.xmlloader.XmlParseException(
+                f"{filename}: not well-formed XML: {error}: correct it, and save it as UTF-8"
+            ) from error
         roots = document.getElementsByTagName("launch")
         if len(roots) != 1:
             raise roslaunch.xmlloader.XmlParseException(f"{filename}: must have one root element <launch>")
@@ -153,12 +193,9 @@ class _Builder(expatbuilder.ExpatBuilderNS):
 
 
 def _checked(path: str | Path, config: Any) -> LaunchFile:
-    try:
-        config.assign_machines()
-    except roslaunch.core.RLException as error:
-        raise LaunchFileError(f"{path}: {_one_line(error)}") from error
+    config.assign_machines()
     if config.config_errors:
-        raise LaunchFileError(f"{path}: {_one_line(config.config_errors[0])}")
+        raise LaunchFileError(f"{path}: {' '.join(str(config.config_errors[0]).split())}")
     if not config.nodes:
         raise LaunchFileError(f"{path}: starts no node")
     if config.has_remote_nodes():
@@ -206,7 +243,3 @@ def _roslaunch_node(node: NodeDescription) -> Any:
         cwd=node.cwd,
         launch_prefix=node.launch_prefix,
     )
-
-
-def _one_line(error: object) -> str:
-    return " ".join(str(error).split())

@@ -67,7 +67,6 @@ class Manipulator:
         self._lock = threading.Lock()  # requests, handles, interruption
         self._interruption: CancelledError | None = None
         self._deployments = DeployedConfigurations(parameters.number("probation", 5.0, low=0.0))
-        self._journal = Journal()
         self._journal_lock = threading.Lock()
         self._announcer = Announcer()
         self._resumption = self._find_resumption(initial, parameters)
@@ -91,6 +90,7 @@ class Manipulator:
         report = report_from(state)
         launched = report.configuration if report.configuration in self._options.configurations else ""
         resumption = resume(journal, launched, report.state == FAILED, initial, time.time())
+        self._journal = Journal(wanted=resumption.deploy, attempts=resumption.attempts)
         goal = None
         if self._options.save_action:
             goal = PendingGoal(
@@ -127,9 +127,27 @@ class Manipulator:
             rospy.loginfo("took over the running configuration %s", running.name)
         elif wanted:
             self._deploy(wanted)
+        else:
+            self._note(wanted="")
+        refused = known.get(self._resumption.refused)
+        if refused:
+            self._refuse(refused)
         self._server.start()
         while not rospy.is_shutdown():
             self._inbox.do_next(wait_s=0.2)
+
+    def _refuse(self, refused: Configuration) -> None:
+        """Tell that the change that was under way is not begun again, and what runs instead."""
+        running = self._deployments.running
+        message = (
+            f"{refused.name} is not deployed again: {self._resumption.reason}: see the node's log, correct the "
+            f"configuration, then request it; {running.name if running else 'nothing'} runs"
+        )
+        rospy.logerr("%s", message)
+        outcome = Outcome(Result.FAILED if running else Result.GENERAL_ERROR, running, message)
+        state = FunctionGrounding.STABLE if running else FunctionGrounding.FAILED
+        self._announcer.announce(running or refused, state, outcome)
+        self._announcer.diagnose(False, message, refused)
 
     def _heartbeat(self) -> None:
         if self._journal.needs_heartbeat(time.time()):
@@ -139,12 +157,15 @@ class Manipulator:
         """Write the journal."""
         last_good = self._deployments.last_good
         with self._journal_lock:
-            noted = self._journal.noted(last_good.name if last_good else "", time.time(), wanted, ended)
-            if noted is self._journal:
-                return
-            self._journal = noted
-            with contextlib.suppress(CallError):  # without a master there is nobody to read it
-                set_parameters({rospy.resolve_name("~journal"): noted.as_parameter()})
+            self._write(self._journal.noted(last_good.name if last_good else "", time.time(), wanted, ended))
+
+    def _write(self, journal: Journal) -> None:
+        """Publish a journal as a parameter, where it differs from the present one."""
+        if journal is self._journal:
+            return
+        self._journal = journal
+        with contextlib.suppress(CallError):  # without a master there is nobody to read it
+            set_parameters({rospy.resolve_name("~journal"): journal.as_parameter()})
 
     # -- requests -------------------------------------------------------------------------------------------------
 
@@ -212,10 +233,20 @@ class Manipulator:
     # -- changes --------------------------------------------------------------------------------------------------
 
     def _deploy(self, wanted: Configuration) -> Outcome:
+        """Deploy a configuration. An error that nobody expects ends the node; the next one does not begin it again."""
+        self._note(wanted=wanted.name)
+        try:
+            return self._change_to(wanted)
+        except (Exception, SystemExit) as error:
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            with self._journal_lock:
+                self._write(self._journal.broken(reason, time.time()))
+            raise
+
+    def _change_to(self, wanted: Configuration) -> Outcome:
         watch = Stopwatch(time.monotonic)
         began = time.monotonic()
         self._announcer.announce(wanted, FunctionGrounding.RECONFIGURING)
-        self._note(wanted=wanted.name)
         try:
             with watch.phase("plan"):
                 found = self._plans(wanted)
