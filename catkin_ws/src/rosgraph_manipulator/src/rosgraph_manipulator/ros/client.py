@@ -15,6 +15,7 @@ from metacontrol_msgs.msg import (
     MvpReconfigurationAction,
     MvpReconfigurationGoal,
 )
+from node_kit.ros.action_server import wait_for_server
 
 from rosgraph_manipulator.configuration.configurations import KEYS
 
@@ -72,7 +73,7 @@ def request(configuration: str) -> Answer:
     """
     action = rospy.get_param(f"{NODE}/reconfiguration_action_name", "rosgraph_manipulator_action_server")
     client = actionlib.SimpleActionClient(action, MvpReconfigurationAction)
-    if not client.wait_for_server(rospy.Duration.from_sec(FIND_TIMEOUT)):
+    if not wait_for_server(client, FIND_TIMEOUT):
         raise ClientError(f"no manipulator answers at {rospy.resolve_name(action)}: start rosgraph_manipulator")
     client.send_goal(MvpReconfigurationGoal(configuration))
     try:

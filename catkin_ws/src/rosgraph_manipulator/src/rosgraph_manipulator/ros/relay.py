@@ -9,6 +9,7 @@ import actionlib
 import roslib.message
 import rospy
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
+from node_kit.ros.action_server import is_connected
 from node_kit.ros.lifetime import Lifetime
 
 from rosgraph_manipulator.configuration.configurations import ConfigurationError, action_type
@@ -50,7 +51,7 @@ class Relay:
     def _send_goals(self) -> None:
         if not any(goal.link.needs_sending(self._changing) for goal in list(self._goals.values())):
             return
-        if not self._client.wait_for_server(rospy.Duration.from_sec(0.001)):
+        if not is_connected(self._client):
             return
         with self._lock:
             for goal in list(self._goals.values()):
