@@ -54,6 +54,7 @@ class FaultsTest(PairTest):
             ("malformed", "well-formed"),
             ("undefined", "'no_such_argument' is not defined"),
             ("no_node", "no_such_node"),
+            ("no_package", "no_such_package"),
             ("vanishes", "vanishes"),
         ):
             with self.subTest(name):

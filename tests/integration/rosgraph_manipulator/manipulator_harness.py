@@ -63,6 +63,7 @@ CONFIGURATIONS = {
     "dies_later": configuration(args="--die-after 4.5"),
     "malformed": {"function": "f_wait", "launch": str(HERE / "malformed.launch")},
     "undefined": {"function": "f_wait", "launch": str(HERE / "undefined.launch")},
+    "no_package": {"function": "f_wait", "command": "roslaunch no_such_package x.launch"},
     "no_node": {"function": "f_wait", "launch": str(HERE / "no_node.launch")},
     "once": {"function": "f_wait", "launch": str(HERE / "once.launch")},
     "tuned_1": {"function": "f_wait", "launch": str(HERE / "tuned.launch"), "args": ["rate:=1.0"]},

@@ -58,6 +58,17 @@ def test_configurations_can_come_from_a_file(run, launch_files, tmp_path):
     assert (code, error) == (2, "unknown configuration 'c'; known are: a, b\n")
 
 
+def test_configuration_without_its_package_refuses_no_plan_of_the_others(run, launch_files, tmp_path):
+    path = tmp_path / "c.yaml"
+    missing = "{command: roslaunch no_such_package x.launch}"
+    path.write_text(f"configurations: {{a: {{launch: {launch_files[0]}}}, c: {missing}}}")
+    assert run(plan, "", "a", "--config", str(path))[0] == 0
+    code, _, error = run(plan, "a", "c", "--config", str(path))
+    assert code == 2
+    assert error.startswith("configurations/c: ")
+    assert "no_such_package" in error
+
+
 @pytest.mark.parametrize(
     ("command", "words", "told"),
     [

@@ -17,6 +17,23 @@ def test_launch_files_are_found_by_whoever_asks():
     assert [configuration.launch_file for configuration in configurations.values()] == ["/found/1", "/found/2"]
 
 
+def test_configuration_without_its_package_leaves_the_others_usable():
+    def find(uri, _anywhere):
+        if "missing" in uri:
+            raise ConfigurationError("no package missing: install it")
+        return uri
+
+    entries = {"a": {"launch": "package://missing/a.launch", "function": "f_a"}, "b": {"launch": "/b.launch"}}
+    a, b = parse_options({"configurations": entries}, find).configurations.values()
+    assert (a.name, a.function, a.problem) == ("a", "f_a", "configurations/a: no package missing: install it")
+    assert (b.launch_file, b.problem) == ("/b.launch", "")
+
+
+def test_entry_that_is_malformed_refuses_the_file():
+    with pytest.raises(ConfigurationError, match="configurations/a: neither"):
+        parse_options({"configurations": {"a": {}, "b": {"launch": "/b.launch"}}}, lambda uri, _anywhere: uri)
+
+
 def test_configuration_whose_launch_file_is_not_found_is_named():
     def find(_uri, _anywhere):
         raise ConfigurationError("it is nowhere")

@@ -7,6 +7,7 @@ from ros_model.io.files import resolve
 
 from rosgraph_manipulator.change.tactics import NoRunningNodes, load_tactics, plan_change
 from rosgraph_manipulator.cli.invocation import HELP, run
+from rosgraph_manipulator.configuration.configurations import ConfigurationError
 from rosgraph_manipulator.configuration.description import SystemDescription
 from rosgraph_manipulator.configuration.difference import compare
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
@@ -52,6 +53,8 @@ def _system(name: str, config: str | None, online: bool) -> SystemDescription:
     configuration = options.configurations.get(name)
     if configuration is None:
         raise ClientError(f"unknown configuration '{name}'; known are: {', '.join(sorted(options.configurations))}")
+    if configuration.problem:
+        raise ConfigurationError(configuration.problem)
     return read_launch_file(configuration.launch_file, configuration.args).system
 
 

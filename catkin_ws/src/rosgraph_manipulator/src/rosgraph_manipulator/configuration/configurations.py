@@ -32,6 +32,7 @@ class Configuration:
         launch_file: path of the launch file that starts its nodes.
         args: arguments of the launch file, `NAME:=VALUE`.
         topics: topics that its nodes must publish before it is ready.
+        problem: why it cannot be deployed, with the remedy; empty: nothing is known to be wrong with it.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Configuration:
     launch_file: str
     args: tuple[str, ...] = ()
     topics: tuple[str, ...] = ()
+    problem: str = ""
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,8 @@ class ManipulatorOptions:
 def parse_options(parameters: Mapping[str, Any], find_launch_file: FindLaunchFile) -> ManipulatorOptions:
     """Check the parameters, in the published form or in ours.
 
+    A configuration whose launch file or package is missing has a `problem`; the others can be deployed without it.
+
     Args:
         parameters: keys configurations, kill_nodes, save_action, goal_msg_type, reconfiguration_action_name. A
             configuration is `{launch: FILE or package://PKG/FILE, args: [...], function: NAME, topics: [...]}` or the
@@ -70,7 +74,7 @@ def parse_options(parameters: Mapping[str, Any], find_launch_file: FindLaunchFil
         find_launch_file: finds the launch file that a configuration names.
 
     Raises:
-        ConfigurationError: a key is missing or has a value that cannot be used.
+        ConfigurationError: a key is missing or has a value that cannot be used, or no launch file at all is found.
     """
     entries = parameters.get("configurations")
     if not isinstance(entries, Mapping) or not entries:
@@ -84,10 +88,12 @@ def parse_options(parameters: Mapping[str, Any], find_launch_file: FindLaunchFil
     save_action = parameters.get("save_action") or None
     if save_action is not None and not isinstance(save_action, str):
         raise ConfigurationError("parameter 'save_action' must be the name of an action, e.g. move_base")
+    configurations = {str(name): _configuration(str(name), entry, find_launch_file) for name, entry in entries.items()}
+    problems = [configuration.problem for configuration in configurations.values()]
+    if all(problems):
+        raise ConfigurationError(problems[0])
     return ManipulatorOptions(
-        configurations={
-            str(name): _configuration(str(name), entry, find_launch_file) for name, entry in entries.items()
-        },
+        configurations=configurations,
         kill_nodes=tuple(kill_nodes),
         save_action=save_action.strip("/") if save_action else None,
         action_type=action_type(parameters.get("goal_msg_type"), "goal_msg_type") if save_action else None,
@@ -117,7 +123,7 @@ def _configuration(name: str, entry: object, find_launch_file: FindLaunchFile) -
     try:
         launch_file = find_launch_file(uri, "command" in entry)  # a command names a file anywhere in its package
     except ConfigurationError as error:
-        raise ConfigurationError(f"{where}: {error}") from error
+        return Configuration(name, function, "", tuple(args), tuple(topics), problem=f"{where}: {error}")
     return Configuration(name, function, launch_file, tuple(args), tuple(topics))
 
 

@@ -218,6 +218,8 @@ class RosExecutor:
 
     @staticmethod
     def _read(configuration: Configuration) -> SystemDescription:
+        if configuration.problem:
+            raise DeploymentError(configuration.problem)
         try:
             return read_launch_file(configuration.launch_file, configuration.args).system
         except LaunchFileError as error:

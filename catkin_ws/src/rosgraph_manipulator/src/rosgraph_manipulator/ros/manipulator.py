@@ -352,6 +352,9 @@ def main() -> None:
     with Lifetime("rosgraph_manipulator", ConfigurationError, ParameterError, PluginError) as life:
         life.start()
         options = options_from(read_parameters(rospy.myargv()[1:]))
+        for configuration in options.configurations.values():
+            if configuration.problem:
+                rospy.logwarn("%s is refused when it is requested: %s", configuration.name, configuration.problem)
         initial = str(rospy.get_param("~initial_configuration", ""))
         if initial and initial not in options.configurations:
             known = ", ".join(sorted(options.configurations))
