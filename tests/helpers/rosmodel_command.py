@@ -1,4 +1,4 @@
-"""What the tests of ros_model share."""
+"""The command rosmodel as tests run it."""
 
 import pytest
 from ros_model.cli.rosmodel import main

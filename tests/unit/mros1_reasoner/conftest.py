@@ -7,6 +7,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from helpers.rosmodel_command import run  # noqa: F401
 from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.knowledge.model import Direction
 from mros1_reasoner.pellet.process import PelletReasoner

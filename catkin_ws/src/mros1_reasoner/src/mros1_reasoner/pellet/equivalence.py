@@ -1,41 +1,65 @@
 """Equivalent individuals: an ontology says the same about them, so Pellet reasons about one of them only.
 
-When every statement about one individual also holds for another one, the two can be exchanged without a change of the
-ontology. So what follows for one follows for the other, until a fact distinguishes them.
+Two individuals are equivalent when the ontology stays the same if they change places. So what follows for one follows
+for the other. One of them, the deputy, can take the place of a whole group in every statement: each statement then
+becomes one that the ontology holds already. A model of the smaller ontology becomes a model of the whole one when each
+individual denotes what its deputy denotes. So the whole ontology implies nothing else.
+
+This holds for every axiom and rule that does not name the individuals: functional properties, cardinalities, keys,
+inequalities and built-ins of rules included. It holds because two names may denote the same in OWL. An individual is in
+no group when a class expression, a rule, owl:sameAs, owl:differentFrom or anything else than a plain statement names
+it. A plain statement gives its class, or the value of a declared property.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations, product
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.reasoner import Assertion
 from mros1_reasoner.knowledge.triples import Triple, iri_of, literal_of
 
 _OWL = "http://www.w3.org/2002/07/owl#"
-_PROPERTIES = (_OWL + "ObjectProperty", _OWL + "DatatypeProperty")
-_LANGUAGE = (_OWL, "http://www.w3.org/2000/01/rdf-schema#", v.SWRL)
-_NOTES = (v.RDFS_LABEL, "http://www.w3.org/2000/01/rdf-schema#comment")
+_RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+_RDFS = "http://www.w3.org/2000/01/rdf-schema#"
+_LANGUAGE = (_OWL, _RDF, _RDFS, v.SWRL, v.XSD)
+_TYPE = f"<{v.RDF_TYPE}>"
+_NAMED_INDIVIDUAL = f"<{v.OWL_NAMED_INDIVIDUAL}>"
+_OBJECT_PROPERTY, _DATATYPE_PROPERTY = f"<{_OWL}ObjectProperty>", f"<{_OWL}DatatypeProperty>"
+_ANNOTATION_PROPERTY = f"<{_OWL}AnnotationProperty>"
+_NOTES = (f"<{v.RDFS_LABEL}>", f"<{_RDFS}comment>")
 
 
 @dataclass(frozen=True)
 class Expansion:
-    """Copies the conclusions about the deputy of each group to the other members: (deputy, others)."""
+    """Copies the conclusions about the deputies of each group to the other members.
 
-    groups: tuple[tuple[str, tuple[str, ...]], ...]
+    Attributes:
+        members: the members that each deputy stands for, the deputy included.
+    """
+
+    members: Mapping[str, tuple[str, ...]]
 
     def __call__(self, values: Iterable[Assertion]) -> set[Assertion]:
         """Return the values of the deputies and those of the individuals that they stand for."""
-        found = set(values)
-        for deputy, others in self.groups:
-            for value in [value for value in found if deputy in (value.subject, value.value)]:
-                for other in others:
-                    subject = other if value.subject == deputy else value.subject
-                    target = other if value.value == deputy and not value.datatype else value.value
-                    found.add(value._replace(subject=subject, value=target))
-        return found
+        return {expanded for value in values for expanded in self._expanded(value)}
+
+    def is_ambiguous(self, values: Iterable[Assertion]) -> bool:
+        """Tell whether a deputy has itself as a value: for a member, that may mean itself or another member."""
+        return any(value.subject == value.value and value.subject in self.members for value in values)
+
+    def _expanded(self, value: Assertion) -> Iterator[Assertion]:
+        subjects = self.members.get(value.subject, (value.subject,))
+        targets = (value.value,) if value.datatype else self.members.get(value.value, (value.value,))
+        pairs: Iterable[tuple[str, ...]] = product(subjects, targets)
+        if subjects == targets:
+            is_same = value.subject == value.value
+            pairs = zip(subjects, subjects, strict=True) if is_same else permutations(subjects, 2)
+        for subject, target in pairs:
+            yield value._replace(subject=subject, value=target)
 
 
 class EquivalentIndividuals:
@@ -47,51 +71,89 @@ class EquivalentIndividuals:
 
     def __init__(self, triples: Sequence[Triple]) -> None:
         """Find the groups in the triples of an ontology."""
-        about: dict[str, list[Triple]] = defaultdict(list)
-        candidates = set()
-        sayable = {v.RDF_TYPE} | {
-            iri_of(s) for s, p, o in triples if iri_of(p) == v.RDF_TYPE and iri_of(o) in _PROPERTIES
-        }
-        for triple in triples:
-            subject, predicate, value = triple
-            if iri_of(predicate) in _NOTES:
-                continue
-            if iri_of(predicate) == v.RDF_TYPE and not subject.startswith("_:") and _is_class_of_individuals(value):
-                candidates.add(subject)
-            for term in {subject, predicate, value}:
-                about[term].append(triple)
-        groups: dict[tuple[tuple[str, ...], ...], list[str]] = defaultdict(list)
-        for term in sorted(candidates):
-            if all(iri_of(predicate) in sayable for _, predicate, _ in about[term]):
-                shape = sorted(tuple("" if part == term else part for part in triple) for triple in about[term])
-                groups[tuple(shape)].append(term)
-        self._groups = [group for group in groups.values() if len(group) > 1]
+        about = _plain_statements(triples)
+        shapes: dict[tuple[tuple[str, ...], ...], list[str]] = defaultdict(list)
+        for term in sorted(about):
+            shape = sorted({tuple("" if part == term else part for part in triple) for triple in about[term]})
+            shapes[tuple(shape)].append(term)
+        self._groups = [group for group in shapes.values() if len(group) > 1]
         self._about = {term: about[term] for group in self._groups for term in group}
         dropped = {term for group in self._groups for term in group[1:]}
         self.reduced = [triple for triple in triples if dropped.isdisjoint(triple)]
 
-    def split(self, facts: Sequence[Assertion]) -> tuple[list[Assertion], Expansion]:
+    def split(self, facts: Sequence[Assertion], deputies: int = 1) -> tuple[list[Assertion], Expansion]:
         """Return the facts to add to the reduced ontology, and how to expand what follows.
 
-        An individual that a fact mentions is in no group. One of the others is the deputy of its group.
+        An individual that a fact mentions stands for itself. What is added makes the reduced ontology the whole one
+        without the individuals that are left out: it has every statement that names none of them.
+
+        Args:
+            facts: what is known now.
+            deputies: number for each group. Two of them show whether a member has itself or another member as value.
         """
         mentioned = {f"<{fact.subject}>" for fact in facts} | {f"<{f.value}>" for f in facts if not f.datatype}
-        added: list[Assertion] = []
-        groups = []
+        left_out: set[str] = set()
+        present: list[str] = []
+        members: dict[str, tuple[str, ...]] = {}
         for group in self._groups:
-            own = [term for term in group if term in mentioned]
             rest = [term for term in group if term not in mentioned]
-            for term in [*own, *rest[:1]]:
-                if term != group[0]:
-                    added += [_assertion(t) for t in self._about[term] if iri_of(t[2]) != v.OWL_NAMED_INDIVIDUAL]
-            if len(rest) > 1:
-                groups.append((iri_of(rest[0]), tuple(iri_of(term) for term in rest[1:])))
-        return [*facts, *added], Expansion(tuple(groups))
+            left_out.update(rest[deputies:])
+            present += [term for term in group[1:] if term in mentioned or term in rest[:deputies]]
+            if len(rest) > deputies:
+                members |= dict.fromkeys(map(iri_of, rest[:deputies]), tuple(map(iri_of, rest)))
+        added = {t: None for term in present for t in self._about[term] if left_out.isdisjoint(t)}  # each one once
+        return [*facts, *map(_assertion, added)], Expansion(members)
 
 
-def _is_class_of_individuals(term: str) -> bool:
-    iri = iri_of(term)
-    return iri == v.OWL_NAMED_INDIVIDUAL or not iri.startswith(("_:", *_LANGUAGE))
+def _plain_statements(triples: Sequence[Triple]) -> dict[str, list[Triple]]:
+    """Return the statements about each individual that only plain statements name, without labels and comments.
+
+    An assertion can say each of them: its property is declared, and its individuals have a class.
+    """
+    types: dict[str, set[str]] = defaultdict(set)
+    for subject, predicate, value in triples:
+        if predicate == _TYPE:
+            types[subject].add(value)
+    read = {part for subject, _, value in triples if value != _ANNOTATION_PROPERTY for part in (subject, value)}
+    notes = set(_NOTES) - read  # no axiom or rule is about them
+    no_individuals = {predicate for _, predicate, _ in triples} | {kind for kinds in types.values() for kind in kinds}
+    individuals = {
+        term
+        for term, kinds in types.items()
+        if _is_name(term)
+        and term not in no_individuals
+        and all(kind == _NAMED_INDIVIDUAL or not _is_of_language(kind) for kind in kinds)
+    }
+
+    def is_plain(subject: str, predicate: str, value: str) -> bool:
+        if predicate == _TYPE:
+            return value == _NAMED_INDIVIDUAL or _is_name(value)
+        kinds = types[predicate] & {_OBJECT_PROPERTY, _DATATYPE_PROPERTY}
+        if len(kinds) != 1 or not _is_name(predicate) or _is_of_language(predicate) or subject not in individuals:
+            return False
+        # Text without a datatype may have a language, which an assertion can't say.
+        return value in individuals if kinds == {_OBJECT_PROPERTY} else value.startswith('"') and value.endswith(">")
+
+    about: dict[str, list[Triple]] = {term: [] for term in individuals if types[term] != {_NAMED_INDIVIDUAL}}
+    for triple in triples:
+        if triple[1] in notes:
+            continue
+        plain = is_plain(*triple)
+        for term in {triple[0], triple[2]} & about.keys():
+            if not plain:
+                del about[term]
+            elif triple[2] != _NAMED_INDIVIDUAL:
+                about[term].append(triple)
+    return about
+
+
+def _is_name(term: str) -> bool:
+    """Tell whether a term is an IRI, and one that stands for itself: without escaped characters."""
+    return term.startswith("<") and "\\" not in term
+
+
+def _is_of_language(term: str) -> bool:
+    return iri_of(term).startswith(_LANGUAGE)
 
 
 def _assertion(triple: Triple) -> Assertion:
@@ -99,4 +161,4 @@ def _assertion(triple: Triple) -> Assertion:
     literal = literal_of(value)
     if literal is None:
         return Assertion(iri_of(subject), iri_of(predicate), iri_of(value))
-    return Assertion(iri_of(subject), iri_of(predicate), literal[0], literal[1] or v.XSD + "string")
+    return Assertion(iri_of(subject), iri_of(predicate), *literal)

@@ -106,8 +106,11 @@ class PelletReasoner:
     def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
         """See Reasoner.infer."""
         added, expand = self._equivalent.split(facts)
-        answer = self._ask_twice({"op": "infer", "facts": [list(f) for f in added], "properties": list(properties)})
-        return sorted(expand(Assertion(*row) for row in answer["values"]))
+        values = self._infer(added, properties)
+        if expand.is_ambiguous(values):
+            added, expand = self._equivalent.split(facts, deputies=2)
+            values = self._infer(added, properties)
+        return sorted(expand(values))
 
     def close(self) -> None:
         """End the child."""
@@ -119,6 +122,10 @@ class PelletReasoner:
             if stream:
                 stream.close()
         process.wait()
+
+    def _infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
+        request = {"op": "infer", "facts": [list(fact) for fact in facts], "properties": list(properties)}
+        return [Assertion(*row) for row in self._ask_twice(request)["values"]]
 
     def _start(self) -> None:
         child = Path(__file__).with_name("child.py")
