@@ -96,7 +96,7 @@ class ContingenciesTest(unittest.TestCase):
         self.assertTrue(becomes(lambda: stamps(4) == sorted(set(stamps(4)))))
         refused = self.strike(kind="jump", target="/simulator")
         self.assertFalse(refused.success)
-        self.assertIn("no driver", refused.message)
+        self.assertIn("not a driver", refused.message)
 
     def test_3_what_makes_no_sense_is_refused_with_a_reason(self):
         for request, reason in (
