@@ -37,8 +37,10 @@ class BagBuilder:
         pairs = [KeyValue(key, str(value)) for key, value in values.items()]
         self.add(stamp, "/mission/event", MissionEvent(kind=kind, name=name, values=pairs))
 
-    def diagnostic(self, stamp, message, key, value, name=""):
-        status = DiagnosticStatus(name=name, message=message, values=[KeyValue(key, str(value))])
+    def diagnostic(self, stamp, message, key, value, name="", hardware_id=""):
+        status = DiagnosticStatus(
+            name=name, message=message, hardware_id=hardware_id, values=[KeyValue(key, str(value))]
+        )
         self.add(stamp, "/diagnostics", DiagnosticArray(status=[status]))
 
     def configuration(self, stamp, configuration, state):

@@ -132,10 +132,11 @@ def test_snapshot_checks_and_lacks_no_component_of_the_models(seen):
     checked = rosmodel("check", seen.folder / "snapshot.ros", seen.folder / "snapshot.rossystem")
     assert checked.returncode == 0, checked.stdout + checked.stderr
     compared = rosmodel("diff", D2 / "models" / "d2.rossystem", seen.folder / "snapshot.rossystem")
-    assert compared.returncode == 1, compared.stdout + compared.stderr  # the snapshot has the meta-controller, too
+    assert compared.returncode == 1, compared.stdout + compared.stderr  # the snapshot has more parameters
     lines = compared.stdout.splitlines()
     assert [line for line in lines if re.fullmatch(r"- component '[^']*'", line)] == []
-    assert "+ component 'reasoner'" in lines  # so that a changed form of these lines is noticed
+    assert [line for line in lines if line.startswith("+ component 'move_base', ")]  # the form that is expected
+    assert "+ component 'reasoner'" not in lines  # a snapshot leaves the meta-controller out
     assert "who calls which service" in (seen.folder / "snapshot.rossystem").read_text()
 
 
@@ -164,7 +165,8 @@ def test_source_has_every_interface_that_the_running_nodes_have(seen):
     sys.stdout.write("\n".join([*said, f"made by rospy in every node: {own}", ""]))
     assert missing == []
     assert all(total[kind] for kind in KINDS)
-    assert sum(by_name.values()) > 0.8 * sum(total.values())
+    # Most of the others are names that follow from parameters: of layers, planners and sensors of move_base.
+    assert sum(by_name.values()) > 2 / 3 * sum(total.values())
 
 
 def ports_of(end: End, details: Details, extracted: dict[str, ExtractedPackage]) -> tuple[FoundPort, ...] | None:

@@ -3,6 +3,7 @@
 
 import base64
 import contextlib
+import copy
 import io
 import math
 import signal
@@ -20,6 +21,7 @@ import rostest
 import tf2_ros
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import PolygonStamped, PoseStamped, TransformStamped, Twist
+from map_msgs.msg import OccupancyGridUpdate
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseGoal
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
 from nav_msgs.srv import GetPlan
@@ -149,7 +151,9 @@ class MoveBaseTest(unittest.TestCase):
 
     @classmethod
     def start(cls):
-        cls.process = subprocess.Popen(["/usr/bin/rosrun", "move_base", "move_base", "__name:=move_base"])
+        cls.process = subprocess.Popen(
+            ["/usr/bin/rosrun", "move_base", "move_base", "__name:=move_base", "odom:=odometry/filtered"]
+        )
 
     @classmethod
     def stop(cls, how=signal.SIGINT):
@@ -319,9 +323,24 @@ class MoveBaseTest(unittest.TestCase):
         self.assertEqual(self.finish(), (GoalStatus.SUCCEEDED, "Goal reached."))
 
     def listen_to_costmap(self):
+        """Return a list that grows by the costmap after each message, whole or update, as RViz puts them together."""
         costmaps = []
-        subscriber = rospy.Subscriber("move_base/local_costmap/costmap", OccupancyGrid, costmaps.append)
-        self.addCleanup(subscriber.unregister)
+
+        def take(update):
+            if costmaps:
+                grid = copy.copy(costmaps[-1])
+                cells = np.array(grid.data, dtype=np.int8).reshape(grid.info.height, grid.info.width)
+                area = slice(update.y, update.y + update.height), slice(update.x, update.x + update.width)
+                cells[area] = np.array(update.data, dtype=np.int8).reshape(update.height, update.width)
+                grid.data = cells.ravel().tolist()
+                costmaps.append(grid)
+
+        name = "move_base/local_costmap/costmap"
+        for subscriber in (
+            rospy.Subscriber(name, OccupancyGrid, costmaps.append),
+            rospy.Subscriber(f"{name}_updates", OccupancyGridUpdate, take),
+        ):
+            self.addCleanup(subscriber.unregister)
         return costmaps
 
     @staticmethod

@@ -10,6 +10,7 @@ import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from helpers.waiting import DEADLINE_S, wait_for
+from metacontrol_bags import ownership
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
     Decision,
@@ -52,10 +53,15 @@ def status(message, *values, level=0, name=""):
 
 
 class Diagnostics:
-    """Publishes statuses on /diagnostics."""
+    """Publishes statuses on /diagnostics, or on the topic that takes its place.
 
-    def __init__(self):
-        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
+    Attributes:
+        robot: namespace of the robot of which they are; empty: the statuses do not say.
+    """
+
+    def __init__(self, topic="/diagnostics"):
+        self.robot = "/"
+        self._publisher = rospy.Publisher(topic, DiagnosticArray, queue_size=50)
 
     def reaches(self, node):
         """Tell whether a node is connected to it."""
@@ -63,6 +69,8 @@ class Diagnostics:
 
     def tell(self, *statuses, stamp=None):
         """Publish statuses in one array, and return its stamp."""
+        for item in statuses:
+            item.hardware_id = item.hardware_id or (self.robot and ownership.hardware_id_of(self.robot))
         array = DiagnosticArray(status=list(statuses))
         array.header.stamp = stamp or rospy.Time.now()
         self._publisher.publish(array)
@@ -136,7 +144,8 @@ class Listener:
             self.lines.append(message)
 
     def _on_diagnostics(self, array):
-        self.troubles += [s for s in array.status if s.hardware_id == self.node and "econfiguration" in s.message]
+        trouble = f"{self.node.strip('/')}: reconfiguration"
+        self.troubles += [s for s in array.status if s.name == trouble]
 
     def decided(self, state, count=1):
         """Wait until so many decisions of a state were heard; return the last."""
@@ -153,11 +162,11 @@ class Listener:
 class Reasoner:
     """A reasoner as a process, in a namespace of its own; ends with the block."""
 
-    def __init__(self, namespace, diagnostics, **parameters):
+    def __init__(self, namespace, diagnostics, *remappings, **parameters):
         self.namespace = namespace
         self.node = f"{namespace}/reasoner"
         self._diagnostics = diagnostics
-        self._parameters = {**PARAMETERS, **parameters}
+        self._parameters, self._remappings = {**PARAMETERS, **parameters}, remappings
         self.listener = Listener(namespace)
         self._process = None
 
@@ -171,9 +180,11 @@ class Reasoner:
     def start(self):
         """Start it and wait until it is ready."""
         before = len(self.listener.log)
+        self._diagnostics.robot = self.namespace
         arguments = [f"_{name}:={value}" for name, value in self._parameters.items()]
         self._process = subprocess.Popen(
-            [sys.executable, str(NODE), f"__ns:={self.namespace}", *arguments], stdout=subprocess.DEVNULL
+            [sys.executable, str(NODE), f"__ns:={self.namespace}", *self._remappings, *arguments],
+            stdout=subprocess.DEVNULL,
         )
         self.listener.logged("Reasoner Initialization Ok", before)
         wait_for(lambda: self._diagnostics.reaches(self.node), "the reasoner hears diagnostics")

@@ -107,6 +107,34 @@ class LifecycleTest(unittest.TestCase):
             reasoner.listener.decided("EXECUTED", 2)
             self.assertEqual(manipulator.requests, ["camera_slow", "scan_slow"])
 
+    def test_statuses_of_other_robots_are_not_heeded(self):
+        manipulator = Manipulator("/hall_1")
+        manipulator.announce("scan_slow")
+        with self.reasoner("/hall_1") as reasoner:
+            reasoner.listener.logged("f_move runs scan_slow")
+            for owner in ("robot:/hall_2", "robot:/", "/hall_2/laser", "/dev/ttyUSB0", "none"):
+                failed = status("Component status", ("laser", "FALSE"), name="laser")
+                failed.hardware_id = owner
+                self.diagnostics.tell(failed)
+            # What is its own comes through the same connection, after those.
+            failed = status("Component status", ("camera", "FALSE"), name="camera")
+            failed.hardware_id = "hall_1/camera"
+            self.diagnostics.tell(failed, status("QA status", ("energy", "0.3")))
+            reasoner.listener.logged("TYPE: energy\tVALUE: 0.3")
+            designs = reasoner.service("feasible", Feasible, "f_move").functions[0].designs
+            self.assertTrue(designs)
+            self.assertEqual({name.split("_")[0] for name in designs}, {"scan"})
+
+    def test_all_on_a_topic_that_takes_the_place_of_diagnostics_is_the_robots_own(self):
+        manipulator = Manipulator("/yard")
+        manipulator.announce("scan_slow")
+        own = Diagnostics("/yard/diagnostics")
+        with Reasoner("/yard", own, "/diagnostics:=/yard/diagnostics") as reasoner:
+            reasoner.listener.logged("f_move runs scan_slow")
+            own.robot = ""
+            own.component("laser", "FALSE")
+            self.assertEqual(reasoner.listener.decided("EXECUTED").to_configuration, "camera_slow")
+
     def test_failed_task_violates_its_objective(self):
         manipulator = Manipulator("/task")
         manipulator.announce("scan_slow")

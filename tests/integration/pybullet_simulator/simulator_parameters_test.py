@@ -10,7 +10,7 @@ import rostest
 DEADLINE_S = 150
 REFUSED = (
     ("simulator", "_slip:=5", "/slip is 5: it must be a finite number, at least 0 and at most 0.1"),
-    ("simulator", "_world:=/nowhere/hall.yaml", "/nowhere/hall.yaml: cannot be read"),
+    ("simulator", "_world:=/nowhere/hall.yaml", "/nowhere/hall.yaml: No such file or directory: check the path"),
     ("simulator", "_initial_pose_x:=99", "initial pose (99, 0) is off the floor"),
     ("rear_laser", "_seed:=-4", "/seed is -4: it must be a whole number, at least 0"),
     ("camera", "_range_max:=0.01", "/range_max is 0.01: it must be a finite number, at least 0.15"),

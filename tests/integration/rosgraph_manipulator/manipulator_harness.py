@@ -21,7 +21,7 @@ from geometry_msgs.msg import Twist
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
-    LauncherState,
+    LaunchedFunctions,
     MvpReconfigurationAction,
     MvpReconfigurationGoal,
 )
@@ -126,7 +126,7 @@ class PairTest(unittest.TestCase):
         rospy.set_param("rosgraph_launcher", {"restart_intensity": 3, **cls.launcher_parameters})
         cls.subscribers = [
             rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, cls.states.append),
-            rospy.Subscriber("rosgraph_launcher/state", LauncherState, cls.launcher_states.append),
+            rospy.Subscriber("rosgraph_launcher/functions", LaunchedFunctions, cls.on_launched),
             rospy.Subscriber("cmd_vel", Twist, cls.commands.append),
             rospy.Subscriber("wait/status", GoalStatusArray, cls.on_status),
         ]
@@ -153,6 +153,11 @@ class PairTest(unittest.TestCase):
         for node in (cls.manipulator, cls.launcher):
             if node:
                 node.end()
+
+    @classmethod
+    def on_launched(cls, message):
+        """Keep what the launcher tells of the tests' only function."""
+        cls.launcher_states.extend(message.functions[:1])
 
     @classmethod
     def on_status(cls, message):

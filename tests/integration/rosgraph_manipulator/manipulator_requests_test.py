@@ -62,7 +62,8 @@ class RequestsTest(PairTest):
         self.restart_with(ready_timeout=10.0)
         self.addCleanup(self.restart_with, ready_timeout=30.0)
         self.assertEqual(self.request("mute"), 0)
-        self.assertIn("not all of the topics /cmd_vel, /wait/status are published", self.text)
+        self.assertIn("not all of its topics are published", self.text)
+        self.assertIn("/cmd_vel is missing", self.text)
         self.wait_for_state("slow")
 
     def test_requests_wait_for_their_turn(self):

@@ -153,6 +153,19 @@ class SurvivalTest(PairTest):
         self.wait_for_goal(goal_id, server)
         wait_for(lambda: self.states[-1].functions[0].state == "STABLE", "a configuration is stable")
 
+    def test_launcher_that_dies_before_the_nodes_are_ready_is_noticed(self):
+        self.client.send_goal(MvpReconfigurationGoal("hangs"))
+        wait_for(
+            lambda: (self.launcher_states[-1].configuration, self.launcher_states[-1].state) == ("hangs", "STABLE"),
+            "the launcher has made the change",
+        )
+        self.launcher.end(signal.SIGKILL)
+        self.restart_launcher()
+        self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
+        self.assertEqual(self.client.get_result().result, 0, self.text)
+        self.assertIn("rosgraph_launcher has died", self.text)
+        self.wait_for_state("slow")
+
     def test_launcher_that_dies_just_when_it_is_asked_is_waited_for(self):
         """The kernel closes a dying launcher's sockets one by one: it may be found, and then refuse the request."""
         self.launcher.end(signal.SIGKILL)

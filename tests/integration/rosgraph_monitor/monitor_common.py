@@ -60,6 +60,18 @@ class Diagnostics:
         return self.wait(f"{message} {value or ''} of {name!r}", fits, timeout)
 
 
+def run(*command, environment=None):
+    """Run a command of the monitor's package."""
+    return subprocess.run(
+        ["rosrun", "rosgraph_monitor", *command],
+        env=os.environ | (environment or {}),
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
 def start_node(name, *, code=NODE, arguments=(), prefix=(), **options):
     """Start a node as a process."""
     return subprocess.Popen([*prefix, sys.executable, "-c", code, name, *arguments], **options)

@@ -6,7 +6,7 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
 from helpers.waiting import wait_for
-from monitor_common import GraphTest, end, value_of
+from monitor_common import GraphTest, end, run, value_of
 
 ACTION = "move_base_msgs/MoveBaseAction"
 RVIZ = "/robot/rviz_1700000000"
@@ -55,6 +55,12 @@ class MonitorNamesTest(GraphTest):
         self.seen.forget()
         self.start("/robot/rviz_1700000001")
         self.seen.wait_status("rviz", "Component status", "RECOVERED")
+
+    def test_live_table_shows_the_robot_of_its_namespace_alone(self):
+        done = run("watch", "--once", "4", environment={"COLUMNS": "160", "ROS_NAMESPACE": "/robot"})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("arm/nav", done.stdout)
+        self.assertNotIn("camera", done.stdout)
 
     def test_only_nodes_of_the_namespace_that_are_not_anonymous_are_additional(self):
         tool = "/robot/tool_1700000000"

@@ -7,7 +7,6 @@ What it publishes changes with each message, or what ~mode says: "quiet" nothing
 """
 
 import itertools
-import sys
 
 import actionlib
 import roslib.message
@@ -70,5 +69,6 @@ def message(message_class, number):
 
 
 if __name__ == "__main__":
-    node = Node(sys.argv[1], [argument for argument in sys.argv[2:] if "=" in argument])
+    _, name, *arguments = rospy.myargv()
+    node = Node(name, [argument for argument in arguments if "=" in argument])
     rospy.spin()

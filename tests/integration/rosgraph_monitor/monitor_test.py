@@ -59,6 +59,7 @@ class MonitorTest(unittest.TestCase):
     def restart_and_expect_recovery(self, name, component):
         self.start(name)
         self.seen.wait_status(component, "Component status", "RECOVERED")
+        self.seen.wait_status(component, "Component status", "TRUE")
         self.seen.forget()
         self.seen.wait_status(component, "Component status", "TRUE")
         self.assertNotIn("RECOVERED", [s.values[0].value for s in self.seen.statuses(component, "Component status")])

@@ -2,25 +2,12 @@
 """What stands around the monitor: the aggregator's groups, the live table, the snapshot on the command line."""
 
 import json
-import os
-import subprocess
 import unittest
 
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
-from monitor_common import Diagnostics, end, start_node
-
-
-def run(*command, environment=None):
-    return subprocess.run(
-        ["rosrun", "rosgraph_monitor", *command],
-        env=os.environ | (environment or {}),
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+from monitor_common import Diagnostics, end, run, start_node
 
 
 class MonitorToolsTest(unittest.TestCase):

@@ -59,11 +59,14 @@ class Bag:
     def __exit__(self, *_):
         self._writer.close()
 
-    def write(self, topic, kind, message, stamp):
-        if topic not in self._connections:
-            self._connections[topic] = self._writer.add_connection(topic, kind, typestore=self.types.store)
+    def write(self, topic, kind, message, stamp, publisher=None):
+        key = topic, publisher
+        if key not in self._connections:
+            self._connections[key] = self._writer.add_connection(
+                topic, kind, typestore=self.types.store, callerid=publisher
+            )
         data = self.types.store.serialize_ros1(message, kind)
-        self._writer.write(self._connections[topic], round(stamp * 1e9), data)
+        self._writer.write(self._connections[key], round(stamp * 1e9), data)
 
     def decision(self, decision, stamp, topic="/mros1_reasoner/decision"):
         self.write(topic, "metacontrol_msgs/msg/Decision", self.types.decision(decision, stamp), stamp)
@@ -86,7 +89,7 @@ class Bag:
         )
         self.write(topic, "metacontrol_msgs/msg/ReasonerJournal", message, stamp)
 
-    def statuses(self, stamp, *statuses):
+    def statuses(self, stamp, *statuses, publisher=None, hardware_id=""):
         """Write statuses given as (message, name, level, ((key, value), ...))."""
         types = self.types.store.types
         found = [
@@ -94,18 +97,18 @@ class Bag:
                 level=level,
                 name=name,
                 message=message,
-                hardware_id="",
+                hardware_id=hardware_id,
                 values=[types[f"{DIAGNOSTICS}KeyValue"](key=key, value=value) for key, value in values],
             )
             for message, name, level, values in statuses
         ]
         array = types[f"{DIAGNOSTICS}DiagnosticArray"](header=self.types.header(stamp), status=found)
-        self.write("/diagnostics", f"{DIAGNOSTICS}DiagnosticArray", array, stamp)
+        self.write("/diagnostics", f"{DIAGNOSTICS}DiagnosticArray", array, stamp, publisher)
 
-    def active(self, stamp, function, configuration, state="STABLE"):
+    def active(self, stamp, function, configuration, state="STABLE", space=""):
         grounding = self.types.FunctionGrounding(function=function, configuration=configuration, state=state)
         message = self.types.ActiveConfiguration(header=self.types.header(stamp), functions=[grounding])
-        topic = "/rosgraph_manipulator/active_configuration"
+        topic = f"{space}/rosgraph_manipulator/active_configuration"
         self.write(topic, "metacontrol_msgs/msg/ActiveConfiguration", message, stamp)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from node_kit import parameters
-from node_kit.parameters import ParameterError, ParameterTree
+from node_kit.parameters import ParameterError, ParameterTree, named_entries
 
 REMEDY = "correct the launch or YAML file that sets it"
 
@@ -31,6 +31,9 @@ REMEDY = "correct the launch or YAML file that sets it"
         ("texts", ["/a", "/b"], ["/a", "/b"]),
         ("texts", "/a, /b,", ["/a", "/b"]),
         ("texts", "", []),
+        ("texts", "[/a, /b]", ["/a", "/b"]),
+        ("texts", " ['/a', \"/b\",] ", ["/a", "/b"]),
+        ("texts", "[]", []),
         ("numbers", [1, 0.5], [1.0, 0.5]),
         ("numbers", "[0.1, -0.3]", [0.1, -0.3]),
         ("numbers", "", []),
@@ -130,3 +133,22 @@ def test_former_name_counts_where_the_present_one_is_not_given():
 def test_value_where_a_level_should_be():
     with pytest.raises(ParameterError, match=r"^parameter ~costmap is 3: it must be a group of parameters"):
         ParameterTree({"costmap": 3}).child("costmap")
+
+
+NAMED = {"lift/driver": {"node": "lift/driver"}, "lift": {"node": "lift"}, "eye": {"topic": "eye/scan"}, "odd": 3}
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        NAMED,
+        {"lift": {"driver": {"node": "lift/driver"}, "node": "lift"}, "eye": {"topic": "eye/scan"}, "odd": 3},
+    ],
+    ids=["file", "parameter server"],
+)
+def test_entries_have_the_names_of_the_file_also_where_the_server_made_levels_of_their_slashes(tree):
+    assert dict(named_entries(tree)) == NAMED
+
+
+def test_empty_entry_is_an_entry():
+    assert list(named_entries({"lift": {"driver": {}}})) == [("lift/driver", {})]

@@ -25,7 +25,7 @@ def test_route_is_read(tmp_path):
         ("routes: {r1: {start: [0, 0]}}", "'r1', goal"),
         ("routes: {r1: {start: [0, .nan], goal: [1, 1]}}", "'r1', start"),
         ("routes: {r1: 7}", "needs a start"),
-        ("routes: [1", "cannot be read"),
+        ("routes: [1", "correct the YAML"),
         ("7", "no route"),
     ],
 )

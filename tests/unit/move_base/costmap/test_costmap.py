@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from move_base.costmap.costmap import Costmap
-from move_base.costmap.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, occupancy_values
+from move_base.costmap.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, changed_area, occupancy_values
 from move_base.costmap.sensors import Observation
-from move_base.costmap.static_map import MapError, StaticMap
+from move_base.costmap.static_map import MapError, MapPart, StaticMap
 from move_base.parameters.reader import read_parameters
 from robot_formulas.geometry import ORIGIN, Pose
 
@@ -139,6 +141,97 @@ def test_map_gives_the_global_costmap_its_size(tree):
     assert snapshot.costs.shape == (40, 60)
     assert at(snapshot, -3.0 + 2.05, -2.0 + 1.05) == LETHAL
     assert at(snapshot, -3.0 + 5.05, -2.0 + 3.05) == UNKNOWN
+
+
+def two_maps(tree, **changes):
+    """A global costmap with a second static layer, `rooms`, listed last; maps of 2 x 2 m, one obstacle in each."""
+    plugins = [*tree()["global_costmap"]["plugins"][:1], {"name": "rooms", "type": "costmap_2d::StaticLayer"}]
+    settings = {"global_costmap__plugins": plugins, "global_costmap__rooms__map_topic": "rooms", **changes}
+    costmap = Costmap(read_parameters(tree(**settings)).global_costmap)
+    for topic, cell in (("map", (5, 5)), ("rooms", (30, 30))):
+        occupancy = np.zeros((40, 40), dtype=np.int8)
+        occupancy[cell] = 100
+        assert costmap.missing_map() == topic
+        costmap.set_map(static_map(occupancy), topic)
+    assert not costmap.needs_map
+    return costmap
+
+
+def test_later_map_replaces_the_one_before_unless_the_maximum_counts(tree):
+    costs = two_maps(tree).update(ORIGIN, []).costs
+    assert (costs[5, 5], costs[30, 30]) == (FREE, LETHAL)
+    costs = two_maps(tree, global_costmap__rooms__use_maximum=True).update(ORIGIN, []).costs
+    assert (costs[5, 5], costs[30, 30]) == (LETHAL, LETHAL)
+
+
+def test_part_of_a_map_is_updated_for_the_layer_that_asks_for_it(tree):
+    part = MapPart.create([100, 100], column=10, row=20, width=2, height=1)
+    deaf = two_maps(tree)
+    deaf.update_map(part, "rooms")
+    assert deaf.update(ORIGIN, []).costs[20, 10] == FREE
+    costmap = two_maps(tree, global_costmap__rooms__subscribe_to_updates=True)
+    costmap.update_map(part, "rooms")
+    costs = costmap.update(ORIGIN, []).costs
+    assert (costs[20, 10], costs[20, 11], costs[20, 12]) == (LETHAL, LETHAL, FREE)
+    with pytest.raises(MapError, match="reaches beyond the map"):
+        costmap.update_map(MapPart.create([1, 1], column=39, row=0, width=2, height=1), "rooms")
+
+
+def test_first_map_only_keeps_it(tree):
+    costmap = two_maps(tree, global_costmap__rooms__first_map_only=True)
+    costmap.set_map(static_map(np.zeros((40, 40), dtype=np.int8)), "rooms")
+    assert costmap.update(ORIGIN, []).costs[30, 30] == LETHAL
+
+
+def test_costs_of_a_map_grow_with_its_occupancy_where_asked_for(tree):
+    occupancy = np.array([[0, 30, 60, 90, 100, -1]], dtype=np.int8)
+    settings = {"global_costmap__plugins": tree()["global_costmap"]["plugins"][:1]}
+    for trinary, expected in ((True, [0, 0, 0, 0, 254, 255]), (False, [0, 76, 152, 228, 254, 255])):
+        settings["global_costmap__static_layer__trinary_costmap"] = trinary
+        costmap = Costmap(read_parameters(tree(**settings)).global_costmap)
+        costmap.set_map(static_map(occupancy))
+        assert costmap.update(ORIGIN, []).costs.tolist() == [expected]
+
+
+def test_unknown_cells_are_inflated_where_asked_for(tree):
+    occupancy = np.full((40, 60), -1, dtype=np.int8)
+    occupancy[10, 20] = 100
+    near = (10, 20 + 12)  # 0.6 m from the obstacle, beyond the inscribed radius
+    for inflated, expected in ((False, [UNKNOWN, UNKNOWN]), (True, [187, UNKNOWN])):
+        settings = {"global_costmap__inflater_layer__inflate_unknown": inflated}
+        costmap = Costmap(read_parameters(tree(**settings)).global_costmap)
+        costmap.set_map(static_map(occupancy))
+        costs = costmap.update(Pose(30.0, 30.0, 0.0), []).costs
+        assert [int(costs[near]), int(costs[10, 50])] == pytest.approx(expected, abs=3)
+
+
+def test_layers_keep_their_obstacles_apart(tree):
+    plugins = [{"name": name, "type": "costmap_2d::ObstacleLayer"} for name in ("low", "high")]
+    laser = {"observation_sources": "scan", "scan": {"data_type": "LaserScan", "topic": "front/scan"}}
+    groups = {"local_costmap__low": {**laser, "enabled": True}, "local_costmap__high": laser}
+    costmap = Costmap(read_parameters(tree(local_costmap__plugins=plugins, **groups)).local_costmap)
+    low, high = costmap.parameters.sources
+    for source, x in ((low, 1.0), (high, 2.0)):
+        points = np.array([(x, 0.0, 0.0)], dtype=np.float32)
+        costmap.update(ORIGIN, [(Observation(source, "sensor", 1.0, points, np.array([True]), True), sensor())])
+    costmap.clear(layers=["low"])
+    snapshot = costmap.update(ORIGIN, [])
+    assert (at(snapshot, 1.0, 0.0), at(snapshot, 2.0, 0.0)) == (FREE, LETHAL)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.2))
+def test_changed_area_holds_all_changes_and_is_the_smallest(seed, share):
+    random = np.random.default_rng(seed)
+    old = random.integers(0, 3, (7, 9), dtype=np.uint8)
+    new = np.where(random.random(old.shape) < share, random.integers(0, 3, old.shape, dtype=np.uint8), old)
+    area = changed_area(old, new)
+    if area is None:
+        assert (old == new).all()
+        return
+    outside = old != new
+    assert all(outside[area].any(axis=axis)[[0, -1]].all() for axis in (0, 1))
+    outside[area] = False
+    assert not outside.any()
 
 
 @pytest.mark.parametrize("resolution", [0.025, 0.08, 0.1])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from move_base.costmap.sensors import SensorError, cloud_observation, scan_observation
+from move_base.costmap.sensors import SensorError, cloud_observation, points_observation, scan_observation
 from move_base.parameters.parameters import ObservationSource
 
 SCAN = ObservationSource("scan", "LaserScan", "front/scan", raytrace_range=12.0, inf_is_valid=True)
@@ -76,6 +76,14 @@ def test_cloud_becomes_its_finite_points():
     observation = cloud_observation(cloud([(1.0, 2.0, 3.0), (math.nan, 0.0, 0.0), (4.0, 5.0, 6.0)]), CLOUD)
     assert observation.points.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
     assert not observation.ordered
+
+
+def test_cloud_of_the_former_type_becomes_its_finite_points():
+    points = [SimpleNamespace(x=1.0, y=2.0, z=3.0), SimpleNamespace(x=math.nan, y=0.0, z=0.0)]
+    observation = points_observation(SimpleNamespace(points=points, header=header("bumper")), CLOUD)
+    assert observation.points.tolist() == [[1.0, 2.0, 3.0]]
+    assert (observation.frame, observation.ordered) == ("bumper", False)
+    assert points_observation(SimpleNamespace(points=[], header=header()), CLOUD).points.shape == (0, 3)
 
 
 def test_empty_cloud_is_an_observation_of_nothing():

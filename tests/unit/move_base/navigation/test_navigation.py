@@ -1,5 +1,6 @@
 """The closed loop: navigator, costmaps, planner and controller drive a simulated base."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -143,7 +144,7 @@ def test_repeated_messages_do_not_count_as_current(simulate, walls):
     simulation = simulate(walls())
     simulation.sense()
     (source,) = simulation.navigator.sources
-    old = simulation.navigator._surroundings._sensors[source.topic, source.data_type].recent[-1]
+    old = simulation.navigator._surroundings._sensors[source.stream].recent[-1]
     assert "not newer" in simulation.navigator.observe(old, simulation.time)
     assert "ahead of the clock" in simulation.navigator.observe(
         type(old)(**{**vars(old), "stamp": simulation.time + 5.0}), simulation.time
@@ -294,12 +295,40 @@ def test_rotation_of_recovery_is_a_full_turn(simulate, walls, tree):
 def test_clearing_keeps_a_square_of_its_reset_distance(simulate, walls, tree, side, kept):
     wipe = [{"name": "wipe", "type": "clear_costmap_recovery/ClearCostmapRecovery"}]
     changes = {"planner_patience": 1.0, "recovery_behaviors": wipe, "wipe__reset_distance": side}
+    changes["wipe__layer_names"] = ["obstacles_layer"]
     simulation = simulate([*walls(), CLOSED], start=(-3.0, 0.0, math.pi), tree=tree(**changes))
     costmap = simulation.navigator._global.costmap
     behind = costmap.geometry.cell(-2.0, 0.0)  # where no ray goes
-    costmap._obstacles[behind] = LETHAL
+    costmap.obstacles("obstacles_layer")[behind] = LETHAL
     assert recovered(drive(simulation, (3.0, 0.0, 0.0))) == ["wipe"]
-    assert (costmap._obstacles[behind] == LETHAL) == kept
+    assert (costmap.obstacles("obstacles_layer")[behind] == LETHAL) == kept
+
+
+@pytest.mark.parametrize(
+    ("changes", "clears"),
+    [
+        ({}, (False, False)),  # the default is a layer named obstacles
+        ({"wipe__layer_names": ["obstacles_layer"]}, (True, True)),
+        ({"wipe__layer_names": ["obstacles_layer"], "wipe__affected_maps": "local"}, (False, True)),
+        ({"wipe__layer_names": ["obstacles_layer"], "wipe__affected_maps": "global"}, (True, False)),
+        ({"wipe__layer_names": ["obstacles_layer"], "wipe__invert_area_to_clear": True}, (False, False)),
+        ({"wipe__layer_names": ["elsewhere"]}, (False, False)),
+    ],
+)
+def test_clearing_is_limited_to_its_layers_and_maps(simulate, walls, tree, changes, clears):
+    wipe = [{"name": "wipe", "type": "clear_costmap_recovery/ClearCostmapRecovery"}]
+    settings = {"planner_patience": 1.0, "recovery_behaviors": wipe, "wipe__reset_distance": 1.0, **changes}
+    simulation = simulate([*walls(), CLOSED], start=(-3.0, 0.0, math.pi), tree=tree(**settings))
+    held = []
+    simulation.run(0.3)
+    for area in (simulation.navigator._global, simulation.navigator._local):
+        robot = area.robot_pose(simulation.time, simulation)
+        x, y = robot.apply(np.array([[-1.0, 0.0]]))[0]  # behind the robot, where no ray goes
+        held.append((area.costmap, area.costmap.geometry.cell(x, y)))
+        area.costmap.obstacles("obstacles_layer")[held[-1][1]] = LETHAL
+    assert recovered(drive(simulation, (3.0, 0.0, 0.0))) == ["wipe"]
+    found = tuple(costmap.obstacles("obstacles_layer")[cell] != LETHAL for costmap, cell in held)
+    assert found == clears
 
 
 def test_planning_is_given_up_after_the_retries(simulate, walls, tree):
@@ -346,7 +375,7 @@ def test_scan_that_repeats_is_old_after_a_while(simulate, walls):
     simulation = simulate(walls(), start=(-4.0, 0.0, 0.0))
     drive(simulation, (4.0, 0.0, 0.0), seconds=2.0)
     observe, (source,) = simulation.navigator.observe, simulation.navigator.sources
-    stuck = simulation.navigator._surroundings._sensors[source.topic, source.data_type].recent[-1]
+    stuck = simulation.navigator._surroundings._sensors[source.stream].recent[-1]
     simulation.navigator.observe = lambda _, now: observe(stuck, now)
     log = simulation.run(30.0)
     assert log.outcome is Outcome.ABORTED
@@ -366,7 +395,53 @@ def test_scan_whose_stamp_jumps_does_not_shut_out_later_ones(simulate, walls):
     simulation = simulate(walls(), start=(-4.0, 0.0, 0.0))
     drive(simulation, (4.0, 0.0, 0.0), seconds=2.0)
     (source,) = simulation.navigator.sources
-    newest = simulation.navigator._surroundings._sensors[source.topic, source.data_type].recent[-1]
+    newest = simulation.navigator._surroundings._sensors[source.stream].recent[-1]
     for jump in (1e9, -50.0):
         assert simulation.navigator.observe(replace(newest, stamp=newest.stamp + jump), simulation.time)
     assert simulation.run(40.0).outcome is Outcome.SUCCEEDED
+
+
+def test_sensor_has_the_range_of_each_costmap(simulate, walls, tree):
+    given = json.loads(json.dumps(tree()))  # so that the costmaps share no group
+    given["global_costmap"]["obstacles_layer"]["scan"]["obstacle_range"] = 1.0
+    simulation = simulate([], hidden=[(2.0, 0.0, 0.5, 0.5, 0.0)], tree=given)
+    simulation.run(1.0)
+    seen = [
+        (area.snapshot.costs == LETHAL).any() for area in (simulation.navigator._global, simulation.navigator._local)
+    ]
+    assert seen == [False, True]
+
+
+def test_costmaps_rest_without_a_goal_where_asked_for(simulate, walls, tree):
+    simulation = simulate(walls(), tree=tree(shutdown_costmaps=True))
+    simulation.run(1.0)
+    assert simulation.navigator.local_snapshot is None
+    assert drive(simulation, (2.0, 0.0, 0.0)).text == "Goal reached."
+
+
+def test_recovery_tells_its_name_and_place_in_the_sequence(simulate, walls, tree):
+    simulation = simulate([*walls(), CLOSED], start=(-3.0, 0.0, 0.0), tree=tree(planner_patience=1.0))
+    begun, step = [], simulation.navigator.step
+    simulation.navigator.step = lambda *arguments: _noted(step(*arguments), begun)
+    drive(simulation, (3.0, 0.0, 0.0))
+    found = [(one.name, one.index, one.count) for one in begun]
+    names = ("conservative_reset", "rotate_recovery", "aggressive_reset", "rotate_recovery")
+    assert found == [(name, index, 4) for index, name in enumerate(names)]
+
+
+def _noted(result, begun):
+    if result.recovery is not None:
+        begun.append(result.recovery)
+    return result
+
+
+def test_differential_drive_arrives(simulate, walls, tree):
+    simulation = simulate(
+        [*walls(), (0.0, 1.0, 0.8, 2.4, 0.0)],
+        start=(-3.0, 0.0, 1.5),
+        tree=tree(TrajectoryPlannerROS__holonomic_robot=False),
+    )
+    log = drive(simulation, (3.0, 0.5, 0.0))
+    assert log.text == "Goal reached."
+    assert {command.y for _, command in log.commands} == {0.0}
+    assert log.contacts == 0

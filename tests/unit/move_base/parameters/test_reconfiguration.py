@@ -19,8 +19,12 @@ def test_servers_have_the_published_names(tree):
         "",
         "TrajectoryPlannerROS",
         "global_costmap",
+        "global_costmap/static_layer",
+        "global_costmap/obstacles_layer",
         "global_costmap/inflater_layer",
         "local_costmap",
+        "local_costmap/static_layer",
+        "local_costmap/obstacles_layer",
         "local_costmap/inflater_layer",
     ]
 
@@ -37,21 +41,62 @@ def test_present_values_are_those_that_the_node_has(tree):
 
 def test_definitions_have_the_nodes_own_defaults(tree):
     minimal = {name: {"plugins": tree()[name]["plugins"]} for name in ("global_costmap", "local_costmap")}
-    parameters = read_parameters(minimal)
-    for server in servers(parameters):
-        defaults = definition(server.definition).defaults
-        assert present_values(parameters, {}, server, defaults).items() <= defaults.items(), server
+    for given in (minimal, {**minimal, "base_local_planner": "dwa_local_planner/DWAPlannerROS"}):
+        parameters = read_parameters(given)
+        for server in servers(parameters):
+            defaults = definition(server.definition).defaults
+            present = present_values(parameters, {}, server, set(defaults) - {"base_local_planner"})
+            assert present.items() <= defaults.items(), server
 
 
 def test_every_parameter_of_every_server_can_be_set(tree):
     parameters = read_parameters(tree())
     for server in servers(parameters):
         for name, value in definition(server.definition).defaults.items():
+            if name in {"base_global_planner", "base_local_planner"}:
+                continue
             new, _ = changed(tree(), server.namespace, {name: value})
             level = new
             for part in filter(None, server.namespace.split("/")):
                 level = level[part]
             assert level[name] == value
+
+
+def test_planner_changes_with_a_new_start_only(tree):
+    with pytest.raises(ParameterError, match="base_local_planner can't change while move_base runs"):
+        changed(tree(), "", {"base_local_planner": "dwa_local_planner/DWAPlannerROS"})
+
+
+def test_size_of_a_rolling_window_changes(simulate, walls, tree):
+    simulation = driving(simulate(walls(8.0, 8.0)), (2.0, 0.0, 0.0), seconds=1.0)
+    _, parameters = changed(tree(), "local_costmap", {"width": 5, "height": 4})
+    simulation.navigator.reconfigure(parameters)
+    simulation.run(0.05)
+    assert simulation.navigator.local_snapshot.costs.shape == (80, 100)
+
+
+def test_footprint_that_comes_later_is_kept_free(simulate, walls, tree):
+    simulation = driving(simulate(walls(8.0, 8.0)), (2.0, 0.0, 0.0), seconds=1.0)
+    before = simulation.navigator.local_snapshot.inscribed_radius
+    _, parameters = changed(
+        tree(), "local_costmap", {"footprint": "[[0.9, 0.8], [0.9, -0.8], [-0.9, -0.8], [-0.9, 0.8]]"}
+    )
+    simulation.navigator.reconfigure(parameters)
+    simulation.run(0.05)
+    assert simulation.navigator.local_snapshot.inscribed_radius > before + 0.3
+
+
+def test_switched_off_obstacle_layer_neither_shows_nor_stops_the_robot(simulate, walls, tree):
+    simulation = simulate([], hidden=[(2.0, 0.0, 0.5, 0.5, 0.0)])
+    simulation.run(1.0)
+    assert (simulation.navigator.local_snapshot.costs == LETHAL).any()
+    off, _ = changed(tree(), "local_costmap/obstacles_layer", {"enabled": False})
+    _, parameters = changed(off, "global_costmap/obstacles_layer", {"enabled": False})
+    simulation.navigator.reconfigure(parameters)
+    simulation.silent_from = simulation.time
+    simulation.run(2.0)
+    assert not (simulation.navigator.local_snapshot.costs == LETHAL).any()
+    assert simulation.navigator._surroundings.stale_reason(simulation.time) == ""
 
 
 def test_layer_that_starts_switched_off_can_be_switched_on(tree):

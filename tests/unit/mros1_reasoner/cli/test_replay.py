@@ -209,6 +209,26 @@ def test_running_configuration_is_taken_from_a_bag_without_a_journal(tmp_path, m
     assert "scan_slow -> camera_slow" in result.output, result.output
 
 
+@pytest.mark.parametrize(
+    ("publisher", "hardware_id", "adapts"),
+    [
+        ("/cell_1/rosgraph_monitor", "", True),
+        ("/cell_2/rosgraph_monitor", "", False),
+        ("/play_42", "robot:/cell_1", True),
+        ("/play_42", "robot:/cell_2", False),
+    ],
+)
+def test_replay_heeds_its_own_robot_alone(tmp_path, model, publisher, hardware_id, adapts):
+    path = tmp_path / "cells.bag"
+    with Bag(path) as bag:
+        bag.active(START, "f_move", "scan_slow", space="/cell_1")
+        for tick in range(50):
+            status = ("Component status", "laser", 0, (("laser", "FALSE"),))
+            bag.statuses(START + tick / 10, status, publisher=publisher, hardware_id=hardware_id)
+    result = run(replay, path, "--model", model, "--nfr", "energy=0.62")
+    assert ("scan_slow -> camera_slow" in result.output) is adapts, result.output
+
+
 def test_explain_tells_every_decision_of_a_bag(life, bag):
     lived = life(BUSY)
     result = run(explain, bag(lived))

@@ -4,6 +4,7 @@ import math
 
 import pytest
 from mros1_reasoner.io.parameters import Parameters
+from mros1_reasoner.knowledge.model import Direction
 from node_kit.parameters import ParameterError
 from reasoner_helpers import application
 
@@ -52,9 +53,46 @@ def test_models_as_list_or_separated_by_commas(model, tmp_path):
     assert given(model, model_file=f"{model}, {more}").model_files == [model, more]
 
 
+def test_list_in_an_argument_of_a_launch_file_is_a_list(model, tmp_path):
+    """As in the published `tomasys:="[a, b]"`, which roslaunch passes on as text."""
+    (tmp_path / "more.owl").write_text(model.read_text().replace("app#", "more#").replace("/app", "/more"))
+    parameters = Parameters({"model_file": f"[{model}]", "tomasys_file": f"[{tmp_path / 'more.owl'}, '{model}']"})
+    assert parameters.model_files == [model]
+    assert parameters.vocabulary_files == [tmp_path / "more.owl", model]
+
+
+def test_default_limits_hold_where_the_model_has_no_objective(model, tmp_path):
+    defaults = {"energy": 0.5, "safety": 0.5, "comfort": 0.5}
+    parameters = given(model, default_nfrs=defaults, nfr_safety=0.7)
+    (objective,) = parameters.objectives(parameters.knowledge_base())
+    assert objective.limits == {"energy": 0.5, "safety": 0.7}
+    asked_for = '<t:Objective rdf:about="#o_go"><t:typeF rdf:resource="#f_move"/></t:Objective>'
+    model.write_text(application(extra=asked_for))
+    parameters = given(model, default_nfrs=defaults)
+    (objective,) = parameters.objectives(parameters.knowledge_base())
+    assert (objective.name, objective.limits) == ("o_go", {})
+
+
+def test_qualities_with_a_namespace_in_their_names(model):
+    """The parameter server makes levels of the slashes."""
+    model.write_text(model.read_text().replace("#energy", "#arm/energy"))
+    parameters = given(
+        model,
+        qa_direction={"arm": {"energy": "higher_is_better"}, "safety": "lower_is_better"},
+        nfr_arm={"energy": 0.3},
+        nfr_safety=0.5,
+    )
+    knowledge_base = parameters.knowledge_base()
+    assert knowledge_base.qualities["arm/energy"].direction is Direction.HIGHER_IS_BETTER
+    (objective,) = parameters.objectives(knowledge_base)
+    assert objective.limits == {"arm/energy": 0.3, "safety": 0.5}
+    defaults = given(model, default_nfrs={"arm": {"energy": 0.5}})
+    assert defaults.objectives(knowledge_base)[0].limits == {"arm/energy": 0.5}
+
+
 def test_nodes_of_components(model):
-    parameters = given(model, components={"laser": {"node": "/front_laser"}, "base": {}, "odd": 3})
-    assert parameters.nodes == {"front_laser": "laser"}
+    components = {"laser": {"node": "/front_laser"}, "base": {}, "odd": 3, "arm": {"driver": {"node": "arm/driver"}}}
+    assert given(model, components=components).nodes == {"front_laser": "laser", "arm/driver": "arm/driver"}
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,14 @@ def test_every_variant_is_a_design_with_its_levels_and_components(project, writt
         assert design.components == required[variant.name]
 
 
+def test_every_design_deploys_the_nodes_of_its_variant_and_requires_none_of_them(written):
+    knowledge_base = read_knowledge_base([written])
+    assert knowledge_base.own_nodes == {"move_base"}
+    for design in knowledge_base.designs.values():
+        assert design.nodes == {"move_base"}
+        assert not design.nodes & design.components
+
+
 def test_laser_variants_require_the_laser_and_camera_variants_the_camera(written):
     designs = read_knowledge_base([written]).designs.values()
     assert all(("front_laser" in d.components) != d.name.endswith("_k") for d in designs)

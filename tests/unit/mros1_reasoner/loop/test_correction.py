@@ -124,7 +124,7 @@ def test_factor_is_bounded_and_never_makes_things_look_better(mission, d2, ratio
     core.observe_active(0.0, "f_navigate", START, "STABLE")
     for now in range(300):
         core.observe_level(now, "energy", ratio * expected_energy(d2))
-    assert core._deliberation.factors("o_navigate", 300.0)["energy"] == pytest.approx(factor, abs=0.01)
+    assert core._deliberation.factors("o_navigate", 300.0)["energy", ""] == pytest.approx(factor, abs=0.01)
 
 
 def test_what_was_learnt_of_one_design_holds_for_the_next(mission, d2):
@@ -160,7 +160,10 @@ def test_quality_where_higher_is_better_is_corrected_downwards():
     designs = [Design("now", "f", {"reach": 0.8, "use": 0.1}), Design("other", "f", {"reach": 0.9, "use": 0.2})]
     designs.append(Design("far", "f", {"reach": 1.4, "use": 0.1}))
     situation = Situation(
-        {"reach": Quality(Direction.HIGHER_IS_BETTER)}, current="now", observed={"reach": 0.4}, factors={"reach": 0.5}
+        {"reach": Quality(Direction.HIGHER_IS_BETTER)},
+        current="now",
+        observed={"reach": 0.4},
+        factors={("reach", ""): 0.5},
     )
     outcome = plan(Objective("o", "f", {"reach": 0.6}), designs, situation, use_of, difference)
     assert (outcome.choice, outcome.degraded) == ("far", False)
@@ -172,7 +175,7 @@ def test_degraded_design_stays_where_another_is_hardly_better():
         Design("other", "f", {"load": 0.33}),
         Design("far", "f", {"load": 0.3}),
     ]
-    situation = Situation(current="now", observed={"load": 0.7}, factors={"load": 2.0}, worth=0.1)
+    situation = Situation(current="now", observed={"load": 0.7}, factors={("load", ""): 2.0}, worth=0.1)
     objective = Objective("o", "f", {"load": 0.5})
     outcome = plan(objective, designs[:2], situation, use_of, difference)
     assert (outcome.choice, outcome.degraded) == ("now", True)

@@ -134,6 +134,65 @@ def test_decision_that_climbs_names_what_failed_and_what_is_released(one_arm):
     assert refused["FD1"] == "requires F1, which no design can provide now"
 
 
+def test_what_nothing_needs_any_longer_is_released_from_the_top_down_after_the_change(one_arm):
+    core = one_arm.core
+    assert core.released == ()
+    core.observe_component(1.0, "rgbd", "FALSE")
+    (decision,) = core.step(1.0)
+    assert core.released == (), "what runs is needed until the change is made"
+    core.report(1.0, decision.id, True)
+    core.step(1.5)
+    assert core.released == ("F1", "F2")
+    core.report_released("F1")
+    core.observe_active(2.0, "F2", "", "")
+    assert core.released == ()
+    assert set(core.active) == {"F0"}
+
+
+def test_function_that_is_needed_again_before_its_release_stays(one_arm):
+    core = one_arm.core
+    core.observe_component(1.0, "rgbd", "FALSE")
+    assert one_arm.run(seconds=1.0) == [("o_build", "FD2", EXECUTED)]
+    assert core.released == ("F1", "F2")
+    core.observe_component(one_arm.now, "rgbd", "TRUE")
+    core.observe_component(one_arm.now, "left_arm", "FALSE")
+    assert one_arm.run(seconds=1.0)[-1] == ("o_build", "FD1", EXECUTED)
+    assert core.released == ()
+    assert one_arm.groundings == {"o_build": "FD1", "o_F1": "FD1.1", "o_F2": "FD2.1"}
+
+
+def test_removed_objective_is_released_with_what_it_required(make):
+    designs = {**D1, "FD3": ("F3", 0.5, ("F2",))}
+    robot = make([PICK_AND_PLACE, Objective("o_look", "F3")], text=model(designs, {}), desired="FD1", broken=["FD2"])
+    robot.run(seconds=1.0)
+    robot.core.operator.remove_objective("o_build")
+    robot.run(seconds=1.0)
+    assert robot.core.released == ("F0", "F1"), "o_look still requires F2"
+
+
+def test_function_that_vanishes_runs_no_more_and_is_deployed_again(one_arm):
+    one_arm.core.observe_active(one_arm.now, "F1", "", "")
+    one_arm.core.step(one_arm.now)
+    assert one_arm.groundings == {"o_build": "FD1", "o_F2": "FD2.1"}
+    assert one_arm.core.released == (), "what it requires is still needed"
+    assert one_arm.run(seconds=2.0) == [("o_F1", "FD1.1", EXECUTED)]
+
+
+def test_function_that_never_ran_may_vanish(one_arm):
+    one_arm.core.observe_active(one_arm.now, "F7", "", "")
+    assert one_arm.run(seconds=2.0) == []
+
+
+def test_first_deployment_is_known_as_such(make):
+    core = make(desired="FD1").core
+    (decision,) = core.step(0.0)
+    assert core.is_first(decision)
+    core.report(0.0, decision.id, True)
+    core.observe_task(1.0, "o_F2", True)
+    decision = next(d for now in range(1, 20) for d in core.step(float(now)) if d.objective == "o_F2")
+    assert not core.is_first(decision)
+
+
 def test_leaf_that_cannot_be_helped_is_told_once_where_nothing_above_helps(one_arm):
     one_arm.core.observe_component(1.0, "left_arm", "FALSE")
     one_arm.core.observe_component(1.0, "rgbd", "FALSE")

@@ -17,6 +17,7 @@ from mros1_reasoner.loop.entries import (
     Lock,
     Pause,
     Reject,
+    Released,
     RemoveObjective,
     Result,
     Resume,
@@ -58,6 +59,8 @@ WRITTEN = [  # as bags have them
     ("remove_objective", ("o_move",), RemoveObjective("o_move")),
     ("set_nfr", ("o_move", "safety", "0.5"), SetNfr("o_move", "safety", 0.5)),
     ("set_nfr", ("", "safety", "0.5"), SetNfr("", "safety", 0.5)),
+    ("active", ("f_move", "", ""), ActiveFact("f_move", "", "")),
+    ("released", ("f_grip",), Released("f_grip")),
     ("decided", ("x-1", "o_move", "camera_slow"), Decided("x-1", "o_move", "camera_slow")),
 ]
 BRING_NOTHING = [content for kind, _, content in WRITTEN if kind not in ("step", "result", "approve", "reject")]

@@ -12,9 +12,18 @@ from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.settings import Settings
 
 DESIGNS = {**D1, "FD3": ("F3", 0.5, ("F2",)), "FD3.0": ("F3", 0.4, ())}
+NODES = {"gripper": ("FD1", "FD2"), "finder": ("FD2.1",)}
+NODES_OF_DESIGNS = "".join(
+    f'<t:Component rdf:about="#{node}">'
+    + "".join(f'<m:deployedBy rdf:resource="#{design}"/>' for design in designs)
+    + "</t:Component>"
+    for node, designs in NODES.items()
+)
+FUNCTIONS = sorted({function for function, _, _ in DESIGNS.values()})
 ROOTS = (Objective("o_build", "F0", {"error": 0.5}), Objective("o_look", "F3"))
 EVENTS = st.one_of(
-    st.tuples(st.just("component"), st.sampled_from(sorted(COMPONENTS)), st.sampled_from(["TRUE", "FALSE"])),
+    st.tuples(st.just("component"), st.sampled_from(sorted(COMPONENTS | NODES)), st.sampled_from(["TRUE", "FALSE"])),
+    st.tuples(st.sampled_from(["active", "release"]), st.sampled_from(FUNCTIONS), st.just("")),
     st.tuples(st.just("task"), st.sampled_from(["o_build", "o_look", "F1", "F2"]), st.booleans()),
     st.tuples(st.just("level"), st.sampled_from([0.1, 0.4, 0.9]), st.just(None)),
     st.tuples(st.just("active"), st.sampled_from(sorted(DESIGNS)), st.sampled_from(["STABLE", "FAILED", "RECOVERING"])),
@@ -38,7 +47,10 @@ def apply(core, now, event):
         case "level":
             core.observe_level(now, "error", what)
         case "active":
-            core.observe_active(now, DESIGNS[what][0], what, how)
+            runs = what in DESIGNS
+            core.observe_active(now, DESIGNS[what][0] if runs else what, what if runs else "", how)
+        case "release":
+            core.report_released(what)
         case "remove":
             core.operator.remove_objective(what)
         case "add":
@@ -66,6 +78,9 @@ def check(core, decisions):
         assert design.name not in core.analysis.unrealisable
         grounded = {core.objectives[name].function for name, running in core._state.running.items() if running.design}
         assert set(design.requires) <= grounded, "what a design requires is grounded before it"
+    needed = {objective.function for objective in core.objectives.values()}
+    assert needed.isdisjoint(core.released)
+    assert set(core.released) <= set(core.active), "only what runs is released"
     for decision in decisions:
         assert decision.causes
         assert decision.objective
@@ -73,10 +88,10 @@ def check(core, decisions):
         assert all(candidate.lost_because for candidate in losers), "each candidate that lost has a reason"
 
 
-@settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(events=st.lists(EVENTS, max_size=25), approval=st.booleans(), improves=st.booleans())
 def test_loop_holds_whatever_happens(load, pellet, events, approval, improves):
-    knowledge_base = load(model(DESIGNS))
+    knowledge_base = load(model(DESIGNS, extra=NODES_OF_DESIGNS))
     pellet.load(knowledge_base.ontology)
     core = Mape(knowledge_base, pellet, ROOTS, Settings(approval=approval, always_improve=improves))
     now = 0.0

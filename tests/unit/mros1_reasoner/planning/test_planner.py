@@ -109,6 +109,11 @@ def test_where_all_were_tried_in_vain_they_are_tried_again():
     result = choose(design("a"), design("b", use=0.9), tried={"a": "x", "b": "x"})
     assert result.choice == "b"
     assert result.degraded
+    assert (
+        result.reason == "degraded: all designs that keep every limit have failed recently; b is taken: it is the "
+        "most useful of them"
+    )
+    assert reasons(result)["a"] == "x"
 
 
 def test_nothing_can_be_deployed():

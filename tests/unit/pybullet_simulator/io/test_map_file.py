@@ -112,7 +112,7 @@ def test_coloured_and_transparent_images_are_read(make):
         ({"occupied_thresh": 1.5}, "occupied_thresh: is 1.5"),
         ({"free_thresh": 0.9}, "free_thresh: 0.9 is above occupied_thresh"),
         ({"image": None}, "image: is None"),
-        ({"image": "nowhere.pgm"}, r"image: .*nowhere\.pgm cannot be read \(No such file"),
+        ({"image": "nowhere.pgm"}, r"image: .*nowhere\.pgm: No such file"),
         ({"image": "hall.yaml"}, "hall.yaml is no image that can be read"),
     ],
 )

@@ -63,5 +63,5 @@ def test_bad_urdf_is_refused(tmp_path, text, said):
     path.write_text(text)
     with pytest.raises(RobotFileError, match=said):
         planar_urdf(path)
-    with pytest.raises(RobotFileError, match="cannot be read"):
+    with pytest.raises(RobotFileError, match="No such file or directory: check the path"):
         planar_urdf(tmp_path / "none.urdf")

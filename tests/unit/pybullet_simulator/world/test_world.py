@@ -26,7 +26,7 @@ def gap(one, other):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("boxes: [", "is not YAML"),
+        ("boxes: [", "correct the YAML"),
         ("- 1", "holds no world"),
         ("floor: {x: [1, 1], y: [0, 1]}", "floor: each max"),
         ("floor: {x: [0, .inf], y: [0, 1]}", "floor: x: must be 2 finite numbers"),
@@ -57,7 +57,7 @@ def test_bad_world_is_refused_with_file_and_entry(tmp_path, text, message):
 
 
 def test_missing_world_is_refused():
-    with pytest.raises(WorldError, match=r"nowhere\.yaml: cannot be read"):
+    with pytest.raises(WorldError, match=r"nowhere\.yaml: No such file"):
         read_world(Path("nowhere.yaml"))
 
 

@@ -10,7 +10,7 @@ from ros_model.checks.packages import check_packages
 from ros_model.checks.systems import check_system
 from ros_model.cli.rosmodel import main
 from ros_model.io.installed import InstalledPackages
-from ros_model.language.library import Library
+from ros_model.language.library import Library, NothingInstalled
 from ros_model.language.packages_reader import parse_packages
 from ros_model.language.system_reader import parse_system
 
@@ -291,6 +291,7 @@ def check(capsys, tmp_path, monkeypatch):
     (tmp_path / "ros" / "arm.ros").write_text(PACKAGES)
     (tmp_path / "ok.rossystem").write_text(SYSTEM)
     (tmp_path / "bad.rossystem").write_text(SYSTEM.replace("value 5", "value 'a,\\n%'"))
+    monkeypatch.setattr(InstalledPackages, "missing_executable", NothingInstalled.missing_executable)
 
     def run(*arguments):
         with pytest.raises(SystemExit) as done:

@@ -120,6 +120,39 @@ def test_project_that_reads_well_but_is_wrong_ends_with_status_1(run, project, n
     assert rule in {finding["rule"] for finding in findings if message in finding["message"]}
 
 
+TWO_FUNCTIONS = """package: p
+base: base.rossystem
+variants:
+  - {component: nav, table: table.csv, qa: qa.csv}
+  - {component: arm, table: grips.csv}
+functions: {f: {designs: [a, b]}, f_grip: {designs: [soft, hard]}}
+quality_attributes: {safety: {direction: lower_is_better, range: [0, 1]}}
+utility: safety
+objectives: {o: {function: f}}
+"""
+
+
+def test_qualities_are_demanded_of_the_designs_of_one_function_only(run, project, model):
+    model(TWO_FUNCTIONS, "metacontrol.yaml")
+    arm = ", ComponentInterface { name arm FromRosNode 'p.arm.arm' } )"
+    base = project.parent / "base.rossystem"
+    base.write_text(base.read_text().replace(" )", arm))
+    parameter = "Parameters { Parameter { name speed type Integer } }"
+    nodes = (f"Artifact {name} {{ Node {{ name {name} {parameter} }} }}" for name in ("nav", "arm"))
+    model(f"PackageSet {{ CatkinPackage p {{ {', '.join(nodes)} }} }}", "p.ros")
+    model("name,arm.speed\nsoft,1\nhard,2\n", "grips.csv")
+    status, out, _ = run("check", project.parent)
+    assert (status, "safety" in out) == (0, False)
+    assert run("generate", "all", project.parent, "-o", project.parent / "out")[0] == 0
+    model(TWO_FUNCTIONS.replace("grips.csv}", "grips.csv, qa: qa2.csv}"), "metacontrol.yaml")
+    model("name,safety\nsoft,\nhard,\n", "qa2.csv")
+    assert run("check", project.parent)[0] == 0
+    model("name,safety\nsoft,0.3\nhard,\n", "qa2.csv")
+    status, out, _ = run("check", project.parent)
+    assert status == 1
+    assert "variant 'hard' has no value for 'qa_safety', as 'soft' has: add one" in out
+
+
 @pytest.mark.parametrize(("name", "text"), [("metacontrol.yaml", "a: b: c"), ("qa.csv", 'name,"'), ("p.ros", "x")])
 def test_project_that_can_not_be_read_ends_with_status_2(run, project, name, text):
     assert run("check", project.parent)[0] == 1  # its parameter is in no model

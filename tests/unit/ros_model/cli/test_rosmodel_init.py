@@ -137,3 +137,41 @@ def test_what_can_not_become_a_project_is_refused(run, base, text, arguments, me
     assert status == 2
     assert message in err
     assert [file.name for file in path.parent.iterdir()] == ["base.rossystem"]
+
+
+TWO_CELLS = """RosSystem { Name cells RosComponents ( CELLS ) TopicConnections {
+    TopicConnection 'left/image' { From ( 'left/camera.image' ) To ( 'left/picker.image' ) },
+    TopicConnection 'right/image' { From ( 'right/camera.image' ) To ( 'right/picker.image' ) } } }""".replace(
+    "CELLS",
+    ",".join(
+        f"""ComponentInterface {{ name '{side}/camera' FromRosNode 'p.camera.py.camera'
+            RosPublishers {{ RosPublisher image {{ RefPublisher 'p.camera.py.camera.image' }} }} }},
+        ComponentInterface {{ name '{side}/picker' FromRosNode 'p.picker.py.picker'
+            RosSubscribers {{ RosSubscriber image {{ RefSubscriber 'p.picker.py.picker.image' }} }}
+            RosParameters {{ RosParameter speed {{ RefParameter 'p.picker.py.picker.speed' value 0.5 }} }} }}"""
+        for side in ("left", "right")
+    ),
+)
+
+
+def test_both_copies_of_two_robots_are_components_and_what_varies_is_said(run, base):
+    path = base(TWO_CELLS, "cells.rossystem")
+    status, out, _ = run("init", path)
+    assert status == 0
+    settings = yaml.safe_load((path.parent / "metacontrol.yaml").read_text())
+    assert settings["components"] == {name: {"node": name} for name in ("left/camera", "right/camera", "right/picker")}
+    assert "right/picker runs the same executable as left/picker. Only left/picker varies" in out
+    assert run("check", path.parent)[0] == 0
+    assert run("generate", "all", path.parent, "-o", path.parent.parent)[0] == 0
+    assert load_project(path.parent).required_components() == {"cells_default": {"left/camera"}}
+
+
+def test_copies_told_apart_by_their_namespaces_are_both_components(run, base):
+    text = TWO_CELLS.replace("name 'left/", "name 'left_").replace("'left/", "'left_")
+    for name in ("camera", "picker"):
+        text = text.replace(f"name 'left_{name}'", f"name {name} NameSpace left")
+        text = text.replace(f"name 'right/{name}'", f"name {name} NameSpace right")
+    path = base(text[: text.index("TopicConnections")] + "}", "cells.rossystem")
+    assert run("init", path)[0] == 0
+    settings = yaml.safe_load((path.parent / "metacontrol.yaml").read_text())
+    assert set(settings["components"]) == {"left/camera", "right/camera", "right/picker"}

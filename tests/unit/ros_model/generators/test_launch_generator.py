@@ -24,6 +24,7 @@ from ros_model.language.metamodel import (
     SystemParameter,
 )
 from ros_model.language.packages_reader import parse_packages
+from rosgraph.names import resolve_name
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
@@ -205,6 +206,21 @@ def test_port_is_remapped_to_its_connection():
 def test_connection_is_absolute_where_the_component_has_a_namespace():
     system = of(namespace="arm", ports=(port("out", "scan"),), connections=connected("front/scan"))
     assert remaps(system) == [("scan", "/front/scan")]
+
+
+@pytest.mark.parametrize(
+    ("connection", "remapped"),
+    [("left/scan", []), ("left/front/scan", [("scan", "front/scan")]), ("scan", [("scan", "/scan")])],
+)
+def test_connection_is_named_as_a_node_in_a_namespace_resolves_it(connection, remapped):
+    system = of(name="left/laser", ports=(port("out", "scan"),), connections=connected(connection, "left/laser"))
+    assert remaps(system) == remapped
+
+
+def test_node_in_a_namespace_publishes_its_connection():
+    system = of(name="left/laser", ports=(port("out", "scan"),), connections=connected("left/merged", "left/laser"))
+    (node,) = loaded(system).nodes
+    assert resolve_name(dict(node.remap_args)["scan"], f"{node.namespace}{node.name}") == "/left/merged"
 
 
 def test_port_without_a_connection_has_its_own_name():

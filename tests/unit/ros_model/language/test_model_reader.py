@@ -4,12 +4,13 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from ros_model.errors import ModelError
 from ros_model.io.models import read_system
 from ros_model.language.builder import MAX_NESTING
 from ros_model.language.metamodel import (
+    EXTENSIONS_OF_SCRIPTS,
     ConnectionKind,
     ParameterType,
     PortKind,
@@ -18,6 +19,7 @@ from ros_model.language.metamodel import (
     RosParameter,
     SystemParameter,
 )
+from ros_model.language.notation import quoted
 from ros_model.language.system_reader import parse_system
 from ros_model.language.system_writer import write_system
 
@@ -135,6 +137,42 @@ def test_reference_keeps_dots_and_slashes_of_the_port():
     text += "RefPublisher 'pkg./iiwa/x./iiwa/x./iiwa/joint.states' } } } ) }"
     reference = parse_system(text).components[0].ports[0].reference
     assert reference == Reference("pkg", "/iiwa/x", "/iiwa/x", "/iiwa/joint.states")
+
+
+ONE_COMPONENT = "RosSystem {{ Name x RosComponents ( ComponentInterface {{ name a FromRosNode {} }} ) }}"
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("vision.detector_fast.py.eye.found", ("vision", "detector_fast.py", "eye", "found")),
+        ("vision.start.sh.eye", ("vision", "start.sh", "eye")),
+        ("vision.eye.eye.x.py", ("vision", "eye", "eye", "x.py")),
+        (r"vision.node_1\.0.eye.found", ("vision", "node_1.0", "eye", "found")),
+        (r"vision.old\.eye.py.eye.found", ("vision", "old.eye.py", "eye", "found")),
+    ],
+)
+def test_reference_keeps_the_name_of_the_executable(text, parts):
+    assert Reference.parse(text) == Reference(*parts)
+    assert str(Reference(*parts)) == text
+    system = parse_system(ONE_COMPONENT.format(quoted(text)))
+    assert system.components[0].node == Reference(*parts)
+    assert parse_system(write_system(system)) == system
+
+
+def test_reference_without_a_node_after_a_script_is_incomplete_but_read():
+    (component,) = parse_system(ONE_COMPONENT.format("'v.e.py'")).components
+    assert component.node == Reference("v", "e.py", "")
+
+
+_PART_OF_A_REFERENCE = st.from_regex(r"[A-Za-z][A-Za-z0-9_.]{0,8}", fullmatch=True)
+
+
+@given(_PART_OF_A_REFERENCE, _PART_OF_A_REFERENCE, st.from_regex(r"[a-z]{1,3}", fullmatch=True), st.text(max_size=8))
+def test_any_reference_is_read_as_it_was_written(package, artifact, node, name):
+    assume(node not in EXTENSIONS_OF_SCRIPTS)
+    reference = Reference(package, artifact, node, name)
+    assert Reference.parse(str(reference)) == reference
 
 
 def test_words_may_be_keywords_where_a_name_stands():

@@ -1,8 +1,11 @@
 """Projects: metacontrol.yaml, the base, the family of variants, and what each variant requires."""
 
+import re
+
 import pytest
 import yaml
 from ros_model.errors import ModelError
+from ros_model.generators.deployment import manipulator
 from ros_model.io.project import load_project, problems_of
 from ros_model.language.metamodel import PortPath, compose
 
@@ -363,7 +366,7 @@ def test_every_problem_of_the_settings_is_told_at_its_place(tmp_path):
         ("a: 1\nb: 2\na: 3", "3:1: the key 'a' stands twice"),
         ("a: \x07", "1:1: special characters are not allowed"),
         ("a: 1\n---\nb: 1", "2:1: but found another document"),
-        ("base: 2001-99-99", "1:1: month must be in 1..12"),
+        ("base: 2001-99-99", "1:1: a value is not of its type (month must be in 1..12)"),
     ],
 )  # fmt: skip
 def test_treacherous_yaml_is_refused_in_one_line(tmp_path, text, message):
@@ -372,3 +375,32 @@ def test_treacherous_yaml_is_refused_in_one_line(tmp_path, text, message):
         load_project(tmp_path)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+GRASP = {"save_action": "grasp", "goal_msg_type": "arm_msgs.msg.GraspAction"}
+
+
+def test_action_to_keep_belongs_to_a_function(load, settings):
+    settings["functions"]["f_grasp"] = {"designs": [], **GRASP, "kill_nodes": ["gripper"]}
+    content = manipulator(load())
+    assert content["functions"] == {"f_grasp": {**GRASP, "kill_nodes": ["gripper"]}}
+    assert "save_action" not in content
+
+
+@pytest.mark.parametrize(
+    ("functions", "common", "message"),
+    [
+        ({"f_grasp": {"designs": []}}, GRASP, "put it under functions/NAME"),
+        ({"f_move": {"designs": "all", **GRASP}}, GRASP, "put it under functions/NAME"),
+        (
+            {"f_grasp": {"designs": [], "save_action": "grasp"}},
+            {},
+            "functions.f_grasp.save_action: has no goal_msg_type",
+        ),
+    ],
+)
+def test_action_of_which_function_or_type_is_unclear_is_refused(load, settings, functions, common, message):
+    settings["functions"].update(functions)
+    settings["manipulator"] = common
+    with pytest.raises(ModelError, match=re.escape(message)):
+        load()

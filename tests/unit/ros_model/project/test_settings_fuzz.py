@@ -26,6 +26,7 @@ BASE = """RosSystem { Name base
             RosPublishers { RosPublisher cmd { RefPublisher 'n.nav.nav.cmd' } }
             RosParameters { RosParameter speed { RefParameter 'n.nav.nav.speed' value 1 } } } )
     TopicConnections { TopicConnection odom { From ( 'robot.odom' ) To ( 'guard.odom' ) } } }"""
+KEPT = {"save_action": "a", "goal_msg_type": "b", "kill_nodes": ["nav"]}
 SETTINGS = {
     "package": "p",
     "base": "base.rossystem",
@@ -40,7 +41,7 @@ SETTINGS = {
             "ignore": ["note"],
         }
     ],
-    "functions": {"f": {"designs": ["a"], "requires": {"a": ["g"]}}, "g": {"designs": ["b"], "requires": []}},
+    "functions": {"f": {"designs": ["a"], "requires": {"a": ["g"]}}, "g": {"designs": ["b"], "requires": [], **KEPT}},
     "quality_attributes": {"safety": {"direction": "lower_is_better", "range": [0, 1]}},
     "utility": "safety",
     "objectives": {"o": {"function": "f", "nfrs": {"safety": 0.5}}},
@@ -58,7 +59,7 @@ SETTINGS = {
             "plugin": "y:Y",
         },
     ],
-    "manipulator": {"save_action": "a", "goal_msg_type": "b", "kill_nodes": ["nav"], "action_name": "c"},
+    "manipulator": {"action_name": "c"},
     "requires": {"speed": {"1": "robot"}},
 }
 TABLE = {

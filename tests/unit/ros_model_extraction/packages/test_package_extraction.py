@@ -170,14 +170,13 @@ def test_command_writes_a_model_that_reads_back_and_checks(tmp_path, capsys):
     make_script(folder / "nodes" / "talker.py")
     assert run("extract", tmp_path, "-o", tmp_path / "out") == 0
     written = read_packages(tmp_path / "out" / "demo.ros")
-    node = written.node("demo", "talker", "talker")
+    node = written.node("demo", "talker.py", "talker")
     assert node and [(p.kind, p.name, p.type) for p in node.ports] == [
         (PortKind.PUBLISHER, "chatter", "std_msgs/String"),
         (PortKind.SUBSCRIBER, "heard", "std_msgs/String"),
         (PortKind.SERVICE_SERVER, "~reset", ""),
     ]
     assert "nodes/talker.py:7:1: service server: its type is not known" in written.header
-    assert "artifact talker is the executable talker.py" in written.header
     assert "1 node, 3 interfaces, 1 not fully known" in capsys.readouterr().out
     assert run("check", tmp_path / "out" / "demo.ros") == 0
 
@@ -263,6 +262,17 @@ def test_folder_below_that_can_not_be_entered_is_told_and_the_others_read(tmp_pa
         f"no package.xml here or below: give the folder of a ROS package, or of several; {tmp_path}/src/closed: "
         in (capsys.readouterr().err)
     )
+
+
+def test_folder_above_the_working_folder_may_be_given(tmp_path, monkeypatch, capsys):
+    folder = make_package(tmp_path / "demo", cmake="catkin_install_python(PROGRAMS nodes/talker)\n")
+    (folder / "nodes").mkdir()
+    (folder / "nodes" / "talker").write_text(TALKER)
+    models = tmp_path / "models"
+    models.mkdir()
+    monkeypatch.chdir(models)
+    assert run("extract", "..", "-o", models) == 0, capsys.readouterr().err
+    assert read_packages(models / "demo.ros").node("demo", "talker", "talker")
 
 
 def test_listed_executable_that_does_not_exist_is_told(tmp_path, capsys):
@@ -362,3 +372,32 @@ def test_launch_file_that_roslaunch_refuses_is_told_in_one_line(launched, text, 
         launched(text, *arguments)
     message = str(told.value).replace("is not NAME:=VALUE", "is no NAME:=VALUE")
     assert said in message and "\n" not in message
+
+
+@pytest.mark.parametrize("condition", ["1/0", "nothing", "1 +", "'a'.x", "[0][1]"])
+def test_launch_file_whose_condition_fails_is_refused_in_one_line(tmp_path, capsys, condition):
+    path = tmp_path / "robot.launch"
+    path.write_text(f'<launch><group if="$(eval {condition})"/></launch>')
+    assert run("extract", path, "-o", tmp_path) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"rosmodel: {path}: roslaunch ")
+    assert len(error.splitlines()) == 1
+
+
+def test_what_a_launch_file_says_and_a_model_can_not_is_listed(tmp_path, monkeypatch):
+    make_script(make_package(tmp_path / "demo") / "nodes" / "talker.py")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
+    path = tmp_path / "robot.launch"
+    path.write_text(
+        """<launch><group ns="cell"><node pkg="demo" type="talker.py" name="eye" args="--fast _topic:=found x:=y"
+            launch-prefix="nice" respawn="true"><env name="A" value="b"/>
+            <remap from="heard" to="/ears"/><remap from="~image" to="/camera/image"/></node>
+            <node pkg="nowhere" type="tool" name="tool"><remap from="in" to="out"/></node></group></launch>"""
+    )
+    models = read_launch_file(path)
+    (eye, _) = models.system.components
+    assert (eye.node.artifact, {port.name for port in eye.ports}) == ("talker.py", {"/ears", "found", "eye/reset"})
+    header = models.system.header
+    assert "remappings of /cell/eye, whose source has no such interface: /cell/eye/image to /camera/image, " in header
+    assert "remappings of /cell/tool, whose source has no such interface: /cell/in to /cell/out." in header
+    assert 'Left out: args="--fast", launch-prefix="nice", env="A=b", respawn="true" of /cell/eye' in header

@@ -475,7 +475,7 @@ def test_broken_module_is_a_remark_with_its_place_and_the_rest_is_read(package):
         (b"#!/usr/bin/python\n" + b"(" * 100_000, "not read: no Python 3: too many nested parentheses"),
         (b"#!/usr/bin/python\nx = '\xff'\n", "not read: no Python 3: (unicode error)"),
         (b"#!/usr/bin/python\n" + b"-" * 20_000 + b"1\n", "not read: no Python 3"),
-        (b"#!/usr/bin/python\n" + b"#" * 5_000_000, "nodes/talker:1:1: not read: larger than"),
+        (b"#!/usr/bin/python\n" + b"#" * 5_000_000, "nodes/talker:1:1: not read: 5000018 bytes are too many"),
     ],
     ids=["python2", "binary", "brackets", "encoding", "nesting", "huge"],
 )

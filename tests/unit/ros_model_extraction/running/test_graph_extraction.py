@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from ros_model.checks.systems import check_system
+from ros_model.generators.launch import launch_file
 from ros_model.graph.snapshot import GraphSnapshot, build_snapshot
 from ros_model.language.metamodel import ConnectionKind, PortKind, RosSystem
 from ros_model.language.system_reader import parse_system
@@ -16,6 +17,8 @@ from ros_model_extraction.names import as_seen_from, resolve
 from ros_model_extraction.running.details import Details, Origin
 from ros_model_extraction.running.graph import NO_PACKAGE, Models, models_of
 from ros_model_extraction.values import UnwritableValueError, leaves, typed
+from roslaunch.config import ROSLaunchConfig
+from roslaunch.xmlloader import XmlLoader
 
 ACTION_TYPES = {
     "goal": "demo_msgs/MoveActionGoal",
@@ -120,14 +123,13 @@ def test_service_has_the_type_that_its_node_told_and_what_is_not_known_is_said()
     snapshot = graph(services=[["/a/reset", ["/a"]], ["/b/reset", ["/b"]]], subscribers=[["/odd", ["/a"]]])
     details = Details({"/a": Origin("demo", "a.py")}, {"/b": "it does not answer"}, {"/a/reset": "std_srvs/Empty"})
     models = extracted(snapshot, details)
-    declared = models.packages.node("demo", "a", "a")
+    declared = models.packages.node("demo", "a.py", "a")
     assert declared and {port.name: port.type for port in declared.ports} == {"odd": "", "a/reset": "std_srvs/Empty"}
     header = models.packages.header
     assert "who calls which service" in header
     assert "the types of the services /b/reset." in header
     assert "the types of the topics /odd." in header
     assert "the package and executable of /b: it does not answer." in header
-    assert "artifact a is the executable a.py" in header
 
 
 def test_private_parameters_go_to_their_node_and_the_others_to_the_system():
@@ -163,6 +165,46 @@ def test_dead_node_is_left_out_and_said_so():
     models = extracted(graph([["/scan", ["/laser", "/other"]]]), Details(dead=frozenset({"/laser"})))
     assert [component.name for component in models.system.components] == ["other"]
     assert "/laser: the master lists them, but nobody listens there" in models.system.header
+
+
+def test_artifact_is_the_executable_that_roslaunch_is_to_start():
+    origins = {"/cell/eye": Origin("vision", "detector_fast.py"), "/odd": Origin("vision", "node_1.0")}
+    models = extracted(graph([["/cell/found", ["/cell/eye"]], ["/x", ["/odd"]]]), Details(origins))
+    text = launch_file(models.system)
+    assert [f'type="{name}"' in text for name in ("detector_fast.py", "node_1.0")] == [True, True]
+
+
+def test_parameters_of_nodes_that_have_ended_are_left_out_and_said():
+    tree = {
+        "eye": {"rate": 5},
+        "old": {"costmap": {"width": 3}, "rate": 1},
+        "cell": {"gone": {"rate": 2}, "speed": 0.5},
+        "arm_controller": {"joints": ["a"]},
+        "crashed": {"rate": 9},
+        "max_vel": 0.5,
+    }
+    publishers = [["/found", ["/eye"]], ["/cell/x", ["/cell/arm", "/crashed"]], ["/arm_controller/x", ["/cell/arm"]]]
+    models = extracted(graph(publishers, parameters=tree), Details(dead=frozenset({"/crashed"})))
+    assert {p.name for p in models.system.parameters} == {"arm_controller/joints", "cell/speed", "max_vel"}
+    assert "the parameters below /cell/gone, /old: no running node is there" in models.system.header
+    everything = extracted(graph(publishers, parameters=tree), everything=True)
+    assert "old/costmap/width" in {p.name for p in everything.system.parameters}
+
+
+def test_nodes_of_the_meta_controller_and_their_parameters_are_left_out_and_said():
+    watching = "/rosgraph_monitor", "/cell/reasoner", "/rosgraph_manipulator", "/my_launcher", "/reasoner"
+    tree = {name.lstrip("/"): {"rate": 2} for name in ("/rosgraph_monitor", "/my_launcher", "/reasoner")}
+    tree |= {"kill_nodes": ["/x"], "configurations": {"a": {"launch": "b"}}, "max_vel": 0.5}
+    origins = {
+        "/my_launcher": Origin("rosgraph_manipulator", "rosgraph_launcher"),
+        "/reasoner": Origin("logic", "reasoner"),  # somebody else's node of that name
+    }
+    snapshot = graph([["/diagnostics", [*watching, "/eye"]]], parameters=tree)
+    models = extracted(snapshot, Details(origins))
+    assert {c.name for c in models.system.components} == {"eye", "reasoner"}
+    assert {p.name for p in models.system.parameters} == {"max_vel"}
+    assert "/my_launcher, /rosgraph_manipulator, /rosgraph_monitor: the meta-controller's" in models.system.header
+    assert len(extracted(snapshot, Details(origins), everything=True).system.components) == 6
 
 
 def test_value_without_notation_is_left_out_and_said_so():
@@ -218,9 +260,66 @@ def test_executable_is_found_behind_an_interpreter(tmp_path: Path):
     script.touch()
     wanted = Origin("demo", "talker.py")
     assert executable_of(["/usr/bin/python3", "-u", str(script), "__name:=x"], tmp_path, ["demo"]) == wanted
-    assert executable_of(["lib/demo/talker.py", "scan:=/front"], tmp_path, ["demo"]) == wanted
+    line = ["lib/demo/talker.py", "__log:=x"]
+    assert executable_of(line, tmp_path, ["demo"]) == wanted
     assert executable_of([str(script)], tmp_path, ["other"]) is None
     assert executable_of(["python3", "-m", "demo.talker"], tmp_path, ["demo"]) is None
+
+
+def test_command_line_tells_remappings_and_arguments(tmp_path: Path):
+    script = tmp_path / "lib" / "demo" / "talker.py"
+    script.parent.mkdir(parents=True)
+    script.touch()
+    line = [str(script), "-f", "map", "~in:=/front", "__name:=x", "_rate:=5", "out:=back", ""]
+    wanted = Origin("demo", "talker.py", (("~in", "/front"), ("out", "back")), ("-f", "map"))
+    assert executable_of(["/usr/bin/python3", "-u", *line], tmp_path, ["demo"]) == wanted
+
+
+def remapped(*remaps, arguments=()):
+    origin = Origin("demo", "gate", remaps, arguments)
+    publishers = [["/base/wheels", ["/base/gate"]], ["/joints", ["/base/gate"]]]
+    subscribers = [["/base/mux", ["/base/gate"]], ["/base/wheels", ["/base/gate"]]]
+    return extracted(graph(publishers, subscribers), Details({"/base/gate": origin}))
+
+
+def test_remapped_interface_refers_to_its_name_in_the_code_and_a_launch_file_remaps_it_again():
+    models = remapped(("~in", "/base/mux"), ("~out", "wheels"), ("~feedback", "wheels"), ("joint_states", "/joints"))
+    system, packages = models.system, models.packages
+    gate = system.component("gate")
+    assert gate and {port.reference.name for port in gate.ports if port.reference} == {
+        "~in",
+        "~out",
+        "~feedback",
+        "joint_states",
+    }
+    declared = packages.node("demo", "gate", "gate")
+    assert declared and {port.name for port in declared.ports} == {"~in", "~out", "~feedback", "joint_states"}
+    config = ROSLaunchConfig()
+    XmlLoader(resolve_anon=False).load_string(launch_file(system), config, verbose=False)
+    (node,) = config.nodes
+    remaps = {inside: resolve(outside, "/base/gate") for inside, outside in node.remap_args}
+    wheels = "/base/wheels"
+    assert remaps == {"~in": "/base/mux", "~out": wheels, "~feedback": wheels, "joint_states": "/joints"}
+
+
+def test_remapped_action_refers_to_its_name_in_the_code():
+    topics = ("goal", "cancel", "status", "result", "feedback")
+    inputs = [[f"/base/grasp/{topic}", ["/base/hand"]] for topic in topics[:2]]
+    outputs = [[f"/base/grasp/{topic}", ["/base/hand"]] for topic in topics[2:]]
+    origin = Origin("demo", "hand", tuple((f"~do/{topic}", f"grasp/{topic}") for topic in topics))
+    types = [[f"/base/grasp/{topic}", ACTION_TYPES[topic]] for topic in topics]
+    models = extracted(graph(outputs, inputs, types=types), Details({"/base/hand": origin}))
+    hand = models.system.component("hand")
+    assert hand and [(port.kind, port.reference.name) for port in hand.ports if port.reference] == [
+        (PortKind.ACTION_SERVER, "~do")
+    ]
+    assert "remapping" not in models.system.header
+
+
+def test_remapping_of_nothing_and_arguments_are_told():
+    header = remapped(("unheard", "silence"), arguments=("-f", "map")).system.header
+    assert "no interface of /base/gate has such a name now: the remapping of unheard to silence" in header
+    assert "the arguments of /base/gate: -f map" in header
 
 
 def test_executable_in_a_source_tree_belongs_to_the_package_around_it(tmp_path: Path):

@@ -3,7 +3,15 @@
 import itertools
 
 import pytest
-from rosgraph_manipulator.change.deployment import CancelledError, DeploymentError, Result, Stopwatch, deploy, durations
+from rosgraph_manipulator.change.deployment import (
+    CancelledError,
+    DeploymentError,
+    Result,
+    Stopwatch,
+    deploy,
+    durations,
+    release,
+)
 from rosgraph_manipulator.change.tactics import ChangeProcesses, Plan, SetParameters
 from rosgraph_manipulator.configuration.configurations import Configuration
 
@@ -43,8 +51,8 @@ class Recorder:
     def restore(self, configuration):
         self._call("restore", configuration.name)
 
-    def stop_everything(self):
-        self._call("stop_everything")
+    def release(self, function):
+        self._call("release", function)
 
 
 def run(executor, plans, last_good=OLD):
@@ -85,24 +93,24 @@ def test_last_good_configuration_is_restored_when_all_plans_fail(where):
     assert executor.calls[-1] == "restore old"
 
 
-def test_everything_stops_when_there_is_nothing_to_restore():
+def test_function_is_released_when_there_is_nothing_to_restore():
     executor = Recorder(ready=DeploymentError("it dies"))
     outcome = run(executor, [RESTART], last_good=None)
     assert (outcome.result, outcome.running) == (Result.GENERAL_ERROR, None)
-    assert executor.calls[-1] == "stop_everything"
+    assert executor.calls[-1] == "release f"
 
 
-def test_everything_stops_when_restoring_fails_too():
+def test_function_is_released_when_restoring_fails_too():
     executor = Recorder(ready=DeploymentError("it dies"), restore=DeploymentError("so does the old one"))
     outcome = run(executor, [RESTART])
     assert (outcome.result, outcome.running) == (Result.GENERAL_ERROR, None)
     assert "so does the old one" in outcome.message
-    assert executor.calls[-1] == "stop_everything"
+    assert executor.calls[-1] == "release f"
 
 
 def test_failing_stop_is_told_and_changes_nothing_else():
     error = DeploymentError("no launcher")
-    outcome = run(Recorder(ready=error, restore=error, stop_everything=error), [RESTART])
+    outcome = run(Recorder(ready=error, restore=error, release=error), [RESTART])
     assert outcome.result is Result.GENERAL_ERROR
 
 
@@ -146,3 +154,18 @@ def test_launchers_phases_stand_for_the_change_that_went_well():
     phases, launcher = {"plan": 0.1, "change": 1.0, "ready": 0.2}, {"stop": 0.4, "start": 0.6}
     assert list(durations(phases, launcher, True)) == ["plan", "stop", "start", "ready"]
     assert durations(phases, launcher, False) == phases
+
+
+@pytest.mark.parametrize(("running", "told"), [(OLD, "f is released: old is stopped"), (None, "nothing ran for it")])
+def test_released_function_runs_nothing(running, told):
+    executor = Recorder()
+    outcome = release(executor, "f", running, Stopwatch(itertools.count().__next__))
+    assert (outcome.result, outcome.running) == (Result.OK, None)
+    assert told in outcome.message
+    assert executor.calls == ["release f"]
+
+
+def test_release_that_fails_is_told():
+    executor = Recorder(release=DeploymentError("no launcher"))
+    outcome = release(executor, "f", OLD, Stopwatch(itertools.count().__next__))
+    assert (outcome.result, "no launcher" in outcome.message) == (Result.GENERAL_ERROR, True)

@@ -1,12 +1,19 @@
 """How a manipulator begins, by what the one before it has left."""
 
 import pytest
-from rosgraph_manipulator.change.journal import MAX_ATTEMPTS, Journal, Resumption, parse_journal, resume
+from rosgraph_manipulator.change import journal as module
+from rosgraph_manipulator.change.journal import MAX_ATTEMPTS, Journal, Resumption, parse_journal
 
 NOW = 1000.0
-STEADY = Journal("good", "", alive=NOW - 1.0)
-CHANGING = Journal("good", "better", alive=NOW - 1.0, attempts=1)
+GOOD = {"f_pick": "good"}
+KNOWN = {**dict.fromkeys(("first", "good", "better"), "f_pick"), "near": "f_look", "far": "f_look"}
+STEADY = Journal(GOOD, "", alive=NOW - 1.0)
+CHANGING = Journal(GOOD, "better", alive=NOW - 1.0, attempts=1)
 BROKEN = CHANGING.broken("NameError: name 'x' is not defined", NOW - 1.0)
+
+
+def resume(journal, launched, failed, initial, now, function="f_pick"):
+    return module.resume(journal, KNOWN, function, launched, failed, initial, now)
 
 
 def test_what_runs_is_taken_over_with_its_goal():
@@ -29,7 +36,9 @@ def test_killed_pair_brings_the_mission_back():
 def die(journal):
     """Return the journal of a manipulator that begins as `journal` says, and dies while it deploys."""
     begun = resume(journal, "good", False, "first", NOW)
-    return Journal(wanted=begun.deploy, attempts=begun.attempts).noted(begun.last_good, NOW, wanted=begun.deploy)
+    return Journal(wanted=begun.deploy, attempts=begun.attempts).noted(
+        {"f_pick": begun.last_good}, NOW, wanted=begun.deploy
+    )
 
 
 @pytest.mark.parametrize("launched", ["good", ""])
@@ -42,7 +51,7 @@ def test_change_that_ended_the_manipulator_by_an_error_is_not_begun_again(launch
 
 
 def test_change_during_which_manipulators_die_without_an_error_is_begun_a_few_times_only():
-    journal = Journal().noted("good", NOW, wanted="better")
+    journal = Journal().noted(GOOD, NOW, wanted="better")
     for _ in range(MAX_ATTEMPTS - 1):
         assert resume(journal, "good", False, "first", NOW).deploy == "better"
         journal = die(journal)
@@ -57,19 +66,19 @@ def test_refused_change_that_the_launcher_has_made_is_taken_back():
 
 
 def test_refused_change_without_an_earlier_configuration_leaves_what_runs():
-    journal = Journal("", "better", alive=NOW, error="x")
+    journal = Journal({}, "better", alive=NOW, error="x")
     assert resume(journal, "better", False, "first", NOW).running == "better"
 
 
 @pytest.mark.parametrize(("initial", "deployed"), [("first", "first"), ("better", ""), ("", "")])
 def test_refused_change_is_not_begun_again_as_the_initial_configuration(initial, deployed):
-    journal = Journal("", "better", alive=NOW, error="x")
+    journal = Journal({}, "better", alive=NOW, error="x")
     resumption = resume(journal, "", False, initial, NOW)
     assert (resumption.running, resumption.deploy, resumption.refused) == ("", deployed, "better")
 
 
 def test_refused_restoration_is_not_begun_again():
-    journal = Journal("good", "good", alive=NOW, error="x")
+    journal = Journal(GOOD, "good", alive=NOW, error="x")
     assert resume(journal, "", False, "", NOW).deploy == ""
 
 
@@ -83,13 +92,13 @@ def test_refusal_of_another_time_is_not_believed():
 
 
 def test_error_is_kept_when_the_manipulator_ends_of_it():
-    assert BROKEN.noted("good", NOW, ended=True) == BROKEN
+    assert BROKEN.noted(GOOD, NOW, ended=True) == BROKEN
 
 
 def test_change_that_has_ended_leaves_no_attempts():
-    ended = Journal().noted("good", NOW, wanted="better").noted("better", NOW, wanted="")
+    ended = Journal().noted(GOOD, NOW, wanted="better").noted({"f_pick": "better"}, NOW, wanted="")
     assert (ended.attempts, ended.refusal) == (0, "")
-    again = ended.noted("better", NOW, wanted="better")
+    again = ended.noted({"f_pick": "better"}, NOW, wanted="better")
     assert (again.attempts, again.refusal) == (1, "")
 
 
@@ -97,14 +106,14 @@ def test_configuration_that_the_launcher_gave_up_is_not_taken_over():
     assert resume(Journal(), "good", True, "first", NOW) == Resumption(deploy="first")
 
 
-@pytest.mark.parametrize("journal", [Journal("good", "", alive=NOW - 3600.0), Journal("good", "", NOW + 60.0)])
+@pytest.mark.parametrize("journal", [Journal(GOOD, "", alive=NOW - 3600.0), Journal(GOOD, "", NOW + 60.0)])
 def test_journal_of_another_time_is_not_believed(journal):
     assert resume(journal, "", False, "first", NOW) == Resumption(deploy="first")
     assert resume(journal, "good", False, "first", NOW) == Resumption(running="good")
 
 
 def test_system_that_was_ended_starts_anew():
-    ended = Journal("good", "", alive=NOW - 1.0, ended=True)
+    ended = Journal(GOOD, "", alive=NOW - 1.0, ended=True)
     assert resume(ended, "", False, "first", NOW) == Resumption(deploy="first")
     assert resume(ended, "good", False, "first", NOW) == Resumption(running="good", keep_goal=True)
 
@@ -122,7 +131,24 @@ def test_journal_survives_the_parameter_server():
         {**STEADY.as_parameter(), "alive": "yes"},
         {**STEADY.as_parameter(), "attempts": True},
         {"configuration": "x"},
+        {**STEADY.as_parameter(), "configurations": {"f_pick": 3}},
     ],
 )
 def test_parameter_of_another_form_is_no_journal(value):
     assert parse_journal(value) == Journal()
+
+
+def test_change_of_one_function_leaves_the_others_as_they_are():
+    journal = Journal({**GOOD, "f_look": "near"}, "better", alive=NOW - 1.0, attempts=1)
+    assert resume(journal, "far", False, "", NOW, "f_look") == Resumption(running="far", keep_goal=True)
+    assert resume(journal, "", False, "", NOW, "f_look") == Resumption(deploy="near", keep_goal=True)
+    assert resume(journal, "good", False, "", NOW, "f_pick").deploy == "better"
+
+
+def test_refused_change_of_one_function_refuses_nothing_of_another():
+    journal = Journal({"f_look": "near"}, "better", alive=NOW, error="x")
+    assert resume(journal, "near", False, "", NOW, "f_look") == Resumption(running="near", keep_goal=True)
+
+
+def test_configuration_that_is_known_no_longer_is_not_deployed():
+    assert resume(Journal({"f_look": "gone"}, "", alive=NOW), "", False, "far", NOW, "f_look").deploy == "far"

@@ -10,8 +10,13 @@ from rosgraph_manipulator.launching.report import CHANGING, FAILED, RECOVERING, 
 NEW = Configuration("new", "f", "new.launch", topics=("plan",))
 
 
-def report(state=STABLE, configuration="old", change=1, nodes=("/a", "/b"), dead=(), message=""):
-    return LauncherReport(configuration, change, state, nodes, dead, message)
+def report(state=STABLE, configuration="old", change=1, nodes=("/a", "/b"), dead=(), message="", function="f"):
+    return LauncherReport(function, configuration, change, state, nodes, dead, message)
+
+
+def reports(*arguments, **options):
+    """What the launcher tells of function f, beside another function that shares /b."""
+    return [LauncherReport("g", "other", 1, STABLE, ("/b", "/c")), report(*arguments, **options)]
 
 
 def system(**nodes):
@@ -24,22 +29,22 @@ def system(**nodes):
 @pytest.fixture
 def progress():
     found = ChangeProgress()
-    found.take(report())
-    found.begin(NEW, 10.0)
+    found.take(reports())
+    found.begin("f", NEW, 10.0)
     return found
 
 
 def test_robot_is_stopped_once_when_its_last_driver_has_ended(progress):
     progress.leave({"/a"}, drivers={"/a"}, servers=None)
-    assert not progress.take(report(CHANGING))  # nodes may still run
-    assert progress.take(report(CHANGING, "new"))
-    assert not progress.take(report(CHANGING, "new"))
+    assert not progress.take(reports(CHANGING))  # nodes may still run
+    assert progress.take(reports(CHANGING, "new"))
+    assert not progress.take(reports(CHANGING, "new"))
 
 
 @pytest.mark.parametrize("drivers", [set(), {"/a", "/b"}, {"/a", "/joystick"}])
 def test_robot_is_not_stopped_while_somebody_may_still_drive_it(progress, drivers):
     progress.leave({"/a"}, drivers, servers=None)
-    assert not progress.take(report(CHANGING, "new"))
+    assert not progress.take(reports(CHANGING, "new"))
 
 
 @pytest.mark.parametrize(("servers", "replaced"), [({"/a"}, True), (set(), True), ({"/a", "/b"}, False), (None, False)])
@@ -69,9 +74,9 @@ def test_server_that_an_earlier_manipulator_stopped_is_waited_for(progress):
 
 
 def test_launcher_has_reported_a_change_when_it_is_over(progress):
-    progress.take(report(CHANGING, "new", change=2))
+    progress.take(reports(CHANGING, "new", change=2))
     assert not progress.is_reported(2)
-    progress.take(report(STABLE, "new", change=2))
+    progress.take(reports(STABLE, "new", change=2))
     assert progress.is_reported(2)
     assert not progress.is_reported(3)
 
@@ -80,67 +85,107 @@ def test_launcher_has_reported_a_change_when_it_is_over(progress):
 def test_death_after_the_change_fails_it(progress, state):
     progress.answered(2)
     assert progress.failure() is None
-    progress.take(report(state, "new", change=2, message="/a died"))
+    progress.take(reports(state, "new", change=2, message="/a died"))
     assert progress.failure() == "/a died"
 
 
 def test_death_that_comes_before_the_answer_fails_the_change_too(progress):
-    progress.take(report(RECOVERING, "new", change=2, message="/a died"))
+    progress.take(reports(RECOVERING, "new", change=2, message="/a died"))
     progress.answered(2)
     assert progress.failure() == "/a died"
 
 
 def test_death_of_an_earlier_change_does_not_count(progress):
-    progress.take(report(RECOVERING, "old", change=1, message="/a died"))
+    progress.take(reports(RECOVERING, "old", change=1, message="/a died"))
     progress.answered(2)
     assert progress.failure() is None
-    progress.begin(NEW, 0.0)
+    progress.begin("f", NEW, 0.0)
     progress.answered(1)  # of a new launcher, which counts anew
     assert progress.failure() is None
 
 
 def test_node_that_has_done_its_work_needs_not_answer(progress):
-    progress.take(report(nodes=("/b",)))
+    progress.take(reports(nodes=("/b",)))
     assert progress.has_finished("/a")
     assert not progress.has_finished("/b")
 
 
 def test_recovery_waits_for_the_nodes_and_for_a_server_that_died(progress):
-    progress.take(report(RECOVERING, change=4, dead=("/a",), message="/a died"))
-    assert progress.server_died({"/a"})
-    progress.take(report(STABLE, change=4))
-    progress.recover(NEW, 20.0)
+    progress.take(reports(RECOVERING, change=4, dead=("/a",), message="/a died"))
+    assert progress.server_died("f", {"/a"})
+    progress.take(reports(STABLE, change=4))
+    progress.recover("f", NEW, 20.0, new_server=True)
     assert progress.awaited(False) == Awaited(("/a", "/b"), frozenset({"plan"}), server=True)
     assert progress.failure() is None
-    progress.take(report(RECOVERING, change=4, dead=("/b",), message="/b died"))
+    progress.take(reports(RECOVERING, change=4, dead=("/b",), message="/b died"))
     assert progress.failure() == "/b died"
 
 
 def test_server_that_lives_need_not_be_waited_for(progress):
-    progress.take(report(RECOVERING, dead=("/a",)))
-    assert not progress.server_died({"/b"})
+    progress.take(reports(RECOVERING, dead=("/a",)))
+    assert not progress.server_died("f", {"/b"})
 
 
 def test_dead_nodes_do_not_run(progress):
-    progress.take(report(RECOVERING, dead=("/a",)))
-    assert list(progress.running_system(system(a={}, b={})).nodes) == ["/b"]
+    progress.take(reports(RECOVERING, dead=("/a",)))
+    assert list(progress.running_system("f", system(a={}, b={})).nodes) == ["/b"]
 
 
 def test_failed_configuration_does_not_run(progress):
-    assert progress.running == "old"
-    progress.take(report(FAILED))
-    assert progress.running == ""
+    assert progress.running("f") == "old"
+    progress.take(reports(FAILED))
+    assert progress.running("f") == ""
 
 
 def test_node_whose_parameters_are_uncertain_differs_until_the_launcher_has_set_all(progress):
     described = system(a={"speed": 1}, b={"speed": 1})
     progress.parameters_change("/a/costmap")
-    difference = compare(progress.running_system(described), described)
+    difference = compare(progress.running_system("f", described), described)
     assert difference.parameters == {"/a": {"speed": 1}}
     progress.answered(2)
-    assert not compare(progress.running_system(described), described).touches_nodes
+    assert not compare(progress.running_system("f", described), described).touches_nodes
 
 
 def test_of_a_configuration_without_description_only_the_names_are_known(progress):
-    difference = compare(progress.running_system(None), system(b={}))
+    difference = compare(progress.running_system("f", None), system(b={}))
     assert (difference.stops, difference.replaced) == (("/a",), ("/b",))
+
+
+def test_of_several_functions_each_has_a_report_of_its_own(progress):
+    assert progress.functions == ("g", "f")
+    assert progress.launched == ("/b", "/c", "/a")
+    assert progress.launched_for("f") == ("/a", "/b")
+    assert progress.running("g") == "other"
+    assert progress.report("h").configuration == ""
+    assert ChangeProgress().report("h") is None
+
+
+def test_nodes_that_run_for_other_functions_are_shared(progress):
+    assert progress.shared("f") == {"/b", "/c"}
+    assert progress.shared("g") == {"/a", "/b"}
+    progress.take([report(FAILED, function="g"), report()])
+    assert progress.shared("f") == frozenset()
+
+
+def test_death_in_another_function_does_not_fail_the_change(progress):
+    progress.answered(2)
+    progress.take([report(RECOVERING, "other", change=2, message="/c died", function="g"), report(change=2)])
+    assert progress.failure() is None
+
+
+def test_value_that_was_set_since_is_what_runs(progress):
+    described = system(a={"speed": 1}, b={"speed": 1})
+    running = progress.running_system("f", described, {"/a/speed": 3})
+    assert compare(running, described).parameters == {"/a": {"speed": 1}}
+
+
+def test_node_that_a_plan_has_not_stopped_yet_runs(progress):
+    progress.take([report(nodes=("/a", "/left"))])
+    assert list(progress.running_system("f", system(a={})).nodes) == ["/a", "/left"]
+
+
+def test_server_that_an_earlier_step_replaced_is_waited_for(progress):
+    progress.leave({"/a"}, set(), servers={"/a"})
+    progress.start(("/new",))
+    progress.leave({"/old"}, set(), servers={"/new"})
+    assert progress.awaited(False).server

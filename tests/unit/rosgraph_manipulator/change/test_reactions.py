@@ -18,7 +18,7 @@ def deployed(*configurations, now=0.0):
 
 
 def report(configuration, state):
-    return LauncherReport(configuration.name if configuration else "", state=state)
+    return LauncherReport("f", configuration.name if configuration else "", state=state)
 
 
 def test_configuration_that_ran_is_restored_when_the_next_one_does_not_come_up():

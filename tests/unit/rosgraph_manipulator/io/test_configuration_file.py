@@ -35,8 +35,9 @@ def test_published_action_type_is_understood(launch_file):
             "kill_nodes": ["/move_base"],
         }
     )
-    assert options.save_action == "move_base"
-    assert options.action_type == "move_base_msgs/MoveBaseAction"
+    navigate = options.of("f_navigate")
+    assert navigate.save_action == "/move_base"  # with its slash, it is a global name
+    assert navigate.action_type == "move_base_msgs/MoveBaseAction"
     assert options.reconfiguration_action_name == "rosgraph_manipulator_action_server"
 
 
@@ -85,12 +86,13 @@ def test_published_file_loads_unchanged(tmp_path):
     # as roslaunch does, a file is found anywhere in its package
     assert options.configurations["f_one"].launch_file.endswith("metacontrol_sim/launch/variants/f1_v1_r1.launch")
     assert options.configurations["f_two"].args == ("config:=/some/file.yaml",)
-    assert options.kill_nodes == ("/move_base",)
-    assert (options.save_action, options.action_type) == ("move_base", "move_base_msgs/MoveBaseAction")
+    navigate = options.of("f_navigate")
+    assert navigate.kill_nodes == ("/move_base",)
+    assert (navigate.save_action, navigate.action_type) == ("move_base", "move_base_msgs/MoveBaseAction")
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [("", "found none"), ("a: [", "is not YAML"), ("- a", "found none"), (None, "cannot be read")]
+    ("text", "words"), [("", "found none"), ("a: [", "correct the YAML"), ("- a", "found none"), (None, "No such file")]
 )
 def test_file_that_is_no_configuration_is_refused(tmp_path, text, words):
     path = tmp_path / "configurations.yaml"

@@ -35,6 +35,16 @@ def test_nodes_keep_their_parameters_remaps_and_environment(tmp_path):
     assert launch.system.parameters == {"/shared": 1}
 
 
+def test_all_that_a_start_needs_is_in_the_description(tmp_path):
+    body = f"""<machine name="here" address="localhost" default="never"/>
+      {NODE} respawn="true" respawn_delay="2.5" machine="here" launch-prefix="nice" cwd="node"/>
+      <node name="m" pkg="move_base" type="move_base" required="true"/>"""
+    nodes = read_launch_file(write(tmp_path, body)).system.nodes
+    assert (nodes["/n"].respawn, nodes["/n"].respawn_delay, nodes["/n"].required) == (True, 2.5, False)
+    assert (nodes["/n"].machine, nodes["/n"].launch_prefix, nodes["/n"].cwd) == ("", "nice", "node")
+    assert (nodes["/m"].respawn, nodes["/m"].respawn_delay, nodes["/m"].required) == (False, 0.0, True)
+
+
 def test_two_readings_of_anonymous_names_are_the_same(tmp_path):
     path = write(tmp_path, '<node name="$(anon n)" pkg="move_base" type="move_base"/>')
     assert list(read_launch_file(path).system.nodes) == list(read_launch_file(path).system.nodes)
@@ -49,7 +59,7 @@ def test_two_readings_of_anonymous_names_are_the_same(tmp_path):
         (f'<include file="/no/such.launch"/>{NODE}/>', "no/such.launch"),
         (f'{NODE}/><param name="x" value="$(arg nowhere)"/>', "nowhere"),
         (f"{NODE}/>{NODE}/>", "multiple nodes named"),
-        (f'<machine name="far" address="192.0.2.1" env-loader="/x"/>{NODE} machine="far"/>', "another machine"),
+        (f'<machine name="far" address="192.0.2.1" env-loader="/x"/>{NODE} machine="far"/>', "n is for machine 'far'"),
     ],
 )
 def test_files_that_cannot_be_used_are_refused_in_one_line(tmp_path, body, words):
@@ -164,6 +174,12 @@ def test_launch_prefix_comes_first(tmp_path):
     node = read_launch_file(write(tmp_path, f'{NODE} launch-prefix="nice -n 5"/>')).system.nodes["/n"]
     words, prefixed = command_line(node)
     assert (words[:3], prefixed) == (["nice", "-n", "5"], 3)
+
+
+def test_launch_prefix_that_does_not_exist_is_refused(tmp_path):
+    node = read_launch_file(write(tmp_path, f'{NODE} launch-prefix="no-such-command -e"/>')).system.nodes["/n"]
+    with pytest.raises(LaunchFileError, match=r"node /n: no command 'no-such-command', .*: install it"):
+        command_line(node)
 
 
 def test_executable_that_does_not_exist_is_refused(tmp_path):

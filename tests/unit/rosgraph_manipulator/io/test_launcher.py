@@ -1,45 +1,20 @@
 """The launcher's own work in a change, with real processes and a master that is played."""
 
-import xml.parsers.expat
-
 import pytest
+from rosgraph_manipulator.configuration.description import NodeDescription
 from rosgraph_manipulator.io import launcher as module
 from rosgraph_manipulator.io import node_processes
 from rosgraph_manipulator.io.launcher import Launcher, LauncherError
 from rosgraph_manipulator.launching.options import LauncherOptions
 
-SLEEPER = "launch-prefix=\"/bin/sh -c 'exec sleep 1000'\" pkg='rosgraph_manipulator' type='rosgraph_launcher'"
-
-
-class Parses:
-    """Counts the parsers that are made, of whatever module."""
-
-    def __init__(self, monkeypatch):
-        self.count = 0
-        make = xml.parsers.expat.ParserCreate
-
-        def counting(*arguments, **options):
-            self.count += 1
-            return make(*arguments, **options)
-
-        monkeypatch.setattr(xml.parsers.expat, "ParserCreate", counting)
+PREFIX = "/bin/sh -c 'exec sleep 1000'"
 
 
 @pytest.fixture
-def server(monkeypatch):
-    parameters = {}
-
-    def set_parameters(values, delete=()):
-        for name in delete:
-            parameters.pop(name, None)
-        parameters.update(values)
-
-    monkeypatch.setattr(module, "get_parameters", lambda names: {n: parameters[n] for n in names if n in parameters})
-    monkeypatch.setattr(module, "set_parameters", set_parameters)
+def master(monkeypatch):
     monkeypatch.setattr(module, "advertised", lambda _names: set())
     monkeypatch.setattr(node_processes, "forget_node", lambda _name: None)
-    monkeypatch.setattr(node_processes.NodeApi, "request_shutdown", lambda _name, _reason: False)  # so SIGINT is sent
-    return parameters
+    monkeypatch.setattr(node_processes.NodeApi, "answer", lambda _name: None)  # so SIGINT is sent
 
 
 @pytest.fixture
@@ -48,56 +23,84 @@ def reports():
 
 
 @pytest.fixture
-def launcher(tmp_path, server, reports, monkeypatch):
+def launcher(tmp_path, master, reports, monkeypatch):
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
     owner = Launcher(LauncherOptions(mark=f"test {tmp_path}"), reports.append, lambda line: None)
     yield owner
     owner.close()
 
 
-def launch_file(folder, *names):
-    path = folder / f"{'_'.join(names)}.launch"
-    nodes = [f"<node name='{name}' {SLEEPER}><param name='x' value='1'/></node>" for name in names]
-    path.write_text(f"<launch>{''.join(nodes)}</launch>")
-    return str(path)
+def nodes(*names):
+    description = {"package": "rosgraph_manipulator", "executable": "rosgraph_launcher", "launch_prefix": PREFIX}
+    return {name: NodeDescription(name, "/", **description) for name in names}
 
 
-def test_change_parses_its_launch_file_once(launcher, tmp_path, monkeypatch):
-    first, second = launch_file(tmp_path, "a"), launch_file(tmp_path, "a", "b")
-    launcher.change("first", first, [], ["/a"])
-    parses = Parses(monkeypatch)
-    launcher.change("second", second, [], ["/b"])
-    assert parses.count == 1
+def running(launcher):
+    return {name: descriptor for descriptor, name in launcher.pidfds().items()}
 
 
-def test_change_starts_keeps_and_ends_processes(launcher, tmp_path, server, reports):
-    launcher.change("first", launch_file(tmp_path, "a", "b"), [], ["/a", "/b"])
-    before = {name: descriptor for descriptor, name in launcher.pidfds().items()}
-    phases = launcher.change("second", launch_file(tmp_path, "b", "c"), [], ["/c"])
-    after = {name: descriptor for descriptor, name in launcher.pidfds().items()}
+def last(reports, function):
+    return next(report for report in reports[-1] if report.function == function)
+
+
+def test_change_starts_keeps_and_ends_processes(launcher, reports):
+    launcher.change("f", "first", nodes("/a", "/b"), [], ["/a", "/b"])
+    before = running(launcher)
+    phases = launcher.change("f", "second", nodes("/b", "/c"), ["/a"], ["/c"])
+    after = running(launcher)
     assert set(after) == {"/b", "/c"}
     assert after["/b"] == before["/b"]
     assert list(phases) == ["prepare", "stop", "start"]
-    assert server == {"/b/x": 1, "/c/x": 1}
-    assert (reports[-1].configuration, reports[-1].state, reports[-1].change) == ("second", "STABLE", 2)
+    report = last(reports, "f")
+    assert (report.configuration, report.state, report.change) == ("second", "STABLE", 2)
 
 
-def test_file_that_cannot_be_used_leaves_the_running_nodes_alone(launcher, tmp_path):
-    launcher.change("first", launch_file(tmp_path, "a"), [], ["/a"])
+def test_functions_run_side_by_side_and_share_nodes(launcher, reports):
+    launcher.change("f", "first", nodes("/a", "/shared"), [], ["/a", "/shared"])
+    before = running(launcher)
+    launcher.change("g", "other", nodes("/shared", "/b"), [], ["/b"])
+    launcher.change("f", "second", nodes("/c"), ["/a", "/shared"], ["/c"])
+    assert set(running(launcher)) == {"/shared", "/b", "/c"}
+    assert running(launcher)["/shared"] == before["/shared"]
+    assert last(reports, "g").nodes == ("/shared", "/b")
+    assert last(reports, "f").nodes == ("/c",)
+
+
+def test_release_ends_what_only_the_function_needs(launcher, reports):
+    launcher.change("f", "first", nodes("/a", "/shared"), [], ["/a", "/shared"])
+    launcher.change("g", "other", nodes("/shared"), [], [])
+    launcher.change("f", "", {}, [], [])
+    assert set(running(launcher)) == {"/shared"}
+    assert (last(reports, "f").configuration, last(reports, "f").nodes) == ("", ())
+    launcher.change("g", "", {}, [], [])
+    assert running(launcher) == {}
+
+
+def test_step_may_start_nodes_before_another_one_stops_the_old_ones(launcher):
+    launcher.change("f", "first", nodes("/a"), [], ["/a"])
+    launcher.change("f", "second", nodes("/b"), [], ["/b"])
+    assert set(running(launcher)) == {"/a", "/b"}
+    launcher.change("f", "second", nodes("/b"), ["/a"], [])
+    assert set(running(launcher)) == {"/b"}
+
+
+def test_request_that_cannot_be_carried_out_leaves_the_running_nodes_alone(launcher):
+    launcher.change("f", "first", nodes("/a"), [], ["/a"])
     before = launcher.pidfds()
     with pytest.raises(LauncherError, match="starts no node /z"):
-        launcher.change("second", launch_file(tmp_path, "b"), [], ["/z"])
+        launcher.change("f", "second", nodes("/b"), ["/a"], ["/z"])
     assert launcher.pidfds() == before
 
 
-def test_change_that_was_planned_for_a_launcher_with_more_nodes_is_refused(launcher, tmp_path):
+def test_executable_that_is_missing_leaves_the_running_nodes_alone(launcher):
+    launcher.change("f", "first", nodes("/a"), [], ["/a"])
+    missing = {"/b": NodeDescription("/b", "/", "rosgraph_manipulator", "no_such_executable")}
+    with pytest.raises(LauncherError, match="no_such_executable"):
+        launcher.change("f", "second", missing, ["/a"], ["/b"])
+    assert set(running(launcher)) == {"/a"}
+
+
+def test_change_that_was_planned_for_a_launcher_with_more_nodes_is_refused(launcher):
     with pytest.raises(LauncherError, match="needs /a, which does not run"):
-        launcher.change("second", launch_file(tmp_path, "a", "b"), [], ["/b"])
+        launcher.change("f", "second", nodes("/a", "/b"), [], ["/b"])
     assert launcher.pidfds() == {}
-
-
-def test_stop_ends_every_process(launcher, tmp_path, reports):
-    launcher.change("first", launch_file(tmp_path, "a"), [], ["/a"])
-    launcher.change("", "", [], [])
-    assert launcher.pidfds() == {}
-    assert reports[-1].nodes == ()

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import psutil
 import pytest
@@ -51,22 +52,47 @@ def test_process_runs_in_its_folder_with_its_log(command, tmp_path):
 
 
 def test_prepared_process_imports_first_and_begins_when_told(command, tmp_path):
-    (tmp_path / "heavy.py").write_text("open('/proc/self/comm', 'w').write('imported')\n")
-    text = "import sys\nimport heavy\nif __name__ == '__main__':\n    print(*sys.argv[1:], __file__)\n"
+    text = "import sys\nimport decimal\nprint(*sys.argv[1:], __file__)\n"
     wanted = command(text, "a", "__name:=n", log=tmp_path / "log")
     process = processes.prepare(wanted)
-    wait_for(lambda: psutil.Process(process.pid).name() == "imported", "the import is done")
-    assert not (tmp_path / "log").exists()
-    process.begin(wanted)
+    maps = Path(f"/proc/{process.pid}/maps")
+    wait_for(lambda: "_decimal" in maps.read_text(), "the import is done")
+    assert (tmp_path / "log").read_text() == ""
+    process.begin()
     assert processes.wait_for_ends([process], DEADLINE_S)
     process.close()
     assert (tmp_path / "log").read_text().split() == ["a", "__name:=n", str(tmp_path / "node")]
 
 
+def test_log_of_an_earlier_process_is_continued(command, tmp_path):
+    wanted = command("print('hello')\n", log=tmp_path / "log")
+    for process in (processes.start(wanted), processes.prepare(wanted)):
+        if process.gate >= 0:
+            process.begin()
+        assert processes.wait_for_ends([process], DEADLINE_S)
+        process.close()
+    assert (tmp_path / "log").read_text().split() == ["hello", "hello"]
+
+
+def test_prepared_process_that_is_closed_never_runs_its_script(command, tmp_path):
+    process = processes.prepare(command("open('ran', 'w')\n"))
+    process.close()
+    assert not (tmp_path / "ran").exists()
+
+
+def test_prepared_process_that_was_killed_is_told(command):
+    process = processes.prepare(command("pass\n"))
+    process.signal(signal.SIGKILL)
+    assert processes.wait_for_ends([process], DEADLINE_S)
+    with pytest.raises(StartError, match="node: its process has ended before it began"):
+        process.begin()
+    process.close()
+
+
 def test_prepared_process_keeps_the_exit_status_of_its_script(command):
     wanted = command("import sys\nsys.exit(3)\n")
     process = processes.prepare(wanted)
-    process.begin(wanted)
+    process.begin()
     assert processes.wait_for_ends([process], DEADLINE_S)
     assert process.status == 3
     process.close()
@@ -75,15 +101,40 @@ def test_prepared_process_keeps_the_exit_status_of_its_script(command):
 def test_script_that_cannot_be_imported_fails_when_it_runs(command):
     wanted = command("import no_such_module\n")
     process = processes.prepare(wanted)
-    process.begin(wanted)
+    process.begin()
     assert processes.wait_for_ends([process], DEADLINE_S)
     assert process.status == 1
     process.close()
 
 
-def test_only_python_scripts_are_prepared(command, tmp_path):
-    assert processes.prepare(command("echo", python=False)) is None
+@pytest.mark.parametrize(
+    ("first", "is_python"),
+    [
+        ("#!/usr/bin/python3", True),
+        ("#!/usr/bin/python3 -u", True),
+        ("#!/usr/bin/env python3", True),
+        ("#!/usr/bin/env -S python3 -u", True),
+        (f"#!{sys.executable}", True),
+        ("#!/usr/bin/python3 -I", False),
+        ("#!/usr/bin/python3 -S", False),
+        ("#!/usr/bin/env no_python3", False),
+        ("#!/usr/bin/env", False),
+        ("#!/bin/sh", False),
+        ("#!", False),
+        ("import sys", False),
+        ("#!/usr/bin/python3 'open", False),
+    ],
+)
+def test_only_scripts_for_a_plain_python_3_are_prepared(tmp_path, first, is_python):
+    script = tmp_path / "node"
+    script.write_text(f"{first}\n")
+    assert Command((str(script),), "/", {"PATH": os.environ["PATH"]}).is_python is is_python
+    assert not Command(("nice", str(script)), "/", {"PATH": os.environ["PATH"]}, prefixed=1).is_python
+
+
+def test_executable_that_is_no_script_is_not_prepared(tmp_path):
     assert processes.prepare(Command((sys.executable,), str(tmp_path), {})) is None
+    assert processes.prepare(Command((str(tmp_path / "missing"),), str(tmp_path), {})) is None
 
 
 def test_log_that_cannot_be_written_stops_nothing(command, tmp_path):

@@ -6,7 +6,7 @@ from rich.console import Console
 from ros_model.graph.snapshot import build_snapshot
 from rosgraph_monitor.cli.snapshot import lines
 from rosgraph_monitor.diagnostics.aggregator_names import unique_name
-from rosgraph_monitor.diagnostics.overview import Overview, thresholds
+from rosgraph_monitor.diagnostics.overview import Overview, of_robot, thresholds
 
 
 def status(name, message, *values, level=0):
@@ -71,6 +71,24 @@ def test_thresholds_are_found_wherever_they_stand():
 )
 def test_each_thing_has_a_name_of_its_own(given, name):
     assert unique_name(given) == name
+
+
+def test_board_of_a_robot_in_a_namespace_has_its_own_nodes_and_thresholds():
+    parameters = {"cell_1": {"reasoner": {"nfr_hits": 0.6}}, "cell_2": {"reasoner": {"nfr_hits": 0.9}}, "rate": 3}
+    names, own = of_robot(["/cell_1/arm/driver", "/cell_2/eye", "/rosout"], parameters, "/cell_1/")
+    assert (names, thresholds(own)) == (["arm/driver"], {"hits": 0.6})
+    assert of_robot(["/eye"], parameters, "/") == (["eye"], parameters)
+    assert of_robot([], parameters, "/cell_3") == ([], {})
+    assert of_robot([], parameters, "/rate") == ([], {})
+
+
+def test_same_component_of_two_robots_has_two_names_for_the_aggregator():
+    names = set()
+    for robot in ("robot:/cell_1", "robot:/cell_2"):
+        given = status("gripper", "Component status", ("gripper", "TRUE"))
+        given.hardware_id = robot
+        names.add(unique_name(given))
+    assert names == {"Component gripper in /cell_1", "Component gripper in /cell_2"}
 
 
 def test_snapshot_in_lines():

@@ -3,8 +3,10 @@
 import pytest
 from ros_model.graph.snapshot import GraphSnapshot, NodeState, build_snapshot
 from ros_model.language.metamodel import Component, Reference, RosParameter, RosSystem, SystemParameter
+from ros_model.language.packages_reader import parse_packages
 from rosgraph_monitor.diagnostics.status import Level
 from rosgraph_monitor.graph.comparison import Scope, compare, wrong_topic_types
+from rosgraph_monitor.graph.defaults import parameter_defaults
 from rosgraph_monitor.graph.findings import (
     NO_NODE,
     NOT_SET,
@@ -158,3 +160,45 @@ def test_type_of_a_topic_by_settings():
     assert wrong_topic_types(live, {"scan": "sensor_msgs/LaserScan"}) == [
         WrongType("laser", "scan", "sensor_msgs/LaserScan", "std_msgs/String")
     ]
+
+
+SOURCE = """PackageSet { CatkinPackage p { Artifact pick.py { Node { name picker Parameters {
+    Parameter { name speed type Double value 0.3 },
+    Parameter { name limits/force type Double default 5.0 },
+    Parameter { name grip type String }
+} } } } }"""
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "actual"),
+    [
+        ("speed", 0.3, None),
+        ("speed", 0.5, "0.3 (not set: the code's default)"),
+        ("limits/force", 5, None),
+        ("limits/force", 7, "5.0 (not set: the code's default)"),
+        ("grip", "soft", "<not set>"),
+        ("other", 1, "<not set>"),
+    ],
+)
+def test_parameter_that_nobody_set_has_the_default_of_the_code(name, value, actual):
+    parameters = (RosParameter("label", Reference("p", "pick.py", "pick_1", name), value),)  # as a snapshot names it
+    desired = system(Component("pick_1", namespace="cell", parameters=parameters))
+    scope = Scope(defaults=parameter_defaults([parse_packages(SOURCE)]))
+    found = compare(graph("/cell/pick_1"), desired, dead={}, scope=scope)
+    assert [str(wrong.actual) for wrong in found] == ([actual] if actual else [])
+    set_otherwise = graph(
+        "/cell/pick_1", cell={"pick_1": {"speed": 9, "limits": {"force": 9}, "grip": "x", "other": 9}}
+    )
+    assert len(compare(set_otherwise, desired, dead={}, scope=scope)) == 1
+
+
+def test_default_in_which_two_nodes_of_an_executable_differ_is_not_known():
+    other = "Node { name other Parameters { Parameter { name speed type Double value 0.9 } } }"
+    defaults = parameter_defaults(
+        [parse_packages(SOURCE), parse_packages(SOURCE.replace("Node {", f"{other} Node {{"))]
+    )
+    parameters = (RosParameter("label", Reference("p", "pick.py", "picker", "speed"), 0.3),)
+    (wrong,) = compare(
+        graph("/a"), system(Component("a", parameters=parameters)), dead={}, scope=Scope(defaults=defaults)
+    )
+    assert str(wrong.actual) == "<not set>"

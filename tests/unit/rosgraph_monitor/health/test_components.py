@@ -27,9 +27,41 @@ def history(tracker, *steps, excused=(), patience=None):
     return said
 
 
-def test_death_is_false_until_the_return_which_is_recovered_once():
-    steps = (0.0, ALIVE), (0.5, GONE), (1.0, GONE), (1.5, ALIVE), (2.0, ALIVE)
-    assert history(ComponentTracker({}), *steps) == [TRUE, FALSE, FALSE, RECOVERED, TRUE]
+def test_death_is_false_until_the_return_which_is_recovered_for_a_while():
+    steps = (0.0, ALIVE), (0.5, GONE), (1.0, GONE), (1.5, ALIVE), (2.0, ALIVE), (2.6, ALIVE)
+    assert history(ComponentTracker({}, recovery=1.0), *steps) == [TRUE, FALSE, FALSE, RECOVERED, RECOVERED, TRUE]
+
+
+@pytest.mark.parametrize("period", [0.1, 1.0, 2.0])
+def test_reader_that_looks_now_and_then_sees_a_recovery(period):
+    """The monitor looks twice in a second, and at once when a node comes back."""
+    moments = [0.0, 0.5, 1.0, 1.03, *(1.5 + number / 2 for number in range(20))]
+    said = history(ComponentTracker({}), (0.0, ALIVE), (0.5, GONE), *((now, ALIVE) for now in moments[2:]))
+    for offset in range(10):
+        begin = period * offset / 10
+        looks = [begin + period * number for number in range(int(9.0 / period))]
+        read = [[s for at, s in zip(moments, said, strict=True) if at <= look][-1] for look in looks]
+        assert RECOVERED in read
+
+
+def test_failure_during_a_recovery_is_told_at_once():
+    steps = (0.0, ALIVE), (0.5, GONE), (1.0, ALIVE), (1.1, GONE), (1.2, ALIVE)
+    assert history(ComponentTracker({}), *steps) == [TRUE, FALSE, RECOVERED, FALSE, RECOVERED]
+
+
+def test_successor_of_a_failed_node_is_not_blamed_before_it_is_known():
+    tracker = ComponentTracker({})
+    assert history(tracker, (0.0, ALIVE), (1.0, GONE)) == [TRUE, FALSE]
+    history(tracker, (2.0, GONE), excused={"laser"})
+    steps = (2.1, UNKNOWN), (2.2, GONE), (2.3, UNKNOWN), (2.4, ALIVE)
+    assert history(tracker, *steps, patience={"laser": 1.0}) == [None, None, None, RECOVERED]
+
+
+def test_failed_node_that_is_still_gone_after_the_excuse_has_failed():
+    tracker = ComponentTracker({})
+    assert history(tracker, (0.0, ALIVE), (1.0, GONE)) == [TRUE, FALSE]
+    history(tracker, (2.0, GONE), excused={"laser"})
+    assert history(tracker, (2.1, GONE), (3.2, GONE), (4.0, UNKNOWN), patience={"laser": 1.0}) == [None, FALSE, FALSE]
 
 
 def test_node_that_never_ran_fails_after_the_grace():
@@ -64,7 +96,7 @@ def test_node_that_failed_before_the_excuse_recovers_after_it():
     tracker = ComponentTracker({})
     assert history(tracker, (0.0, ALIVE), (1.0, GONE)) == [TRUE, FALSE]
     assert history(tracker, (2.0, ALIVE), excused={"laser"}) == [None]
-    assert history(tracker, (3.0, ALIVE), (4.0, ALIVE)) == [RECOVERED, TRUE]
+    assert history(tracker, (3.0, ALIVE), (9.0, ALIVE)) == [RECOVERED, TRUE]
 
 
 def test_node_that_is_not_expected_any_more_is_forgotten():
@@ -77,6 +109,13 @@ def test_node_that_is_not_expected_any_more_is_forgotten():
 def test_node_maps_to_its_component():
     tracker = ComponentTracker(parse_components({"laser_resender": {"node": "/laser"}}).of_node)
     assert tracker.update({"laser": ALIVE}, 0.0) == [("laser_resender", TRUE)]
+
+
+def test_component_in_a_namespace_is_read_as_the_parameter_server_has_it():
+    tree = {"arm": {"driver": {"node": "arm/driver"}, "eye": {"topic": "arm/scan"}}, "torso": {"driver": {"node": "t"}}}
+    found = parse_components(tree)
+    assert found.of_node == {"arm/driver": "arm/driver", "t": "torso/driver"}
+    assert found.topics["arm/scan"].component == "arm/eye"
 
 
 def test_topic_stands_for_a_component():

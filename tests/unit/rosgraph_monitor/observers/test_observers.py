@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import rospy
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from ros_model.language.metamodel import Component, Connection, ConnectionKind, RosParameter, RosSystem
-from rosgraph_monitor.observer import TopicObserver
+from rosgraph_monitor.observer import Observer, TopicObserver
 from rosgraph_monitor.observers.cpu import CpuLoadQualityObserver
 from rosgraph_monitor.observers.energy import EnergyQualityObserver
 from rosgraph_monitor.observers.frames import StaticFrames, rotation_translation
@@ -372,3 +372,21 @@ def test_aborted_goal_is_an_objective_error_until_the_next_goal():
 
 def test_goal_that_had_failed_before_is_no_concern():
     assert told(ObjectiveErrorObserver(), goals(("old", 1, GoalStatus.ABORTED))) == []
+
+
+@pytest.mark.parametrize("returned", [DiagnosticArray(), None, []])
+def test_published_observer_may_return_an_array_or_nothing(returned):
+    class LogObserver(Observer):
+        def generate_diagnostics(self):
+            return returned
+
+    assert LogObserver("LogObserver").evaluate(0.0) == []
+
+
+def test_statuses_of_an_array_are_published():
+    class GripObserver(Observer):
+        def generate_diagnostics(self):
+            return DiagnosticArray(status=[DiagnosticStatus(message="QA status", values=[KeyValue("grip", "0.5")])])
+
+    (status,) = GripObserver("GripObserver").evaluate(0.0)
+    assert status.values == [KeyValue("grip", "0.5")]

@@ -6,6 +6,7 @@ Message types come from the bag itself: every connection of a bag carries the de
 from __future__ import annotations
 
 import math
+import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,8 @@ from metacontrol_bags.typestore import typestore
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
+
+    from rosbags.interfaces import Connection
 
     from metacontrol_bags.decision import Decision
     from metacontrol_bags.record import ConfigurationReport, Event
@@ -78,7 +81,7 @@ def read_record(path: Path) -> MissionRecord:
     Raises:
         BagError: the file is missing, no bag, not closed, or holds messages that do not fit their definition.
     """
-    if not path.is_file():
+    if not os.path.isfile(path):  # False also for what can be no path
         raise BagError(f"{path}: no such bag")
     builder = _Builder()
     try:
@@ -87,6 +90,7 @@ def read_record(path: Path) -> MissionRecord:
             store = typestore(wanted)
             for connection, nanoseconds, data in reader.messages(connections=wanted):
                 message = store.deserialize_ros1(data, connection.msgtype)
+                builder.publisher = publisher_of(connection)
                 builder.handlers[connection.topic](nanoseconds * 1e-9, message)
             if not reader.message_count:
                 raise BagError(f"{path}: holds no messages")
@@ -97,10 +101,20 @@ def read_record(path: Path) -> MissionRecord:
     return builder.build(first, last)
 
 
+def publisher_of(connection: Connection) -> str:
+    """Return the name of the node that published the messages of a connection; empty where the bag does not tell."""
+    return str(getattr(connection.ext, "callerid", None) or "")
+
+
 class _Builder:
-    """Collects what the messages say; one handler per topic, called with the time of recording in s and the message."""
+    """Collects what the messages say; one handler per topic, called with the time of recording in s and the message.
+
+    Attributes:
+        publisher: of the message that is handled now.
+    """
 
     def __init__(self) -> None:
+        self.publisher = ""
         self._events: list[Event] = []
         self._poses: list[tuple[float, float, float]] = []
         self._samples: dict[str, list[tuple[float, float]]] = {"safety": [], "energy": [], "contacts": []}
@@ -114,7 +128,7 @@ class _Builder:
         self._map: OccupancyMap | None = None
         self.handlers: dict[str, Callable[[float, Any], None]] = {
             "/mission/event": lambda t, m: self._events.append(messages.event(m, t)),
-            "/diagnostics": lambda t, m: self._diagnostics.extend(messages.diagnostics(m, t)),
+            "/diagnostics": lambda t, m: self._diagnostics.extend(messages.diagnostics(m, t, publisher=self.publisher)),
             "/mros1_reasoner/decision": lambda t, m: self._decisions.append(messages.decision(m, t)),
             "/move_base/goal": lambda t, m: self._goals.append(messages.goal(m, t)),
             "/move_base/result": lambda t, m: self._results.append(messages.result(m, t)),

@@ -9,6 +9,7 @@ import math
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
+from metacontrol_bags import ownership
 from metacontrol_bags.decision import Candidate, Cause, Decision
 from metacontrol_bags.record import (
     ComponentReport,
@@ -48,14 +49,22 @@ def event(message: Any, received: float) -> Event:
     return Event(header_stamp(message.header, received), message.kind, message.name, values)
 
 
-def diagnostics(message: Any, received: float) -> tuple[DiagnosticReport, ...]:
-    """Return what a diagnostic_msgs/DiagnosticArray says of components, qualities and cost.
+def diagnostics(
+    message: Any, received: float, namespace: str = "/", publisher: str = ""
+) -> tuple[DiagnosticReport, ...]:
+    """Return what a diagnostic_msgs/DiagnosticArray says of components, qualities and cost of one robot.
 
     A level or cost that is no finite number is left out.
+
+    Args:
+        message: the array.
+        received: when, s.
+        namespace: of the robot; `ownership` says which statuses are its own.
+        publisher: name of the node that has published the array; empty where it is not known.
     """
     stamp = header_stamp(message.header, received)
     reports: list[DiagnosticReport] = []
-    for status in message.status:
+    for status in ownership.own(message.status, namespace, publisher):
         if status.message == DiagnosticWords.COMPONENT_STATUS:
             reports += (ComponentReport(stamp, pair.key, pair.value) for pair in status.values)
         elif status.message == DiagnosticWords.QA_STALE:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
 PRIVATE = "~"
 """Stands for the node's name in names of parameters."""
@@ -99,15 +99,40 @@ def choice(value: object, name: str, choices: Sequence[str]) -> str:
     return value
 
 
+def named_entries(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield (name, entry) of a mapping whose names are those of the graph, such as `arm/driver: {node: arm/driver}`.
+
+    The parameter server reads the slashes in a name as levels of a tree. So mappings in an entry are entries whose
+    names go on with a slash; what else an entry has is its own.
+
+    Args:
+        tree: the mapping, as the file or as the parameter server has it.
+        above: what all names begin with.
+    """
+    for key, value in tree.items():
+        name = f"{above}/{key}" if above else str(key)
+        if not isinstance(value, Mapping):
+            yield name, value
+            continue
+        own = {k: v for k, v in value.items() if not isinstance(v, Mapping)}
+        below = {k: v for k, v in value.items() if isinstance(v, Mapping)}
+        if own or not below:
+            yield name, own
+        yield from named_entries(below, name)
+
+
 def path(value: object, name: str) -> Path:
     """Return the path of a file; `~` is the home folder.
 
     Raises:
-        ParameterError: it is no text, or empty.
+        ParameterError: it is no text, is empty, or can be no path.
     """
-    if not isinstance(value, str) or not value:
+    if not isinstance(value, str) or not value or "\0" in value:
         raise misfit(value, name, "must be the path of a file")
-    return Path(value).expanduser()
+    try:
+        return Path(value).expanduser()
+    except RuntimeError as error:  # there is no such user
+        raise misfit(value, name, "must be the path of a file") from error
 
 
 def items(value: object, name: str) -> list[Any]:
@@ -124,11 +149,18 @@ def items(value: object, name: str) -> list[Any]:
 def texts(value: object, name: str) -> list[str]:
     """Return a list of texts; a text is the list of its parts between commas.
 
+    A text may have brackets and quotes, too, as in `tomasys:="[a.owl, 'b.owl']"`: roslaunch passes lists in arguments
+    on as texts.
+
     Raises:
         ParameterError: it is neither.
     """
     if isinstance(value, str):
-        return [part.strip() for part in value.split(",") if part.strip()]
+        inner = value.strip()
+        if inner.startswith("[") and inner.endswith("]"):
+            inner = inner[1:-1]
+        parts = (part.strip().strip("'\"").strip() for part in inner.split(","))
+        return [part for part in parts if part]
     if not isinstance(value, (list, tuple)) or not all(isinstance(item, str) for item in value):
         raise misfit(value, name, "must be a list of texts")
     return list(value)

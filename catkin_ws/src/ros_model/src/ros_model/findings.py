@@ -20,6 +20,7 @@ RULES = {
     "unreadable": "The file can be read and used.",
     "unknown-reference": "A reference leads to what a .ros model declares.",
     "incomplete-reference": "A reference names package, artifact, node and, for ports and parameters, a name.",
+    "executable": "roslaunch finds the executable of each component.",
     "wrong-kind": "References and connections lead to ports of the right kind.",
     "connection": "A connection has ends, and they are ports of the system.",
     "type-mismatch": "The ends of a connection have one type.",

@@ -25,9 +25,9 @@ def resolve(name: str, node: str) -> str:
     return f"{split_name(node)[0]}/{name.rstrip('/')}"
 
 
-def executable_name(file: str) -> str:
-    """Return the name under which a reference may name a file: `talker.py` -> `talker`; dots would split it."""
-    return file.removesuffix(".py").replace(".", "_") or "_"
+def node_name(text: str) -> str:
+    """Return the name of a node of a model for a name in the graph or a file's: `talker.py` -> `talker`."""
+    return text.removesuffix(".py").replace(".", "_") or "_"
 
 
 def is_known_type(type_name: str) -> bool:

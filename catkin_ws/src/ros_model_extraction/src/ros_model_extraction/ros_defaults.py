@@ -1,4 +1,4 @@
-"""What ROS itself gives every node, and which models leave out: logging, the clock, roslaunch's own parameters."""
+"""What models leave out: logging and the clock of each node, roslaunch's parameters, the meta-controller."""
 
 from __future__ import annotations
 
@@ -8,6 +8,13 @@ from ros_model.language.metamodel import PortKind
 
 NODES = frozenset({"/rosout"})
 """Nodes that come with the master."""
+
+_METACONTROL_PACKAGES = frozenset({"mros1_reasoner", "rosgraph_manipulator", "rosgraph_monitor"})
+_METACONTROL_NODES = frozenset({"reasoner", "rosgraph_launcher", "rosgraph_manipulator", "rosgraph_monitor"})
+_METACONTROL_PARAMETERS = frozenset(
+    {"configs", "goal_msg_type", "kill_nodes", "reconfiguration_action_name", "save_action"}
+)
+"""Global parameters that the manipulator sets from its configuration file, beside the group `configurations`."""
 
 REMARK = (
     "Left out, because every node has it: publishing /rosout, listening to /clock, the services ~get_loggers and "
@@ -45,6 +52,18 @@ def is_plumbing(end: Interface) -> bool:
     if end.kind is PortKind.SERVICE_SERVER:
         return end.name in {f"{end.node}/{service}" for service in _SERVICES}
     return (end.kind, end.name) in _TOPICS
+
+
+def is_metacontrol(node: str, package: str | None) -> bool:
+    """Return whether a node is one of the meta-controller's, by its package, or by its name if that is not known."""
+    if package is not None:
+        return package in _METACONTROL_PACKAGES
+    return node.rpartition("/")[2] in _METACONTROL_NODES
+
+
+def is_metacontrol_parameter(name: str) -> bool:
+    """Return whether the manipulator sets a global parameter (its name without the leading slash) for itself."""
+    return name in _METACONTROL_PARAMETERS
 
 
 def is_roslaunch_parameter(name: str) -> bool:

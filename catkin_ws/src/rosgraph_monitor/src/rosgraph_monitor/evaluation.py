@@ -11,7 +11,7 @@ from rosgraph_monitor.diagnostics.status import Status, graph_ok, graph_problem
 from rosgraph_monitor.graph.comparison import NOT_REGISTERED, Scope, compare, wrong_topic_types
 from rosgraph_monitor.graph.findings import Finding, MissingNode, PortFinding, concerned, finding_statuses
 from rosgraph_monitor.graph.names import instance, relative, resolved
-from rosgraph_monitor.health.components import ComponentTracker, NodeCondition, component_statuses
+from rosgraph_monitor.health.components import DEFAULT_RECOVERY, ComponentTracker, NodeCondition, component_statuses
 from rosgraph_monitor.health.liveness import Life
 from rosgraph_monitor.health.topics import TopicVerdict, verdict_statuses
 
@@ -36,11 +36,13 @@ class Patience:
         restart: in which the manipulator may announce that it restarts a variant's node, before that node's death is
             reported. Deaths of the base's nodes are reported at once.
         ports: for which a difference in interfaces must last: nodes connect one after the other.
+        recovery: for which a component that works again is RECOVERED, so that slow readers see it.
     """
 
     startup: float = 10.0
     restart: float = 1.0
     ports: float = 1.0
+    recovery: float = DEFAULT_RECOVERY
 
 
 @dataclass
@@ -72,7 +74,7 @@ class GraphEvaluator:
         self._component_of = dict(component_of)
         self._scope = scope or Scope()
         self._patience = patience
-        self._tracker = ComponentTracker(component_of, patience.startup)
+        self._tracker = ComponentTracker(component_of, patience.startup, patience.recovery)
         self._told = _Told()
         self._publisher: dict[str, str] = {}
         self._last: tuple[tuple[Any, ...], tuple[Finding, ...]] | None = None

@@ -14,7 +14,7 @@ import re
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import DiagnosticWords as Words
 
 if TYPE_CHECKING:
@@ -119,7 +119,9 @@ class Observer:
         try:
             timed = inspect.signature(self.generate_diagnostics).parameters
             statuses = self.generate_diagnostics(now) if timed else self.generate_diagnostics()  # type: ignore[call-arg]
-            return [self._checked(status) for status in statuses]
+            if isinstance(statuses, DiagnosticArray):  # as some published observers return
+                statuses = statuses.status
+            return [self._checked(status) for status in statuses or []]
         except StaleInputError as error:
             return [self.stale(str(error))]
 

@@ -12,6 +12,7 @@ from metacontrol_bags.bag import BagError, read_record
 from metacontrol_bags.decision import DECIDED
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S, MetricsError, summarise
 from metacontrol_bags.timeline import Timeline
+from node_kit.io.input_files import is_file
 
 from metacontrol_experiments.cli.figure import draw_figure
 from metacontrol_experiments.cli.summary import write_summary
@@ -169,7 +170,7 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
         raise RunError(f"--initial-configuration: no configuration {name!r}; there are {known}")
     components = read_components(simulation / "models" / "metacontrol.yaml")
     world = options["world"]
-    if world is not None and not world.is_file():
+    if world is not None and not is_file(world):
         raise RunError(f"--world: {world} is no file; give the path of a world file or of a map's YAML file")
     return Settings(
         route=read_route(options["routes"] or simulation / "worlds" / "routes.yaml", options["route"]),

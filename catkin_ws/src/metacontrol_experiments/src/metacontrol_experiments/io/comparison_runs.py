@@ -9,6 +9,8 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
 
+from node_kit.io.input_files import InputFileError, read_text
+
 from metacontrol_experiments.io.processes import RunError, signals_as_interrupts
 from metacontrol_experiments.mission.settings import SUMMARY_NAME
 
@@ -29,7 +31,10 @@ def claim(folder: Path, options: Sequence[str]) -> None:
     """
     folder.mkdir(parents=True, exist_ok=True)
     path, asked = folder / "options.txt", shlex.join(options) + "\n"
-    held = path.read_text(encoding="utf-8") if path.exists() else asked
+    try:
+        held = read_text(path) if path.exists() else asked
+    except InputFileError as error:
+        raise ComparisonError(str(error)) from error
     if held != asked:
         said = held.strip() or "without options"
         raise ComparisonError(f"{folder} holds other missions ({said}): name another folder by --runs, or delete it")
@@ -43,8 +48,10 @@ def read_summary(path: Path) -> dict[str, Any]:
         ComparisonError: it is none.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+        content = json.loads(read_text(path))
+    except InputFileError as error:
+        raise ComparisonError(str(error)) from error
+    except (ValueError, RecursionError) as error:
         raise ComparisonError(f"{path}: is no JSON ({error}); run its mission again") from error
     if not isinstance(content, dict) or "reconfigurations" not in content:
         raise ComparisonError(f"{path}: is no summary of a mission; run one")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import rospkg
-import yaml
+from node_kit.io.input_files import InputFileError, read_yaml
 
 from metacontrol_experiments.contingency.contingency import Contingency
 from metacontrol_experiments.contingency.parsing import (
@@ -75,6 +75,6 @@ def read_components(path: Path) -> dict[str, str]:
 def _content(path: Path, failure: type[ValueError]) -> Any:
     """Return the content of a YAML file; raise `failure` where it cannot be read."""
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise failure(f"{path}: cannot be read as YAML: {' '.join(str(error).split())}") from error
+        return read_yaml(path)
+    except InputFileError as error:
+        raise failure(str(error)) from error

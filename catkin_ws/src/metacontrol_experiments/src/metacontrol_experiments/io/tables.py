@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
+import os
 from collections import defaultdict
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rospkg
+from node_kit.io.input_files import InputFileError, read_text
 
 from metacontrol_experiments.campaign.calibration import QUALITIES, CalibrationError, Run, measure
 from metacontrol_experiments.lockstep.delays import KINDS, DelayError, Delays
@@ -29,10 +32,9 @@ def read_delays(path: Path | None = None) -> Delays:
     path = path or Path(rospkg.RosPack().get_path("metacontrol_experiments")) / "config" / "delays.csv"
     samples: defaultdict[str, list[float]] = defaultdict(list)
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            for row in csv.DictReader(file):
-                samples[row["delay"]].append(float(row["seconds"]))
-    except (OSError, KeyError, TypeError, ValueError) as error:
+        for row in csv.DictReader(io.StringIO(read_text(path), newline="")):
+            samples[row["delay"]].append(float(row["seconds"]))
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
         raise DelayError(f"{path}: no table of delay and seconds ({error}); make one by: metacontrol delays") from error
     lacking = [kind for kind in KINDS if not samples[kind]]
     if lacking or not all(math.isfinite(value) and value >= 0.0 for values in samples.values() for value in values):
@@ -56,16 +58,19 @@ def read_runs(path: Path) -> list[Run]:
     Raises:
         CalibrationError: it is no such file.
     """
-    if not path.exists():
+    if not os.path.lexists(path):
         return []
-    text = path.read_text(encoding="utf-8")
+    try:
+        text = read_text(path)
+    except InputFileError as error:
+        raise CalibrationError(str(error)) from error
     whole = text[: text.rfind("\n") + 1]
     rows = csv.DictReader(whole.splitlines())
     if whole and tuple(rows.fieldnames or ()) != _COLUMNS:
         raise CalibrationError(f"{path}: its columns are not {', '.join(_COLUMNS)}; name another file of runs")
     try:
         return [_run(row) for row in rows]
-    except (TypeError, ValueError, KeyError) as error:
+    except (TypeError, ValueError, KeyError, csv.Error) as error:
         raise CalibrationError(f"{path}: line {rows.line_num} is no run ({error}); take it out") from error
 
 

@@ -300,7 +300,8 @@ class MissionNode:
         self._tell(messages.decision(message, rospy.get_time()))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        for report in messages.diagnostics(message, rospy.get_time()):
+        publisher = message._connection_header.get("callerid", "")
+        for report in messages.diagnostics(message, rospy.get_time(), rospy.get_namespace(), publisher):
             if isinstance(report, QualityReport) and report.level is not None:
                 self._readiness.observed.add(report.name)
             self._readiness.has_graph |= not isinstance(report, QualityReport)

@@ -6,6 +6,7 @@ import threading
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
+from metacontrol_bags import ownership
 from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.ros.lifetime import Lifetime
 from visualization_msgs.msg import Marker
@@ -29,12 +30,14 @@ class RvizTextNode:
         self._lock = threading.Lock()
         self._marker = rospy.Publisher("rviz/text", Marker, queue_size=1, latch=True)
         self._inputs = (
-            rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics),
+            rospy.Subscriber(ownership.TOPIC, DiagnosticArray, self._on_diagnostics),
             rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration),
         )
         self._timer = rospy.Timer(rospy.Duration.from_sec(_PERIOD_S), lambda _event: self._publish(), reset=True)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        publisher = message._connection_header.get("callerid", "")
+        message.status = ownership.own(message.status, rospy.get_namespace(), publisher)
         with self._lock:
             self._text.take_diagnostics(message)
 

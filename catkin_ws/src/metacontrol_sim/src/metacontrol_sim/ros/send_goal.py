@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 
 import rospy
-import yaml
 from actionlib_msgs.msg import GoalStatusArray
 from geometry_msgs.msg import PoseStamped
+from node_kit.io.input_files import InputFileError, read_yaml
 from node_kit.ros.lifetime import Lifetime
 
 
@@ -23,9 +23,9 @@ def read_goal(path: Path) -> PoseStamped:
         GoalFileError: the file cannot be read, or lacks a finite number.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise GoalFileError(f"{path}: {' '.join(str(error).split())}") from error
+        content = read_yaml(path)
+    except InputFileError as error:
+        raise GoalFileError(str(error)) from error
     goal = PoseStamped()
     try:
         goal.header.frame_id = str(content["header"]["frame_id"])

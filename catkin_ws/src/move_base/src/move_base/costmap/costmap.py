@@ -10,18 +10,19 @@ import cv2
 import numpy as np
 from robot_formulas.geometry import ORIGIN, Pose, inscribed_radius
 
-from move_base.costmap.grid import FREE, LETHAL, Geometry
+from move_base.costmap.grid import FREE, LETHAL, UNKNOWN, Geometry
 from move_base.costmap.inflation import Inflation
 from move_base.costmap.static_map import bounding_geometry, resample
+from move_base.parameters.parameters import OBSTACLE_KINDS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
     from move_base.costmap.sensors import Observation
-    from move_base.costmap.static_map import StaticMap
-    from move_base.parameters.parameters import CostmapParameters
+    from move_base.costmap.static_map import MapPart, StaticMap
+    from move_base.parameters.parameters import CostmapParameters, Layer
 
 MAX_RAY_GAP = math.radians(3.0)
 """Neighbouring rays farther apart than this leave what lies between them as it was."""
@@ -59,17 +60,18 @@ class Costmap:
     def __init__(self, parameters: CostmapParameters) -> None:
         self.parameters = parameters
         self.geometry = self._initial_geometry()
+        self._maps: dict[str, StaticMap] = {}  # by topic
+        self._static_costs: dict[str, NDArray[np.uint8]] = {}  # by layer
+        self._static_placed: dict[str, tuple[Geometry, Pose]] = {}
+        self._obstacles = self._no_obstacles()
         self.reconfigure(parameters)
-        self._static_layer = next(iter(parameters.layers_of("static")), None)
-        self._static: StaticMap | None = None
-        self._static_costs: NDArray[np.uint8] | None = None
-        self._static_placed: tuple[Geometry, Pose] | None = None
-        self._obstacles = np.zeros(self.geometry.shape, dtype=np.uint8)
 
     def reconfigure(self, parameters: CostmapParameters) -> None:
-        """Change inflation, padding or rates. Obstacles stay; size, frame and other layers can't change."""
-        self.parameters = parameters
-        self._clears_footprint = any(layer.footprint_clearing for layer in parameters.layers_of("obstacle"))
+        """Take other parameters; frames and layers can't change. Obstacles stay, unless the grid is another one."""
+        old, self.parameters = self.parameters, parameters
+        if _grid(old) != _grid(parameters) and not self._has_size_of_map():
+            self.geometry = self._initial_geometry()
+            self._obstacles = self._no_obstacles()
         padded = parameters.padded_footprint()
         self.inscribed_radius = inscribed_radius(padded)
         self.circumscribed_radius = float(np.hypot(*padded.T).max())
@@ -79,20 +81,48 @@ class Costmap:
     @property
     def needs_map(self) -> bool:
         """Whether a static layer still waits for its map."""
-        return self._static_layer is not None and self._static is None
+        return self.missing_map() != ""
 
-    def set_map(self, static: StaticMap) -> None:
-        """Take a new static map. A costmap that does not roll takes its size and resolution from the map."""
-        if self._static_layer is None:
+    def missing_map(self) -> str:
+        """Return the topic of a map that a static layer still waits for, or an empty text."""
+        topics = (layer.map_topic for layer in self.parameters.layers_of("static"))
+        return next((topic for topic in topics if topic not in self._maps), "")
+
+    def set_map(self, static: StaticMap, topic: str = "") -> None:
+        """Take a new static map. A costmap that does not roll takes its size and resolution from its first layer's map.
+
+        Args:
+            static: the map.
+            topic: where it comes from; empty: it is for all static layers.
+        """
+        layers = [layer for layer in self.parameters.layers if layer.kind == "static"]
+        for layer in layers:
+            if topic in {"", layer.map_topic} and not (layer.first_map_only and layer.map_topic in self._maps):
+                self._maps[layer.map_topic] = static
+                self._static_costs.pop(layer.name, None)
+        if not layers or self.parameters.rolling_window or self._maps.get(layers[0].map_topic) is not static:
             return
-        self._static = static
-        self._static_costs = None
-        if not self.parameters.rolling_window:
-            geometry = static.geometry if static.yaw == 0.0 else bounding_geometry(static)
-            if geometry != self.geometry:
-                self.geometry = geometry
-                self._obstacles = np.zeros(geometry.shape, dtype=np.uint8)
-                self._inflation = self._make_inflation()
+        geometry = static.geometry if static.yaw == 0.0 else bounding_geometry(static)
+        if geometry != self.geometry:
+            self.geometry = geometry
+            self._obstacles = self._no_obstacles()
+            self._inflation = self._make_inflation()
+
+    def update_map(self, part: MapPart, topic: str) -> None:
+        """Replace a part of the map from a topic, for the layers that subscribe to updates.
+
+        Raises:
+            MapError: the part is not within the map.
+        """
+        layers = [one for one in self.parameters.layers if one.kind == "static" and one.subscribe_to_updates]
+        for layer in layers:
+            if layer.map_topic == topic and topic in self._maps:
+                self._maps[topic] = self._maps[topic].updated(part)
+                self._static_costs.pop(layer.name, None)
+
+    def obstacles(self, layer: str) -> NDArray[np.uint8]:
+        """Return the obstacles that a layer holds (H, W): LETHAL or FREE."""
+        return self._obstacles[layer]
 
     def update(
         self,
@@ -111,25 +141,61 @@ class Costmap:
             self._roll(robot)
         for observation, transform in observations:
             self._observe(observation, transform)
-        if self._clears_footprint:
-            self._fill(robot.apply(self._footprint), FREE)
+        for layer in self.parameters.layers_of(*OBSTACLE_KINDS):
+            if layer.footprint_clearing_enabled:
+                self._fill(self._obstacles[layer.name], robot.apply(self._footprint))
         return self._combine(map_pose or ORIGIN)
 
-    def clear(self, robot: Pose | None = None, keep_radius: float = 0.0) -> None:
-        """Forget the obstacles seen, except in a square of half-width `keep_radius` (m) around the robot."""
-        kept = self._obstacles.copy() if robot is not None and keep_radius > 0.0 else None
-        self._obstacles[:] = FREE
-        if kept is not None and robot is not None:
+    def clear(
+        self,
+        robot: Pose | None = None,
+        keep_radius: float = 0.0,
+        *,
+        layers: Collection[str] | None = None,
+        inside: bool = False,
+    ) -> None:
+        """Forget the obstacles seen, except in a square around the robot.
+
+        Args:
+            robot: pose in the costmap's frame; None: nothing is kept.
+            keep_radius: half the side of the square, m.
+            layers: names of the layers to clear; None: all.
+            inside: forget what is in the square, and keep what is outside of it.
+        """
+        for name, obstacles in self._obstacles.items():
+            if layers is not None and name not in layers:
+                continue
+            if robot is None:
+                obstacles[:] = FREE
+                continue
             row, column = self.geometry.cell(robot.x, robot.y)
             reach = int(keep_radius / self.geometry.resolution)
             window = (slice(max(row - reach, 0), row + reach + 1), slice(max(column - reach, 0), column + reach + 1))
-            self._obstacles[window] = kept[window]
+            kept = np.zeros_like(obstacles)
+            if inside:
+                kept[:] = obstacles
+                kept[window] = FREE
+            elif keep_radius > 0.0:
+                kept[window] = obstacles[window]
+            obstacles[:] = kept
 
     def static_cost(self, x: float, y: float) -> int:
-        """Return the static layer's own cost at a point (FREE without a static layer or outside of it)."""
-        if self._static_costs is None or not self.geometry.contains(x, y):
+        """Return the static layers' own cost at a point (FREE without a static layer or outside of it)."""
+        if not self.geometry.contains(x, y):
             return FREE
-        return int(self._static_costs[self.geometry.cell(x, y)])
+        cell = self.geometry.cell(x, y)
+        costs = [int(self._static_costs[layer.name][cell]) for layer in self._placed_layers()]
+        return costs[-1] if costs else FREE
+
+    def _placed_layers(self) -> list[Layer]:
+        return [layer for layer in self.parameters.layers_of("static") if layer.name in self._static_costs]
+
+    def _no_obstacles(self) -> dict[str, NDArray[np.uint8]]:
+        names = [layer.name for layer in self.parameters.layers if layer.kind in OBSTACLE_KINDS]
+        return {name: np.zeros(self.geometry.shape, dtype=np.uint8) for name in names}
+
+    def _has_size_of_map(self) -> bool:
+        return bool(self._maps) and not self.parameters.rolling_window
 
     def _initial_geometry(self) -> Geometry:
         p = self.parameters
@@ -154,16 +220,19 @@ class Costmap:
         up = round((origin_y - g.origin_y) / g.resolution)
         if right == 0 and up == 0:
             return
-        rolled = np.zeros_like(self._obstacles)
-        if abs(right) < g.width and abs(up) < g.height:
-            target = (_overlap(-up, g.height), _overlap(-right, g.width))
-            origin = (_overlap(up, g.height), _overlap(right, g.width))
-            rolled[target] = self._obstacles[origin]
-        self._obstacles = rolled
+        overlaps = abs(right) < g.width and abs(up) < g.height
+        for name, obstacles in self._obstacles.items():
+            rolled = np.zeros_like(obstacles)
+            if overlaps:
+                target = (_overlap(-up, g.height), _overlap(-right, g.width))
+                origin = (_overlap(up, g.height), _overlap(right, g.width))
+                rolled[target] = obstacles[origin]
+            self._obstacles[name] = rolled
         self.geometry = replace(g, origin_x=origin_x, origin_y=origin_y)
 
     def _observe(self, observation: Observation, transform: NDArray[np.float64]) -> None:
         source = observation.source
+        obstacles = self._obstacles[source.layer]
         points = observation.points @ transform[:3, :3].T.astype(np.float32) + transform[:3, 3].astype(np.float32)
         in_band = (points[:, 2] >= source.min_obstacle_height) & (points[:, 2] <= source.max_obstacle_height)
         points, hits = points[in_band, :2], observation.hits[in_band]
@@ -173,14 +242,15 @@ class Costmap:
         if source.clearing and len(points):
             angles = np.arctan2(offsets[:, 1], offsets[:, 0])
             profile = (np.unwrap(angles), ranges) if observation.ordered else _nearest_by_sector(angles, ranges)
-            self._clear_seen(origin, profile, source.raytrace_range)
+            self._clear_seen(obstacles, origin, profile, source.raytrace_range)
         if source.marking:
             rows, columns = self.geometry.cells(points[hits & (ranges <= source.obstacle_range)])
             inside = (rows >= 0) & (rows < self.geometry.height) & (columns >= 0) & (columns < self.geometry.width)
-            self._obstacles[rows[inside], columns[inside]] = LETHAL
+            obstacles[rows[inside], columns[inside]] = LETHAL
 
     def _clear_seen(
         self,
+        obstacles: NDArray[np.uint8],
         origin: NDArray[np.float64],
         profile: tuple[NDArray[np.floating], NDArray[np.floating]],
         reach: float,
@@ -201,35 +271,52 @@ class Costmap:
         corners[1::2, 1] = origin[1] + bound * np.sin(angles[:-1])
         corners[2::2, 0] = origin[0] + bound * np.cos(angles[1:])
         corners[2::2, 1] = origin[1] + bound * np.sin(angles[1:])
-        self._fill(corners, FREE)
+        self._fill(obstacles, corners)
 
-    def _fill(self, corners: NDArray[np.float64], cost: int) -> None:
+    def _fill(self, obstacles: NDArray[np.uint8], corners: NDArray[np.float64]) -> None:
+        """Free a polygon."""
         g = self.geometry
         scaled = (
             corners - (g.origin_x, g.origin_y)
         ) / g.resolution - 0.5  # cv2 counts from the centre of the first cell
         fixed = np.round(scaled * (1 << SUBPIXEL_BITS)).astype(np.int32)
-        cv2.fillPoly(self._obstacles, [fixed], cost, shift=SUBPIXEL_BITS)
+        cv2.fillPoly(obstacles, [fixed], FREE, shift=SUBPIXEL_BITS)
 
     def _combine(self, map_pose: Pose) -> Snapshot:
         self._place_static(map_pose)
-        if self._static_costs is None:
-            costs = self._obstacles.copy()
-        else:
-            costs = self._static_costs.copy()
-            costs[self._obstacles == LETHAL] = LETHAL
+        costs = np.zeros(self.geometry.shape, dtype=np.uint8)
+        for layer in self.parameters.layers:  # in the order of the list, as in costmap_2d
+            if not layer.enabled:
+                continue
+            if layer.name in self._static_costs:
+                static = self._static_costs[layer.name]
+                costs = _larger(costs, static) if layer.use_maximum else static.copy()
+            elif layer.name in self._obstacles:
+                costs[self._obstacles[layer.name] == LETHAL] = LETHAL
         costs, clearance = self._inflation.apply(costs)
         return Snapshot(self.geometry, costs, clearance, self._inflation.limit, self.inscribed_radius)
 
     def _place_static(self, map_pose: Pose) -> None:
-        """Resample the static map into the grid, where grid or map moved since the last time."""
-        if self._static is None or self._static_layer is None:
-            return
+        """Resample the static maps into the grid, where grid or map moved since the last time."""
         placement = (self.geometry, map_pose)
-        if self._static_costs is not None and self._static_placed == placement:
-            return
-        self._static_costs = resample(self._static, self._static_layer, self.geometry, map_pose)
-        self._static_placed = placement
+        for layer in self.parameters.layers_of("static"):
+            static = self._maps.get(layer.map_topic)
+            if static is None or (layer.name in self._static_costs and self._static_placed[layer.name] == placement):
+                continue
+            self._static_costs[layer.name] = resample(static, layer, self.geometry, map_pose)
+            self._static_placed[layer.name] = placement
+
+
+def _grid(parameters: CostmapParameters) -> tuple[float, ...]:
+    """Return what the grid's size and place follow from."""
+    p = parameters
+    return p.width, p.height, p.resolution, p.origin_x, p.origin_y
+
+
+def _larger(costs: NDArray[np.uint8], other: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the larger costs; an unknown cell takes the other cost."""
+    known = np.where(other == UNKNOWN, costs, np.maximum(costs, other))
+    return np.where(costs == UNKNOWN, other, known).astype(np.uint8)
 
 
 def _overlap(shift: int, size: int) -> slice:

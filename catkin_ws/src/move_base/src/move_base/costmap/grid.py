@@ -77,3 +77,11 @@ def occupancy_values(costs: NDArray[np.uint8]) -> NDArray[np.int8]:
     table[1:INSCRIBED] = 1 + 97 * (np.arange(1, INSCRIBED) - 1) // 251
     table[INSCRIBED], table[LETHAL], table[UNKNOWN] = 99, 100, -1
     return table[costs]
+
+
+def changed_area(old: NDArray[np.uint8], new: NDArray[np.uint8]) -> tuple[slice, slice] | None:
+    """Return rows and columns of the smallest rectangle outside of which two grids of one size are equal, or None."""
+    rows, columns = np.nonzero(old != new)
+    if not len(rows):
+        return None
+    return slice(int(rows.min()), int(rows.max()) + 1), slice(int(columns.min()), int(columns.max()) + 1)

@@ -35,6 +35,7 @@ class Inflation:
         """
         self._resolution = resolution
         self._costs = layer is not None
+        self._least_known = FREE + 1 if layer is not None and layer.inflate_unknown else INSCRIBED
         radius = layer.inflation_radius if layer is not None else 0.0
         factor = layer.cost_scaling_factor if layer is not None else 0.0
         reach = max(radius, circumscribed, inscribed) / resolution + 2.0
@@ -59,5 +60,5 @@ class Inflation:
         steps = cv2.convertScaleAbs(cells, alpha=self._scale)
         inflated = np.asarray(cv2.LUT(steps, self._table), dtype=np.uint8)
         if unknown.any():
-            inflated[unknown & (inflated < INSCRIBED)] = UNKNOWN
+            inflated[unknown & (inflated < self._least_known)] = UNKNOWN
         return inflated, clearance

@@ -119,6 +119,20 @@ def cloud_observation(message: Any, source: ObservationSource) -> Observation:
     )
 
 
+def points_observation(message: Any, source: ObservationSource) -> Observation:
+    """Convert a sensor_msgs/PointCloud; points that are not finite are dropped.
+
+    Raises:
+        SensorError: it has too many points, or no frame.
+    """
+    if len(message.points) > MAX_POINTS:
+        raise SensorError(f"the cloud has {len(message.points)} points, more than {MAX_POINTS}")
+    points = np.array([(point.x, point.y, point.z) for point in message.points], dtype=np.float32).reshape(-1, 3)
+    points = points[np.isfinite(points).all(axis=1)]
+    hits = np.ones(len(points), dtype=np.bool_)
+    return Observation(source, _frame(message, source), message.header.stamp.to_sec(), points, hits, False)
+
+
 def _frame(message: Any, source: ObservationSource) -> str:
     frame: str = (source.sensor_frame or message.header.frame_id).removeprefix("/")
     if not frame:

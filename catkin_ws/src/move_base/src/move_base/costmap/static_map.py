@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import cv2
@@ -25,6 +25,26 @@ MIN_RESOLUTION, MAX_RESOLUTION = 0.001, 10.0
 
 class MapError(ValueError):
     """A map can't be used; the message says why."""
+
+
+@dataclass(frozen=True)
+class MapPart:
+    """A part of an occupancy grid that has changed: its first column and row, and the new values (H, W)."""
+
+    column: int
+    row: int
+    occupancy: NDArray[np.int8]
+
+    @classmethod
+    def create(cls, data: Sequence[int], column: int, row: int, width: int, height: int) -> MapPart:
+        """Check the fields of a map_msgs/OccupancyGridUpdate.
+
+        Raises:
+            MapError: sizes do not fit.
+        """
+        if width <= 0 or height <= 0 or column < 0 or row < 0 or len(data) != width * height:
+            raise MapError(f"the update announces {width} x {height} cells and holds {len(data)}")
+        return cls(column, row, np.asarray(data, dtype=np.int8).reshape(height, width))
 
 
 @dataclass(frozen=True)
@@ -57,6 +77,20 @@ class StaticMap:
         occupancy = np.asarray(data, dtype=np.int8).reshape(height, width)
         return cls(Geometry(resolution, width, height, origin[0], origin[1]), origin[2], occupancy)
 
+    def updated(self, part: MapPart) -> StaticMap:
+        """Return the map with a part of it replaced.
+
+        Raises:
+            MapError: the part is not within the map.
+        """
+        height, width = part.occupancy.shape
+        rows, columns = slice(part.row, part.row + height), slice(part.column, part.column + width)
+        if rows.stop > self.geometry.height or columns.stop > self.geometry.width:
+            raise MapError("the update reaches beyond the map")
+        occupancy = self.occupancy.copy()
+        occupancy[rows, columns] = part.occupancy
+        return replace(self, occupancy=occupancy)
+
 
 def bounding_geometry(static: StaticMap) -> Geometry:
     """Return the upright grid that holds a turned map."""
@@ -73,8 +107,7 @@ def bounding_geometry(static: StaticMap) -> Geometry:
 def resample(static: StaticMap, layer: Layer, target: Geometry, map_pose: Pose) -> NDArray[np.uint8]:
     """Return the static map's costs on another grid; what the map does not cover is unknown (if tracked) or FREE."""
     outside = UNKNOWN if layer.track_unknown_space else FREE
-    costs = np.where(static.occupancy >= layer.lethal_cost_threshold, LETHAL, FREE).astype(np.uint8)
-    costs[static.occupancy < 0] = outside
+    costs = _costs(static.occupancy, layer)
     source = static.geometry
     identity = map_pose == ORIGIN and static.yaw == 0.0
     if identity and source == target:
@@ -103,3 +136,14 @@ def resample(static: StaticMap, layer: Layer, target: Geometry, map_pose: Pose) 
         ),
         dtype=np.uint8,
     )
+
+
+def _costs(occupancy: NDArray[np.int8], layer: Layer) -> NDArray[np.uint8]:
+    """Return the costs of occupancy values; they count as 0..255, as in costmap_2d, so an unknown cell is 255."""
+    values = np.arange(256)
+    table = np.where(values >= layer.lethal_cost_threshold, LETHAL, FREE)
+    if not layer.trinary_costmap:
+        scaled = values / max(layer.lethal_cost_threshold, 1) * LETHAL
+        table = np.where(values >= layer.lethal_cost_threshold, LETHAL, scaled)
+    table[layer.unknown_cost_value % 256] = UNKNOWN if layer.track_unknown_space else FREE
+    return np.asarray(table.astype(np.uint8)[occupancy.view(np.uint8)])

@@ -6,7 +6,7 @@ It also tells what keeps them from being current: a missing map or transform, a 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
 
 from robot_formulas.geometry import ORIGIN, Pose
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from move_base.costmap.sensors import Observation
-    from move_base.costmap.static_map import StaticMap
+    from move_base.costmap.static_map import MapPart, StaticMap
     from move_base.parameters.parameters import CostmapParameters, MoveBaseParameters, ObservationSource
 
 FUTURE_LIMIT = 0.5
@@ -104,10 +104,6 @@ class Area:
             return None
         return Pose.from_matrix(matrix)
 
-    def map_topic(self) -> str:
-        """Return the topic that its map comes from."""
-        return next((layer.map_topic for layer in self.parameters.layers_of("static")), "map")
-
 
 class Surroundings:
     """The global and the local costmap, and the sensors of both."""
@@ -115,8 +111,9 @@ class Surroundings:
     def __init__(self, parameters: MoveBaseParameters) -> None:
         self.global_area = Area(parameters.global_costmap)
         self.local_area = Area(parameters.local_costmap)
-        sources = [*parameters.global_costmap.sources, *parameters.local_costmap.sources]
-        self._sensors = {(source.topic, source.data_type): _Sensor(source) for source in sources}
+        sources = [*parameters.global_costmap.all_sources, *parameters.local_costmap.all_sources]
+        sources.sort(key=lambda source: source.expected_update_rate, reverse=True)  # the shortest period counts
+        self._sensors = {source.stream: _Sensor(source) for source in sources}
         self._map_frame = ""
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
@@ -126,19 +123,29 @@ class Surroundings:
 
     @property
     def sources(self) -> list[ObservationSource]:
-        """The sources to listen to, each topic once."""
+        """The sources to listen to, those that convert a topic's messages alike once."""
         return [sensor.source for sensor in self._sensors.values()]
 
-    def set_map(self, static: StaticMap, frame: str) -> None:
-        """Take the static map."""
+    def set_map(self, static: StaticMap, frame: str, topic: str = "") -> None:
+        """Take the static map of a topic; without one, it is for all static layers."""
         self._map_frame = frame.removeprefix("/")
         for area in (self.global_area, self.local_area):
-            area.costmap.set_map(static)
+            area.costmap.set_map(static, topic)
             area.snapshot = None
+
+    def update_map(self, part: MapPart, topic: str) -> None:
+        """Take a part of the static map of a topic.
+
+        Raises:
+            MapError: the part is not within the map.
+        """
+        for area in (self.global_area, self.local_area):
+            area.costmap.update_map(part, topic)
+            area.updated = -math.inf
 
     def observe(self, observation: Observation, now: float) -> str:
         """Take a measurement; return why it was ignored, or an empty text."""
-        sensor = self._sensors[(observation.source.topic, observation.source.data_type)]
+        sensor = self._sensors[observation.source.stream]
         if observation.stamp > now + FUTURE_LIMIT:
             return f"{observation.source.topic}: the stamp is more than {FUTURE_LIMIT:g} s ahead of the clock"
         if sensor.recent and observation.stamp <= sensor.recent[-1].stamp:
@@ -172,7 +179,7 @@ class Surroundings:
         """
         for area, pose in ((self.local_area, local_robot), (self.global_area, robot)):
             if area.costmap.needs_map:
-                return f"no map received on {area.map_topic()}"
+                return f"no map received on {area.costmap.missing_map()}"
             if pose is None or not area.due(now):
                 continue
             map_pose = self._map_pose(area, frames)
@@ -188,18 +195,23 @@ class Surroundings:
 
     def stale_reason(self, now: float) -> str:
         """Name the first source whose data are too old, or return an empty text."""
-        return next(filter(None, (sensor.trouble(now) for sensor in self._sensors.values())), "")
+        areas = (self.global_area, self.local_area)
+        used = {source.stream for area in areas for source in area.parameters.sources}
+        sensors = (sensor for stream, sensor in self._sensors.items() if stream in used)
+        return next(filter(None, (sensor.trouble(now) for sensor in sensors)), "")
 
     def _observations_for(self, area: Area, frames: Transformer) -> list[tuple[Observation, NDArray[np.float64]]]:
         """Return the newest unused observation of each source, with its transform."""
         observations = []
         for source in area.parameters.sources:
-            key = (source.topic, source.data_type)
-            found = self._sensors[key].newest(area.used.get(key, -math.inf), area.parameters.global_frame, frames)
+            key = (source.layer, source.name)
+            sensor = self._sensors[source.stream]
+            found = sensor.newest(area.used.get(key, -math.inf), area.parameters.global_frame, frames)
             if found is not None:
-                observations.append(found)
-                area.used[key] = found[0].stamp
-                self._sensors[key].used = max(self._sensors[key].used, found[0].stamp)
+                observation, transform = found
+                observations.append((replace(observation, source=source), transform))
+                area.used[key] = observation.stamp
+                sensor.used = max(sensor.used, observation.stamp)
         return observations
 
     def _map_pose(self, area: Area, frames: Transformer) -> Pose | None:

@@ -20,7 +20,7 @@ from move_base.control.dwa import DwaController
 from move_base.costmap.grid import LETHAL
 from move_base.costmap.surroundings import Surroundings
 from move_base.navigation.goal_memory import Work
-from move_base.navigation.result import Outcome, Result, State
+from move_base.navigation.result import Outcome, RecoveryStatus, Result, State
 from move_base.planning.followed_plan import FollowedPlan
 from move_base.planning.global_planner import Plan, PlanningError, make_plan
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from move_base.costmap.costmap import Snapshot
     from move_base.costmap.sensors import Observation
-    from move_base.costmap.static_map import StaticMap
+    from move_base.costmap.static_map import MapPart, StaticMap
     from move_base.costmap.surroundings import Transformer
     from move_base.parameters.parameters import MoveBaseParameters, ObservationSource
 
@@ -67,7 +67,7 @@ class Navigator:
 
     @property
     def sources(self) -> list[ObservationSource]:
-        """The sources to listen to, each topic once."""
+        """The sources to listen to, those that convert a topic's messages alike once."""
         return self._surroundings.sources
 
     @property
@@ -80,9 +80,17 @@ class Navigator:
         """The newest local costmap."""
         return self._local.snapshot
 
-    def set_map(self, static: StaticMap, frame: str) -> None:
-        """Take the static map."""
-        self._surroundings.set_map(static, frame)
+    def set_map(self, static: StaticMap, frame: str, topic: str = "") -> None:
+        """Take the static map of a topic; without one, it is for all static layers."""
+        self._surroundings.set_map(static, frame, topic)
+
+    def update_map(self, part: MapPart, topic: str) -> None:
+        """Take a part of the static map of a topic.
+
+        Raises:
+            MapError: the part is not within the map.
+        """
+        self._surroundings.update_map(part, topic)
 
     def observe(self, observation: Observation, now: float) -> str:
         """Take a measurement.
@@ -126,7 +134,8 @@ class Navigator:
             velocity: of the base, measured, in its own frame.
         """
         robot, local_robot = self._global.robot_pose(now, frames), self._local.robot_pose(now, frames)
-        missing = self._surroundings.update(now, frames, robot, local_robot)
+        resting = self.goal is None and self.parameters.shutdown_costmaps
+        missing = "" if resting else self._surroundings.update(now, frames, robot, local_robot)
         if self.goal is None:
             return Result(robot=robot)
         if missing or robot is None or local_robot is None:
@@ -332,7 +341,8 @@ class Navigator:
             return self._abort(robot, f"{reason} ({tried})")
         self.state = State.RECOVERING
         warning = f"Recovery {behaviour.name}: {reason}"
-        return Result(velocity=STOP, robot=robot, warning=warning, new_plan=new_plan)
+        status = RecoveryStatus(behaviour.name, self._work.recovery.tried - 1, len(p.recovery_behaviors))
+        return Result(velocity=STOP, robot=robot, warning=warning, new_plan=new_plan, recovery=status)
 
     def _recover(self, now: float, robot: Pose, local_robot: Pose) -> Result:
         recovery = self._work.recovery
@@ -344,9 +354,15 @@ class Navigator:
             if turn is not None:
                 return Result(velocity=turn.velocity, robot=robot, trajectory=turn)
         else:
-            keep = 0.5 * recovery.behaviour.reset_distance
-            self._global.costmap.clear(robot, keep)
-            self._local.costmap.clear(local_robot, keep)
+            behaviour = recovery.behaviour
+            for costmap, area, pose in (("global", self._global, robot), ("local", self._local, local_robot)):
+                if behaviour.affects(costmap):
+                    area.costmap.clear(
+                        pose,
+                        0.5 * behaviour.reset_distance,
+                        layers=behaviour.layer_names,
+                        inside=behaviour.invert_area_to_clear,
+                    )
         self.state = State.PLANNING
         self._followed = None
         self._work.planned = -math.inf

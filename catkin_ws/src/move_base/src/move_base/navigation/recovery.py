@@ -29,10 +29,11 @@ class Recovery:
 
     Attributes:
         behaviour: the present one.
+        tried: number of behaviours that have begun.
     """
 
     behaviour: RecoveryBehavior | None = None
-    _tried: int = 0
+    tried: int = 0
     _since: float = 0.0
     _where: Pose | None = None
     _turned: float = 0.0
@@ -40,10 +41,10 @@ class Recovery:
 
     def begin(self, behaviours: Sequence[RecoveryBehavior], now: float, robot: Pose) -> RecoveryBehavior | None:
         """Go on to the next behaviour and return it; return None when all were tried."""
-        if self._tried >= len(behaviours):
+        if self.tried >= len(behaviours):
             return None
-        self.behaviour = behaviours[self._tried]
-        self._tried += 1
+        self.behaviour = behaviours[self.tried]
+        self.tried += 1
         self._since, self._where = now, robot
         self._turned, self._yaw = 0.0, robot.yaw
         return self.behaviour
@@ -51,7 +52,7 @@ class Recovery:
     def follow(self, robot: Pose) -> None:
         """Restart the sequence if the robot has moved away."""
         if self._where is not None and robot.distance(self._where) > AFRESH_DISTANCE:
-            self._tried, self._where = 0, None
+            self.tried, self._where = 0, None
 
     def left_to_turn(self, now: float, robot: Pose) -> float:
         """Return what is left of a full turn, rad; 0 when it is complete or took too long."""

@@ -32,6 +32,15 @@ class Outcome(Enum):
 
 
 @dataclass(frozen=True)
+class RecoveryStatus:
+    """A recovery behaviour that begins: its name, its index in the sequence, and the length of the sequence."""
+
+    name: str
+    index: int
+    count: int
+
+
+@dataclass(frozen=True)
 class Result:
     """What one step decided.
 
@@ -44,6 +53,7 @@ class Result:
         new_plan: the plan, where a new one was taken.
         path: what the controller followed, in the local frame.
         trajectory: what it chose.
+        recovery: the recovery behaviour that begins.
     """
 
     velocity: Velocity | None = None
@@ -54,3 +64,4 @@ class Result:
     new_plan: Plan | None = None
     path: NDArray[np.float64] | None = None
     trajectory: Trajectory | None = None
+    recovery: RecoveryStatus | None = None

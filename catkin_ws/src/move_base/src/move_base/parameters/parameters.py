@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 DEFAULT_UPDATE_PERIOD = 1.0
 """Seconds after which a source without `expected_update_rate` counts as silent; costmap_2d would wait for ever."""
 
+OBSTACLE_KINDS = ("obstacle", "voxel")
+"""Kinds of layers that sensors fill."""
+
 
 @dataclass(frozen=True)
 class ObservationSource:
@@ -31,6 +34,7 @@ class ObservationSource:
         raytrace_range: rays clear up to this distance, m.
         expected_update_rate: longest time between two messages, s (a period, whatever its name says).
         inf_is_valid: whether an infinite reading of a scan is a ray that met nothing, and clears.
+        layer: name of the obstacle layer that it fills.
     """
 
     name: str
@@ -45,6 +49,12 @@ class ObservationSource:
     raytrace_range: float = 3.0
     expected_update_rate: float = DEFAULT_UPDATE_PERIOD
     inf_is_valid: bool = False
+    layer: str = ""
+
+    @property
+    def stream(self) -> tuple[str, str, str, bool, float]:
+        """Topic and type, and how its messages are converted. Sources that agree in these share one conversion."""
+        return self.topic, self.data_type, self.sensor_frame, self.inf_is_valid, self.raytrace_range
 
 
 @dataclass(frozen=True)
@@ -53,15 +63,22 @@ class Layer:
 
     Attributes:
         name: the layer's name, under which its parameters are.
-        kind: `static`, `obstacle` or `inflation`.
+        kind: `static`, `obstacle`, `voxel` (which works as `obstacle`) or `inflation`.
         enabled: whether it is used.
         map_topic: topic of the occupancy grid (static).
         track_unknown_space: whether unknown cells stay unknown; else they are free (static).
         lethal_cost_threshold: occupancy from which a cell is an obstacle, 0..100 (static).
+        unknown_cost_value: occupancy of an unknown cell (static).
+        trinary_costmap: whether a cell is free, an obstacle or unknown; else its cost grows with occupancy (static).
+        first_map_only: whether later maps are ignored (static).
+        subscribe_to_updates: whether parts of the map come on the topic `MAP_TOPIC_updates` (static).
+        use_maximum: whether a larger cost of a layer listed before is kept (static).
         sources: sensors (obstacle).
-        footprint_clearing: whether the robot's own area is cleared (obstacle).
+        footprint_clearing_enabled: whether the robot's own area is cleared (obstacle).
+        max_obstacle_height: m; limits that of each source (obstacle).
         inflation_radius: m (inflation).
         cost_scaling_factor: 1/m, decay of the cost beyond the inscribed radius (inflation).
+        inflate_unknown: whether every cost replaces that of an unknown cell (inflation).
     """
 
     name: str
@@ -70,15 +87,25 @@ class Layer:
     map_topic: str = "map"
     track_unknown_space: bool = True
     lethal_cost_threshold: int = 100
+    unknown_cost_value: int = -1
+    trinary_costmap: bool = True
+    first_map_only: bool = False
+    subscribe_to_updates: bool = False
+    use_maximum: bool = False
     sources: tuple[ObservationSource, ...] = ()
-    footprint_clearing: bool = True
+    footprint_clearing_enabled: bool = True
+    max_obstacle_height: float = 2.0
     inflation_radius: float = 0.55
     cost_scaling_factor: float = 10.0
+    inflate_unknown: bool = False
 
 
 @dataclass(frozen=True)
 class CostmapParameters:
-    """Parameters of `global_costmap` or `local_costmap`; lengths in metres, frequencies in Hz."""
+    """Parameters of `global_costmap` or `local_costmap`; lengths in metres, frequencies in Hz.
+
+    `footprint_topic` is empty unless it is given; `robot_radius` is used where no footprint is given.
+    """
 
     global_frame: str
     robot_base_frame: str
@@ -92,17 +119,26 @@ class CostmapParameters:
     origin_x: float
     origin_y: float
     footprint: tuple[tuple[float, float], ...]
+    robot_radius: float
     footprint_padding: float
+    always_send_full_costmap: bool
+    footprint_topic: str
+    published_footprint: str
     layers: tuple[Layer, ...]
 
-    def layers_of(self, kind: str) -> tuple[Layer, ...]:
-        """Return the layers of a kind that are enabled."""
-        return tuple(layer for layer in self.layers if layer.kind == kind and layer.enabled)
+    def layers_of(self, *kinds: str) -> tuple[Layer, ...]:
+        """Return the layers of these kinds that are enabled."""
+        return tuple(layer for layer in self.layers if layer.kind in kinds and layer.enabled)
 
     @property
     def sources(self) -> tuple[ObservationSource, ...]:
-        """All observation sources of the costmap's layers."""
-        return tuple(source for layer in self.layers_of("obstacle") for source in layer.sources)
+        """The observation sources of the layers that are enabled."""
+        return tuple(source for layer in self.layers_of(*OBSTACLE_KINDS) for source in layer.sources)
+
+    @property
+    def all_sources(self) -> tuple[ObservationSource, ...]:
+        """The observation sources of all layers: a layer that is not enabled may be enabled later."""
+        return tuple(source for layer in self.layers for source in layer.sources)
 
     def padded_footprint(self) -> NDArray[np.float64]:
         """Return the padded footprint's corners (N, 2) in the base frame; each coordinate grows by the padding."""
@@ -112,8 +148,12 @@ class CostmapParameters:
 
 @dataclass(frozen=True)
 class ControllerParameters:
-    """Parameters of `TrajectoryPlannerROS`; metres, radians, seconds."""
+    """Parameters of the local planner; metres, radians, seconds.
 
+    `name` is the local planner's name without its package: its namespace for parameters and topics.
+    """
+
+    name: str
     odom_topic: str
     acc_lim_x: float
     acc_lim_y: float
@@ -147,11 +187,21 @@ class RecoveryBehavior:
         name: as warnings tell it.
         kind: `clear` or `rotate`.
         reset_distance: side of the square around the robot in which obstacles are kept, m (clear).
+        invert_area_to_clear: whether obstacles are cleared inside of the square, not outside of it (clear).
+        affected_maps: `global`, `local` or `both` (clear).
+        layer_names: names of the layers that are cleared (clear).
     """
 
     name: str
     kind: str
     reset_distance: float = 0.0
+    invert_area_to_clear: bool = False
+    affected_maps: str = "both"
+    layer_names: tuple[str, ...] = ("obstacles",)
+
+    def affects(self, costmap: str) -> bool:
+        """Return whether it clears layers of a costmap, `global` or `local`."""
+        return self.kind == "clear" and self.affected_maps in {costmap, "both"}
 
 
 @dataclass(frozen=True)
@@ -159,7 +209,7 @@ class MoveBaseParameters:
     """All parameters of move_base; frequencies in Hz, times in s, lengths in m.
 
     `max_planning_retries` is -1 where only `planner_patience` limits them; `default_tolerance` is how far a plan may
-    end from a blocked goal.
+    end from a blocked goal; `notes` say which parameters were taken in a way that may surprise.
     """
 
     controller_frequency: float
@@ -172,9 +222,24 @@ class MoveBaseParameters:
     conservative_reset_dist: float
     recovery_behavior_enabled: bool
     clearing_rotation_allowed: bool
+    shutdown_costmaps: bool
+    make_plan_add_unreachable_goal: bool
+    base_global_planner: str
+    base_local_planner: str
     recovery_behaviors: tuple[RecoveryBehavior, ...]
     allow_unknown: bool
     default_tolerance: float
     controller: ControllerParameters
     global_costmap: CostmapParameters
     local_costmap: CostmapParameters
+    notes: tuple[str, ...] = ()
+
+    @property
+    def global_planner(self) -> str:
+        """The global planner's name without its package: its namespace for parameters and topics."""
+        return plugin_name(self.base_global_planner)
+
+
+def plugin_name(kind: str) -> str:
+    """Return the name of a plug-in without its package, which is its namespace."""
+    return kind.replace("::", "/").rpartition("/")[2]

@@ -5,12 +5,14 @@ The servers and the names of their parameters are those of ROS Navigation; the d
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from node_kit.parameters import ParameterError
+
+from move_base.parameters.layout import with_layers
 from move_base.parameters.reader import read_parameters
 
 if TYPE_CHECKING:
@@ -30,17 +32,27 @@ class ServerDescription:
     definition: str
 
 
+OF_LAYERS = {
+    "static": "GenericPlugin",
+    "obstacle": "ObstaclePlugin",
+    "voxel": "VoxelPlugin",
+    "inflation": "InflationPlugin",
+}
+"""Definitions of the layers' servers, by kind."""
+
+OF_LOCAL_PLANNERS = {"TrajectoryPlannerROS": "BaseLocalPlanner", "DWAPlannerROS": "DWAPlanner"}
+"""Definitions of the local planners' servers, by name."""
+
+
 def servers(parameters: MoveBaseParameters) -> list[ServerDescription]:
     """Return the servers that a node with these parameters offers."""
-    found = [ServerDescription("", "MoveBase"), ServerDescription("TrajectoryPlannerROS", "BaseLocalPlanner")]
+    controller = parameters.controller.name
+    found = [ServerDescription("", "MoveBase"), ServerDescription(controller, OF_LOCAL_PLANNERS[controller])]
     costmaps = {"global_costmap": parameters.global_costmap, "local_costmap": parameters.local_costmap}
     for name, costmap in costmaps.items():
         found.append(ServerDescription(name, "Costmap2D"))
-        found += [
-            ServerDescription(f"{name}/{layer.name}", "InflationPlugin")
-            for layer in costmap.layers  # also those that are switched off: they can be switched on
-            if layer.kind == "inflation"
-        ]
+        # Layers that are switched off have one, too: they can be switched on.
+        found += [ServerDescription(f"{name}/{layer.name}", OF_LAYERS[layer.kind]) for layer in costmap.layers]
     return found
 
 
@@ -50,13 +62,19 @@ def present_values(
     """Return the present values of a server's parameters, without infinite values."""
     name, _, layer = server.namespace.partition("/")
     source: object = parameters
-    if name == "TrajectoryPlannerROS":
+    if server.definition == "DWAPlanner":
+        source = None  # the controller's parameters have other names and units
+    elif name == parameters.controller.name:
         source = parameters.controller
     elif name:
         costmap: CostmapParameters = getattr(parameters, name)
         source = next((one for one in costmap.layers if one.name == layer), None) if layer else costmap
-    given = _level(tree, server.namespace)
+    given = _level(with_layers(tree), server.namespace)
     values = {key: getattr(source, key, given.get(key)) for key in names}
+    if "y_vels" in values:
+        values["y_vels"] = _text(given.get("y_vels", values["y_vels"]))
+    if "footprint" in values:
+        values["footprint"] = _text(given.get("footprint", tree.get("footprint", "[]")))
     return {key: value for key, value in values.items() if value is not None and not _is_infinite(value)}
 
 
@@ -68,9 +86,15 @@ def changed(
     Raises:
         ParameterError: the values do not fit, alone or with the others.
     """
-    new = copy.deepcopy(dict(tree))
+    for name in _FIXED & values.keys():
+        raise ParameterError(f"{name} can't change while move_base runs: set it in the launch file and start again")
+    new = with_layers(tree)
     _level(new, namespace).update(values)
     return new, read_parameters(new)
+
+
+_FIXED = {"base_global_planner", "base_local_planner"}
+"""Parameters that only a new start changes: topics and servers have the planners' names."""
 
 
 def _level(tree: Any, namespace: str) -> Any:
@@ -81,3 +105,10 @@ def _level(tree: Any, namespace: str) -> Any:
 
 def _is_infinite(value: object) -> bool:
     return isinstance(value, float) and math.isinf(value)
+
+
+def _text(value: object) -> str | None:
+    """Return a list of numbers, or of lists of them, as dynamic_reconfigure sends it: as a text."""
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(str(_text(item)) for item in value)}]"
+    return None if value is None else str(value)

@@ -12,7 +12,13 @@ import genpy
 import rospy
 from actionlib.goal_id_generator import GoalIDGenerator
 from geometry_msgs.msg import PoseStamped
-from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseFeedback, MoveBaseResult
+from move_base_msgs.msg import (
+    MoveBaseAction,
+    MoveBaseActionGoal,
+    MoveBaseFeedback,
+    MoveBaseResult,
+    RecoveryStatus,
+)
 from node_kit.io.inbox import Inbox
 from robot_formulas.geometry import Pose
 
@@ -25,6 +31,7 @@ if TYPE_CHECKING:
 
     from actionlib.server_goal_handle import ServerGoalHandle
 
+    from move_base.navigation import result as recovery
     from move_base.ros.frames import TfTransformer
 
 ACTION = "move_base"
@@ -82,6 +89,7 @@ class GoalServer:
         self._waiting: tuple[ServerGoalHandle, float] | None = None
         self._fed_back = -math.inf
         self._sent_on = rospy.Publisher(f"{ACTION}/goal", MoveBaseActionGoal, queue_size=5)
+        self._recovery = rospy.Publisher(f"{ACTION}/recovery_status", RecoveryStatus, queue_size=1)
         self._current_goal = rospy.Publisher("~current_goal", PoseStamped, queue_size=1)
         self._server = _TakingOverActionServer(
             ACTION, MoveBaseAction, goal_cb=self._on_goal, cancel_cb=self._on_cancel, resumed=resumed
@@ -104,6 +112,15 @@ class GoalServer:
             self._fed_back = now
             pose = pose_stamped(robot, self._global_frame, rospy.Time.now())
             self._active.publish_feedback(MoveBaseFeedback(base_position=pose))
+
+    def tell_recovery(self, begun: recovery.RecoveryStatus, robot: Pose) -> None:
+        """Publish that a recovery behaviour begins."""
+        status = RecoveryStatus()
+        status.pose_stamped = pose_stamped(robot, self._global_frame, rospy.Time.now())
+        status.current_recovery_number = begun.index
+        status.total_number_of_recoveries = begun.count
+        status.recovery_behavior_name = begun.name
+        self._recovery.publish(status)
 
     def finish(self, outcome: Outcome, text: str) -> None:
         """Tell the active goal's client how it ended."""

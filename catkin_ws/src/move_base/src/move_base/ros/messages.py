@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from geometry_msgs.msg import Point32, PolygonStamped, PoseStamped, Quaternion, Twist
+from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid, Path
 from robot_formulas.geometry import quaternion_of, transform_of
 
@@ -92,3 +93,17 @@ def occupancy_grid(snapshot: Snapshot, frame: str, stamp: genpy.Time) -> Occupan
     grid.info.origin.orientation.w = 1.0
     grid.data = occupancy_values(snapshot.costs).ravel().tolist()
     return grid
+
+
+def occupancy_update(
+    snapshot: Snapshot, area: tuple[slice, slice], frame: str, stamp: genpy.Time
+) -> OccupancyGridUpdate:
+    """Return a part of a costmap, rows and columns, with the values that costmap_2d publishes."""
+    rows, columns = area
+    update = OccupancyGridUpdate()
+    update.header.stamp = stamp
+    update.header.frame_id = frame
+    update.x, update.y = columns.start, rows.start
+    update.width, update.height = columns.stop - columns.start, rows.stop - rows.start
+    update.data = occupancy_values(snapshot.costs[area]).ravel().tolist()
+    return update

@@ -10,26 +10,28 @@ from typing import TYPE_CHECKING, Any
 
 import cv2
 import rospy
-from geometry_msgs.msg import PoseStamped, Twist
+from geometry_msgs.msg import Polygon, PoseStamped, Twist
+from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.srv import GetPlan, GetPlanResponse
 from node_kit.parameters import ParameterError
 from node_kit.ros.lifetime import Lifetime
 from robot_formulas.geometry import STOP, Pose, Velocity
 from rospy.numpy_msg import numpy_msg
-from sensor_msgs.msg import LaserScan, PointCloud2
+from sensor_msgs.msg import LaserScan, PointCloud, PointCloud2
 from std_srvs.srv import Empty, EmptyResponse
 
-from move_base.costmap.sensors import SensorError, cloud_observation, scan_observation
-from move_base.costmap.static_map import MapError, StaticMap
+from move_base.costmap.sensors import SensorError, cloud_observation, points_observation, scan_observation
+from move_base.costmap.static_map import MapError, MapPart, StaticMap
 from move_base.navigation.navigator import Navigator
+from move_base.parameters.layout import sought_above
 from move_base.parameters.reader import read_parameters
 from move_base.parameters.reconfiguration import changed, present_values, servers
 from move_base.planning.global_planner import PlanningError
-from move_base.ros.display import CostmapDisplay, PathDisplay
+from move_base.ros.display import CostmapDisplay, PathDisplay, in_costmap
 from move_base.ros.frames import TfTransformer
 from move_base.ros.goals import GoalServer, resumed_goal
-from move_base.ros.messages import goal_problem, matrix_of, path_of, twist_of
+from move_base.ros.messages import goal_problem, matrix_of, path_of, pose_stamped, twist_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -41,6 +43,12 @@ if TYPE_CHECKING:
 
 WARN_PERIOD = 5.0
 """The same warning is repeated no sooner than this, s."""
+
+ENDS_AT_GOAL = 1e-3
+"""A plan whose end is nearer to the goal than this ends there, m."""
+
+_KINDS = {"LaserScan": numpy_msg(LaserScan), "PointCloud": PointCloud, "PointCloud2": PointCloud2}
+_CONVERSIONS = {"LaserScan": scan_observation, "PointCloud": points_observation, "PointCloud2": cloud_observation}
 
 
 class MoveBaseNode:
@@ -62,7 +70,7 @@ class MoveBaseNode:
         self._goals = GoalServer(
             self._frames, parameters.global_costmap.global_frame, self._begin_goal, self._cancel_goal, resumed
         )
-        self._path_display = PathDisplay(parameters.global_costmap.global_frame, parameters.local_costmap.global_frame)
+        self._path_display = PathDisplay(parameters)
         self._displays = [
             CostmapDisplay("global_costmap", parameters.global_costmap),
             CostmapDisplay("local_costmap", parameters.local_costmap),
@@ -70,7 +78,8 @@ class MoveBaseNode:
         rospy.on_shutdown(self._stop_base)
         self._subscribe()
         self._goals.start()
-        rospy.Service("~make_plan", GetPlan, self._on_make_plan)
+        for name in ("~make_plan", f"~{parameters.global_planner}/make_plan"):
+            rospy.Service(name, GetPlan, self._on_make_plan)
         rospy.Service("~clear_costmaps", Empty, self._on_clear_costmaps)
         # Beside the control loop: the first command must not wait for a score of registrations.
         threading.Thread(target=self._offer_reconfiguration, daemon=True).start()
@@ -104,6 +113,8 @@ class MoveBaseNode:
         if result.warning:
             rospy.logwarn_throttle_identical(WARN_PERIOD, result.warning)
         self._path_display.publish(result)
+        if result.recovery is not None and result.robot is not None:
+            self._goals.tell_recovery(result.recovery, result.robot)
         if result.outcome is not None:
             self._goals.finish(result.outcome, result.text)
         elif result.robot is not None:
@@ -152,18 +163,25 @@ class MoveBaseNode:
         controller = self._parameters.controller
         rospy.Subscriber(controller.odom_topic, Odometry, self._on_odometry, queue_size=1)
         for source in self._navigator.sources:
-            kind = numpy_msg(LaserScan) if source.data_type == "LaserScan" else PointCloud2
             # buff_size: a cloud must fit in it, or rospy falls behind
             callback = functools.partial(self._on_sensor, source)
-            rospy.Subscriber(source.topic, kind, callback, queue_size=2, buff_size=1 << 22)
-        costmaps = (self._parameters.global_costmap, self._parameters.local_costmap)
-        for topic in {layer.map_topic for costmap in costmaps for layer in costmap.layers_of("static")}:
-            rospy.Subscriber(topic, numpy_msg(OccupancyGrid), self._on_map, queue_size=1)
+            rospy.Subscriber(source.topic, _KINDS[source.data_type], callback, queue_size=2, buff_size=1 << 22)
+        costmaps = {"global_costmap": self._parameters.global_costmap, "local_costmap": self._parameters.local_costmap}
+        static = [layer for costmap in costmaps.values() for layer in costmap.layers if layer.kind == "static"]
+        for topic in {layer.map_topic for layer in static}:
+            callback = functools.partial(self._on_map, topic)
+            rospy.Subscriber(topic, numpy_msg(OccupancyGrid), callback, queue_size=1)
+        for topic in {layer.map_topic for layer in static if layer.subscribe_to_updates}:
+            callback = functools.partial(self._on_map_update, topic)
+            rospy.Subscriber(f"{topic}_updates", numpy_msg(OccupancyGridUpdate), callback, queue_size=10)
+        for name, costmap in costmaps.items():
+            if costmap.footprint_topic:
+                topic = in_costmap(name, costmap.footprint_topic)
+                rospy.Subscriber(topic, Polygon, functools.partial(self._on_footprint, name), queue_size=1)
 
     def _on_sensor(self, source: ObservationSource, message: Any) -> None:
-        convert = scan_observation if source.data_type == "LaserScan" else cloud_observation
         try:
-            observation = convert(message, source)
+            observation = _CONVERSIONS[source.data_type](message, source)
         except SensorError as error:
             rospy.logwarn_throttle_identical(WARN_PERIOD, f"{source.topic}: message ignored: {error}")
             return
@@ -180,7 +198,12 @@ class MoveBaseNode:
         else:
             rospy.logwarn_throttle(WARN_PERIOD, "Odometry ignored: its velocity is not finite")
 
-    def _on_map(self, message: OccupancyGrid) -> None:
+    def _on_footprint(self, costmap: str, message: Polygon) -> None:
+        problem = self._reconfigure(costmap, {"footprint": [[point.x, point.y] for point in message.points]})
+        if problem:
+            rospy.logwarn_throttle_identical(WARN_PERIOD, f"Footprint ignored: {problem}")
+
+    def _on_map(self, topic: str, message: OccupancyGrid) -> None:
         info = message.info
         yaw = Pose.from_matrix(matrix_of(info.origin.position, info.origin.orientation)).yaw
         origin = (info.origin.position.x, info.origin.position.y, yaw)
@@ -190,7 +213,15 @@ class MoveBaseNode:
             rospy.logwarn_throttle_identical(WARN_PERIOD, f"Map ignored: {error}")
             return
         with self._lock:
-            self._navigator.set_map(static, message.header.frame_id)
+            self._navigator.set_map(static, message.header.frame_id, topic)
+
+    def _on_map_update(self, topic: str, message: OccupancyGridUpdate) -> None:
+        try:
+            part = MapPart.create(message.data, message.x, message.y, message.width, message.height)
+            with self._lock:
+                self._navigator.update_map(part, topic)
+        except MapError as error:
+            rospy.logwarn_throttle_identical(WARN_PERIOD, f"{topic}_updates: update ignored: {error}")
 
     def _on_make_plan(self, request: Any) -> GetPlanResponse:
         response = GetPlanResponse()
@@ -208,6 +239,8 @@ class MoveBaseNode:
             rospy.logwarn("make_plan: %s", error)
             return response
         response.plan.poses = path_of(plan.points, plan.headings(), frame, response.plan.header.stamp).poses
+        if self._parameters.make_plan_add_unreachable_goal and plan.goal.distance(goal) > ENDS_AT_GOAL:
+            response.plan.poses.append(pose_stamped(goal, frame, response.plan.header.stamp))
         return response
 
     def _on_clear_costmaps(self, _request: Any) -> EmptyResponse:
@@ -264,5 +297,11 @@ def main() -> None:
         cv2.setNumThreads(1)  # the grids are small: threads cost more than they give
         tree = rospy.get_param("~", {})
         tree = tree if isinstance(tree, dict) else {}
+        for name in sought_above(tree):
+            above = rospy.search_param(name)
+            if above:
+                tree[name] = rospy.get_param(above)
         parameters = read_parameters(tree)
+        for note in parameters.notes:
+            rospy.logwarn("%s", note)
         MoveBaseNode(parameters, tree, resumed_goal(tree.pop("resume_goal", None))).run()

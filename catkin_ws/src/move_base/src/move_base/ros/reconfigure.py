@@ -40,6 +40,7 @@ class _Server(Server):
         self._present = present
         self._take = take
         self._written: dict[str, Any] = {}
+        self._first: dict[str, Any] = {}  # the values of the start
         definition = importlib.import_module(f"move_base.cfg.{description.definition}Config")
         self._names = [str(name) for name in definition.defaults]
         super().__init__(definition, self._on_change, description.namespace)
@@ -57,7 +58,10 @@ class _Server(Server):
     def _on_change(self, config: Any, level: int) -> Any:
         if level == -1:  # the first call tells what there is
             self._written = {name: config[name] for name in self._names}
+            self._first = dict(self._written)
             return config
+        if config.get("restore_defaults"):
+            config.update(self._first)
         values = {name: config[name] for name in self._names if config[name] != self._written.get(name)}
         problem = self._take(self._description.namespace, values) if values else ""
         if problem:

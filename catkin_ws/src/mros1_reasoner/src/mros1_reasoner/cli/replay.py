@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import click
-import yaml
 from metacontrol_bags.decision import Decision
 from metacontrol_msgs.msg import FunctionGrounding
 from node_kit.parameters import ParameterError
+from node_kit.yaml_text import YamlError, parse_yaml
 from rich.console import Console
 from rich.table import Table
 
@@ -147,9 +147,9 @@ def _assignments(texts: Sequence[str]) -> list[tuple[str, Any]]:
         if not is_given or not name:
             raise ValueError(f"{text!r}: expected NAME=VALUE")
         try:
-            found.append((name, yaml.safe_load(value)))
-        except yaml.YAMLError as error:
-            raise ValueError(f"{text!r}: the value is no YAML") from error
+            found.append((name, parse_yaml(value)))
+        except YamlError as error:
+            raise ValueError(f"{text!r}: the value is no YAML: {error.problem}") from error
     return found
 
 

@@ -7,12 +7,17 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from node_kit.io.input_files import InputFileError, is_file, read_bytes, real_path
+
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.loading import renamed, without_concluding_rules
 from mros1_reasoner.knowledge.model import Analysis, Direction, Facts
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError, read_model
 from mros1_reasoner.knowledge.triples import Triple, TripleError, iri_of, local_name, parse_owl
+
+MAX_SIZE = 200_000_000
+"""Bytes of the largest ontology that is read; one of 1,000 designs has 3 million."""
 
 _log = logging.getLogger(__name__)
 
@@ -37,7 +42,7 @@ def read_knowledge_base(
     if not models:
         raise KnowledgeBaseError("no application model is given: set model_file to an OWL file")
     own = own_ontologies()
-    others = [path for path in vocabularies if path.resolve() not in {file.resolve() for file in own}]
+    others = [path for path in vocabularies if real_path(path) not in {real_path(file) for file in own}]
     triples, files = _read_ontologies(own, [*others, *models])
     return KnowledgeBase(read_model(triples, ", ".join(str(path) for path in models), directions), files)
 
@@ -81,11 +86,11 @@ def read_triples(path: Path) -> list[Triple]:
         KnowledgeBaseError: the file is missing, unreadable, or not OWL; one line with the file and the reason.
     """
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise KnowledgeBaseError(f"{path}: {error.strerror or error}: check the path") from error
+        data = read_bytes(path, MAX_SIZE)
+    except InputFileError as error:
+        raise KnowledgeBaseError(str(error)) from error
     try:
-        return parse_owl(data, path.resolve().as_uri())
+        return parse_owl(data, real_path(path).as_uri())
     except TripleError as error:
         raise KnowledgeBaseError(f"{path}: {error}") from error
 
@@ -119,9 +124,9 @@ def _read_ontologies(own: Sequence[Path], others: Sequence[Path]) -> tuple[list[
             known.add(iri)
             continue
         path, ours = queue.pop(0)
-        if path.resolve() in read:
+        if real_path(path) in read:
             continue
-        read[path.resolve()] = path
+        read[real_path(path)] = path
         content = read_triples(path)
         known |= {
             iri_of(s).rstrip("#/") for s, p, o in content if iri_of(p) == v.RDF_TYPE and iri_of(o) == v.OWL_ONTOLOGY
@@ -135,16 +140,16 @@ def _read_ontologies(own: Sequence[Path], others: Sequence[Path]) -> tuple[list[
 def _find_import(iri: str, importer: Path) -> Path | None:
     """Return the file beside the importing one whose name is the last part of the IRI, else the IRI itself."""
     name = local_name(iri)
-    folder = importer.resolve().parent
+    folder = real_path(importer).parent
     for file_name in (name, f"{name}.owl", f"{name}.rdf"):
         path = folder / file_name
-        if file_name and path.is_file() and path.parent == folder:
+        if file_name and is_file(path) and path.parent == folder:
             return path
     bears = re.compile(rf"Ontology[^>]*\b(?:about|ontologyIRI)=[\"']{re.escape(iri)}[#/]?[\"']".encode())
     for path in sorted([*folder.glob("*.owl"), *folder.glob("*.rdf")]):
         try:
-            if bears.search(path.read_bytes()):
+            if bears.search(read_bytes(path, MAX_SIZE)):
                 return path
-        except OSError:
+        except InputFileError:
             continue
     return None

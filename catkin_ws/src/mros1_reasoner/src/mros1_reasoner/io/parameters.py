@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import rospkg
-from node_kit.parameters import ParameterError, ParameterTree
+from node_kit.parameters import ParameterError, ParameterTree, named_entries
 from ros_model.io.files import resolve
 
 from mros1_reasoner.io.ontology_files import read_knowledge_base
@@ -69,7 +69,7 @@ class Parameters:
         """Component by node, from `~components`: {component: {node: name}}."""
         return {
             str(entry["node"]).strip("/"): str(component)
-            for component, entry in self._tree.mapping("components", "component -> {node: name}").items()
+            for component, entry in named_entries(self._tree.mapping("components", "component -> {node: name}"))
             if isinstance(entry, dict) and entry.get("node")
         }
 
@@ -101,9 +101,9 @@ class Parameters:
             KnowledgeBaseError, ModelError: a file can't be used.
         """
         directions = {}
-        for quality, direction in self._tree.mapping("qa_direction", "QA -> direction").items():
+        for quality, direction in _leaves(self._tree.mapping("qa_direction", "QA -> direction")):
             try:
-                directions[str(quality)] = Direction(direction)
+                directions[quality] = Direction(direction)
             except ValueError as error:
                 known = " or ".join(d.value for d in Direction)
                 raise ParameterError(f"parameter ~qa_direction/{quality} is {direction!r}: expected {known}") from error
@@ -115,20 +115,22 @@ class Parameters:
         objectives = knowledge_base.objectives
         if not objectives:
             required = {function for design in knowledge_base.designs.values() for function in design.requires}
+            given = ParameterTree(dict(_leaves(self._tree.mapping("default_nfrs", "QA -> limit"))), "~default_nfrs")
+            defaults = {quality: given.number(quality, 0.0) for quality in sorted(given.values)}
+            known = {quality: limit for quality, limit in defaults.items() if quality in knowledge_base.qualities}
             objectives = tuple(
-                Objective(f"o_{function.removeprefix('f_')}A", function)
+                Objective(f"o_{function.removeprefix('f_')}A", function, known)
                 for function in knowledge_base.functions
                 if function not in required
             )
         limits = {}
-        for name in sorted(self.values):
+        nfrs = ParameterTree(dict(_leaves({k: v for k, v in self.values.items() if k.startswith(_NFR)})))
+        for name in sorted(nfrs.values):
             quality = name.removeprefix(_NFR)
-            if quality == name:
-                continue
             if quality not in knowledge_base.qualities:
                 _log.warning("parameter ~%s: Unsupported QA TYPE received: %s: left out", name, quality)
                 continue
-            limits[quality] = self._tree.number(name, 0.0)
+            limits[quality] = nfrs.number(name, 0.0)
         return tuple(replace(o, limits={**o.limits, **limits}) for o in objectives)
 
     def settings(self, knowledge_base: KnowledgeBase) -> Settings:
@@ -157,3 +159,12 @@ class Parameters:
     def _files(self, name: str) -> list[Path]:
         """Return the files that a parameter names: one, several separated by commas, or a list."""
         return [resolve(path.strip()) for path in self._tree.texts(name) if path.strip()]
+
+
+def _leaves(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield name and value of each parameter: the server makes levels of the slashes in a quality's name."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{above}{key}/")
+        else:
+            yield f"{above}{key}", value

@@ -8,10 +8,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import yaml
-from metacontrol_bags import messages
+from metacontrol_bags import messages, ownership
+from metacontrol_bags.bag import publisher_of
 from metacontrol_bags.decision import Decision
 from metacontrol_bags.typestore import typestore
+from node_kit.io.input_files import is_file
+from node_kit.yaml_text import YamlError, parse_yaml
+from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.typesys import TypesysError
 
@@ -22,7 +25,6 @@ from mros1_reasoner.replay.recording import Recording, RecordingError, Run, Stat
 _JOURNAL = "mros1_reasoner/journal"
 _DECISION = "mros1_reasoner/decision"
 _ACTIVE = "rosgraph_manipulator/active_configuration"
-_DIAGNOSTICS = "/diagnostics"
 _UNREADABLE = (ReaderError, TypesysError, AttributeError, IndexError, UnicodeDecodeError)
 
 
@@ -52,10 +54,14 @@ def read_recording(path: Path, namespace: str | None = None) -> Recording:
         journal = _topic(path, reader, _JOURNAL, namespace)
         decision = _topic(path, reader, _DECISION, namespace)
         active = _topic(path, reader, _ACTIVE, namespace)
-        raw = [] if journal else [active, _DIAGNOSTICS]
+        robot = "/" if namespace is None else namespace
+        for topic, name in ((decision, _DECISION), (active, _ACTIVE)):
+            robot = topic.removesuffix(name) if topic and namespace is None else robot
+        raw = [] if journal else [active, ownership.TOPIC]
         recording.start = reader.start_time * 1e-9
         wanted = [topic for topic in (journal, decision, *raw) if topic]
-        for topic, now, message in _messages(path, reader, wanted):
+        for connection, now, message in _messages(path, reader, wanted):
+            topic = connection.topic
             if topic == journal:
                 _add_journal(path, recording, message)
             elif topic == decision:
@@ -63,8 +69,8 @@ def read_recording(path: Path, namespace: str | None = None) -> Recording:
             elif topic == active:
                 recording.active += [(now, ActiveFact(f.function, f.configuration, f.state)) for f in message.functions]
             else:
-                statuses = Statuses(now, messages.seconds(message.header.stamp), tuple(message.status))
-                recording.diagnostics.append(statuses)
+                own = ownership.own(message.status, robot, publisher_of(connection))
+                recording.diagnostics.append(Statuses(now, messages.seconds(message.header.stamp), tuple(own)))
     return recording
 
 
@@ -76,8 +82,8 @@ def _add_journal(path: Path, recording: Recording, message: Any) -> None:
     run = runs[-1]
     if message.parameters and not run.parameters:
         try:
-            parameters = yaml.safe_load(message.parameters)
-        except yaml.YAMLError as error:
+            parameters = parse_yaml(message.parameters)
+        except YamlError as error:
             raise RecordingError(f"{path}: the reasoner's parameters are no YAML: {error}") from error
         run.parameters = parameters if isinstance(parameters, dict) else {}
         run.files = dict(zip(message.files, message.contents, strict=False))
@@ -91,7 +97,7 @@ def _add_journal(path: Path, recording: Recording, message: Any) -> None:
 @contextmanager
 def _open(path: Path) -> Iterator[Reader]:
     """Open a bag; any error becomes a RecordingError."""
-    if not path.is_file():
+    if not is_file(path):
         raise RecordingError(f"{path}: no such bag")
     try:
         with Reader(path) as reader:
@@ -112,8 +118,8 @@ def _topic(path: Path, reader: Reader, name: str, namespace: str | None) -> str:
     return found[0] if found else ""
 
 
-def _messages(path: Path, reader: Reader, topics: Collection[str]) -> Iterator[tuple[str, float, Any]]:
-    """Yield topic, time of recording and message, in the order of recording."""
+def _messages(path: Path, reader: Reader, topics: Collection[str]) -> Iterator[tuple[Connection, float, Any]]:
+    """Yield connection, time of recording and message, in the order of recording."""
     connections = [connection for connection in reader.connections if connection.topic in topics]
     if not connections:
         return
@@ -123,4 +129,4 @@ def _messages(path: Path, reader: Reader, topics: Collection[str]) -> Iterator[t
             message = store.deserialize_ros1(data, connection.msgtype)
         except (ValueError, struct.error, AssertionError) as error:
             raise RecordingError(f"{path}: a message on {connection.topic} does not fit its definition") from error
-        yield connection.topic, nanoseconds * 1e-9, message
+        yield connection, nanoseconds * 1e-9, message

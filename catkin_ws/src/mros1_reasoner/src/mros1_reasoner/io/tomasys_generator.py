@@ -5,10 +5,11 @@ from __future__ import annotations
 from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 from ros_model.file_names import safe_file_name
 from ros_model.generators import write_file
+from ros_model.project.corrections import correction_groups
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Direction
@@ -60,10 +61,16 @@ def application_model(project: Project, iri: str) -> str:
             numbers["qa_min"], numbers["qa_max"] = entry["range"]
         reaching = {"qa_reaching_violates": True} if entry.get("reaching_violates") else {}
         parts.append(_individual("QualityAttributeType", quality, {}, numbers, reaching))
-    required = project.required_components()
-    for component in sorted(set(settings["components"]) | {name for names in required.values() for name in names}):
-        designs = [variant.name for variant in project.variants if component in required[variant.name]]
-        parts.append(_individual("Component", component, {"mros:requiredBy": designs}))
+    nodes = _own_nodes(project)
+    required = {name: names - nodes[name] for name, names in project.required_components().items()}
+    components = {name for names in (*required.values(), *nodes.values()) for name in names}
+    for component in sorted(components | set(settings["components"])):
+        of_designs = {
+            f"mros:{link}": [variant.name for variant in project.variants if component in names[variant.name]]
+            for link, names in (("requiredBy", required), ("deployedBy", nodes))
+        }
+        parts.append(_individual("Component", component, of_designs))
+    groups = correction_groups(project)
     for variant in project.variants:
         function = project.function_of(variant.name)
         levels = {q: level for q, level in variant.expected_qas.items() if q in settings["quality_attributes"]}
@@ -73,7 +80,7 @@ def application_model(project: Project, iri: str) -> str:
             "tomasys:hasQAestimation": [f"{variant.name}_{quality}" for quality in levels],
         }
         parts.append(_individual("FunctionDesign", variant.name, links))
-        parts += _levels(variant.name, levels)
+        parts += _levels(variant.name, levels, {quality: names[variant.name] for quality, names in groups.items()})
     for name, objective in settings["objectives"].items():
         limits = objective.get("nfrs", {})
         values = [f"{name}_{quality}" for quality in limits]
@@ -84,9 +91,33 @@ def application_model(project: Project, iri: str) -> str:
     return "\n".join([*parts, "</rdf:RDF>", ""])
 
 
-def _levels(owner: str, levels: Mapping[str, float]) -> list[str]:
+def _own_nodes(project: Project) -> dict[str, frozenset[str]]:
+    """Return, for each variant, the components that it brings as nodes, by the names that the monitor gives them."""
+    component_of = {
+        str(entry["node"]).strip("/"): str(name)
+        for name, entry in project.settings["components"].items()
+        if "node" in entry
+    }
+    return {
+        variant.name: frozenset(
+            component_of.get(component.graph_name, component.graph_name)
+            for component in variant.components
+            if component.executable
+        )
+        for variant in project.variants
+    }
+
+
+def _levels(owner: str, levels: Mapping[str, float], groups: Mapping[str, str] | None = None) -> list[str]:
+    texts = {quality: {"qa_correction_group": group} for quality, group in (groups or {}).items()}
     return [
-        _individual("QAvalue", f"{owner}_{quality}", {"tomasys:isQAtype": [quality]}, {"hasValue": level})
+        _individual(
+            "QAvalue",
+            f"{owner}_{quality}",
+            {"tomasys:isQAtype": [quality]},
+            {"hasValue": level},
+            texts=texts.get(quality),
+        )
         for quality, level in levels.items()
     ]
 
@@ -97,6 +128,7 @@ def _individual(
     links: Mapping[str, Iterable[str]],
     numbers: Mapping[str, float] | None = None,
     flags: Mapping[str, bool] | None = None,
+    texts: Mapping[str, str] | None = None,
 ) -> str:
     lines = [f"  <tomasys:{class_name} rdf:about={quoteattr('#' + name)}"]
     resources = [(link, target) for link, targets in links.items() for target in targets]
@@ -108,6 +140,10 @@ def _individual(
     body += [
         f'    <tomasys:{flag} rdf:datatype="{v.XSD}boolean">{str(value).lower()}</tomasys:{flag}>'
         for flag, value in (flags or {}).items()
+    ]
+    body += [
+        f'    <tomasys:{text} rdf:datatype="{v.XSD}string">{escape(value)}</tomasys:{text}>'
+        for text, value in (texts or {}).items()
     ]
     if not body:
         return lines[0] + "/>"

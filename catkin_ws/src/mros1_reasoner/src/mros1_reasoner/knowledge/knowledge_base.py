@@ -27,6 +27,7 @@ class KnowledgeBase:
         functions: names of all functions.
         designs: every design by name, with its expected levels.
         components: names of all components.
+        own_nodes: components that are nothing but nodes of designs; no rule is about them.
         qualities: how levels compare, of every quality attribute by name.
         objectives: those that the models hold already, but for those that a grounding requires.
         component_statuses: statuses that the models assert.
@@ -42,6 +43,7 @@ class KnowledgeBase:
         self.functions = tuple(sorted(model.function_iris))
         self.designs = model.designs
         self.components = frozenset(model.component_iris)
+        self.own_nodes = model.own_nodes
         self.qualities = model.qualities
         self.objectives = model.objectives
         self.component_statuses = model.component_statuses
@@ -148,10 +150,11 @@ class KnowledgeBase:
         for design in self.designs.values():
             for quality, level in sorted(design.expected.items()):
                 iri = f"{v.RUNTIME}expected_{design.name}_{quality}"
-                triples.append(
-                    assertion_triple(Assertion(self._model.design_iris[design.name], v.HAS_QA_ESTIMATION, iri))
-                )
+                design_iri = self._model.design_iris[design.name]
+                triples.append(assertion_triple(Assertion(design_iri, v.HAS_QA_ESTIMATION, iri)))
                 triples += [assertion_triple(assertion) for assertion in self._level(iri, quality, level)]
+                if group := design.group(quality):
+                    triples.append(assertion_triple(Assertion(iri, v.QA_CORRECTION_GROUP, group, _STRING)))
         world = owlready2.World()
         text = self.ontology + write_ntriples(triples)
         world.get_ontology(v.RUNTIME).load(fileobj=io.BytesIO(text.encode()), format="ntriples")

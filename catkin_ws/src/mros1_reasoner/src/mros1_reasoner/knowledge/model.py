@@ -93,6 +93,8 @@ class Design:
         expected: expected level of each quality attribute.
         components: components that it cannot be deployed without.
         requires: functions that must be provided for it to work.
+        nodes: components that it brings itself, as nodes.
+        groups: by quality, what the design is like in all that a correction depends on; empty: corrected like all.
     """
 
     name: str
@@ -100,6 +102,12 @@ class Design:
     expected: Mapping[str, float] = field(default_factory=dict)
     components: frozenset[str] = frozenset()
     requires: tuple[str, ...] = ()
+    nodes: frozenset[str] = frozenset()
+    groups: Mapping[str, str] = field(default_factory=dict)
+
+    def group(self, quality: str) -> str:
+        """Return the group of designs of which a quality is corrected together."""
+        return self.groups.get(quality, "")
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ _DECIMAL = v.XSD + "decimal"
 # Statements that hold at one moment only. They come as facts of each analysis, so the ontology goes without them.
 _MOMENTARY = (*v.DERIVED_STATUSES, v.O_UPDATABLE, v.C_STATUS, v.FD_ERROR_LOG, v.SOLVES_O, v.TYPE_FD, v.REQUIRES_O)
 _COMPARISONS = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES)
+_OF_NODES = (v.RDF_TYPE, v.RDFS_LABEL, v.C_STATUS, v.DEPLOYED_BY)
 _LEVELS = (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION, v.HAS_VALUE, v.IS_QA_TYPE)
 
 
@@ -49,6 +50,7 @@ class ApplicationModel:
         designs: every design by name, with its expected levels.
         objectives: those that the ontologies hold already, but for those that a grounding requires.
         component_statuses: statuses that the ontologies assert.
+        own_nodes: components that are nothing but nodes of designs.
         ontology: vocabulary, rules and models as N-Triples, without what comes as facts.
     """
 
@@ -63,6 +65,7 @@ class ApplicationModel:
     designs: Mapping[str, Design]
     objectives: tuple[Objective, ...]
     component_statuses: Mapping[str, str]
+    own_nodes: frozenset[str]
     ontology: str
 
 
@@ -91,7 +94,7 @@ class _Reader:
         self._designs = self._names((v.FUNCTION_DESIGN,), graph.subjects(v.SOLVES_F))
         self._components = self._names(
             (v.COMPONENT, v.COMPONENT_STATE, v.COMPONENT_SPECIFICATION),
-            graph.subjects(v.REQUIRED_BY) | graph.subjects(v.C_STATUS),
+            graph.subjects(v.REQUIRED_BY) | graph.subjects(v.C_STATUS) | graph.subjects(v.DEPLOYED_BY),
         )
         self._quality_types = self._names((v.QA_TYPE,), graph.objects(v.IS_QA_TYPE))
         self._objectives = self._names((v.OBJECTIVE,), graph.subjects(v.TYPE_F))
@@ -123,6 +126,7 @@ class _Reader:
                 for subject, value in graph.literals(v.C_STATUS)
                 if value in v.COMPONENT_STATUSES
             },
+            own_nodes=self._own_nodes(),
             ontology=self._static(),
         )
 
@@ -188,7 +192,18 @@ class _Reader:
             expected=expected,
             components=frozenset(self._component_name[c] for c in self._graph.subjects_of(v.REQUIRED_BY, iri)),
             requires=tuple(sorted(local_name(f) for f in self._graph.objects_of(iri, v.REQUIRES_F))),
+            nodes=frozenset(self._component_name[c] for c in self._graph.subjects_of(v.DEPLOYED_BY, iri)),
+            groups=self._groups(iri),
         )
+
+    def _groups(self, design: str) -> dict[str, str]:
+        """Return by quality the group in which the levels that are expected of a design are corrected."""
+        found = {}
+        for value in sorted(self._graph.objects_of(design, v.HAS_QA_ESTIMATION)):
+            types = self._graph.objects_of(value, v.IS_QA_TYPE)
+            for text in self._graph.literals_of(value, v.QA_CORRECTION_GROUP)[:1]:
+                found.update({self._quality_name[quality]: text for quality in types})
+        return found
 
     def _objective(self, name: str) -> Objective:
         iri = self._objectives[name]
@@ -261,13 +276,20 @@ class _Reader:
         for function in sorted(self._functions):
             visit(function, ())
 
+    def _own_nodes(self) -> frozenset[str]:
+        """Return the components of which the ontologies say only which designs bring them: no rule is about them."""
+        nodes = self._graph.subjects(v.DEPLOYED_BY)
+        others = [t for t in self._graph.triples if iri_of(t[1]) not in _OF_NODES]
+        nodes -= {iri_of(term) for subject, _, value in others for term in (subject, value)}
+        return frozenset(self._component_name[iri] for iri in nodes)
+
     def _static(self) -> str:
         values = self._graph.instances(v.QA_VALUE) | {
             value
             for predicate in (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION)
             for value in self._graph.objects(predicate)
         }
-        dropped = {*_MOMENTARY, *_LEVELS, *_COMPARISONS}
+        dropped = {*_MOMENTARY, *_LEVELS, *_COMPARISONS, v.DEPLOYED_BY}
 
         def stays(triple: Triple) -> bool:
             subject, predicate, value = triple

@@ -74,6 +74,9 @@ def _component_errors(view: View, name: str, now: float) -> list[Cause]:
         words = f"component {component}, which {running.design} requires, does not work"
         stamp = known.stamp if known else now
         found.append(Cause(stamp, f"component:{component}", words, "compError, compErrFG, S1a"))
+    for node in running.failed_nodes:
+        words = f"node {node} of {running.design} does not work"
+        found.append(Cause(view.components[node].stamp, f"component:{node}", words, "S1a"))
     if running.is_broken or not (found or _inherits(view, running)):
         words = f"configuration {running.design} does not run"
         found.append(Cause(running.failed_stamp or now, f"component:{running.design}", words, "S1a"))

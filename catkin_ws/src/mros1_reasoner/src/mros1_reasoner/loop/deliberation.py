@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from metacontrol_bags.decision import ADVISED, DECIDED, FAILED, Cause, Decision
 
+from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Design, Direction, Objective
 from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance
 from mros1_reasoner.loop.readable_state import Running
@@ -94,7 +95,8 @@ class Deliberation:
 
     def _is_change(self, name: str, outcome: Plan) -> bool:
         running = self._state.running[name]
-        return outcome.choice is not None and (outcome.choice != running.design or running.is_broken)
+        is_lame = running.is_broken or bool(running.failed_nodes)
+        return outcome.choice is not None and (outcome.choice != running.design or is_lame)
 
     def _adapt(
         self, name: str, level: str, outcome: Plan, causes: list[Cause], timing: Timing, began: float
@@ -119,6 +121,8 @@ class Deliberation:
         if objective != name:
             words += f"{objective}: "
         words += f"{design or 'nothing'} -> {first.choice}"
+        if running and running.failed_nodes and design == first.choice:
+            words += f", with {', '.join(running.failed_nodes)} started anew"
         if objective != level:
             words += f", which {outcome.choice} of {level} requires: {first.reason}"
         words += f": {outcome.reason}"
@@ -197,6 +201,10 @@ class Deliberation:
             self._state.note_in_vain(now, running.design or "", name, reason)
         if running.is_broken and running.design:
             self._state.note_in_vain(now, running.design, name, "did not run")
+        restarts = [moment for moment in running.restarts if now - moment < self._state.settings.error_log_expiry]
+        if running.failed_nodes and running.design and len(restarts) >= self._state.settings.restart_limit:
+            reason = f"{', '.join(running.failed_nodes)} failed again after {len(restarts)} restarts"
+            self._state.note_in_vain(now, running.design, name, reason)
 
     def _causes(self, name: str, now: float) -> list[Cause]:
         """Return all causes for an adaptation of an objective itself: errors first, then chances."""
@@ -231,6 +239,7 @@ class Deliberation:
                 if outcome and (outcome.choice is None or outcome.degraded):
                     kind = unfulfilled if outcome.choice is None else strained
                     kind.setdefault(design.name, []).append(required)
+        is_tried = (running.design or "", name) in self._state.error_log
         situation = Situation(
             qualities=self._state.kb.qualities,
             unrealisable=self._state.analysis.unrealisable,
@@ -241,37 +250,61 @@ class Deliberation:
                 for (design, tried_for), (expiry, reason) in self._state.error_log.items()
                 if tried_for == name
             },
-            current=None if running.is_broken else running.design,
+            current=None if running.is_broken or (running.failed_nodes and is_tried) else running.design,
             observed=self._state.levels.latest(name),
             factors=self.factors(name, now),
             worth=self._state.settings.worth,
         )
+        if running.failed_nodes and not is_tried and self._needs_only_a_restart(name, situation):
+            same = plan(
+                objective, [self._state.kb.designs[running.design or ""]], situation, self._utility, self._distance
+            )
+            return replace(same, degraded=False, reason=f"{running.design} is deployed again")
         desired = self._state.settings.desired
         is_possible = situation.can_deploy(desired) and desired not in strained and desired not in situation.tried
         if running.design is None and is_possible:
             designs = tuple(design for design in designs if design.name == desired) or designs
         return plan(objective, designs, situation, self._utility, self._distance)
 
-    def factors(self, name: str, now: float) -> dict[str, float]:
-        """Return the factors for the expected levels of qualities; a factor never makes a level look better."""
+    def _needs_only_a_restart(self, name: str, situation: Situation) -> bool:
+        """Return whether nothing is wrong with a running design but that nodes of it do not work."""
+        running, result = self._state.running[name], self._state.analysis.objectives.get(name)
+        is_in_error = running.is_broken or running.task_failure or (result and v.IN_ERROR_NFR in result.causes)
+        return not is_in_error and situation.can_deploy(running.design or "")
+
+    def factors(self, name: str, now: float) -> dict[tuple[str, str], float]:
+        """Return the factors for the expected levels of qualities, by quality and group of designs.
+
+        A factor never makes a level look better.
+        """
         objective = self._state.objectives.get(name)
         if not self._state.settings.correct_expected or objective is None:
             return {}
         most = max(1.0, self._state.settings.correction_limit)
         found = {}
         for quality in objective.limits:
-            ratio = self._state.levels.ratio(now, (name, quality))
-            if ratio is not None and quality in self._state.kb.qualities:
-                lower_is_better = self._state.kb.qualities[quality].direction is Direction.LOWER_IS_BETTER
-                found[quality] = min(max(1.0, ratio), most) if lower_is_better else max(min(1.0, ratio), 1.0 / most)
+            for group in self._state.levels.groups((name, quality)):
+                ratio = self._ratio(now, name, quality, group)
+                if ratio is not None and quality in self._state.kb.qualities:
+                    lower_is_better = self._state.kb.qualities[quality].direction is Direction.LOWER_IS_BETTER
+                    factor = min(max(1.0, ratio), most) if lower_is_better else max(min(1.0, ratio), 1.0 / most)
+                    found[quality, group] = factor
         return found
+
+    def _ratio(self, now: float, name: str, quality: str, group: str) -> float | None:
+        design = self._state.running[name].design
+        is_observed = design is not None and self._state.kb.designs[design].group(quality) == group
+        # A correction that holds for all designs is observed again whatever runs.
+        return self._state.levels.ratio(now, (name, quality), group, fades=bool(group) and not is_observed)
 
     def _corrections(self, name: str, now: float) -> tuple[str, ...]:
         limit = self._state.settings.correction_limit
+        design = self._state.running[name].design if name in self._state.running else None
         return tuple(
-            f"{quality} was {self._state.levels.ratio(now, (name, quality)) or 1.0:.3g} times what was expected of "
-            f"{self._state.running[name].design}: {factor:.3g} times (at most {limit:g}) is expected of the others"
-            for quality, factor in self.factors(name, now).items()
+            f"{quality} was {self._ratio(now, name, quality, group) or 1.0:.3g} times what was expected of "
+            f"{f'designs with {group}' if group else design}: {factor:.3g} times (at most {limit:g}) is expected "
+            f"of {'these' if group else 'the others'}"
+            for (quality, group), factor in self.factors(name, now).items()
             if round(factor, 2) != 1.0
         )
 

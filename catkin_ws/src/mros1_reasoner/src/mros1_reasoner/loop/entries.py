@@ -71,7 +71,7 @@ class TaskFact:
 
 @dataclass(frozen=True)
 class ActiveFact:
-    """A configuration runs for a function, in a state of metacontrol_msgs/FunctionGrounding."""
+    """A configuration runs for a function, in a state of metacontrol_msgs/FunctionGrounding; empty: nothing does."""
 
     function: str
     configuration: str
@@ -184,7 +184,14 @@ class Decided:
     configuration: str
 
 
-Content = Fact | Command | Step | Result | Decided
+@dataclass(frozen=True)
+class Released:
+    """A function that nothing needed any longer was released."""
+
+    function: str
+
+
+Content = Fact | Command | Step | Result | Decided | Released
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@
 | component | component, status, stamp of the diagnostic |
 | binding | grounding, in error |
 | task | objective or its function, failed, stamp, message; any other name means the only root objective |
-| active | function, configuration, state |
+| active | function, configuration (empty: nothing runs), state |
 | step | whether it is a heartbeat |
 | result | decision, whether it is carried out, message, whether the configuration is to blame |
 | pause, resume | |
@@ -17,6 +17,7 @@
 | remove_objective | objective |
 | set_nfr | objective, quality, limit |
 | decided | decision, objective, configuration: the outcome of the entry before it |
+| released | function |
 
 Numbers are written so that they read back exactly; yes is 1, no is 0.
 """
@@ -49,6 +50,7 @@ _KINDS: Mapping[str, type[entries.Content]] = {
     "remove_objective": entries.RemoveObjective,
     "set_nfr": entries.SetNfr,
     "decided": entries.Decided,
+    "released": entries.Released,
 }
 _NAMES = {content: kind for kind, content in _KINDS.items()}
 _READERS: Mapping[str, Callable[[str], Any]] = {"str": str, "float": float, "bool": lambda text: text == _YES}

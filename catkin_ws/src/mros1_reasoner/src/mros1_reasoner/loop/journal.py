@@ -52,6 +52,8 @@ def apply(core: Mape, entry: Entry) -> list[Decision]:
             return core.step(now, heartbeat=content.heartbeat)
         case entries.Result():
             return [core.report(now, content.decision, content.ok, content.message, blame=content.blame)]
+        case entries.Released():
+            core.report_released(content.function)
         case entries.Decided():
             pass
         case _:

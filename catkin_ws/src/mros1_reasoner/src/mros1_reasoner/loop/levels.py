@@ -20,6 +20,7 @@ class Level:
         passed_since: since when the limit has been passed without a break.
         count: levels since then whose ratio to the expected one is known.
         ratios: sum of those ratios.
+        group: of designs that are corrected together, in which the deployed one is.
     """
 
     value: float
@@ -28,6 +29,7 @@ class Level:
     passed_since: float | None = None
     count: int = 0
     ratios: float = 0.0
+    group: str = ""
 
 
 @dataclass(frozen=True)
@@ -49,13 +51,21 @@ class Levels:
         """
         self._window, self._timeout, self._memory = window, timeout, memory
         self._levels: dict[Key, Level] = {}
-        self._ratios: dict[Key, _Ratio] = {}
+        self._ratios: dict[tuple[Key, str], _Ratio] = {}
 
     def __getitem__(self, key: Key) -> Level:
         return self._levels[key]
 
     def observe(
-        self, now: float, key: Key, value: float, *, passed: bool, stamp: float, expected: float | None
+        self,
+        now: float,
+        key: Key,
+        value: float,
+        *,
+        passed: bool,
+        stamp: float,
+        expected: float | None,
+        group: str = "",
     ) -> None:
         """Take in a level.
 
@@ -66,14 +76,15 @@ class Levels:
             passed: whether it passes the limit.
             stamp: of the diagnostic that brought it, 0 where it has none.
             expected: level that is expected of the deployed design.
+            group: of designs that are corrected together, in which the deployed one is.
         """
         before = self._levels.get(key)
         known = before if before and now - before.stamp <= self._timeout else None
         ratio = value / expected if expected else None
         if ratio is not None:
-            self._average(now, key, ratio)
+            self._average(now, (key, group), ratio)
         if not passed:
-            self._levels[key] = Level(value, now, last_good=value)
+            self._levels[key] = Level(value, now, last_good=value, group=group)
             return
         goes_on = known if known and known.passed_since is not None else None
         self._levels[key] = Level(
@@ -83,6 +94,7 @@ class Levels:
             passed_since=goes_on.passed_since if goes_on else stamp or now,
             count=(goes_on.count if goes_on else 0) + (ratio is not None),
             ratios=(goes_on.ratios if goes_on else 0.0) + (ratio or 0.0),
+            group=group,
         )
 
     def forget(self, objective: str = "", quality: str = "", now: float | None = None) -> None:
@@ -94,16 +106,16 @@ class Levels:
             now: present time; None: that of the levels.
         """
         for key in [k for k in self._levels if objective in ("", k[0]) and quality in ("", k[1])]:
-            stamp = self._levels[key].stamp
-            ratio = self.ratio(stamp if now is None else now, key)
+            stamp, group = self._levels[key].stamp, self._levels[key].group
+            ratio = self.ratio(stamp if now is None else now, key, group)
             if ratio is not None:
-                self._ratios[key] = _Ratio(ratio, stamp)
+                self._ratios[key, group] = _Ratio(ratio, stamp)
             del self._levels[key]
 
     def drop(self, objective: str) -> None:
         """Forget everything about an objective."""
         self._levels = {key: level for key, level in self._levels.items() if key[0] != objective}
-        self._ratios = {key: ratio for key, ratio in self._ratios.items() if key[0] != objective}
+        self._ratios = {place: ratio for place, ratio in self._ratios.items() if place[0][0] != objective}
 
     def counting(self, now: float, calm_until: Mapping[str, float]) -> dict[Key, float]:
         """Return the levels that count.
@@ -125,16 +137,28 @@ class Levels:
         """Return the last level of each quality of an objective."""
         return {quality: level.value for (name, quality), level in self._levels.items() if name == objective}
 
-    def ratio(self, now: float, key: Key) -> float | None:
+    def ratio(self, now: float, key: Key, group: str = "", *, fades: bool = False) -> float | None:
         """Return the ratio of observed to expected level; None if it is unknown.
 
         Once the limit has been violated for the window, it is the mean since then; before that, the average.
+
+        Args:
+            now: present time.
+            key: objective and quality.
+            group: of designs that are corrected together.
+            fades: nobody observes the group now: what was observed counts less and less.
         """
         level = self._levels.get(key)
-        if level and level.count and self._counts(level, now):
+        if level and level.group == group and level.count and self._counts(level, now):
             return level.ratios / level.count
-        average = self._ratios.get(key)
-        return average.value if average else None
+        average = self._ratios.get((key, group))
+        if average is None or not fades:
+            return average.value if average else None
+        return 1.0 + (average.value - 1.0) * (1.0 - self._weight(now - average.stamp))
+
+    def groups(self, key: Key) -> list[str]:
+        """Return the groups of which something was observed."""
+        return [group for known, group in self._ratios if known == key]
 
     def due(self, calm_until: Mapping[str, float]) -> Iterator[float]:
         """Yield the times at which a level begins or stops to count."""
@@ -146,8 +170,11 @@ class Levels:
     def _counts(self, level: Level, now: float) -> bool:
         return level.passed_since is not None and now - level.passed_since >= self._window
 
-    def _average(self, now: float, key: Key, ratio: float) -> None:
-        before = self._ratios.get(key) or _Ratio(1.0, now)
-        passed = min(max(0.0, now - before.stamp), self._timeout)
-        weight = 1.0 - math.exp(-passed / self._memory) if self._memory > 0 else 1.0
-        self._ratios[key] = _Ratio(before.value + weight * (ratio - before.value), now)
+    def _average(self, now: float, place: tuple[Key, str], ratio: float) -> None:
+        before = self._ratios.get(place) or _Ratio(1.0, now)
+        weight = self._weight(min(max(0.0, now - before.stamp), self._timeout))
+        self._ratios[place] = _Ratio(before.value + weight * (ratio - before.value), now)
+
+    def _weight(self, passed: float) -> float:
+        """Return how much of what was observed some seconds ago is forgotten."""
+        return 1.0 - math.exp(-passed / self._memory) if self._memory > 0 else 1.0

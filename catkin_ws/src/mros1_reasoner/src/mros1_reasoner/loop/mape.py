@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED, PROPOSED, Decision
@@ -95,6 +95,27 @@ class Mape:
         """The decision that is under way."""
         return self._state.pending
 
+    @property
+    def active(self) -> Collection[str]:
+        """The functions for which something runs, as the manipulator says."""
+        return self._state.active.keys()
+
+    @property
+    def released(self) -> tuple[str, ...]:
+        """The functions to release now, in this order: they run, and nothing needs them any longer.
+
+        While a decision is under way, there is none.
+        """
+        return () if self._state.pending else tuple(self._state.released)
+
+    def nodes_to_restart(self, decision: Decision) -> tuple[str, ...]:
+        """Return the components that do not work and that a decision's configuration brings as nodes."""
+        return self._state.failed_nodes_of(decision.to_configuration)
+
+    def is_first(self, decision: Decision) -> bool:
+        """Return whether a decision deploys something where nothing runs."""
+        return not self._state.runs(decision.objective)
+
     # R1: facts
 
     def observe_level(self, now: float, quality: str, level: float, grounding: str = "", stamp: float = 0.0) -> None:
@@ -137,6 +158,8 @@ class Mape:
             status = v.RECOVERED
         elif status == v.RECOVERED and before == v.WORKS:
             status = v.WORKS  # it was never seen to fail, or its return has been heeded
+        if status == v.RECOVERED and component in self._kb.own_nodes:
+            status = v.WORKS  # no design waits for it
         if known is None or status != before:
             self._state.note_component(component, status, stamp or now)
 
@@ -177,9 +200,18 @@ class Mape:
     def observe_active(self, now: float, function: str, configuration: str, state: str) -> None:
         """Note what runs for a function, as the manipulator reports it (ActiveConfiguration).
 
+        Args:
+            now: present time.
+            function: the function.
+            configuration: what runs; empty: nothing.
+            state: of the configuration.
+
         Raises:
             MapeError: the model does not hold the configuration, or not for that function.
         """
+        if not configuration:
+            self._state.note_inactive(now, function)
+            return
         design = self._kb.designs.get(configuration)
         if design is None or design.function != function:
             raise MapeError(f"running configuration {configuration!r} is no FunctionDesign of {function} in the model")
@@ -208,6 +240,7 @@ class Mape:
             return []
         self._state.forget_expired(now)
         self._state.match_requirements()
+        self._state.note_failed_nodes(now)
         facts = self._state.facts_at(now)
         seen = self._state.what_counts(facts, now)
         if seen == self._state.seen and not (heartbeat and facts != self._state.facts):
@@ -271,6 +304,10 @@ class Mape:
             stamp_executed=now,
             execute_wall_s=self._wall() - began,
         )
+
+    def report_released(self, function: str) -> None:
+        """Take in that a function was released."""
+        self._state.note_released(function)
 
     # Parts
 

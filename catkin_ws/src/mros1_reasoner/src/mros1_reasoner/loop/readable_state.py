@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from metacontrol_bags.decision import Decision
 from metacontrol_msgs.msg import FunctionGrounding
 
+from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
 from mros1_reasoner.loop.levels import Levels
@@ -42,6 +43,9 @@ class Running:
         busy_since: when the present reconfiguration began.
         failed_stamp: when the grounding was first known not to run.
         binding_error: whether a binding of it is in error.
+        failed_nodes: nodes of the design that do not work.
+        deployed_at: when the design was deployed last.
+        restarts: when the design was deployed again because nodes of it did not work.
         task_failure: when the task of the objective has failed, and why.
         calm_until: no limit counts before.
         not_before: no request is made before.
@@ -56,6 +60,9 @@ class Running:
     busy_since: float | None = None
     failed_stamp: float = 0.0
     binding_error: bool = False
+    failed_nodes: tuple[str, ...] = ()
+    deployed_at: float = -math.inf
+    restarts: tuple[float, ...] = ()
     task_failure: tuple[float, str] | None = None
     calm_until: float = -math.inf
     not_before: float = -math.inf
@@ -81,6 +88,7 @@ class View:
         running: what runs, by objective.
         active: configuration and state of each function, as the manipulator says.
         wanted: by objective, the design that waits for what it requires.
+        released: functions that nothing needs any longer although they run, in the order in which to release them.
         components: last status of components.
         levels: observed levels.
         error_log: until when a design is not tried again for an objective, and why.
@@ -103,6 +111,7 @@ class View:
     running: Mapping[str, Running]
     active: Mapping[str, tuple[str, str]]
     wanted: Mapping[str, str]
+    released: Collection[str]
     components: Mapping[str, Component]
     levels: Levels
     error_log: Mapping[tuple[str, str], tuple[float, str]]
@@ -182,6 +191,17 @@ class View:
                         queue.append(provider)
         return needed
 
+    def failed_nodes_of(self, design: str | None) -> tuple[str, ...]:
+        """Return the nodes of a design that do not work, as far as is known."""
+        nodes = self.kb.designs[design].nodes if design else ()
+        known = ((node, self.components.get(node)) for node in sorted(nodes))
+        return tuple(node for node, component in known if component and component.status == v.FAILED)
+
+    def runs(self, name: str) -> bool:
+        """Return whether a design runs for an objective, be it with errors."""
+        running = self.running.get(name)
+        return running is not None and running.design is not None and running.state != FunctionGrounding.FAILED
+
     # Facts
 
     def is_busy(self, running: Running, now: float) -> bool:
@@ -201,8 +221,10 @@ class View:
             objectives=tuple(self.objectives.values()),
             groundings={name: running.design or "" for name, running in grounded.items()},
             levels=self.levels.counting(now, {name: running.calm_until for name, running in self.running.items()}),
-            components={name: component.status for name, component in self.components.items()},
-            broken=frozenset(name for name, running in grounded.items() if running.is_broken),
+            components={
+                name: component.status for name, component in self.components.items() if name not in self.kb.own_nodes
+            },
+            broken=frozenset(name for name, running in grounded.items() if running.is_broken or running.failed_nodes),
             failed=frozenset(name for name, running in grounded.items() if running.task_failure),
             requires={name: self.required(running.design) for name, running in grounded.items()},
         )
@@ -221,6 +243,7 @@ class View:
             replace(facts, levels={}),
             frozenset(facts.levels),
             passed,
+            tuple(running.failed_nodes for running in self.running.values()),
             waits,
             improves,
             self.has_waited(now),
@@ -234,7 +257,9 @@ class View:
     def is_fine(self, name: str) -> bool:
         """Return whether an objective is grounded and not in error."""
         running = self.running.get(name)
-        if running is None or running.design is None or running.is_broken or running.task_failure:
+        if running is None or running.design is None or running.task_failure:
+            return False
+        if running.is_broken or running.failed_nodes:
             return False
         result = self.analysis.objectives.get(name)
         return running.design not in self.analysis.unrealisable and not (result and result.in_error)
@@ -249,5 +274,7 @@ class View:
                 times.append(running.calm_until)
             if running.busy_since is not None:
                 times.append(running.busy_since + self.settings.busy_limit)
+            if self.failed_nodes_of(running.design):
+                times.append(running.deployed_at + self.settings.restart_grace)
         times += [expiry for expiry, _ in self.error_log.values()]
         return min((moment for moment in times if now < moment < math.inf), default=None)

@@ -16,6 +16,8 @@ class Settings:
         cool_down: how long no limit counts after an adaptation; component failures always count.
         level_timeout: how long a level is valid.
         error_log_expiry: how long a design that failed is not tried again.
+        restart_limit: how often within that time a design is deployed again because nodes of it do not work.
+        restart_grace: how long after a deployment a failure of the design's nodes does not count: it may be an old one.
         backoff: wait after a failed reconfiguration; doubled with each further one.
         backoff_limit: the longest such wait.
         start_grace: how long the loop waits for a running configuration after its first step.
@@ -37,6 +39,8 @@ class Settings:
     cool_down: float = 5.0
     level_timeout: float = 5.0
     error_log_expiry: float = 60.0
+    restart_limit: float = 2.0
+    restart_grace: float = 2.0
     backoff: float = 1.0
     backoff_limit: float = 30.0
     start_grace: float = 15.0

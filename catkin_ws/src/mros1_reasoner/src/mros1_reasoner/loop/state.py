@@ -18,6 +18,8 @@ from mros1_reasoner.loop.levels import Levels
 from mros1_reasoner.loop.readable_state import BUSY, Component, Running, View
 from mros1_reasoner.loop.settings import Settings
 
+_MOST_DOUBLINGS = 30  # of a wait; a float holds more, but no robot waits as long
+
 
 class State(View):
     """What is known and asked for at this moment; the attributes are those of View."""
@@ -30,6 +32,7 @@ class State(View):
         self.running: dict[str, Running] = {objective: Running() for objective in self.objectives}
         self.active: dict[str, tuple[str, str]] = {}
         self.wanted: dict[str, str] = {}
+        self.released: dict[str, None] = {}
         self.components: dict[str, Component] = {
             c: Component(status, 0.0) for c, status in knowledge_base.component_statuses.items()
         }
@@ -52,8 +55,9 @@ class State(View):
         """Note an observed level of an objective, with the stamp of the diagnostic."""
         limit = self.objectives[name].limits.get(quality)
         passed = limit is not None and self.kb.qualities[quality].violates(level, limit)
-        expected = self.kb.designs[self.running[name].design or ""].expected.get(quality)
-        self.levels.observe(now, (name, quality), level, passed=passed, stamp=stamp, expected=expected)
+        design = self.kb.designs[self.running[name].design or ""]
+        expected, group = design.expected.get(quality), design.group(quality)
+        self.levels.observe(now, (name, quality), level, passed=passed, stamp=stamp, expected=expected, group=group)
 
     def forget_levels(self, quality: str) -> None:
         """Forget the levels of a quality."""
@@ -71,6 +75,24 @@ class State(View):
     def note_task_failure(self, name: str, failure: tuple[float, str] | None) -> None:
         """Note when the task of an objective has failed, and why; None: the task continues."""
         self._run(name, task_failure=failure)
+
+    def note_inactive(self, now: float, function: str) -> None:
+        """Note that nothing runs for a function any more, as the manipulator reports it."""
+        self.active.pop(function, None)
+        self.released.pop(function, None)
+        for name, running in self.running.items():
+            if self.objectives[name].function == function and running.design is not None:
+                self.levels.forget(name, now=now)
+                self.wanted.setdefault(name, running.design)  # what it requires is still needed
+                self._run(name, design=None, state="", busy_since=None, binding_error=False, task_failure=None)
+                # It may be about to come back: a manipulator starts anew.
+                self._run(name, not_before=max(running.not_before, now + self.settings.backoff))
+
+    def note_failed_nodes(self, now: float) -> None:
+        """Note which nodes of the running designs do not work."""
+        for name, running in self.running.items():
+            counts = now >= running.deployed_at + self.settings.restart_grace and not self.is_busy(running, now)
+            self._run(name, failed_nodes=self.failed_nodes_of(running.design) if counts else ())
 
     def note_active(self, now: float, function: str, configuration: str, state: str) -> None:
         """Note what runs for a function, as the manipulator reports it."""
@@ -93,7 +115,10 @@ class State(View):
         running = self.running[name]
         if running.design is not None and running.design != design:
             self._run(name, calm_until=max(running.calm_until, now + self.settings.cool_down))
+        if running.design != design:
+            self._run(name, restarts=())
         self._run(name, design=design, degraded=False, binding_error=False, task_failure=None, refusal=())
+        self._run(name, deployed_at=now, failed_nodes=())
         if self.wanted.get(name) == design:
             del self.wanted[name]
         self.levels.forget(name, now=now)
@@ -131,11 +156,21 @@ class State(View):
                 break
             for name, function in missing.items():
                 self._add(Objective(name, function))
-        for name in [name for name in self.objectives if name not in needed]:
+        for name in self._from_the_top([name for name in self.objectives if name not in needed]):
             self._drop(name)
+
+    def _from_the_top(self, names: list[str]) -> list[str]:
+        """Return objectives in an order in which each one comes before those that its design requires."""
+        found: list[str] = []
+        while names:
+            below = {required for name in names for required in self.required(self.running[name].design)}
+            found += [name for name in names if name not in below]
+            names = [name for name in names if name in below]
+        return found
 
     def _add(self, objective: Objective) -> None:
         """Add an objective; what runs for its function already runs for it."""
+        self.released.pop(objective.function, None)
         self.objectives[objective.name] = objective
         self.running[objective.name] = Running()
         active = self.active.get(objective.function)
@@ -147,7 +182,10 @@ class State(View):
         if self.proposal and self.proposal.objective == name:
             self.proposal = None
         self.wanted.pop(name, None)
+        function, design = self.objectives[name].function, self.running[name].design
         del self.objectives[name], self.running[name]
+        if design is not None and function not in {objective.function for objective in self.objectives.values()}:
+            self.released[function] = None
         self.locked.discard(name)
         self.levels.drop(name)
         self.error_log = {key: entry for key, entry in self.error_log.items() if key[1] != name}
@@ -244,11 +282,17 @@ class State(View):
         """Note that the pending decision was carried out."""
         decision = self._end()
         name, design = decision.objective, decision.to_configuration
-        if self.running[name].state in (*BUSY, FunctionGrounding.FAILED):
+        before = self.running[name]
+        if before.state in (*BUSY, FunctionGrounding.FAILED):
             self._run(name, state=FunctionGrounding.STABLE, busy_since=None)
         self._deploy(name, design, now)
         self.active[self.objectives[name].function] = design, FunctionGrounding.STABLE
         self._run(name, calm_until=now + self.settings.cool_down, attempts=0, degraded=decision.degraded)
+        if before.failed_nodes and before.design == design:
+            self._run(name, restarts=(*before.restarts, now), degraded=decision.degraded or before.degraded)
+            self._run(name, not_before=now + self._wait_after(len(before.restarts)))
+        for node in self.failed_nodes_of(design):
+            self.components[node] = Component(v.WORKS, now)
 
     def fail(self, now: float, why: str | None) -> None:
         """Note that the pending decision was not carried out, and why; None: the configuration is not to blame."""
@@ -256,8 +300,17 @@ class State(View):
         if why is not None:
             self.note_in_vain(now, decision.to_configuration, decision.objective, why)
         running = self.running[decision.objective]
-        wait = min(self.settings.backoff * 2**running.attempts, self.settings.backoff_limit)
+        wait = self._wait_after(running.attempts)
         self._run(decision.objective, not_before=now + wait, attempts=running.attempts + 1)
+
+    def _wait_after(self, attempts: int) -> float:
+        return float(min(self.settings.backoff * 2 ** min(attempts, _MOST_DOUBLINGS), self.settings.backoff_limit))
+
+    def note_released(self, function: str) -> None:
+        """Note that a function has been released."""
+        if function in self.released:
+            del self.released[function]
+            self.active.pop(function, None)
 
     def _end(self) -> Decision:
         assert self.pending is not None  # noqa: S101 - who reports has asked

@@ -43,7 +43,7 @@ class Situation:
         tried: why a design failed a short while ago, by its name.
         current: name of the deployed design.
         observed: levels that were observed with the deployed design; they replace its expected levels.
-        factors: by how much the expected levels of a quality are to be multiplied.
+        factors: by how much the expected levels of a quality are to be multiplied, for a group of designs.
         worth: by how much less another design must violate limits, as a share of a limit, when none keeps them all.
     """
 
@@ -54,8 +54,12 @@ class Situation:
     tried: Mapping[str, str] = field(default_factory=dict)
     current: str | None = None
     observed: Mapping[str, float] = field(default_factory=dict)
-    factors: Mapping[str, float] = field(default_factory=dict)
+    factors: Mapping[tuple[str, str], float] = field(default_factory=dict)
     worth: float = 0.0
+
+    def factor(self, design: Design, quality: str) -> float | None:
+        """Return by how much the level of a quality that is expected of a design is to be multiplied."""
+        return self.factors.get((quality, design.group(quality)))
 
     def can_deploy(self, design: str) -> bool:
         """Return whether a design can be deployed, whatever its levels are."""
@@ -100,13 +104,16 @@ def plan(
         degraded, best = True, min(fresh or deployable, key=by_violation)
         now = next((c for c in fresh if c.design.name == situation.current), None)
         stays = now is not None and (best is now or now.violation - best.violation < situation.worth)
-        reason = f"degraded: no design keeps every limit; {(now if now and stays else best).design.name} "
+        keeps = best.violation <= 0.0  # then only failures speak against it
+        cause = "all designs that keep every limit have failed recently" if keeps else "no design keeps every limit"
+        reason = f"degraded: {cause}; {(now if now and stays else best).design.name} "
         if now and stays and best is not now:
             reason += f"stays: {best.design.name} would violate them hardly less"
             best = now
         else:
-            reason += f"{'stays' if stays else 'is taken'}: it is the least violating"
-        if not fresh:
+            merit = "the most useful of them" if keeps else "the least violating"
+            reason += f"{'stays' if stays else 'is taken'}: it is {merit}"
+        if not fresh and not keeps:
             reason += ", and all were tried before"
     else:
         ranked = sorted(candidates, key=by_violation)
@@ -182,7 +189,8 @@ class _Judged:
 
 def _judge(objective: Objective, design: Design, situation: Situation, utility: Utility) -> _Judged:
     name = design.name
-    expected = {q: level * situation.factors.get(q, 1.0) for q, level in design.expected.items()}
+    factors = {q: found for q in design.expected if (found := situation.factor(design, q)) is not None}
+    expected = {q: level * factors.get(q, 1.0) for q, level in design.expected.items()}
     is_current = name == situation.current
     levels = {**expected, **situation.observed} if is_current else expected
     reasons, violation = [], 0.0
@@ -204,10 +212,10 @@ def _judge(objective: Objective, design: Design, situation: Situation, utility: 
             violation = math.inf
             continue
         if kind.violates(level, limit):
-            factor = "" if is_current else _factor(situation.factors.get(quality, 1.0))
+            factor = "" if is_current else _factor(factors.get(quality, 1.0))
             reasons.append(f"{quality} {level:.4g}{factor} {kind.operator} {limit:g}")
         # A lucky or unlucky moment of the deployed design must not weigh more than what is expected of the others.
-        lasting = kind.direction.better(level, expected.get(quality, level)) if quality in situation.factors else level
+        lasting = kind.direction.better(level, expected.get(quality, level)) if quality in factors else level
         violation += max(0.0, kind.excess(lasting, limit)) / (abs(limit) or 1.0)
     return _Judged(design, utility(design), violation, "; ".join(reasons), levels)
 
@@ -220,7 +228,8 @@ def _loss(candidate: _Judged, best: _Judged, degraded: bool) -> str:
     """Return why a candidate was rejected."""
     if candidate.refused_because:
         worse = f"; violates limits by {candidate.violation:.2g}, the choice by {best.violation:.2g}"
-        return candidate.refused_because + (worse if degraded and math.isfinite(candidate.violation) else "")
+        tells = degraded and math.isfinite(candidate.violation) and candidate.violation > 0.0
+        return candidate.refused_because + (worse if tells else "")
     if candidate.utility < best.utility:
         return f"utility {candidate.utility:.4g} is less than {best.utility:.4g}"
     return "as useful as the choice, but a bigger change"

@@ -50,7 +50,7 @@ class Recording:
         start: of the bag.
         runs: by the journal; empty where the bag has none.
         decisions: every message, with when it was recorded.
-        diagnostics: everything on /diagnostics, and `active`, what ran: read only where there is no journal.
+        diagnostics: the robot's own on /diagnostics, and `active`, what ran: read only where there is no journal.
     """
 
     start: float = 0.0

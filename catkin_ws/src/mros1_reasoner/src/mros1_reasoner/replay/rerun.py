@@ -16,14 +16,14 @@ from metacontrol_bags.decision import DECIDED, EXECUTED, PROPOSED, Decision
 
 from mros1_reasoner.loop import journal
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
-from mros1_reasoner.loop.entries import ActiveFact, Approve, Decided, Entry, Reject, Result, Step
+from mros1_reasoner.loop.entries import ActiveFact, Approve, Decided, Entry, Reject, Released, Result, Step
 from mros1_reasoner.loop.entry_text import kind_of
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.replay.recording import Recording
 
 DEFAULT_DURATION = 1.0  # s of ROS time, of a reconfiguration, where the bag has none
-_CAME_OF_DECISIONS = ActiveFact | Result | Approve | Reject | Decided  # tells what was done then
+_CAME_OF_DECISIONS = ActiveFact | Result | Released | Approve | Reject | Decided  # tells what was done then
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import TypeVar
 import rospy
 from actionlib_msgs.msg import GoalStatusArray
 from diagnostic_msgs.msg import DiagnosticArray
+from metacontrol_bags import ownership
 from metacontrol_bags.decision import DECIDED, Decision
 from metacontrol_msgs import msg as messages
 from node_kit.io.inbox import Inbox
@@ -27,7 +28,7 @@ from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.loop import entries, journal
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark, newest_goal
-from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Result, StaleFact, Step, TaskFact
+from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Released, Result, StaleFact, Step, TaskFact
 from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
@@ -35,7 +36,7 @@ from mros1_reasoner.pellet.process import make_reasoner
 from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic
 from mros1_reasoner.ros.log import Log, log_core
-from mros1_reasoner.ros.requests import Requests
+from mros1_reasoner.ros.requests import Requests, Wanted
 from mros1_reasoner.ros.services import Services
 
 _TIMER_PERIOD = 0.02  # s, wall, the shortest between two looks at ROS time while the core waits for a moment
@@ -73,6 +74,7 @@ class ReasonerNode:
         self.core = Mape(knowledge_base, reasoner, objectives, settings, clock=rospy.get_time, name=name)
         self._inbox = Inbox()
         self._reader = DiagnosticsReader(knowledge_base.qualities, knowledge_base.components, parameters.nodes)
+        self._node_of = {component: node for node, component in parameters.nodes.items()}
         self._log = Log(self._period)
         self._taken_over: set[str] = set()
         self._goals: dict[str, tuple[str, bool]] = {}  # newest goal of an objective's task, and whether it failed
@@ -80,7 +82,14 @@ class ReasonerNode:
         self._decisions = DecisionTopic()
         self._requests = None
         if parameters.asks and not settings.dry_run:
-            self._requests = Requests(parameters.action, parameters.execution_deadline, self._inbox.put, self._report)
+            self._requests = Requests(
+                parameters.action,
+                parameters.execution_deadline,
+                self._inbox.put,
+                self._report,
+                lambda function: self._take(Released(function)),
+                lambda text: self._log.warn("manipulator", text),
+            )
         self._listen(parameters.task_actions)
         self._services = Services(self, parameters.save_folder)
         for objective in objectives:
@@ -90,7 +99,9 @@ class ReasonerNode:
     def _listen(self, task_actions: dict[str, str]) -> None:
         active = "rosgraph_manipulator/active_configuration"
         rospy.Subscriber(active, messages.ActiveConfiguration, self._on_active)
-        rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=100)
+        self._namespace = rospy.get_namespace()
+        self._diagnostics = rospy.resolve_name(ownership.TOPIC)  # it may be remapped
+        rospy.Subscriber(ownership.TOPIC, DiagnosticArray, self._on_diagnostics, queue_size=100)
         rospy.Subscriber("obj_error", Bool, self._on_obj_error)
         for objective, action in task_actions.items():
             listen = partial(self._on_task_status, objective, action)
@@ -110,6 +121,8 @@ class ReasonerNode:
                 if is_heartbeat:
                     self._requests.tell_trouble()
             self._take(Step(is_heartbeat))
+            if self._requests:
+                self._requests.release(self.core.released)
             self._journal.flush()
             until = min(heartbeat, now + _LONGEST_WAIT, self._next_look())
             self._inbox.wait(max(0.0, until - time.monotonic()))
@@ -145,7 +158,9 @@ class ReasonerNode:
             self._log.tell_objective(self.core.objectives[command.name])
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
-        reading = self._reader.read(array.status, array.header.stamp.to_sec())
+        publisher = array._connection_header.get("callerid", "")
+        own = ownership.own(array.status, self._namespace, publisher, self._diagnostics)
+        reading = self._reader.read(own, array.header.stamp.to_sec())
         if not reading.facts and not reading.remarks:
             return
         if not self._inbox.put(lambda: self._take_reading(reading), at_most=_QUEUE):
@@ -196,9 +211,11 @@ class ReasonerNode:
                 self._log.warn("stale", f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
 
     def _take_active(self, active: messages.ActiveConfiguration) -> None:
-        for function in active.functions:
-            if not function.configuration:
-                continue
+        running = [function for function in active.functions if function.configuration]
+        for name in set(self.core.active) - {function.function for function in running}:
+            self._take(ActiveFact(name, "", ""))
+            self._log.tell(f"{name} runs no more")
+        for function in running:
             taken = self._take(ActiveFact(function.function, function.configuration, function.state))
             if taken and function.function not in self._taken_over:
                 self._taken_over.add(function.function)
@@ -215,9 +232,19 @@ class ReasonerNode:
             if decision.state != DECIDED:
                 continue
             if self._requests:
-                self._requests.ask(decision.id, decision.to_configuration)
+                self._requests.ask(decision.id, self._wanted(decision))
             else:
                 self._report(decision.id, True)
+
+    def _wanted(self, decision: Decision) -> Wanted:
+        """Return what to ask the manipulator for."""
+        nodes = (self._node_of.get(component, component) for component in self.core.nodes_to_restart(decision))
+        return Wanted(
+            self.core.objectives[decision.objective].function,
+            decision.to_configuration,
+            tuple(rospy.resolve_name(node) for node in nodes),
+            self.core.is_first(decision),
+        )
 
     def _report(self, decision: str, ok: bool, message: str = "", *, blame: bool = True) -> None:
         """Note the outcome of a decision."""

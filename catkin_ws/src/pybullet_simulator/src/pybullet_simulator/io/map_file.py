@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
+from node_kit.io.input_files import InputFileError, read_bytes
 
 from pybullet_simulator.world.grid import FREE, OCCUPIED, UNKNOWN, Grid
 
@@ -19,6 +20,8 @@ MODES = ("trinary", "scale", "raw")
 MAX_EXTENT = 2000.0
 """m; a larger map has its resolution in another unit."""
 MAX_CELLS = 100_000_000
+MAX_IMAGE_SIZE = 8 * MAX_CELLS
+"""Bytes of the largest image: four channels of 16 bits a cell."""
 
 
 class MapError(ValueError):
@@ -94,9 +97,9 @@ def _image(name: Any, path: Path) -> NDArray[Any]:
         raise MapError(f"{path}: image: is {name!r}; give the name of an image file")
     file = path.parent / name
     try:
-        data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
-    except OSError as error:
-        raise MapError(f"{path}: image: {file} cannot be read ({error.strerror})") from error
+        data = np.frombuffer(read_bytes(file, MAX_IMAGE_SIZE), dtype=np.uint8)
+    except InputFileError as error:
+        raise MapError(f"{path}: image: {error}") from error
     try:
         image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     except cv2.error:

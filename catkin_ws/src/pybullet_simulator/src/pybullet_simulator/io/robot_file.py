@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rospkg
+from node_kit.io.input_files import InputFileError, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,12 +44,12 @@ def planar_urdf(path: Path) -> str:
         RobotFileError: the file cannot be read, is no URDF with the link base_link, or declares entities.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         if "<!DOCTYPE" in text:
             raise RobotFileError(f"{path}: declares a document type; a URDF needs none")
         robot = ET.fromstring(text)  # noqa: S314 (entities are refused above)
-    except OSError as error:
-        raise RobotFileError(f"{path}: cannot be read ({error.strerror})") from error
+    except InputFileError as error:
+        raise RobotFileError(str(error)) from error
     except ET.ParseError as error:
         raise RobotFileError(f"{path}: is not XML: {error}") from error
     if ROOT not in {link.get("name") for link in robot.iter("link")}:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import yaml
+from node_kit.io.input_files import InputFileError, read_yaml
 
 from pybullet_simulator.io.map_file import MapError, read_map
 from pybullet_simulator.world.walking import SPEED, Walker
@@ -22,11 +22,9 @@ def read_world(path: Path) -> World:
         WorldError: the file is missing, not YAML, or one of its entries is wrong; names the file and the entry.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise WorldError(f"{path}: cannot be read ({error.strerror}); give the path of a world file") from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise WorldError(f"{path}: is not YAML: {' '.join(str(error).split())}") from error
+        content = read_yaml(path)
+    except InputFileError as error:
+        raise WorldError(str(error)) from error
     if not isinstance(content, dict):
         raise WorldError(
             f"{path}: holds no world; it needs the keys floor and any of {', '.join(KINDS)}, or those of a map"

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
+from ros_model.project.corrections import correction_groups
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -39,6 +40,14 @@ def wrong_names(project: Project) -> Iterator[ModelError]:
                     f"{component!r} is a component neither of the base nor of components: add it to one",
                     *("requires", parameter, value),
                 )
+
+
+def wrong_corrections(project: Project) -> Iterator[ModelError]:
+    """Yield what `correction` names although neither the base nor a variant has it."""
+    try:
+        correction_groups(project)
+    except ModelError as error:
+        yield error
 
 
 def wrong_levels(project: Project) -> Iterator[ModelError]:
@@ -89,7 +98,11 @@ def two_meanings(project: Project) -> Iterator[ModelError]:
         "a function": settings["functions"],
         "a quality attribute": settings["quality_attributes"],
         "an objective": settings["objectives"],
-        "a component": {*settings["components"], *(component.name for component in project.base.components)},
+        "a component": {
+            *settings["components"],
+            *(component.name for component in project.base.components),
+            *(component.graph_name for variant in project.variants for component in variant.components),
+        },
         "a variant": [variant.name for variant in project.variants],
         "an expected or required level": values,
     }

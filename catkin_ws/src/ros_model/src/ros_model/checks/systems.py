@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ros_model.checks.connections import wrong_ends, wrong_types
+from ros_model.checks.executables import missing_executables
 from ros_model.checks.launch import check_launch
 from ros_model.checks.references import followed, incomplete, not_followed
 from ros_model.checks.values import misfits
 from ros_model.findings import WARNING, Finding, sorted_by_place
-from ros_model.language.library import Library
+from ros_model.language.library import Installed, Library
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,7 +26,10 @@ if TYPE_CHECKING:
 
 
 def check_system(
-    system: RosSystem, whole: RosSystem | None = None, library: Library | None = None
+    system: RosSystem,
+    whole: RosSystem | None = None,
+    library: Library | None = None,
+    installed: Installed | None = None,
 ) -> tuple[Finding, ...]:
     """Return what is wrong with a system, in the order of the file.
 
@@ -33,6 +37,7 @@ def check_system(
         system: the system to check.
         whole: what its connections may lead to, where the system is a part (a variant); the system itself if None.
         library: what is known of packages; without it, references are not followed.
+        installed: knows the executables of this machine; without it, they are not looked for.
     """
     whole = whole or system
     findings = [*_twice(system), *incomplete(system), *_values(system), *check_launch(system, whole, library)]
@@ -40,6 +45,8 @@ def check_system(
         findings += followed(system, library)
     elif library is not None:
         findings += not_followed(system)
+    if installed:
+        findings += missing_executables(system, installed)
     for connection in system.connections:
         problems = [*wrong_ends(connection, whole)]
         findings += problems or (wrong_types(connection, whole, library) if library else ())

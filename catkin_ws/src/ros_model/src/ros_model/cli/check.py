@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from node_kit.io.input_files import real_path
 
 from ros_model.checks.families import check_family, families
 from ros_model.checks.packages import check_packages
@@ -88,7 +90,7 @@ class _Check:
     def add(self, path: Path) -> None:
         """Add a file, a project or a folder of files."""
         try:
-            if path.name == FILE_NAME or (path / FILE_NAME).is_file():
+            if path.name == FILE_NAME or os.path.isfile(path / FILE_NAME):
                 self._add_project(path)
                 return
             found = models_at(path)
@@ -97,19 +99,20 @@ class _Check:
             return
         for file in found:
             self._add_file(file)
-        if not path.is_dir():
+        if not os.path.isdir(path):
             self._know(sorted(path.parent.glob(f"*{PACKAGES}")))
 
     def findings(self) -> list[Finding]:
         """Return all that is wrong, file by file."""
         known = {**self._beside, **self._packages}.values()
-        library = Library((package for packages in known for package in packages.packages), InstalledPackages())
+        installed = InstalledPackages()
+        library = Library((package for packages in known for package in packages.packages), installed)
         found = [*self._refused]
         found += [finding for path, finding in self._unknown.items() if path not in self._asked]
         for packages in self._packages.values():
             found += check_packages(packages, library)
         for path, system in self._systems.items():
-            found += check_system(system, self._wholes.get(path), library)
+            found += check_system(system, self._wholes.get(path), library, installed)
         for family in families(self._systems.values()):
             found += check_family(family)
         for project in self._projects.values():
@@ -117,13 +120,13 @@ class _Check:
         return [*dict.fromkeys(found)]
 
     def _add_project(self, path: Path) -> None:
-        project = self._load(path if path.is_dir() else path.parent)
+        project = self._load(path if os.path.isdir(path) else path.parent)
         self._projects[project.folder] = project
         for file in files_in(project.folder, PACKAGES):
             self._add_file(file)
 
     def _add_file(self, path: Path) -> None:
-        self._asked.add(path.resolve())
+        self._asked.add(real_path(path))
         try:
             model = read_all(path)
         except ModelError as error:
@@ -133,16 +136,16 @@ class _Check:
             self._packages[path] = model
             return
         self._systems[path] = model
-        project = self._project_around(path.resolve())
+        project = self._project_around(real_path(path))
         if project is not None:
             self._know(files_in(project.folder, PACKAGES))
-            if path.resolve() != project.folder / project.settings["base"]:
+            if real_path(path) != project.folder / project.settings["base"]:
                 self._wholes[path] = compose(project.base, model)
 
     def _project_around(self, path: Path) -> Project | None:
         """Return the project that a model belongs to, by the folder that it is in or the one above."""
         for folder in path.parents[:2]:
-            if (folder / FILE_NAME).is_file():
+            if os.path.isfile(folder / FILE_NAME):
                 try:
                     return self._load(folder)
                 except ModelError:  # it is told where the project itself is checked
@@ -163,7 +166,7 @@ class _Check:
                 try:
                     self._beside[path] = read_packages(path)
                 except ModelError as error:
-                    self._unknown[path.resolve()] = _warning(path, error)
+                    self._unknown[real_path(path)] = _warning(path, error)
 
     def _refuse(self, error: ModelError) -> None:
         known = {str(finding) for finding in self._refused}
@@ -178,8 +181,10 @@ def _warning(path: Path, error: ModelError) -> Finding:
 
 
 def _of_project(project: Project, library: Library) -> Iterator[Finding]:
-    yield from check_system(project.whole_base, library=library)
+    yield from check_system(project.whole_base, library=library, installed=library.installed)
     for variant in project.variants:
         # Where nothing is known of packages, the base has told so.
-        yield from check_system(variant, compose(project.base, variant), library or None)
-    yield from check_family(project.variants)
+        whole = compose(project.base, variant)
+        yield from check_system(variant, whole, library or None, library.installed)
+    for function in project.settings["functions"]:  # designs of one function are compared, and only with each other
+        yield from check_family(project.designs(function))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from node_kit.io.input_files import real_path
 
 from ros_model.errors import ModelError
 from ros_model.file_names import safe_file_name
@@ -100,7 +101,7 @@ def _placed(project: Project, output: Path, as_packages: bool) -> tuple[Project,
         ModelError: the models are in the package, but not where generated files look for them.
     """
     package = output / project.package if as_packages else output
-    folder, root = project.folder.resolve(), package.resolve()
+    folder, root = real_path(project.folder), real_path(package)
     if folder.is_relative_to(root) and folder != root / "models":
         raise ModelError(
             f"{project.folder}: generated files look for the models in {package / 'models'}: move them there, "

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
 import click
 from catkin_pkg.package import InvalidPackage, parse_package
+from node_kit.io.input_files import real_path
 
-from ros_model.errors import ModelError
+from ros_model.errors import ModelError, printable
 from ros_model.generators import write_files
 from ros_model.io.models import read_system
 from ros_model.project.first_project import Choices, first_project
@@ -33,23 +35,25 @@ def init(base: str, package: str | None, component: str | None, qualities: tuple
         if not _QUALITY.fullmatch(name):
             raise click.UsageError(f"--qa {name!r} is no name of letters, digits and '_'")
     path = Path(base)
-    if path.is_dir():
+    if os.path.isdir(path):
         raise ModelError(f"{path}: is a folder: give the .rossystem file of the base system")
     folder = path.parent
-    choices = Choices(package or _package_around(folder.resolve()), component, qualities)
-    texts = first_project(read_system(path), path.name, folder.resolve().name or ".", choices)
-    for name in texts:
-        if (folder / name).exists() or (folder / name).is_symlink():
+    choices = Choices(package or _package_around(real_path(folder)), component, qualities)
+    first = first_project(read_system(path), path.name, real_path(folder).name or ".", choices)
+    for name in first.texts:
+        if os.path.lexists(folder / name):
             raise ModelError(f"{folder / name}: is there already: move it away, or edit it")
-    for written in write_files({folder / name: text for name, text in texts.items()}, folder):
+    for written in write_files({folder / name: text for name, text in first.texts.items()}, folder):
         click.echo(f"wrote {written}")
+    for remark in first.remarks:
+        click.echo(printable(remark))
     click.echo(f"Change the places marked CHANGE, then: rosmodel check {folder}")
 
 
 def _package_around(folder: Path) -> str:
     """Return the name of the package around a folder; without one, a name made of the folder's."""
     for around in (folder, *folder.parents):
-        if (around / "package.xml").is_file():
+        if os.path.isfile(around / "package.xml"):
             try:
                 return str(parse_package(str(around)).name)
             except InvalidPackage:

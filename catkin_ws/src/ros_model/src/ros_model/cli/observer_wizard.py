@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -94,7 +95,7 @@ def _class(text: str, project: Project) -> str | None:
 
 
 def _ask_project() -> Project:
-    here = next((folder for folder in ("models", ".") if (Path(folder) / FILE_NAME).is_file()), None)
+    here = next((folder for folder in ("models", ".") if os.path.isfile(Path(folder) / FILE_NAME)), None)
 
     def proc(text: str) -> Project:
         try:

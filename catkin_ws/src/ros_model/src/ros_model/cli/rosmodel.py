@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ros_model.cli import BAD_INPUT
-from ros_model.errors import ModelError
+from ros_model.errors import ModelError, printable
 from ros_model.io.excerpts import caret_lines
 
 if TYPE_CHECKING:
@@ -50,6 +50,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:  # the reader of our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        click.echo(printable(f"rosmodel: {where}{error.strerror or error}: check the path"), err=True)
+        sys.exit(BAD_INPUT)
     sys.exit(status if isinstance(status, int) else 0)
 
 

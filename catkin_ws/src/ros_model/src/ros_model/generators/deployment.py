@@ -10,7 +10,10 @@ import yaml
 from ros_model.file_names import safe_file_name
 from ros_model.generators import write_files
 from ros_model.generators.launch import topic_of
+from ros_model.io.models import files_in
+from ros_model.language.any_language import PACKAGES
 from ros_model.language.metamodel import PortKind, compose
+from ros_model.project.settings import FUNCTION_KEYS
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import RosSystem
@@ -56,10 +59,18 @@ def manipulator(project: Project) -> dict[str, Any]:
             }
             for variant in project.variants
         },
+        **({"functions": functions} if (functions := _functions(project)) else {}),
         **{key: settings[key] for key in ("save_action", "goal_msg_type") if key in settings},
         "reconfiguration_action_name": settings.get("action_name", DEFAULT_ACTION),
         "kill_nodes": list(settings.get("kill_nodes", ())),
     }
+
+
+def _functions(project: Project) -> dict[str, dict[str, Any]]:
+    """Return what the manipulator has to heed while it changes a function, for each function that says so."""
+    functions = project.settings["functions"]
+    kept = {name: {key: entry[key] for key in FUNCTION_KEYS if key in entry} for name, entry in functions.items()}
+    return {name: entry for name, entry in kept.items() if entry}
 
 
 def _deployed(project: Project, name: str) -> dict[str, str]:
@@ -106,6 +117,10 @@ def monitor(project: Project) -> dict[str, Any]:
     return {
         "desired_rossystem": f"package://{project.package}/models/{project.base_file}",
         "variants": f"package://{project.package}/models/variants",
+        "ros_models": [
+            f"package://{project.package}/models/{path.relative_to(project.folder)}"
+            for path in files_in(project.folder, PACKAGES)
+        ],
         "components": settings["components"],
         "observers": [entry["name"] if isinstance(entry, dict) else entry for entry in settings["observers"]],
         **({"topics": settings["topics"]} if "topics" in settings else {}),

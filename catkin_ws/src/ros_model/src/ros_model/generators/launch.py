@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ros_model.language.library import Library
     from ros_model.language.metamodel import (
         Component,
+        Connection,
         ParameterType,
         Port,
         Position,
@@ -131,7 +132,7 @@ def remaps(component: Component, whole: RosSystem) -> Iterable[tuple[str, str]]:
     seen: set[str] = set()
     for port in component.ports:
         inside = port.reference.name if port.reference and port.reference.name else port.name
-        topic = topic_of(component, port, whole)
+        topic = _target(component, port, whole)
         if inside == topic or inside in seen:
             continue
         seen.add(inside)
@@ -147,11 +148,32 @@ def topic_of(component: Component, port: Port, whole: RosSystem) -> str:
 
     It is the name of its connection, absolute where the component has a NameSpace; without a connection, its own.
     """
+    connection = _connection(component, port, whole)
+    if connection is None:
+        return port.name.removeprefix("/") if port.namespace is not None else port.name
+    return f"/{connection.name.lstrip('/')}" if component.namespace is not None else connection.name
+
+
+def _connection(component: Component, port: Port, whole: RosSystem) -> Connection | None:
+    """Return the connection that a port is an end of, if there is one."""
     end = PortPath(component.name, port.name)
-    for connection in whole.connections:
-        if connection.kind is CONNECTION_OF[port.kind] and end in (*connection.sources, *connection.targets):
-            return f"/{connection.name.lstrip('/')}" if component.namespace is not None else connection.name
-    return port.name.removeprefix("/") if port.namespace is not None else port.name
+    alike = (connection for connection in whole.connections if connection.kind is CONNECTION_OF[port.kind])
+    return next((found for found in alike if end in (*found.sources, *found.targets)), None)
+
+
+def _target(component: Component, port: Port, whole: RosSystem) -> str:
+    """Return `topic_of` a port as the node has to be told it: a node resolves names in its own namespace.
+
+    A component `arm/driver` has a namespace in its name, and the connection's name does not begin there. The name is
+    relative where it is in the namespace, and absolute elsewhere, because no relative name leads out of a namespace.
+    """
+    topic = topic_of(component, port, whole)
+    namespace = component.graph_name.rpartition("/")[0]
+    if component.namespace is not None or not namespace or topic.startswith("/"):
+        return topic
+    if _connection(component, port, whole) is None:
+        return topic  # the port's own name, as the node sees it
+    return topic.removeprefix(f"{namespace}/") if topic.startswith(f"{namespace}/") else f"/{topic}"
 
 
 def resource_name(text: str, where: Position) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import math
+import os
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING
@@ -71,7 +72,7 @@ def write_observers(observers: Iterable[ObserverModel], output: Path) -> list[Pa
             plugin: plugin_text(observer),
             output / "test" / f"test_{observer.module}.py": test_text(observer),
         }
-        texts |= {path: text for path, text in code.items() if not path.exists()}
+        texts |= {path: text for path, text in code.items() if not os.path.exists(path)}
     return write_files(texts, output)
 
 
@@ -88,7 +89,7 @@ def _check_numbers(observer: ObserverModel) -> None:
 def missing_exports(observers: Iterable[ObserverModel], output: Path) -> list[str]:
     """Return the lines that the package.xml of the output, which may have one <export>, lacks for the monitor."""
     manifest = output / "package.xml"
-    text = manifest.read_text(encoding="utf-8", errors="replace") if manifest.is_file() else ""
+    text = manifest.read_text(encoding="utf-8", errors="replace") if os.path.isfile(manifest) else ""
     tags = [o.export_tag for o in observers if not o.plugin and f'"{o.target}"' not in text]
     if "<export>" in text:
         return [f"{tag} inside its <export>" for tag in tags]
@@ -105,7 +106,7 @@ def outdated(observers: Iterable[ObserverModel], output: Path) -> list[str]:
     found = []
     for observer in observers:
         path = plugin_path(observer, output)
-        if observer.plugin or not path.is_file():
+        if observer.plugin or not os.path.isfile(path):
             continue
         now = _described(plugin_text(observer), observer.name)
         kept = _described(path.read_text(encoding="utf-8", errors="replace"), observer.name)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import codecs
-import stat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rospkg
+from node_kit.io import input_files
+from node_kit.io.input_files import InputFileError, real_path
 
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import MAX_SIZE, Position
@@ -30,10 +30,13 @@ def resolve(uri: str | Path) -> Path:
     if not text.startswith(_SCHEME):
         if "://" in text:
             raise ModelError(f"{text}: only plain paths and package://PACKAGE/path are known")
-        return Path(text).expanduser().resolve()
+        try:
+            return real_path(Path(text).expanduser())
+        except RuntimeError as error:  # there is no such user
+            raise ModelError(f"{text}: {error}: give another path") from error
     package, _, relative = text.removeprefix(_SCHEME).partition("/")
     root = _package_folder(text, package)
-    path = (root / relative).resolve()
+    path = real_path(root / relative)
     if not relative or relative.startswith("/") or not path.is_relative_to(root):
         raise ModelError(f"{text}: must name a file inside the package {package} ({root})")
     return path
@@ -47,23 +50,11 @@ def read_text(path: Path) -> str:
             of the first bad byte.
     """
     try:
-        about = path.stat()
-        if stat.S_ISFIFO(about.st_mode) or stat.S_ISCHR(about.st_mode) or stat.S_ISSOCK(about.st_mode):
-            raise ModelError(f"{path}: is no regular file: give the path of one")
-        if about.st_size > MAX_SIZE:
-            raise ModelError(f"{about.st_size} bytes are too many ({MAX_SIZE})", Position(str(path), 1, 1))
-        data = path.read_bytes()
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        raise ModelError(f"{path}: {getattr(error, 'strerror', None) or error}: check the path") from error
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        good = data[: error.start].decode("utf-8-sig")
-        position = Position(str(path), good.count("\n") + 1, len(good) - (good.rfind("\n") + 1) + 1)
-        found = "it looks like UTF-16: " if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else ""
-        raise ModelError(
-            f"byte 0x{data[error.start]:02x} is not UTF-8: {found}save the file as UTF-8 text", position
-        ) from error
+        return input_files.read_text(path, MAX_SIZE)
+    except InputFileError as error:
+        if error.place is None:
+            raise ModelError(f"{path}: {error.problem}") from error
+        raise ModelError(error.problem, Position(str(path), *error.place)) from error
 
 
 def write_files(texts: Mapping[Path, str], root: Path) -> list[Path]:
@@ -81,7 +72,7 @@ def write_file(path: Path, text: str, root: Path) -> Path:
     Raises:
         ModelError: the path is outside the root, or can't be written.
     """
-    if not path.resolve().is_relative_to(root.resolve()):
+    if not real_path(path).is_relative_to(real_path(root)):
         raise ModelError(f"{path}: leaves the folder {root}: nothing is written there")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -98,7 +89,7 @@ def _package_folder(uri: str, package: str) -> Path:
     """
     for packages in (rospkg.RosPack.get_instance(), rospkg.RosPack()):
         try:
-            folder = Path(packages.get_path(package)).resolve()
+            folder = real_path(packages.get_path(package))
         except rospkg.ResourceNotFound:
             continue
         if folder.is_dir():

@@ -5,10 +5,17 @@ from __future__ import annotations
 import functools
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import rospkg
 
+from ros_model.findings import WARNING
+from ros_model.language.library import Unknown
+from ros_model.language.metamodel import EXTENSIONS_OF_SCRIPTS
 from ros_model.language.packages import EXTENSIONS, PARTS, MessageField, Spec, SpecKind
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _OF_AN_ACTION = re.compile(r"(\w+?)(?:Action(?:Goal|Result|Feedback)?|Goal|Result|Feedback)", re.ASCII)
@@ -16,6 +23,9 @@ _OF_AN_ACTION = re.compile(r"(\w+?)(?:Action(?:Goal|Result|Feedback)?|Goal|Resul
 
 class InstalledPackages:
     """The packages on ROS_PACKAGE_PATH (an `Installed` of `ros_model.language.library`)."""
+
+    def __init__(self) -> None:
+        self._missing: dict[tuple[str, str], Unknown | None] = {}
 
     def has_package(self, name: str) -> bool:
         """Return whether a package of that name is installed."""
@@ -65,6 +75,54 @@ class InstalledPackages:
             )
             for part, found in zip(PARTS[spec.kind], loaded, strict=True)
         }
+
+    def missing_executable(self, package: str, name: str) -> Unknown | None:
+        """Return why roslaunch does not find an executable; None where it does.
+
+        A package that is not on this machine is a warning, because its models may have been written for another one.
+        """
+        if (package, name) not in self._missing:
+            self._missing[package, name] = _missing_executable(package, name)
+        return self._missing[package, name]
+
+
+def _missing_executable(package: str, name: str) -> Unknown | None:
+    if _folder(package) is None:
+        text = f"the package '{package}' is not on this machine, so its executables can't be looked for"
+        return Unknown(f"{text}: source the workspace that holds it", WARNING)
+    if _executables(package, name):
+        return None
+    text = f"roslaunch finds no executable '{name}' in the package '{package}'"
+    if file := next(_files(package, name), None):
+        return Unknown(f"{text}: {file} is not executable: chmod +x it")
+    if other := next((other for other in _similar(name) if _executables(package, other)), None):
+        return Unknown(f"{text}: did you mean '{other}'?")
+    return Unknown(f"{text}: build and source its workspace, or correct the name")
+
+
+def _executables(package: str, name: str) -> list[str]:
+    """Return the files that roslaunch finds: in libexec, in share, and in the package's folder."""
+    from roslib.packages import find_node  # imported when asked for: it takes 30 ms
+
+    try:
+        found: list[str] = find_node(package, name, _packages())
+    except OSError:  # a link that leads nowhere
+        return []
+    return found
+
+
+def _files(package: str, name: str) -> Iterator[str]:
+    from roslib.packages import find_resource
+
+    yield from find_resource(package, name, rospack=_packages())
+
+
+def _similar(name: str) -> list[str]:
+    """Return a script's name without its extension, or the name with each extension of a script."""
+    stem, _, extension = name.rpartition(".")
+    return (
+        [stem] if extension in EXTENSIONS_OF_SCRIPTS else [f"{name}.{other}" for other in sorted(EXTENSIONS_OF_SCRIPTS)]
+    )
 
 
 @functools.cache

@@ -54,7 +54,7 @@ def read_all(path: Path) -> RosSystem | PackageSet:
     Raises:
         ModelError: it can't be read or is not well-formed.
     """
-    if path.is_dir() and os.access(path, os.R_OK, effective_ids=True):
+    if os.path.isdir(path) and os.access(path, os.R_OK, effective_ids=True):
         raise ModelError(f"{path}: is a folder: give a {SYSTEM} or {PACKAGES} file")
     return parse_all(read_text(path), str(path))
 
@@ -67,7 +67,7 @@ def files_in(folder: Path, extension: str) -> list[Path]:
     Raises:
         ModelError: there is no such folder.
     """
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise ModelError(f"{folder}: no such folder: check the path")
     found: list[Path] = []
     tree = os.walk(folder, onerror=lambda error: found.append(Path(error.filename)))
@@ -83,7 +83,7 @@ def models_at(path: Path) -> list[Path]:
     Raises:
         ModelError: the folder has none.
     """
-    if not path.is_dir():
+    if not os.path.isdir(path):
         return [path]
     found = [*dict.fromkeys([*files_in(path, PACKAGES), *files_in(path, SYSTEM)])]
     if not found:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ros_model.checks.projects import levels_of_nothing, two_meanings, wrong_levels, wrong_names
+from node_kit.io.input_files import real_path
+
+from ros_model.checks.projects import levels_of_nothing, two_meanings, wrong_corrections, wrong_levels, wrong_names
 from ros_model.errors import Gathered, ModelError, first_of
 from ros_model.io.files import read_text
 from ros_model.io.models import files_in, read_library, read_system
@@ -58,17 +61,18 @@ def load_project(folder: str | Path) -> Project:
             variants += found
     wrong.tell()
     project = Project(
-        folder=source.path.parent.resolve(),
+        folder=real_path(source.path.parent),
         settings=source.content,
         base=base,
         variants=tuple(variants),
         source=source,
         whole_base=whole_base,
         by_table=frozenset(by_table),
-        read_library=partial(_read_library, source.path.parent.resolve()),
+        read_library=partial(_read_library, real_path(source.path.parent)),
     )
     wrong.add(wrong_names(project))
     wrong.add(wrong_levels(project))
+    wrong.add(wrong_corrections(project))
     wrong.add(levels_of_nothing(project, levels))
     wrong.tell()
     wrong.add(two_meanings(project))
@@ -83,9 +87,9 @@ def locate(folder: str | Path) -> Path:
         ModelError: the file is no YAML by its name.
     """
     path = Path(folder)
-    if path.is_file() and path.suffix not in {".yaml", ".yml"}:
+    if os.path.isfile(path) and path.suffix not in {".yaml", ".yml"}:
         raise ModelError(f"{path}: is no project: give the folder of {FILE_NAME}, or that file")
-    return path / FILE_NAME if path.is_dir() else path
+    return path / FILE_NAME if os.path.isdir(path) else path
 
 
 def read_settings(path: Path, sections: Sequence[str] = ()) -> Settings:
@@ -159,7 +163,7 @@ def _from_files(source: Settings, keys: Keys) -> list[RosSystem]:
     if "files" in family:
         paths = [source.inside(*keys, "files", number) for number in range(len(family["files"]))]
     else:
-        paths = sorted((source.path.parent.resolve() / "variants").glob("*.rossystem"))
+        paths = sorted((real_path(source.path.parent) / "variants").glob("*.rossystem"))
     if not paths:
         raise source.error("names no table, and variants/ holds no .rossystem file: add one", *keys)
     variants = [read_system(path) for path in paths]

@@ -47,6 +47,12 @@ class Installed(Protocol):
     def parts(self, package: str, spec: Spec) -> Mapping[str, tuple[MessageField, ...]]:
         """Return the fields of an installed message or service by its parts; nothing where there is none."""
 
+    def missing_executable(self, package: str, name: str) -> Unknown | None:
+        """Return why roslaunch does not find an executable; None where it does.
+
+        A package that is not on this machine is a warning, because its models may have been written for another one.
+        """
+
 
 class NothingInstalled:
     """Stands for a host without a single package."""
@@ -62,6 +68,9 @@ class NothingInstalled:
     def parts(self, package: str, spec: Spec) -> Mapping[str, tuple[MessageField, ...]]:  # noqa: ARG002 - interface
         """Return nothing."""
         return {}
+
+    def missing_executable(self, package: str, name: str) -> None:
+        """Return None: nothing is known of executables."""
 
 
 class Library:

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import enum
+import re
 from dataclasses import dataclass, field, replace
 
 MAX_SIZE = 16_000_000
 """Bytes or characters of the largest model that is read; the largest published one has 432 thousand."""
 
 Value = bool | int | float | str | list["Value"] | dict[str, "Value"]
+
+EXTENSIONS_OF_SCRIPTS = frozenset(["bash", "js", "lua", "pl", "py", "rb", "sh"])
+"""Extensions of executables that stand in a reference as they are: `package.talker.py.node`."""
+_UP_TO_DOT = re.compile(r"((?:\\[\\.]|[^.])*+)\.")
+_ESCAPED = re.compile(r"\\([\\.])")
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,11 @@ CONNECTION_OF = {port: kind for kind, ends in ENDS.items() for port in ends}
 
 @dataclass(frozen=True)
 class Reference:
-    """A dotted reference `package.artifact.node.name`; the name may itself hold dots and slashes."""
+    """A dotted reference `package.artifact.node.name`; the name may itself hold dots and slashes.
+
+    The artifact is the name of an executable's file. It may have the extension of a script, as in
+    `package.talker.py.node`. Any other dot in one of the first three parts has a backslash before it.
+    """
 
     package: str
     artifact: str
@@ -71,14 +81,42 @@ class Reference:
         Raises:
             ValueError: the text has fewer than three parts.
         """
-        parts = text.split(".", 3)
+        parts = cls.split(text)
         if len(parts) < 3 or not all(parts[:3]):
             raise ValueError(f"reference '{text}' is not package.artifact.node[.name]")
-        return cls(parts[0], parts[1], parts[2], "".join(parts[3:]))
+        package, artifact, node, name = (*parts, "")[:4]
+        return cls(package, artifact, node, name)
+
+    @staticmethod
+    def split(text: str) -> tuple[str, ...]:
+        """Return the parts of a dotted text, at most four: package, artifact, node, and the rest as it is."""
+        parts = _cut(text, 3)
+        if len(parts) > 2 and parts[2] in EXTENSIONS_OF_SCRIPTS:
+            parts = _cut(text, 4)
+            parts[1:3] = [f"{parts[1]}.{parts[2]}"]
+        return (*(_ESCAPED.sub(r"\1", part) for part in parts[:3]), *parts[3:])
 
     def __str__(self) -> str:
         """Return the dotted form."""
-        return ".".join(part for part in (self.package, self.artifact, self.node, self.name) if part)
+        stem, dot, extension = self.artifact.rpartition(".")
+        is_script = bool(stem) and extension in EXTENSIONS_OF_SCRIPTS
+        artifact = _escaped(stem) + dot + extension if is_script else _escaped(self.artifact)
+        parts = (_escaped(self.package), artifact, _escaped(self.node), self.name)
+        return ".".join(part for part in parts if part)
+
+
+def _cut(text: str, most: int) -> list[str]:
+    """Cut a text at its dots, at most so many times, but not at those that a backslash escapes."""
+    parts: list[str] = []
+    start = 0
+    while len(parts) < most and (match := _UP_TO_DOT.match(text, start)):
+        parts.append(match[1])
+        start = match.end()
+    return [*parts, text[start:]]
+
+
+def _escaped(part: str) -> str:
+    return part.replace("\\", "\\\\").replace(".", "\\.")
 
 
 @dataclass(frozen=True)

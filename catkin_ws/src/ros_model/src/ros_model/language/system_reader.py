@@ -184,7 +184,7 @@ class _Builder(Builder):
 
     def _reference(self, token: Token) -> Reference:
         """Split a reference; one with parts missing at its end is for the checker, as its spelling is not wrong."""
-        parts = text_of(token).split(".", 3)
+        parts = Reference.split(text_of(token))
         if "" in parts[:3]:
             self.refuse(f"reference '{short(text_of(token))}' is not package.artifact.node[.name]", token)
         package, artifact, node, name = (*parts, "", "", "")[:4]

@@ -16,7 +16,7 @@ from ros_model.project.tables import NAME, typed_cell
 from ros_model.project.yaml_file import flow
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from ros_model.language.metamodel import Component, RosParameter, RosSystem
 
@@ -95,8 +95,21 @@ class Choices:
     qualities: tuple[str, ...] = ()
 
 
-def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> dict[str, str]:
-    """Return the texts of metacontrol.yaml and its two tables, by the names of the files.
+@dataclass(frozen=True)
+class FirstProject:
+    """A first project.
+
+    Attributes:
+        texts: of metacontrol.yaml and its two tables, by the names of the files.
+        remarks: what the project leaves to the user, one line each.
+    """
+
+    texts: dict[str, str]
+    remarks: tuple[str, ...] = ()
+
+
+def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> FirstProject:
+    """Return the first project of a base system.
 
     Args:
         base: the system.
@@ -112,8 +125,8 @@ def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> 
     variant = re.sub(r"[^A-Za-z0-9_]+", "_", base.name).strip("_").lower() or "base"
     what = re.sub(r"\W+", "_", component.name, flags=re.ASCII).strip("_")
     qualities = dict.fromkeys((*choices.qualities, UTILITY))
-    others = (other.graph_name for other in base.components if other.name != component.name)
-    names = [name for name in others if _GRAPH_NAME.search(name) and "\n" not in name]
+    others = {key: name for key, name in _nodes(base).items() if name != component.graph_name}
+    nodes = {key: {"node": name} for key, name in others.items() if _GRAPH_NAME.search(key) and "\n" not in key}
     action = next((p.name for p in component.ports if p.kind is PortKind.ACTION_SERVER), None)
     text = _TEMPLATE.format(
         system=base.name.replace("\n", " "),
@@ -129,16 +142,46 @@ def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> 
         objective=f"o_{what}",
         qualities="".join(f"  {name}: {_quality(name)}\n" for name in qualities),
         utility=UTILITY,
-        components=_lines({name.rpartition("/")[2]: {"node": name} for name in names}, indent=2),
+        components=_lines(nodes, indent=2),
         action=f"  # save_action: {action or 'ACTION'}\n  # goal_msg_type: PACKAGE.msg.TYPEAction",
         kill=flow(component.graph_name),
     )
     values = [_cell(parameter) for parameter in columns.values()]
-    return {
+    texts = {
         FILE_NAME: text,
         TABLE: _csv([NAME, *columns], [f"{variant}_default", *values]),
         LEVELS: _csv([NAME, *qualities, "source"], [f"{variant}_default", *["0.5"] * len(qualities), "estimated"]),
     }
+    unnamed = [name for key, name in others.items() if key not in nodes]
+    return FirstProject(texts, (*_copies(base, component), *_unnamed(unnamed)))
+
+
+def _nodes(base: RosSystem) -> dict[str, str]:
+    """Return the name of each component's node, by the component's name; by the node's if two have that name."""
+    names = [component.name for component in base.components]
+    return {
+        component.name if names.count(component.name) == 1 else component.graph_name: component.graph_name
+        for component in base.components
+    }
+
+
+def _copies(base: RosSystem, component: Component) -> Iterator[str]:
+    """Yield that other components run the executable of the one that varies."""
+    copies = [
+        other.graph_name
+        for other in base.components
+        if other.graph_name != component.graph_name and other.executable == component.executable
+    ]
+    if copies:
+        yield (
+            f"{', '.join(copies)} run{'s' * (len(copies) == 1)} the same executable as {component.graph_name}. Only "
+            f"{component.graph_name} varies: add a family with a table for each other one, or choose with --component"
+        )
+
+
+def _unnamed(nodes: Sequence[str]) -> Iterator[str]:
+    if nodes:
+        yield f"{', '.join(nodes)}: no name that ROS allows, so it is not among the components: rename it in the model"
 
 
 def _varying(base: RosSystem, name: str | None) -> Component:
@@ -195,7 +238,7 @@ def _quality(name: str) -> str:
     return f"{{direction: {direction}, range: [0.0, 1.0]}}"
 
 
-def _lines(entries: dict[str, object], indent: int = 4) -> str:
+def _lines(entries: Mapping[str, object], indent: int = 4) -> str:
     if not entries:
         return " {}"
     return "".join(f"\n{' ' * indent}{flow(name)}: {flow(value)}" for name, value in entries.items())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 FILE_NAME = "metacontrol.yaml"
 _SCHEMA = "metacontrol"
+FUNCTION_KEYS = ("save_action", "goal_msg_type", "kill_nodes")
+"""What the manipulator has to heed while it changes a function."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +54,9 @@ class Settings:
         name: Any = self.content
         for key in keys:
             name = name[key]
-        folder = self.path.parent.resolve()
+        folder = Path(os.path.realpath(self.path.parent))
         try:
-            found = (folder / name).resolve()
+            found = Path(os.path.realpath(folder / name))
         except ValueError:  # a character that no path has
             raise self.error(f"{name!r} is no name of a file", *keys) from None
         if not found.is_relative_to(folder):
@@ -117,6 +120,7 @@ def _broken_links(settings: Settings) -> Iterator[ModelError]:
                     yield _no_such(settings, other, "functions", *keys)
                 elif other == name:
                     yield settings.error("a function can't require itself: take it out", *keys)
+    yield from _unclear_functions(settings)
     for name, objective in content["objectives"].items():
         if objective["function"] not in content["functions"]:
             yield _no_such(settings, objective["function"], "functions", "objectives", name, "function")
@@ -134,6 +138,19 @@ def _broken_links(settings: Settings) -> Iterator[ModelError]:
                 yield settings.error(
                     "is for an observer that exists: name it as plugin", "observers", number, "outputs"
                 )
+
+
+def _unclear_functions(settings: Settings) -> Iterator[ModelError]:
+    """Yield keys of `manipulator` that do not say which function they are for, and actions without a type."""
+    functions = settings.content["functions"]
+    for key in FUNCTION_KEYS:
+        if key in settings.content.get("manipulator", {}) and (
+            len(functions) > 1 or key in next(iter(functions.values()))
+        ):
+            yield settings.error("put it under functions/NAME, so that it is clear for which one", "manipulator", key)
+    for name, entry in functions.items():
+        if "save_action" in entry and "goal_msg_type" not in entry:
+            yield settings.error("has no goal_msg_type: add the action's type", "functions", name, "save_action")
 
 
 def _unknown_qas(settings: Settings) -> Iterator[ModelError]:

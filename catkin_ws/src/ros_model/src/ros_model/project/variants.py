@@ -247,9 +247,13 @@ def _levels(row: Row, levels: Table | None) -> Iterator[SystemParameter]:
         return
     found = levels.row(row.name)
     if found is None:
-        raise ModelError(f"no row for {row.name}: add its expected levels", Position(str(levels.path), 1, 1))
-    for column, cell in found.cells.items():
-        if not _ABOUT.fullmatch(column):
+        raise ModelError(
+            f"no row for {row.name}: add its expected levels, or a row of empty cells if its function has none",
+            Position(str(levels.path), 1, 1),
+        )
+    cells = {column: cell for column, cell in found.cells.items() if not _ABOUT.fullmatch(column)}
+    if any(cell is not None for cell in cells.values()):
+        for column, cell in cells.items():
             yield _level(column, cell, f"{row.name}: {column}", found.position)
 
 

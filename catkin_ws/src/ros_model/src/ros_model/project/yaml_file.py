@@ -6,15 +6,11 @@ import math
 from typing import Any
 
 import yaml
+from node_kit.yaml_text import YamlError, parse_marked_yaml
 
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
 from ros_model.project.schema_check import Keys
-
-MAX_SIZE = 4_000_000
-"""Characters of the largest file that is read."""
-MAX_VALUES = 200_000
-"""Values of the largest file that is read, aliases counted as often as they stand."""
 
 
 def parse_yaml(text: str, file: str) -> tuple[Any, dict[Keys, Position]]:
@@ -27,45 +23,11 @@ def parse_yaml(text: str, file: str) -> tuple[Any, dict[Keys, Position]]:
     Raises:
         ModelError: it is no YAML, has a key twice, or is nested or expanded too far.
     """
-    if len(text) > MAX_SIZE:
-        raise ModelError(f"{len(text)} characters are too many (at most {MAX_SIZE})", Position(file, 1, 1))
-    places: dict[Keys, Position] = {}
     try:
-        loader = yaml.SafeLoader(text)
-        node = loader.get_single_node()
-        if node is None:
-            return None, {}
-        _walk(node, (), file, places)
-        return loader.construct_document(node), places
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = Position(file, mark.line + 1, mark.column + 1) if mark else Position(file, 1, 1)
-        what = getattr(error, "problem", None) or getattr(error, "reason", None) or "is no YAML"
-        raise ModelError(f"{what}: correct the YAML", where) from error
-    except RecursionError:
-        raise ModelError("is nested too deep: correct the YAML", Position(file, 1, 1)) from None
-    except ValueError as error:  # a date or a number that can't be
-        raise ModelError(f"{error}: correct the YAML", Position(file, 1, 1)) from error
-
-
-def _walk(node: yaml.Node, keys: Keys, file: str, places: dict[Keys, Position]) -> None:
-    places.setdefault(keys, _position(node, file))
-    if len(places) > MAX_VALUES:
-        raise ModelError(f"holds more than {MAX_VALUES} values: correct its aliases", _position(node, file))
-    if isinstance(node, yaml.SequenceNode):
-        for number, item in enumerate(node.value):
-            _walk(item, (*keys, number), file, places)
-    elif isinstance(node, yaml.MappingNode):
-        for key, item in node.value:
-            inner = (*keys, str(key.value))
-            if inner in places and key.tag != "tag:yaml.org,2002:merge":
-                raise ModelError(f"the key {key.value!r} stands twice: take one out", _position(key, file))
-            places[inner] = _position(key, file)
-            _walk(item, inner, file, places)
-
-
-def _position(node: yaml.Node, file: str) -> Position:
-    return Position(file, node.start_mark.line + 1, node.start_mark.column + 1)
+        value, places = parse_marked_yaml(text)
+    except YamlError as error:
+        raise ModelError(error.problem, Position(file, *error.place)) from error
+    return value, {keys: Position(file, *place) for keys, place in places.items()}
 
 
 def flow(value: Any) -> str:

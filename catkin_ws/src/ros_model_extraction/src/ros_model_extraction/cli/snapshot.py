@@ -30,7 +30,7 @@ _LONGEST = 3600.0  # s
     metavar="S",
     help="Patience with the master and each node.",
 )
-@click.option("--all", "everything", is_flag=True, help="Keep what ROS itself makes: /rosout, ~get_loggers, ...")
+@click.option("--all", "everything", is_flag=True, help="Leave nothing out: /rosout, ~get_loggers, ...")
 def snapshot(output: str, master: str | None, name: str, timeout: float, everything: bool) -> None:
     """Write NAME.ros and NAME.rossystem of the running system.
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import rospkg
+from node_kit.yaml_text import YamlError, parse_yaml
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import PortKind, Reference
 
 from ros_model_extraction import ros_defaults as plumbing
 from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.io.source_files import read_xml
-from ros_model_extraction.names import executable_name, resolve, split_name
+from ros_model_extraction.names import node_name, resolve, split_name
 from ros_model_extraction.node_facts import NodeSource, SourceError
 from ros_model_extraction.packages.catkin_package import CatkinPackage, read_package
 from ros_model_extraction.packages.package_source import named, read_executable
@@ -34,6 +35,7 @@ class LaunchedNode:
     type: str
     remaps: Mapping[str, str]
     private: Mapping[str, Any]  # parameters given as `_name:=value` among its arguments
+    unsaid: tuple[str, ...] = ()  # what a model has no words for
 
 
 def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
@@ -57,18 +59,17 @@ def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
     names = [node.name for node in nodes]
     for node in nodes:
         source = sources.node(node, tree)
-        reference = Reference(node.package, executable_name(node.type), executable_name(split_name(node.name)[1]))
+        reference = Reference(node.package, node.type, node_name(split_name(node.name)[1]))
         instance = Instance(node.name, *label_of(node.name, names), reference)
         if source is None or not source.is_node:
             lines.append(f"The interfaces of {node.name} are not known: {sources.problem(node)}.")
         else:
-            instance.reference = Reference(node.package, executable_name(node.type), named(source, node.type).name)
+            instance.reference = Reference(node.package, node.type, named(source, node.type).name)
             instance.declared = named(source, node.type).declared()
             instance.ends = _ends(node, source)
             lines += [f"{node.package}/{remark}" for remark in source.remarks]
-        if executable_name(node.type) != node.type:
-            lines.append(f"The artifact {executable_name(node.type)} is the executable {node.type}.")
         instances[node.name] = instance
+        lines += _left_out(node, instance.ends)
     unowned = [(key, value) for key, value in share_out(tree, instances) if not plumbing.is_roslaunch_parameter(key)]
     given = f" with {' '.join(arguments)}" if arguments else ""
     title = [
@@ -99,7 +100,7 @@ def load(path: Path, arguments: Sequence[str]) -> tuple[list[LaunchedNode], dict
         )
     except (roslaunch.core.RLException, roslaunch.xmlloader.XmlParseException, rospkg.ResourceNotFound) as error:
         raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(error).split())}") from error
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+    except Exception as error:  # whatever `$(eval ...)`, an encoding or the file's size makes of it
         raise ModelError(f"{path}: roslaunch can't read it: {type(error).__name__}: {error}") from error
     if config.config_errors:
         raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(config.config_errors[0]).split())}")
@@ -111,6 +112,7 @@ def _launched(node: Any) -> LaunchedNode:
     full = resolve(node.name, f"{node.namespace.rstrip('/')}/_")
     remaps = [(str(old), str(new)) for old, new in node.remap_args]
     private = {}
+    plain = []
     try:
         words = shlex.split(node.args or "")
     except ValueError:
@@ -118,13 +120,24 @@ def _launched(node: Any) -> LaunchedNode:
     for word in words:
         old, assigned, new = word.partition(":=")
         if not assigned or old.startswith(_SPECIAL):
+            plain.append(word)
             continue
         if old.startswith("_"):
             private[old[1:]] = _scalar(new)
         else:
             remaps.append((old, new))
     resolved = {resolve(old, full): resolve(new, full) for old, new in remaps}
-    return LaunchedNode(full, node.package, node.type, resolved, private)
+    unsaid = (
+        ("args", shlex.join(plain)),
+        ("launch-prefix", node.launch_prefix),
+        ("env", " ".join(f"{name}={value}" for name, value in node.env_args)),
+        ("machine", node.machine_name),
+        ("respawn", "true" if node.respawn else ""),
+        ("required", "true" if node.required else ""),
+    )
+    return LaunchedNode(
+        full, node.package, node.type, resolved, private, tuple(f'{key}="{value}"' for key, value in unsaid if value)
+    )
 
 
 class _Sources:
@@ -177,6 +190,17 @@ def _ends(node: LaunchedNode, source: NodeSource) -> list[End]:
     return [end for end in ends.values() if not plumbing.is_plumbing(end)]
 
 
+def _left_out(node: LaunchedNode, ends: Sequence[End]) -> Iterator[str]:
+    """Yield what a launch file says of a node and the model does not; a generated launch file lacks it, too."""
+    kept = {resolve(end.declared, node.name) for end in ends if end.declared}
+    actions = {f"{name}/{topic}" for name in kept for topic in ("goal", "cancel", "status", "result", "feedback")}
+    lost = [f"{old} to {new}" for old, new in sorted(node.remaps.items()) if old != new and old not in kept | actions]
+    if lost:
+        yield f"Left out: remappings of {node.name}, whose source has no such interface: {', '.join(lost)}."
+    if node.unsaid:
+        yield f"Left out: {', '.join(node.unsaid)} of {node.name}: a model has no words for it."
+
+
 def _remapped(kind: PortKind, name: str, remaps: Mapping[str, str]) -> str:
     if kind in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT):  # a remapping names its topics
         return remaps.get(f"{name}/goal", f"{name}/goal").removesuffix("/goal")
@@ -209,9 +233,7 @@ def _lookup(tree: Any, name: str) -> Any:
 
 def _scalar(text: str) -> Any:
     """Return a parameter given on the command line, typed as roslaunch does it."""
-    import yaml
-
     try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError:
+        return parse_yaml(text)
+    except YamlError:
         return text

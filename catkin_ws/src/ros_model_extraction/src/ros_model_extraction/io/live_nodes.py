@@ -91,13 +91,28 @@ def executable_of(arguments: Sequence[str], folder: Path, packages: Iterable[str
         if not path.is_file():
             break
         package = path.parent.name if path.parent.name in known else rospkg.get_package_name(str(path))
-        origin = Origin(package, path.name) if package else None
+        origin = Origin(package, path.name, *told(arguments[number + 1 :])) if package else None
         if origin and os.access(path, os.X_OK):
             return origin
         found = found or origin
         if origin is None:
             break  # the program is in no package: what follows are its arguments
     return found
+
+
+def told(arguments: Iterable[str]) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
+    """Return what a node's command line tells it: remappings, and arguments of its own.
+
+    `__name:=` and the like are for ROS, and `_rate:=5` is a parameter, which the parameter server has.
+    """
+    remaps, own = [], []
+    for argument in arguments:
+        inside, is_assignment, outside = argument.partition(":=")
+        if not is_assignment:
+            own.append(argument)
+        elif inside and outside and not inside.startswith("_"):
+            remaps.append((inside, outside))
+    return tuple(remaps), tuple(argument for argument in own if argument)
 
 
 def _service_addresses(master: str, services: Iterable[str], timeout: float) -> dict[str, str]:

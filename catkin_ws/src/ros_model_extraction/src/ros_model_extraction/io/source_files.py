@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from node_kit.io.input_files import InputFileError, read_bytes
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
 
@@ -23,11 +24,9 @@ def read_source(path: Path, shown: str) -> bytes:
         SourceError: it can't be read, is too large, or is no text.
     """
     try:
-        if path.stat().st_size > MAX_SIZE:
-            raise SourceError(Remark(Position(shown, 1, 1), f"not read: larger than {MAX_SIZE} bytes"))
-        data = path.read_bytes()
-    except OSError as error:
-        raise SourceError(Remark(Position(shown, 1, 1), f"not read: {error.strerror or error}")) from error
+        data = read_bytes(path, MAX_SIZE)
+    except InputFileError as error:
+        raise SourceError(Remark(Position(shown, 1, 1), f"not read: {error.problem}")) from error
     if b"\0" in data:
         line = data[: data.index(b"\0")].count(b"\n") + 1
         raise SourceError(Remark(Position(shown, line, 1), "not read: it is no text but binary"))

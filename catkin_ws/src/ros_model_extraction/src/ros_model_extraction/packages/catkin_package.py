@@ -70,8 +70,9 @@ def find_packages(path: Path) -> tuple[tuple[Path, ...], tuple[Remark, ...]]:
         path.stat()
         if path.is_dir():
             _enter(path)
-    except OSError as error:
-        what = "no such folder" if isinstance(error, FileNotFoundError) else f"not read: {error.strerror or error}"
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = getattr(error, "strerror", None) or error
+        what = "no such folder" if isinstance(error, FileNotFoundError) else f"not read: {reason}"
         raise ModelError(f"{path}: {what}: give the folder of a ROS package, or of several") from error
     if not path.is_dir():
         raise ModelError(f"{path}: is no folder: give the folder of a ROS package, or of several")

@@ -11,7 +11,7 @@ from ros_model.language.metamodel import Position
 from ros_model.language.packages import Artifact, Package, PackageSet
 
 from ros_model_extraction.io.python_modules import Library
-from ros_model_extraction.names import executable_name
+from ros_model_extraction.names import node_name
 from ros_model_extraction.node_facts import NodeSource, Remark, SourceError, unique
 from ros_model_extraction.packages.catkin_package import CatkinPackage, Executable, read_package
 from ros_model_extraction.packages.message_files import read_specs
@@ -37,13 +37,8 @@ class ExtractedPackage:
 
     def model(self) -> PackageSet:
         """Return the content of a `.ros` file, with remarks as its first comments."""
-        renamed = [
-            f"The artifact {executable_name(name)} is the executable {name}: a reference can't hold the dot."
-            for name, node in self.nodes.items()
-            if node.is_node and executable_name(name) != name
-        ]
         no_nodes = [name for name, node in self.nodes.items() if not node.is_node]
-        lines = [f"The package {self.package.name}, from its source. Written by rosmodel extract.", *_LEGEND, *renamed]
+        lines = [f"The package {self.package.name}, from its source. Written by rosmodel extract.", *_LEGEND]
         if no_nodes:
             lines.append(f"Executables that start no ROS node: {', '.join(no_nodes)}.")
         return PackageSet((self.package,), "\n".join([*lines, *map(str, self.remarks)]))
@@ -74,7 +69,7 @@ def extract_package(folder: Path) -> ExtractedPackage:
         remarks += node.remarks
     specs, said = read_specs(folder)
     artifacts = tuple(
-        Artifact(executable_name(name), (named(node, name).declared(),), position=node.position)
+        Artifact(name, (named(node, name).declared(),), position=node.position)
         for name, node in nodes.items()
         if node.is_node
     )
@@ -109,4 +104,4 @@ def read_executable(
 def named(node: NodeSource, executable: str) -> NodeSource:
     """Return the node with a name that a reference can hold: that of its executable, where its own is not known."""
     name = node.name if node.name and "{" not in node.name else executable
-    return replace(node, name=executable_name(name.strip("/").replace("/", "_")))
+    return replace(node, name=node_name(name.strip("/").replace("/", "_")))

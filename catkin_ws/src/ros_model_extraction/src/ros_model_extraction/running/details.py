@@ -11,10 +11,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Origin:
-    """The executable that a node runs: its package and the name of its file."""
+    """The executable that a node runs, and how it was started.
+
+    Attributes:
+        package: its package.
+        executable: the name of its file.
+        remaps: (name in the node's code, name in the graph) of its command line, as they are written there.
+        arguments: what else its command line tells the program.
+    """
 
     package: str
     executable: str
+    remaps: tuple[tuple[str, str], ...] = ()
+    arguments: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from ros_model.language.metamodel import (
 from ros_model.language.packages import Artifact, Node, Package, PackageSet, ParameterDeclaration, PortDeclaration
 
 from ros_model_extraction import ros_defaults as plumbing
-from ros_model_extraction.names import as_seen_from, executable_name, is_known_type, split_name
+from ros_model_extraction.names import as_seen_from, is_known_type, node_name, resolve, split_name
 from ros_model_extraction.values import UnwritableValueError, leaves, typed
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from ros_model_extraction.running.details import Details
 
+_ACTION_TOPICS = ("/goal", "/cancel", "/status", "/result", "/feedback")
 NO_PACKAGE = "unknown_package"
 """Package of nodes whose executable can't be traced; the artifact is then named as the node."""
 
@@ -77,21 +78,65 @@ def models_of(
         details: what the nodes tell.
         name: name of the system.
         title: first lines of both files' comments.
-        everything: keep what ROS itself makes for every node, and what roslaunch leaves on the parameter server.
+        everything: keep also what ROS makes for every node, the meta-controller's own nodes, and the parameters that
+            roslaunch and nodes that have ended leave on the parameter server.
     """
     remarks = _Remarks(snapshot, details, everything)
     ends = [end for end in interfaces(snapshot, details) if everything or not plumbing.is_plumbing(end)]
-    running = [
-        node for node in snapshot.nodes if node not in details.dead and (everything or node not in plumbing.NODES)
-    ]
-    instances = _instances(running, details, remarks)
+    living = [node for node in snapshot.nodes if node not in details.dead]
+    if not everything:
+        living = [node for node in living if node not in plumbing.NODES and node not in remarks.metacontrol]
+    instances = _instances(living, details)
     for end in ends:
         if end.node in instances:
             instances[end.node].ends.append(end)
+    for node, instance in instances.items():
+        origin = details.origins.get(node)
+        if origin and origin.remaps:
+            instance.ends, unused = as_declared(node, instance.ends, origin.remaps)
+            remarks.unused_remaps[node] = unused
     unowned = share_out(snapshot.parameters, instances)
     if not everything:
-        unowned = [(key, value) for key, value in unowned if not plumbing.is_roslaunch_parameter(key)]
+        gone = (*details.dead, *remarks.metacontrol)
+        unowned = [(key, value) for key, value in unowned if _is_robots(key, gone)]
+        unowned, remarks.abandoned = _inhabited(unowned, instances.values())
     return assemble(name, instances, unowned, [*title, *remarks.lines()])
+
+
+def _is_robots(parameter: str, gone: Sequence[str]) -> bool:
+    """Return whether a parameter is neither roslaunch's, nor of the meta-controller, nor of a node that is left out."""
+    if plumbing.is_roslaunch_parameter(parameter) or plumbing.is_metacontrol_parameter(parameter):
+        return False
+    return not any(f"/{parameter}".startswith(f"{node}/") for node in gone)
+
+
+def _inhabited(
+    parameters: Sequence[tuple[str, Any]], instances: Iterable[Instance]
+) -> tuple[list[tuple[str, Any]], list[str]]:
+    """Return the parameters whose namespaces are in use, and the namespaces of the others.
+
+    The parameter server keeps the parameters of a node that has ended. They look like those of a namespace. So a
+    namespace counts only if a living node is in it, or offers a topic, service or action in it.
+    """
+    places = {place for instance in instances for place in (instance.name, *map(_offered, instance.ends)) if place}
+    used = {"", *(place[:end] for place in places for end, mark in enumerate(place) if mark == "/")}
+    kept: list[tuple[str, Any]] = []
+    abandoned: dict[str, None] = {}
+    for name, value in parameters:
+        parts = name.split("/")[:-1]
+        namespaces = ["", *("/" + "/".join(parts[: end + 1]) for end in range(len(parts)))]
+        unused = next((namespace for namespace in namespaces if namespace not in used), None)
+        if unused is None:
+            kept.append((name, value))
+        else:
+            abandoned[unused] = None
+    return kept, list(abandoned)
+
+
+def _offered(end: End) -> str:
+    """Return the name of an interface that others may use; "" for one that uses others."""
+    offers = (PortKind.PUBLISHER, PortKind.SERVICE_SERVER, PortKind.ACTION_SERVER)
+    return end.name if end.kind in offers else ""
 
 
 def assemble(
@@ -134,17 +179,38 @@ def interfaces(snapshot: GraphSnapshot, details: Details) -> Iterator[End]:
                 yield End(name, kind, action, snapshot.actions[action].type)
 
 
-def _instances(names: Sequence[str], details: Details, remarks: _Remarks) -> dict[str, Instance]:
+def as_declared(
+    node: str, ends: Sequence[End], remaps: Sequence[tuple[str, str]]
+) -> tuple[list[End], list[tuple[str, str]]]:
+    """Return a node's interfaces with their names in its code, where remappings tell these, and the remappings left.
+
+    If several names in the code are remapped to one name in the graph, each goes to one of the interfaces of that
+    name. Nothing tells which; a launch file has the same remappings either way.
+    """
+    unused = list(remaps)
+    found = []
+    for end in ends:
+        is_action = end.kind in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT)
+        suffix = "/goal" if is_action else ""
+        fitting = [pair for pair in remaps if resolve(pair[1], node) == end.name + suffix and pair[0].endswith(suffix)]
+        name = ""
+        if fitting:
+            chosen = next((pair for pair in fitting if pair in unused), fitting[0])
+            name = chosen[0].removesuffix(suffix)
+            topics = {end.name + topic for topic in _ACTION_TOPICS} if is_action else set()
+            unused = [pair for pair in unused if pair != chosen and resolve(pair[1], node) not in topics]
+        found.append(replace(end, declared=name) if name else end)
+    return found, unused
+
+
+def _instances(names: Sequence[str], details: Details) -> dict[str, Instance]:
     """Give every node its label, unique in the system, and the reference to the executable that it runs."""
     found = {}
     for name in names:
         origin = details.origins.get(name)
         package = origin.package if origin else NO_PACKAGE
         label = split_name(name)[1]
-        artifact = executable_name(origin.executable) if origin else executable_name(label)
-        if origin and artifact != origin.executable:
-            remarks.renamed[origin.executable] = artifact
-        reference = Reference(package, artifact, executable_name(label))
+        reference = Reference(package, origin.executable if origin else node_name(label), node_name(label))
         found[name] = Instance(name, *label_of(name, names), reference)
     return found
 
@@ -283,7 +349,13 @@ class _Remarks:
         self._snapshot = snapshot
         self._details = details
         self._everything = everything
-        self.renamed: dict[str, str] = {}
+        self.metacontrol = [
+            node
+            for node in snapshot.nodes
+            if plumbing.is_metacontrol(node, details.origins[node].package if node in details.origins else None)
+        ]
+        self.abandoned: list[str] = []
+        self.unused_remaps: dict[str, list[tuple[str, str]]] = {}
 
     def lines(self) -> Iterator[str]:
         """Yield the lines."""
@@ -296,11 +368,26 @@ class _Remarks:
         for node, why in sorted(details.unknown.items()):
             if self._everything or node not in plumbing.NODES:
                 yield f"Not known: the package and executable of {node}: {why}."
+        for node, remaps in sorted(self.unused_remaps.items()):
+            if remaps:
+                pairs = ", ".join(f"{inside} to {outside}" for inside, outside in remaps)
+                yield f"Left out, because no interface of {node} has such a name now: the remapping of {pairs}."
+        for node, origin in sorted(details.origins.items()):
+            if origin.arguments and node not in details.dead and (self._everything or node not in self.metacontrol):
+                yield (
+                    f"Left out: the arguments of {node}: {' '.join(origin.arguments)}. Models hold none, so a launch "
+                    "file that is made from this model starts the node without them."
+                )
         if details.dead:
             yield f"Left out: {', '.join(sorted(details.dead))}: the master lists them, but nobody listens there."
-        for executable, artifact in sorted(self.renamed.items()):
-            yield f"The artifact {artifact} is the executable {executable}: a reference can't hold the dot."
         if not self._everything:
+            if self.metacontrol:
+                yield f"Left out: {', '.join(self.metacontrol)}: the meta-controller's nodes, with their parameters."
+            if self.abandoned:
+                yield (
+                    f"Left out: the parameters below {', '.join(self.abandoned)}: no running node is there, or offers "
+                    "anything there. Nodes that have ended may have left them. `rosmodel snapshot --all` keeps them."
+                )
             yield plumbing.REMARK
 
     def _alive(self, service: str) -> bool:

@@ -48,10 +48,10 @@ class ChangeExecutor(StepExecutor, Protocol):
         """Wait for the settling time, in which a node with a fault at its start would die."""
 
     def restore(self, configuration: Configuration) -> None:
-        """Stop all nodes that run, and start all nodes of a configuration."""
+        """Stop all nodes that run for a configuration's function, and start all nodes of the configuration."""
 
-    def stop_everything(self) -> None:
-        """Stop all nodes that the launcher runs, and stop the robot."""
+    def release(self, function: str) -> None:
+        """Stop all nodes that only this function needs, and the robot if none of the others drives it."""
 
 
 @dataclass(frozen=True)
@@ -126,13 +126,34 @@ def deploy(
             reason = f"{wanted.name}: {error}"
             if not touched or error.superseded:
                 return Outcome(Result.FAILED, None if touched else last_good, reason, cancelled=True)
-            return _go_back(executor, last_good, reason, watch, cancelled=True)
+            return _go_back(executor, wanted.function, last_good, reason, watch, cancelled=True)
         except DeploymentError as error:
             reasons.append(f"{plan.tactic}: {error}")
         else:
             failed = f" ({'; '.join(reasons)})" if reasons else ""
             return Outcome(Result.OK, wanted, f"{wanted.name} is deployed by {plan.tactic}{failed}", plan.tactic)
-    return _go_back(executor, last_good, f"{wanted.name}: {'; '.join(reasons) or 'no tactic has a plan'}", watch)
+    reason = f"{wanted.name}: {'; '.join(reasons) or 'no tactic has a plan'}"
+    return _go_back(executor, wanted.function, last_good, reason, watch)
+
+
+def release(executor: ChangeExecutor, function: str, running: Configuration | None, watch: Stopwatch) -> Outcome:
+    """Stop what only one function needs.
+
+    Args:
+        executor: carries out steps on the running system.
+        function: its name.
+        running: the configuration that runs for it; None: none does.
+        watch: measures the phases.
+    """
+    try:
+        with watch.phase("stop"):
+            executor.release(function)
+    except CancelledError as error:
+        return Outcome(Result.FAILED, running, f"{function}: {error}", cancelled=True)
+    except DeploymentError as error:
+        return Outcome(Result.GENERAL_ERROR, None, f"{function} could not be released: {error}")
+    what = f"{running.name} is stopped" if running else "nothing ran for it"
+    return Outcome(Result.OK, None, f"{function} is released: {what}", "release")
 
 
 def _carry_out(executor: ChangeExecutor, plan: Plan, watch: Stopwatch) -> None:
@@ -147,7 +168,12 @@ def _carry_out(executor: ChangeExecutor, plan: Plan, watch: Stopwatch) -> None:
 
 
 def _go_back(
-    executor: ChangeExecutor, last_good: Configuration | None, reason: str, watch: Stopwatch, cancelled: bool = False
+    executor: ChangeExecutor,
+    function: str,
+    last_good: Configuration | None,
+    reason: str,
+    watch: Stopwatch,
+    cancelled: bool = False,
 ) -> Outcome:
     try:
         if last_good is None:
@@ -160,7 +186,7 @@ def _go_back(
         reason = f"{reason}; restoring {last_good.name} failed too: {error}" if last_good else f"{reason}; {error}"
     with watch.phase("stop"):
         try:
-            executor.stop_everything()
+            executor.release(function)
         except DeploymentError as error:
             reason = f"{reason}; {error}"
     return Outcome(Result.GENERAL_ERROR, None, reason, cancelled=cancelled)

@@ -1,4 +1,4 @@
-"""The journal that a manipulator leaves for the next one: which configuration was deployed, which change was under way.
+"""The journal that a manipulator leaves for the next one: what was deployed, and which change was under way.
 
 It is a parameter with a heartbeat, so that the next manipulator can tell a recent journal from an old one.
 """
@@ -6,7 +6,7 @@ It is a parameter with a heartbeat, so that the next manipulator can tell a rece
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 MAX_AGE = 30.0
@@ -25,7 +25,7 @@ class Journal:
     """What a manipulator has deployed, and what it is doing.
 
     Attributes:
-        configuration: the last good configuration; empty: there is none.
+        configurations: the last good configuration of each function.
         wanted: the configuration that is being deployed; empty: no change is under way.
         alive: wall time of the last heartbeat, s since the epoch.
         ended: whether the manipulator has ended because it was told to.
@@ -33,18 +33,20 @@ class Journal:
         error: the error of the change under way that has ended the manipulator; empty: none has.
     """
 
-    configuration: str = ""
+    configurations: Mapping[str, str] = field(default_factory=dict)
     wanted: str = ""
     alive: float = 0.0
     ended: bool = False
     attempts: int = 0
     error: str = ""
 
-    def noted(self, configuration: str, now: float, wanted: str | None = None, ended: bool = False) -> Journal:
+    def noted(
+        self, configurations: Mapping[str, str], now: float, wanted: str | None = None, ended: bool = False
+    ) -> Journal:
         """Return the journal as it is at `now`; one that has ended or has an error does not change any more.
 
         Args:
-            configuration: the last good configuration; empty: there is none.
+            configurations: the last good configuration of each function.
             now: wall time, s since the epoch.
             wanted: the configuration that is being deployed; empty: none is; None: as before.
             ended: whether the manipulator ends because it was told to.
@@ -56,7 +58,7 @@ class Journal:
             attempts = (self.attempts if wanted == self.wanted else 0) + 1 if wanted else 0
         return replace(
             self,
-            configuration=configuration,
+            configurations=dict(configurations),
             wanted=self.wanted if wanted is None else wanted,
             alive=now,
             ended=ended,
@@ -85,7 +87,7 @@ class Journal:
     def as_parameter(self) -> dict[str, Any]:
         """Return the value of the parameter."""
         return {
-            "configuration": self.configuration,
+            "configurations": dict(self.configurations),
             "wanted": self.wanted,
             "alive": self.alive,
             "ended": self.ended,
@@ -98,16 +100,17 @@ def parse_journal(value: object) -> Journal:
     """Read the parameter; return an empty journal where it has another form."""
     if not isinstance(value, Mapping):
         return Journal()
-    journal = Journal(**{key: value.get(key) for key in Journal().as_parameter()})  # type: ignore[arg-type]
-    kinds = {key: type(default) for key, default in Journal().as_parameter().items()}
-    if not all(type(found) is kinds[key] for key, found in journal.as_parameter().items()):
+    empty = Journal().as_parameter()
+    if not all(type(value.get(key)) is type(default) for key, default in empty.items()):
         return Journal()
-    return journal
+    if not all(isinstance(name, str) for pair in value["configurations"].items() for name in pair):
+        return Journal()
+    return Journal(**{key: value[key] for key in empty})
 
 
 @dataclass(frozen=True)
 class Resumption:
-    """How a manipulator begins.
+    """How a manipulator begins with one function.
 
     Attributes:
         deploy: the configuration to deploy; empty: none.
@@ -128,42 +131,45 @@ class Resumption:
     reason: str = ""
 
 
-def resume(journal: Journal, launched: str, failed: bool, initial: str, now: float) -> Resumption:
-    """Decide how to begin.
+def resume(
+    journal: Journal, known: Mapping[str, str], function: str, launched: str, failed: bool, initial: str, now: float
+) -> Resumption:
+    """Decide how to begin with a function.
 
     Args:
         journal: the journal of the last manipulator.
-        launched: the configuration that the launcher runs; empty: none.
+        known: the function of each configuration.
+        function: its name.
+        launched: the configuration that the launcher runs for it; empty: none.
         failed: whether the launcher has given that configuration up.
         initial: the configuration to begin with where nothing is left to resume; empty: none.
         now: wall time, s since the epoch.
     """
     fresh = 0.0 <= now - journal.alive <= MAX_AGE
-    if fresh and journal.refusal:
-        return _without_the_change(journal, "" if failed else launched, initial)
+    last_good = journal.configurations.get(function, "")
+    last_good = last_good if known.get(last_good) == function else ""
+    wanted = journal.wanted if known.get(journal.wanted) == function else ""
+    attempts = journal.attempts if wanted else 0
+    if fresh and wanted and journal.refusal:
+        return _without_the_change(wanted, last_good, journal.refusal, "" if failed else launched, initial)
     if launched and not failed:
-        if fresh and journal.wanted:  # it was killed during a change: finish that
-            return Resumption(
-                deploy=journal.wanted,
-                last_good=journal.configuration,
-                keep_goal=True,
-                attempts=journal.attempts,
-            )
+        if fresh and wanted:  # it was killed during a change: finish that
+            return Resumption(deploy=wanted, last_good=last_good, keep_goal=True, attempts=attempts)
         return Resumption(running=launched, keep_goal=fresh)
-    if fresh and not journal.ended and (journal.wanted or journal.configuration):  # manipulator and launcher died
+    if fresh and not journal.ended and (wanted or last_good):  # manipulator and launcher died
         return Resumption(
-            deploy=journal.wanted or journal.configuration,
-            last_good=journal.configuration if journal.wanted else "",
+            deploy=wanted or last_good,
+            last_good=last_good if wanted else "",
             keep_goal=True,
-            attempts=journal.attempts,
+            attempts=attempts,
         )
     return Resumption(deploy=initial)
 
 
-def _without_the_change(journal: Journal, launched: str, initial: str) -> Resumption:
+def _without_the_change(wanted: str, last_good: str, reason: str, launched: str, initial: str) -> Resumption:
     """Decide how to begin when the change under way is refused: with what runs, or with what ran before."""
-    former = journal.configuration if journal.configuration != journal.wanted else ""
-    begun = Resumption(keep_goal=True, refused=journal.wanted, reason=journal.refusal)
-    if launched and not (former and launched == journal.wanted):
+    former = last_good if last_good != wanted else ""
+    begun = Resumption(keep_goal=True, refused=wanted, reason=reason)
+    if launched and not (former and launched == wanted):
         return replace(begun, running=launched)
-    return replace(begun, deploy=former or (initial if initial != journal.wanted else ""))
+    return replace(begun, deploy=former or (initial if initial != wanted else ""))

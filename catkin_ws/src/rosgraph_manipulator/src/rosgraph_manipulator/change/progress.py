@@ -1,4 +1,4 @@
-"""The progress of the change under way, from the launcher's reports.
+"""The progress of the change of a function that is under way, from the launcher's reports.
 
 The shell asks the nodes and waits. What it waits for, and when a change has failed, is decided here. Times are
 arguments, in seconds of one clock that never goes back.
@@ -6,7 +6,7 @@ arguments, in seconds of one clock that never goes back.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from rosgraph_manipulator.configuration.configurations import Configuration
@@ -30,10 +30,11 @@ class Awaited:
 
 
 class ChangeProgress:
-    """The launcher's last report, and what is known of the change that is being made."""
+    """The launcher's last reports, and what is known of the change that is being made."""
 
     def __init__(self) -> None:
-        self._report: LauncherReport | None = None
+        self._reports: dict[str, LauncherReport] | None = None
+        self._function = ""
         self._wanted: Configuration | None = None
         self._begun = 0.0
         self._started: tuple[str, ...] = ()
@@ -46,21 +47,46 @@ class ChangeProgress:
     # -- the launcher ---------------------------------------------------------------------------------------------
 
     @property
-    def report(self) -> LauncherReport | None:
-        """The launcher's last report; None: it has made none yet."""
-        return self._report
+    def has_reports(self) -> bool:
+        """Whether the launcher has reported."""
+        return self._reports is not None
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """The functions of which the launcher has nodes, or had."""
+        return tuple(self._reports or ())
+
+    def report(self, function: str) -> LauncherReport | None:
+        """Return the launcher's last report of a function; None: the launcher has made no report at all yet."""
+        return None if self._reports is None else self._reports.get(function, LauncherReport(function))
 
     @property
     def launched(self) -> tuple[str, ...]:
-        """The nodes that the launcher should run."""
-        return self._report.nodes if self._report else ()
+        """The nodes that the launcher should run for all functions."""
+        return tuple(dict.fromkeys(node for report in (self._reports or {}).values() for node in report.nodes))
 
-    def take(self, report: LauncherReport) -> bool:
-        """Take in a report; return whether the robot must be stopped now.
+    def launched_for(self, function: str) -> tuple[str, ...]:
+        """Return the nodes that the launcher should run for a function."""
+        report = self.report(function)
+        return report.nodes if report else ()
+
+    def shared(self, function: str) -> frozenset[str]:
+        """Return the nodes that run for other functions."""
+        return frozenset(
+            node
+            for other, report in (self._reports or {}).items()
+            if other != function and report.state != FAILED
+            for node in report.nodes
+            if node not in report.dead
+        )
+
+    def take(self, reports: Iterable[LauncherReport]) -> bool:
+        """Take in the reports of all functions; return whether the robot must be stopped now.
 
         That is when all nodes that drove the robot have ended, and before the first new one begins.
         """
-        self._report = report
+        self._reports = {report.function: report for report in reports}
+        report = self._reports.get(self._function, LauncherReport(self._function))
         if report.state in (RECOVERING, FAILED):
             self._death = (report.change, report.message)
         ended = report.state == CHANGING and self._wanted and report.configuration == self._wanted.name
@@ -70,8 +96,8 @@ class ChangeProgress:
         return True
 
     def is_reported(self, change: int) -> bool:
-        """Tell whether the launcher has reported the end of a change."""
-        report = self._report
+        """Tell whether the launcher has reported the end of a change of the function that changes."""
+        report = (self._reports or {}).get(self._function)
         return report is not None and report.change == change and report.state != CHANGING
 
     # -- one change -----------------------------------------------------------------------------------------------
@@ -81,16 +107,21 @@ class ChangeProgress:
         """The configuration that is being deployed, or was last."""
         return self._wanted
 
-    def begin(self, wanted: Configuration, now: float) -> None:
-        """Begin the change to a configuration."""
-        self._wanted, self._begun = wanted, now
+    @property
+    def function(self) -> str:
+        """The function that changes, or was changed last."""
+        return self._function
+
+    def begin(self, function: str, wanted: Configuration | None, now: float) -> None:
+        """Begin the change of a function to a configuration; None: to release it."""
+        self._function, self._wanted, self._begun = function, wanted, now
         self._started, self._number = (), None
         self._death = None  # the launcher may be a new one, which counts its changes from the start
         self._stops_robot = self._replaces_server = False
 
     def start(self, nodes: tuple[str, ...]) -> None:
-        """Note which nodes the change starts."""
-        self._started = nodes
+        """Note which nodes a step of the change starts."""
+        self._started = tuple(dict.fromkeys((*self._started, *nodes)))
 
     def leave(self, leaving: Collection[str], drivers: Collection[str], servers: Collection[str] | None) -> bool:
         """Note which nodes end or are started anew; return whether the kept action gets a new server.
@@ -104,8 +135,9 @@ class ChangeProgress:
             servers: nodes that serve the kept action; None: no action is kept.
         """
         self._stops_robot = bool(drivers) and set(drivers) <= set(leaving) & set(self.launched)
-        self._replaces_server = servers is not None and not set(servers) - set(leaving)
-        return self._replaces_server
+        replaces = servers is not None and not set(servers) - set(leaving)
+        self._replaces_server = self._replaces_server or replaces  # an earlier step may have done so
+        return replaces
 
     def restart_deadline(self, now: float) -> None:
         """Note that the launcher is asked now: the time for the nodes to be ready begins."""
@@ -136,21 +168,30 @@ class ChangeProgress:
 
     def has_finished(self, node: str) -> bool:
         """Tell whether a node has done its work and ended."""
-        return self._report is not None and node not in self._report.nodes
+        return self._reports is not None and node not in self.launched_for(self._function)
 
     # -- recovery -------------------------------------------------------------------------------------------------
 
-    def server_died(self, servers: Collection[str]) -> bool:
-        """Note who served the kept action when nodes died; return whether one of them was a server."""
-        self._replaces_server = bool(self._report and set(servers) & set(self._report.dead))
-        return self._replaces_server
+    def server_died(self, function: str, servers: Collection[str]) -> bool:
+        """Note who served the kept action when nodes of a function died; return whether one of them was a server."""
+        report = self.report(function)
+        return bool(report and set(servers) & set(report.dead))
 
-    def recover(self, configuration: Configuration | None, now: float) -> None:
-        """Begin to wait for nodes that the launcher has started again."""
-        if self._report is None:
+    def recover(self, function: str, configuration: Configuration | None, now: float, new_server: bool) -> None:
+        """Begin to wait for nodes of a function that the launcher has started again.
+
+        Args:
+            function: its name.
+            configuration: the one that runs for it.
+            now: the time.
+            new_server: whether a server of the kept action had died.
+        """
+        report = self.report(function)
+        if report is None:
             return
-        self._wanted, self._begun, self._death = configuration, now, None
-        self._started, self._number = self._report.nodes, self._report.change
+        self._function, self._wanted, self._begun, self._death = function, configuration, now, None
+        self._started, self._number = report.nodes, report.change
+        self._stops_robot, self._replaces_server = False, new_server
 
     # -- what runs ------------------------------------------------------------------------------------------------
 
@@ -158,26 +199,36 @@ class ChangeProgress:
         """Note that parameters are being set at a dynamic_reconfigure server: its node may soon have a mixture."""
         self._uncertain |= {name for name in self.launched if f"{server}/".startswith(f"{name}/")}
 
-    @property
-    def running(self) -> str:
-        """Name of the configuration that runs; empty where none does."""
-        return self._report.configuration if self._report and self._report.state != FAILED else ""
+    def running(self, function: str) -> str:
+        """Return the name of the configuration that runs for a function; empty where none does."""
+        report = self.report(function)
+        return report.configuration if report and report.state != FAILED else ""
 
-    def running_system(self, described: SystemDescription | None) -> SystemDescription:
-        """Return what runs.
+    def running_system(
+        self, function: str, described: SystemDescription | None, values: Mapping[str, object] | None = None
+    ) -> SystemDescription:
+        """Return what runs for a function.
 
         Args:
+            function: its name.
             described: the description of the configuration that runs; None: nothing is known of its nodes but their
                 names.
+            values: private parameters that were set to other values since, by full name.
         """
-        if self._report is None:
+        report = self.report(function)
+        if report is None:
             return SystemDescription()
         if described is None:
-            return SystemDescription({name: NodeDescription(name, "", "", "") for name in self._report.nodes})
+            return SystemDescription({name: NodeDescription(name, "", "", "") for name in report.nodes})
         # Without parameters, a node whose values are uncertain differs from any description, so all are set anew.
         nodes = {
-            name: replace(node, parameters={}) if name in self._uncertain else node
+            name: replace(node, parameters={} if name in self._uncertain else _with_values(node, values or {}))
             for name, node in described.nodes.items()
-            if name not in self._report.dead
+            if name not in report.dead
         }
-        return SystemDescription(nodes, described.parameters)
+        left = {name: NodeDescription(name, "", "", "") for name in report.nodes if name not in described.nodes}
+        return SystemDescription({**nodes, **left}, described.parameters)
+
+
+def _with_values(node: NodeDescription, values: Mapping[str, object]) -> dict[str, object]:
+    return {key: values.get(f"{node.name}/{key}", value) for key, value in node.parameters.items()}

@@ -24,7 +24,7 @@ class Reaction(enum.Enum):
 
 
 class DeployedConfigurations:
-    """The configuration that runs, and those before it."""
+    """The configuration that runs for one function, and those before it."""
 
     def __init__(self, probation: float) -> None:
         """Begin with nothing deployed.
@@ -77,7 +77,7 @@ class DeployedConfigurations:
             self._last_good, self._deployed_at = outcome.running, now
 
     def react(self, report: LauncherReport | None, now: float) -> Reaction:
-        """Return what to do about a report of the launcher."""
+        """Return what to do about a report of the launcher; None: it has made none yet."""
         if report is None or self._running is None or report.state == CHANGING:
             return Reaction.NONE
         if report.configuration != self._running.name:
@@ -96,6 +96,11 @@ class DeployedConfigurations:
     def failed(self) -> None:
         """Note that the running configuration has failed: it is not restored."""
         self._running = self._last_good = None
+        self._recovering = False
+
+    def released(self) -> None:
+        """Note that the function is needed no longer: nothing is restored."""
+        self._running = self._last_good = self._previous = None
         self._recovering = False
 
     def begin_recovery(self) -> None:

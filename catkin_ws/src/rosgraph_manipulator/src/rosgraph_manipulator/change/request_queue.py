@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 
 class Policy(enum.Enum):
-    """What a new request does while another one is carried out."""
+    """What a new request does while another one of the same function is carried out or waits."""
 
     WAIT = "wait"  # it waits for its turn
-    REPLACE = "replace"  # it replaces all others: the running one is interrupted at once
+    REPLACE = "replace"  # it replaces the others: the running one is interrupted at once
     REFUSE = "refuse"  # it is refused
 
 
@@ -30,11 +30,12 @@ class Arrival:
 
 
 class RequestQueue:
-    """The ids of requests: one runs, others may wait."""
+    """The ids of requests: one runs, others may wait. Requests of different functions do not concern each other."""
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
         self._running: str | None = None
+        self._functions: dict[str, str] = {}  # by request
         self._waiting: list[str] = []
 
     @property
@@ -42,21 +43,27 @@ class RequestQueue:
         """The request that is carried out; None: none is."""
         return self._running
 
-    def arrive(self, request: str) -> Arrival:
-        """Add a new request, and return what happens."""
-        if self._policy is Policy.REFUSE and (self._running or self._waiting):
+    def arrive(self, request: str, function: str) -> Arrival:
+        """Add a new request for a function, and return what happens."""
+        runs = self._running is not None and self._functions[self._running] == function
+        rivals = [waiting for waiting in self._waiting if self._functions[waiting] == function]
+        if self._policy is Policy.REFUSE and (runs or rivals):
             return Arrival(accepted=False)
         dropped: tuple[str, ...] = ()
         if self._policy is Policy.REPLACE:
-            dropped, self._waiting = tuple(self._waiting), []
+            dropped = tuple(rivals)
+            for rival in rivals:
+                self.take_back(rival)
+        self._functions[request] = function
         self._waiting.append(request)
-        return Arrival(True, dropped, interrupts=self._policy is Policy.REPLACE and self._running is not None)
+        return Arrival(True, dropped, interrupts=self._policy is Policy.REPLACE and runs)
 
     def take_back(self, request: str) -> bool:
         """Remove a waiting request; return False where it does not wait."""
         if request not in self._waiting:
             return False
         self._waiting.remove(request)
+        del self._functions[request]
         return True
 
     def next(self) -> str | None:
@@ -68,4 +75,6 @@ class RequestQueue:
 
     def finish(self) -> None:
         """Note that the running request has ended."""
+        if self._running is not None:
+            del self._functions[self._running]
         self._running = None

@@ -9,8 +9,9 @@ offers another tactic in its package.xml:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from dataclasses import replace as with_changes
 from typing import Any, Protocol
 
 from node_kit.plugins import find
@@ -103,9 +104,10 @@ class SetParameters:
 
 @dataclass(frozen=True)
 class ChangeProcesses:
-    """Have the launcher set the configuration's parameters, stop nodes and start nodes.
+    """Set the configuration's parameters, and have the launcher stop nodes and start nodes.
 
-    A node in both tuples is restarted. Without nodes, the launcher only notes which configuration runs.
+    A node in both tuples is restarted. Without nodes, the launcher only notes which configuration runs. A plan may have
+    several such steps, for example to start new nodes before it stops the old ones.
     """
 
     stop: tuple[str, ...] = ()
@@ -196,30 +198,38 @@ def restart(difference: Difference, nodes: RunningNodes) -> Plan | None:
 
 
 def replace(difference: Difference, _nodes: RunningNodes) -> Plan | None:
-    """Stop all running nodes and start all wanted ones, which is always possible."""
-    return Plan(
-        "replace", REPLACE_COST, (ChangeProcesses(tuple(difference.running.nodes), tuple(difference.wanted.nodes)),)
+    """Stop all running nodes and start all wanted ones, which is always possible; shared nodes run on."""
+    stop, start = (
+        tuple(name for name in system.nodes if name not in difference.shared_nodes)
+        for system in (difference.running, difference.wanted)
     )
+    return Plan("replace", REPLACE_COST, (ChangeProcesses(stop, start),))
 
 
 def plan_change(
-    running: SystemDescription, wanted: SystemDescription, nodes: RunningNodes, tactics: Mapping[str, Tactic]
+    running: SystemDescription,
+    wanted: SystemDescription,
+    nodes: RunningNodes,
+    tactics: Mapping[str, Tactic],
+    shared_nodes: Collection[str] = (),
 ) -> tuple[list[Plan], list[str]]:
     """Return the plans that change one configuration into another, cheapest first.
 
     A plan with the same steps as a cheaper one is left out. A tactic that raises does not keep the others from
-    planning.
+    planning. Each plan ends with a step that stops the nodes that the wanted configuration lacks, where no earlier step
+    of it does.
 
     Args:
         running: the configuration that runs.
         wanted: the configuration to deploy.
         nodes: answers what running nodes take by dynamic_reconfigure.
         tactics: the tactics to ask, by name.
+        shared_nodes: nodes that another function needs; they run on.
 
     Returns:
         The plans, and a line for each tactic that raised.
     """
-    difference = compare(running, wanted)
+    difference = compare(running, wanted, shared_nodes)
     proposed, problems = [], []
     for name, tactic in tactics.items():
         try:
@@ -227,12 +237,20 @@ def plan_change(
         except (Exception, SystemExit) as error:  # the code of a plug-in is not ours: the other tactics still plan
             problems.append(f"tactic {name} makes no plan: {type(error).__name__}: {error}")
         else:
-            proposed += [plan] if plan else []
+            proposed += [_completed(plan, difference)] if plan else []
     kept: list[Plan] = []
     for plan in sorted(proposed, key=lambda plan: plan.cost):
         if plan.steps not in [other.steps for other in kept]:
             kept.append(plan)
     return kept, problems
+
+
+def _completed(plan: Plan, difference: Difference) -> Plan:
+    """Return a plan whose last step also stores the configuration and stops what no other step stops."""
+    left = tuple(name for name in difference.stops if name not in plan.touched)
+    if not left and plan.steps and isinstance(plan.steps[-1], ChangeProcesses):
+        return plan
+    return with_changes(plan, steps=(*plan.steps, ChangeProcesses(stop=left)))
 
 
 def load_tactics() -> dict[str, Tactic]:

@@ -13,15 +13,16 @@ from rosgraph_manipulator.ros import client
 
 @click.command(context_settings=HELP)
 @click.argument("name", metavar="NAME")
-def request(name: str) -> None:
+@click.option("--restart", metavar="NODE", multiple=True, help="Restart this node of NAME even if it does not differ.")
+def request(name: str, restart: tuple[str, ...]) -> None:
     """Have the manipulator deploy configuration NAME, and wait for the result.
 
     The exit status is 0 when it runs, 1 when the former one was restored, and 2 otherwise.
     """
     client.join_or_refuse("request")
-    answer = client.request(name)
+    answer = client.request(name, restart)
     click.echo(answer.text)
-    if not answer.deployed:
+    if not answer.done:
         sys.exit(1 if answer.result == ReconfigurationResult.FAILED else 2)
     print_last_change(client.active_configuration())
 

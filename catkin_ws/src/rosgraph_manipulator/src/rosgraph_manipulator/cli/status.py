@@ -12,7 +12,7 @@ from rosgraph_manipulator.ros import client
 def status() -> None:
     """Print what runs, and how the last change went."""
     client.join_or_refuse("status")
-    active, launcher = client.active_configuration(), client.launcher_state()
+    active, launcher = client.active_configuration(), client.launched_functions()
     if active is None and launcher is None:
         raise client.ClientError("neither manipulator nor launcher answers: start manipulator.launch")
     if active is not None:
@@ -20,11 +20,13 @@ def status() -> None:
             click.echo(f"{grounding.function}: {grounding.configuration} {grounding.state}")
         print_last_change(active)
     if launcher is not None:
-        click.echo(f"processes: {launcher.configuration or 'none'} {launcher.state}")
-        for node in launcher.nodes:
-            click.echo(f"  {node}{' (dead)' if node in launcher.dead else ''}")
-        if launcher.message:
-            click.echo(f"  {launcher.message}")
+        click.echo(f"processes: {'' if launcher.functions else 'none'}".rstrip())
+        for function in launcher.functions:
+            click.echo(f"  {function.function}: {function.configuration or 'none'} {function.state}")
+            for node in function.nodes:
+                click.echo(f"    {node}{' (dead)' if node in function.dead else ''}")
+            if function.message:
+                click.echo(f"    {function.message}")
 
 
 def main() -> None:

@@ -4,14 +4,31 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 DEFAULT_FUNCTION = "f_navigate"  # the published configuration files name no function: they are for navigation
 ARGUMENT = re.compile(r"[A-Za-z_]\w*:=.*", re.DOTALL)
-KEYS = ("configurations", "kill_nodes", "save_action", "goal_msg_type", "reconfiguration_action_name")
+KEYS = (
+    "configurations",
+    "configs",
+    "functions",
+    "kill_nodes",
+    "save_action",
+    "goal_msg_type",
+    "reconfiguration_action_name",
+)
+FUNCTION_KEYS = ("kill_nodes", "save_action", "goal_msg_type")
 """The parameters that `parse_options` reads."""
+
+_OLDER = {
+    "kill_nodes": ["/move_base"],
+    "save_action": "move_base",
+    "goal_msg_type": "move_base_msgs.msg.MoveBaseAction",
+}
+"""What the published manipulator did when its file had only `configs` (mc_rosgraph_manipulator, 2020)."""
+_PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 FindLaunchFile = Callable[[str, bool], str]
 """Finds a launch file by its path or `package://` address. The second argument tells whether it may be anywhere in its
@@ -44,22 +61,67 @@ class Configuration:
 
 
 @dataclass(frozen=True)
+class FunctionOptions:
+    """What holds for all configurations of one function.
+
+    Attributes:
+        kill_nodes: nodes to end before a start, even those that the launcher did not start.
+        save_action: the action whose pending goal is kept; None: no goal is kept.
+        action_type: type of that action, e.g. `move_base_msgs/MoveBaseAction`; None: no goal is kept.
+    """
+
+    kill_nodes: tuple[str, ...] = ()
+    save_action: str | None = None
+    action_type: str | None = None
+
+
+@dataclass(frozen=True)
 class ManipulatorOptions:
     """What the manipulator is told once, at its start.
 
     Attributes:
         configurations: by name.
-        kill_nodes: nodes to end before a start, even those that the launcher did not start.
-        save_action: the action whose pending goal is kept; None: no goal is kept.
-        action_type: type of that action, e.g. `move_base_msgs/MoveBaseAction`.
+        functions: the options of those functions that have any, by name.
         reconfiguration_action_name: the action that takes requests.
     """
 
     configurations: Mapping[str, Configuration]
-    kill_nodes: tuple[str, ...] = ()
-    save_action: str | None = None
-    action_type: str | None = None
+    functions: Mapping[str, FunctionOptions] = field(default_factory=dict)
     reconfiguration_action_name: str = "rosgraph_manipulator_action_server"
+
+    def of(self, function: str) -> FunctionOptions:
+        """Return the options of a function."""
+        return self.functions.get(function, FunctionOptions())
+
+    def one_per_function(self, names: object, parameter: str) -> dict[str, str]:
+        """Return the configuration of each function that a parameter names.
+
+        Args:
+            names: the value of the parameter: one name, several in a list or in a text such as `a, b`, or nothing.
+            parameter: its name.
+
+        Raises:
+            ConfigurationError: a name is unknown, or two are of one function.
+        """
+        if not isinstance(names, list):
+            names = [name.strip() for name in str(names or "").strip("[] ").split(",") if name.strip()]
+        found: dict[str, str] = {}
+        for name in map(str, names):
+            if name not in self.configurations:
+                known = ", ".join(sorted(self.configurations))
+                raise ConfigurationError(f"parameter '{parameter}' is '{name}'; known are: {known}")
+            function = self.configurations[name].function
+            if function in found:
+                raise ConfigurationError(
+                    f"parameter '{parameter}': {found[function]} and {name} are both of {function}: name one of them"
+                )
+            found[function] = name
+        return found
+
+    @property
+    def all_functions(self) -> tuple[str, ...]:
+        """The names of all functions."""
+        return tuple(dict.fromkeys(configuration.function for configuration in self.configurations.values()))
 
 
 def parse_options(parameters: Mapping[str, Any], find_launch_file: FindLaunchFile) -> ManipulatorOptions:
@@ -68,38 +130,96 @@ def parse_options(parameters: Mapping[str, Any], find_launch_file: FindLaunchFil
     A configuration whose launch file or package is missing has a `problem`; the others can be deployed without it.
 
     Args:
-        parameters: keys configurations, kill_nodes, save_action, goal_msg_type, reconfiguration_action_name. A
-            configuration is `{launch: FILE or package://PKG/FILE, args: [...], function: NAME, topics: [...]}` or the
-            published `{command: roslaunch PKG FILE [ARG:=VALUE ...]}`.
+        parameters: keys configurations, functions, kill_nodes, save_action, goal_msg_type,
+            reconfiguration_action_name. A configuration is `{launch: FILE or package://PKG/FILE, args: [...], function:
+            NAME, topics: [...]}` or the published `{command: roslaunch PKG FILE [ARG:=VALUE ...]}`. In place of
+            configurations, the older `configs: [NAME, ...]`: NAME is a package with the launch file NAME.launch. An
+            entry of functions is `NAME: {kill_nodes: [...], save_action: ..., goal_msg_type: ...}`. The same three keys
+            outside it hold for the only function, or for the default function.
         find_launch_file: finds the launch file that a configuration names.
 
     Raises:
         ConfigurationError: a key is missing or has a value that cannot be used, or no launch file at all is found.
     """
+    parameters = _from_older_form(parameters)
     entries = parameters.get("configurations")
     if not isinstance(entries, Mapping) or not entries:
         raise ConfigurationError(
             "parameter 'configurations' is missing or empty: "
             "give a YAML file with 'configurations: {NAME: {launch: FILE}}'"
         )
-    kill_nodes = parameters.get("kill_nodes") or []
-    if not isinstance(kill_nodes, list) or not all(isinstance(node, str) for node in kill_nodes):
-        raise ConfigurationError("parameter 'kill_nodes' must be a list of node names")
-    save_action = parameters.get("save_action") or None
-    if save_action is not None and not isinstance(save_action, str):
-        raise ConfigurationError("parameter 'save_action' must be the name of an action, e.g. move_base")
     configurations = {str(name): _configuration(str(name), entry, find_launch_file) for name, entry in entries.items()}
     problems = [configuration.problem for configuration in configurations.values()]
     if all(problems):
         raise ConfigurationError(problems[0])
     return ManipulatorOptions(
         configurations=configurations,
-        kill_nodes=tuple(kill_nodes),
-        save_action=save_action.strip("/") if save_action else None,
-        action_type=action_type(parameters.get("goal_msg_type"), "goal_msg_type") if save_action else None,
+        functions=_functions(parameters, configurations.values()),
         reconfiguration_action_name=str(
             parameters.get("reconfiguration_action_name") or ManipulatorOptions.reconfiguration_action_name
         ),
+    )
+
+
+def _from_older_form(parameters: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the parameters with `configurations` in place of `configs`."""
+    names = parameters.get("configs")
+    if names is None or parameters.get("configurations"):
+        return parameters
+    if not isinstance(names, list) or not all(isinstance(name, str) and _PACKAGE.fullmatch(name) for name in names):
+        raise ConfigurationError(
+            "parameter 'configs' must be a list of packages, each with a launch file of its name: correct it, or give "
+            "'configurations: {NAME: {launch: FILE}}'"
+        )
+    entries = {name: {"command": f"roslaunch {name} {name}.launch profile:={name}"} for name in names}
+    given = {key: value for key, value in parameters.items() if value is not None}
+    return {**_OLDER, **given, "configurations": entries}
+
+
+def _functions(parameters: Mapping[str, Any], configurations: Iterable[Configuration]) -> dict[str, FunctionOptions]:
+    known = list(dict.fromkeys(configuration.function for configuration in configurations))
+    entries = parameters.get("functions") or {}
+    if not isinstance(entries, Mapping) or not all(isinstance(entry, Mapping) for entry in entries.values()):
+        raise ConfigurationError("parameter 'functions' must be of the form {NAME: {save_action: ..., ...}}")
+    for name, entry in entries.items():
+        if name not in known:
+            raise ConfigurationError(
+                f"functions/{name}: no configuration has this function; known are: {', '.join(known)}"
+            )
+        unknown = sorted(set(map(str, entry)) - set(FUNCTION_KEYS))
+        if unknown:
+            raise ConfigurationError(
+                f"functions/{name}: unknown key '{unknown[0]}'; known are: {', '.join(FUNCTION_KEYS)}"
+            )
+    options = {str(name): _function_options(f"functions/{name}/", entry) for name, entry in entries.items()}
+    common = {key: parameters[key] for key in FUNCTION_KEYS if parameters.get(key)}
+    if common:
+        name = known[0] if len(known) == 1 else DEFAULT_FUNCTION
+        if name not in known:
+            raise ConfigurationError(
+                f"parameter '{next(iter(common))}' does not say for which of {', '.join(known)} it holds: "
+                "put it under 'functions: {NAME: {...}}'"
+            )
+        if name in options:
+            raise ConfigurationError(
+                f"parameter '{next(iter(common))}' stands beside functions/{name}: put it there, too"
+            )
+        options[name] = _function_options("", common)
+    return options
+
+
+def _function_options(where: str, entry: Mapping[str, Any]) -> FunctionOptions:
+    kill_nodes = entry.get("kill_nodes") or []
+    if not isinstance(kill_nodes, list) or not all(isinstance(node, str) for node in kill_nodes):
+        raise ConfigurationError(f"parameter '{where}kill_nodes' must be a list of node names")
+    save_action = entry.get("save_action") or None
+    if save_action is not None and not isinstance(save_action, str):
+        raise ConfigurationError(f"parameter '{where}save_action' must be the name of an action, e.g. move_base")
+    return FunctionOptions(
+        kill_nodes=tuple(kill_nodes),
+        # Only a leading slash tells a global action's name from a relative one.
+        save_action=save_action.rstrip("/") if save_action else None,
+        action_type=action_type(entry.get("goal_msg_type"), f"{where}goal_msg_type") if save_action else None,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 QUALITY_PREFIX = "qa_"  # of the global parameters that hold a system's expected quality levels; no node reads them
@@ -24,7 +24,10 @@ class NodeDescription:
         cwd: `node`, `ROS_HOME`, `cwd` or None, as in roslaunch.
         output: `log` or `screen`.
         respawn: whether it is started again even after it ended with status 0.
+        respawn_delay: the least time from its end to its next start, s, wall.
+        required: whether its end, with whatever status, fails the configuration at once.
         launch_prefix: words before its command, or None.
+        machine: address of the host that runs it; empty: the launcher's own host.
         parameters: its private parameters, by their names relative to the node's.
     """
 
@@ -38,8 +41,16 @@ class NodeDescription:
     cwd: str | None = None
     output: str = "log"
     respawn: bool = False
+    respawn_delay: float = 0.0
+    required: bool = False
     launch_prefix: str | None = None
+    machine: str = ""
     parameters: Mapping[str, Any] = field(default_factory=dict)
+
+    def differs_in(self, other: NodeDescription) -> tuple[str, ...]:
+        """Return the names of the attributes, without parameters, in which another node differs."""
+        names = (attribute.name for attribute in fields(self) if attribute.name != "parameters")
+        return tuple(name for name in names if getattr(self, name) != getattr(other, name))
 
 
 @dataclass(frozen=True)

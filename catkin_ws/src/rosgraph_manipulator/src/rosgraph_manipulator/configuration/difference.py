@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from rosgraph_manipulator.configuration.description import QUALITY_PREFIX, NodeDescription, SystemDescription
@@ -16,11 +16,12 @@ class Difference:
     Attributes:
         running: the configuration that runs.
         wanted: the configuration to deploy.
-        starts: nodes that only the wanted configuration has.
+        starts: nodes of the wanted configuration that do not run.
         stops: nodes that only the running configuration has.
         replaced: nodes of both that differ in more than the values of parameters.
         parameters: the private parameters with a new value, for each node of both that is not replaced.
         shared: parameters outside the nodes' namespaces that get a new value, by full name.
+        shared_nodes: nodes of both that another function needs, too; they run on.
     """
 
     running: SystemDescription
@@ -30,6 +31,7 @@ class Difference:
     replaced: tuple[str, ...]
     parameters: Mapping[str, Mapping[str, Any]]
     shared: Mapping[str, Any]
+    shared_nodes: tuple[str, ...] = ()
 
     @property
     def touches_nodes(self) -> bool:
@@ -37,19 +39,26 @@ class Difference:
         return bool(self.starts or self.stops or self.replaced or self.parameters)
 
 
-def compare(running: SystemDescription, wanted: SystemDescription) -> Difference:
+def compare(running: SystemDescription, wanted: SystemDescription, shared_nodes: Collection[str] = ()) -> Difference:
     """Return what differs.
 
     A shared parameter that changes replaces all nodes, because any node may have read it at its start. Expected quality
     levels are an exception: no node reads them. A node is also replaced where the wanted configuration lacks one of
     its parameters, because a running node does not notice that a parameter was deleted.
+
+    Args:
+        running: the configuration that runs.
+        wanted: the configuration to deploy.
+        shared_nodes: nodes that another function needs. They run on, because they are the same in both.
     """
     both = [name for name in wanted.nodes if name in running.nodes]
     shared = _changed(running.parameters, wanted.parameters)
     gone = set(running.parameters) - set(wanted.parameters)
-    all_affected = any(not _is_quality(name) for name in (*shared, *gone))
+    all_affected = any(not is_quality(name) for name in (*shared, *gone))
     replaced = tuple(
-        name for name in both if all_affected or _needs_new_process(running.nodes[name], wanted.nodes[name])
+        name
+        for name in both
+        if name not in shared_nodes and (all_affected or _needs_new_process(running.nodes[name], wanted.nodes[name]))
     )
     parameters = {
         name: changed
@@ -64,12 +73,13 @@ def compare(running: SystemDescription, wanted: SystemDescription) -> Difference
         replaced=replaced,
         parameters=parameters,
         shared=shared,
+        shared_nodes=tuple(name for name in both if name in shared_nodes),
     )
 
 
 def _needs_new_process(running: NodeDescription, wanted: NodeDescription) -> bool:
     lost = set(running.parameters) - set(wanted.parameters)
-    return bool(lost) or replace(running, parameters={}) != replace(wanted, parameters={})
+    return bool(lost or running.differs_in(wanted))
 
 
 def _changed(running: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[str, Any]:
@@ -87,5 +97,6 @@ def same_value(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
-def _is_quality(name: str) -> bool:
+def is_quality(name: str) -> bool:
+    """Tell whether a parameter holds an expected quality level, which no node reads."""
     return name.rpartition("/")[2].startswith(QUALITY_PREFIX)

@@ -140,6 +140,11 @@ class GoalKeeper:
             self._cancelled, self._confirmations = None if self._changing else self._goal, 0
             self._finish(goal_id.id)
 
+    def drop(self) -> None:
+        """Let the pending goal be over."""
+        if self._goal is not None:
+            self._finish(self._goal.goal_id.id)
+
     def _end(self, goal_id: str, state: int) -> None:
         if self._changing and state in DROPPED_BY_SHUTDOWN:
             return

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
-import yaml
+from node_kit.io.input_files import InputFileError, is_file, read_yaml
 from ros_model.errors import ModelError
 from ros_model.io.files import resolve
 
@@ -35,11 +37,15 @@ def find_launch_file(uri: str, anywhere: bool) -> str:
         path = resolve(uri)
     except ModelError as error:
         raise ConfigurationError(str(error)) from error
-    if not path.is_file() and anywhere:
-        path = next(iter(sorted(path.parents[1].rglob(path.name))), path)
-    if not path.is_file():
+    if not is_file(path) and anywhere:
+        path = next((found for found in _files_below(path.parents[1]) if found.name == path.name), path)
+    if not is_file(path):
         raise ConfigurationError(f"there is no launch file {path}: correct the name, or generate it")
     return str(path)
+
+
+def _files_below(folder: Path) -> list[Path]:
+    return sorted(Path(place, name) for place, _, names in os.walk(folder) for name in names)
 
 
 def read_file(name: str) -> dict[str, Any]:
@@ -49,12 +55,9 @@ def read_file(name: str) -> dict[str, Any]:
         ConfigurationError: it can't be read.
     """
     try:
-        with open(name, encoding="utf-8") as file:
-            content = yaml.safe_load(file)
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigurationError(f"{name}: cannot be read: {error}") from error
-    except yaml.YAMLError as error:
-        raise ConfigurationError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
+        content = read_yaml(name)
+    except InputFileError as error:
+        raise ConfigurationError(str(error)) from error
     if not isinstance(content, dict):
         raise ConfigurationError(f"{name}: expected keys such as 'configurations', found none")
     return content

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ import roslaunch.node_args
 import roslaunch.substitution_args
 import roslaunch.xmlloader
 import rospkg
+from node_kit.io.input_files import InputFileError, read_bytes
 from ros_model.errors import ModelError
 from ros_model.generators.launch import launch_file
 from ros_model.io.models import read_system
@@ -72,12 +74,17 @@ def command_line(node: NodeDescription) -> tuple[list[str], int]:
     """Return the command line that starts a node, without `__log:=`, and the number of words of its launch-prefix.
 
     Raises:
-        LaunchFileError: there is no such package or executable.
+        LaunchFileError: there is no such package, executable or command of the launch-prefix.
     """
     prefix = node.launch_prefix or ""
     with _refusing(f"node {node.name}"):
         words = roslaunch.node_args.create_local_process_args(_roslaunch_node(node), roslaunch.core.local_machine())
         bare = roslaunch.node_args._launch_prefix_args(_roslaunch_node(node)) if prefix else []
+        if bare and shutil.which(bare[0]) is None:
+            raise LaunchFileError(
+                f"node {node.name}: no command '{bare[0]}', which its launch-prefix names: install it, or correct the "
+                "launch-prefix"
+            )
         return list(words), len(bare)
 
 
@@ -170,7 +177,10 @@ class _Loader(roslaunch.xmlloader.XmlLoader):
             ) from error
 
     def _parse_launch(self, filename: str, verbose: bool) -> Any:  # noqa: ARG002
-        content = Path(filename).read_bytes()
+        try:
+            content = read_bytes(filename)
+        except InputFileError as error:
+            raise roslaunch.xmlloader.XmlParseException(str(error)) from error
         try:
             document = _Builder().parseString(content)
         except (roslaunch.xmlloader.XmlParseException, RecursionError):
@@ -198,14 +208,18 @@ def _checked(path: str | Path, config: Any) -> LaunchFile:
         raise LaunchFileError(f"{path}: {' '.join(str(config.config_errors[0]).split())}")
     if not config.nodes:
         raise LaunchFileError(f"{path}: starts no node")
-    if config.has_remote_nodes():
-        raise LaunchFileError(f"{path}: has nodes for another machine: only local ones can be started")
     nodes = {}
     left = {key: parameter.value for key, parameter in config.params.items()}
     for node in config.nodes:
         name = rosgraph.names.ns_join(node.namespace, node.name)
         private = {key: left.pop(key) for key in list(left) if key.startswith(f"{name}/")}
-        nodes[name] = _description(name, node, {key.removeprefix(f"{name}/"): value for key, value in private.items()})
+        parameters = {key.removeprefix(f"{name}/"): value for key, value in private.items()}
+        nodes[name] = description = _description(name, node, parameters)
+        if description.machine:
+            raise LaunchFileError(
+                f"{path}: node {name} is for machine '{node.machine.name}' ({description.machine}), and only nodes of "
+                "this host can be started: remove its machine, or start it by a launch file of that machine"
+            )
     return LaunchFile(
         SystemDescription(nodes, left),
         clear=tuple(config.clear_params),
@@ -225,7 +239,10 @@ def _description(name: str, node: Any, parameters: dict[str, Any]) -> NodeDescri
         cwd=node.cwd,
         output=node.output or "log",
         respawn=bool(node.respawn),
+        respawn_delay=float(node.respawn_delay or 0.0),
+        required=bool(node.required),
         launch_prefix=node.launch_prefix or None,
+        machine="" if roslaunch.core.is_machine_local(node.machine) else str(node.machine.address),
         parameters=parameters,
     )
 

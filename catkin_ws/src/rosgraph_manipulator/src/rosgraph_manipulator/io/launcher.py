@@ -1,27 +1,25 @@
-"""Owns the nodes of the configuration that runs: changes them, and starts again those that die.
+"""Owns the nodes of the functions that run: changes them, and starts again those that die.
 
 The decisions are in `launching`. For one thread only: the main thread of the node rosgraph_launcher.
 """
 
 from __future__ import annotations
 
-import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 from node_kit.io.xml_rpc import CallError
 
-from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError, read_launch_file
-from rosgraph_manipulator.io.master import advertised, get_parameters, set_parameters
+from rosgraph_manipulator.configuration.description import NodeDescription
+from rosgraph_manipulator.io.launch_files import LaunchFileError
+from rosgraph_manipulator.io.master import advertised
 from rosgraph_manipulator.io.node_commands import NodeCommands
 from rosgraph_manipulator.io.node_processes import NodeProcesses
+from rosgraph_manipulator.io.ownership import look_up
 from rosgraph_manipulator.io.processes import Command, Process, StartError
 from rosgraph_manipulator.launching.managed_nodes import Ending, ManagedNodes, Verdict
 from rosgraph_manipulator.launching.options import LauncherOptions
-from rosgraph_manipulator.launching.parameters import OverwrittenParameters
 from rosgraph_manipulator.launching.report import LauncherReport
-
-COMMAND_TIMEOUT = 5.0  # s, wall, for a `rosparam` call of a launch file
 
 
 class LauncherError(Exception):
@@ -29,23 +27,25 @@ class LauncherError(Exception):
 
 
 class Launcher:
-    """The nodes of one configuration, and the warm processes that wait for the next one."""
+    """The nodes of all functions, and the warm processes that wait for the next ones."""
 
     def __init__(
-        self, options: LauncherOptions, changed: Callable[[LauncherReport], None], log: Callable[[str], None]
+        self,
+        options: LauncherOptions,
+        changed: Callable[[tuple[LauncherReport, ...]], None],
+        log: Callable[[str], None],
     ) -> None:
         """Begin without nodes.
 
         Args:
             options: the launcher's parameters.
-            changed: is called with each new report.
+            changed: is called with the reports of all functions, whenever one differs.
             log: takes a line for the operator.
         """
         self._options = options
         self._changed = changed
         self._log = log
         self._nodes = ManagedNodes(options.policy)
-        self._parameters = OverwrittenParameters()
         self._commands = NodeCommands(options.mark, options.run_id, log)
         self._processes = NodeProcesses(options, log)
         self._report()
@@ -65,16 +65,24 @@ class Launcher:
 
     # -- changes --------------------------------------------------------------------------------------------------
 
-    def change(self, configuration: str, launch_file: str, args: list[str], start: list[str]) -> dict[str, float]:
-        """Change to a configuration: end the nodes that it lacks, start those in `start`, keep all others.
+    def change(
+        self,
+        function: str,
+        configuration: str,
+        nodes: Mapping[str, NodeDescription],
+        stop: Collection[str],
+        start: Sequence[str],
+    ) -> dict[str, float]:
+        """Change the nodes of a function: end those in `stop`, start those in `start`, keep all others.
 
-        The launch file is read, and its executables are found, before anything is touched. The new processes do
-        their imports while the old nodes end.
+        The executables are found before anything is touched. The new processes do their imports while the old nodes
+        end. A node that another function needs does not end, unless it is in `start` too.
 
         Args:
-            configuration: its name; empty: stop all nodes.
-            launch_file: its launch file.
-            args: arguments of the launch file, `NAME:=VALUE`.
+            function: its name.
+            configuration: the name of its configuration; empty: end all nodes that no other function needs.
+            nodes: all nodes of the configuration, by full name.
+            stop: the nodes to end.
             start: the nodes to start; those that run already are restarted.
 
         Returns:
@@ -84,12 +92,12 @@ class Launcher:
             LauncherError: the change failed. Nodes may have been stopped; none of those in `start` runs.
         """
         began = time.monotonic()
-        self._nodes.ask_for_change()
+        self._nodes.ask_for_change(function)
         if not configuration:
-            self.stop_all()
+            self._release(function)
             return {"stop": time.monotonic() - began}
-        launch, commands = self._look_up(launch_file, args, start)
-        leaving = self._nodes.begin_change(launch.system, start)
+        commands = self._look_up(nodes, start)
+        leaving = self._nodes.begin_change(function, stop, start)
         self._report()
         self._processes.ask_to_end(leaving)
         prepared: dict[str, Process] = {}
@@ -99,46 +107,47 @@ class Launcher:
                 if process:
                     prepared[name] = process
             prepared_at = time.monotonic()
-            self._run_commands(launch)
-            self._set_parameters(launch)
             self._end(leaving, forget=[name for name in leaving if name not in start])
             stopped_at = time.monotonic()
-            self._nodes.adopt(configuration, launch.system, start)
+            self._nodes.adopt(function, configuration, nodes, stop, start)
             self._report()
             for name, command in commands.items():
                 self._nodes.started(name, self._processes.begin(name, command, prepared.pop(name, None)))
-        except (CallError, StartError, OSError, subprocess.SubprocessError) as error:
+        except (CallError, StartError, OSError) as error:
             self._end(start)
-            self._nodes.end_change(time.monotonic(), failed_to_start=start)
+            self._nodes.end_change(function, time.monotonic(), failed_to_start=start)
             self._report()
             raise LauncherError(_one_line(error)) from error
         finally:
             for process in prepared.values():
                 process.close()
         ended_at = time.monotonic()
-        self._nodes.end_change(ended_at)
+        self._nodes.end_change(function, ended_at)
         self._report()
         return {"prepare": prepared_at - began, "stop": stopped_at - prepared_at, "start": ended_at - stopped_at}
 
-    def stop_all(self, gently: bool = True) -> None:
-        """Stop all nodes and all warm processes.
+    def close(self, gently: bool = True) -> None:
+        """Stop everything, because the launcher ends.
 
         Args:
             gently: ask the nodes first. Without a master they can't be asked; then begin with SIGINT.
         """
-        self._nodes.begin_stop()
         names = self._nodes.names
         if gently:
             self._processes.ask_to_end(names)
         self._processes.end(names, forget=names if gently else (), patience=gently)
         self._processes.end_standby()
-        self._nodes.end_stop(time.monotonic())
-        self._report()
-
-    def close(self, gently: bool = True) -> None:
-        """Stop everything, because the launcher ends."""
-        self.stop_all(gently)
         self._processes.close()
+
+    def _release(self, function: str) -> None:
+        leaving = self._nodes.begin_release(function)
+        self._report()
+        self._processes.ask_to_end(leaving)
+        self._end(leaving, forget=leaving)
+        self._nodes.end_release(function, time.monotonic())
+        if not self._nodes.names:
+            self._processes.end_standby()
+        self._report()
 
     # -- supervision ----------------------------------------------------------------------------------------------
 
@@ -146,12 +155,14 @@ class Launcher:
         """Deal with the nodes that have ended, and start again those that are due."""
         now = time.monotonic()
         self._inspect(now)
+        stopped: set[str] = set()
         for name, status in self._processes.take_ended().items():
-            if self._follow(self._nodes.ended(name, status, now)) is Verdict.GIVE_UP:
-                return
+            if name not in stopped:
+                conflict = look_up(name).conflict(self._options.mark)
+                stopped.update(self._follow(self._nodes.ended(name, status, now, conflict)))
         for name in self._nodes.to_restart(now):
-            if self._restart(name) is Verdict.GIVE_UP:
-                return
+            if name not in stopped:
+                stopped.update(self._restart(name))
         if self._nodes.recovered():
             self._report()
 
@@ -169,56 +180,46 @@ class Launcher:
             except CallError:
                 return
 
-    def _follow(self, ending: Ending) -> Verdict:
-        """Do what follows from the end of a node, except for the restart, which is not due yet."""
+    def _follow(self, ending: Ending) -> tuple[str, ...]:
+        """Do what follows from the end of a node, except for the restart, which is not due yet.
+
+        Returns:
+            The nodes that were stopped, because a function was given up.
+        """
         self._log(ending.text)
         if ending.verdict is Verdict.GIVE_UP:
-            names = self._nodes.names
-            self._processes.ask_to_end(names)
-            self._end(names, forget=names)
-            self._nodes.given_up()
+            self._processes.ask_to_end(ending.stopped)
+            self._end(ending.stopped, forget=ending.stopped)
         self._report()
-        return ending.verdict
+        return ending.stopped
 
-    def _restart(self, name: str) -> Verdict:
+    def _restart(self, name: str) -> tuple[str, ...]:
         try:
             command = self._commands.command(self._nodes.description(name))
             self._nodes.started(name, self._processes.begin_again(name, command))
         except (LaunchFileError, StartError, OSError) as error:
             return self._follow(self._nodes.failed_to_restart(name, _one_line(error), time.monotonic()))
         self._report()
-        return Verdict.RESTART
+        return ()
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
-    def _look_up(self, launch_file: str, args: list[str], start: list[str]) -> tuple[LaunchFile, dict[str, Command]]:
+    def _look_up(self, nodes: Mapping[str, NodeDescription], start: Sequence[str]) -> dict[str, Command]:
+        reason = self._nodes.refusal(nodes, start)
+        if reason:
+            raise LauncherError(f"the configuration {reason}")
         try:
-            launch = read_launch_file(launch_file, args)
-            reason = self._nodes.refusal(launch.system, start)
-            if reason:
-                raise LauncherError(f"{launch_file} {reason}")
-            return launch, {name: self._commands.command(launch.system.nodes[name]) for name in start}
+            return {name: self._commands.command(nodes[name]) for name in start}
         except LaunchFileError as error:
             raise LauncherError(str(error)) from error
 
-    def _run_commands(self, launch: LaunchFile) -> None:
-        for command in launch.commands:
-            subprocess.run(["/usr/bin/env", *command], check=True, timeout=COMMAND_TIMEOUT, stdout=subprocess.DEVNULL)
-
-    def _set_parameters(self, launch: LaunchFile) -> None:
-        wanted = launch.system.all_parameters()
-        asked = self._parameters.unknown(wanted)
-        self._parameters.remember(asked, get_parameters(asked))
-        values, gone = self._parameters.transition(wanted)
-        set_parameters(values, delete=[*launch.clear, *gone])
-
-    def _end(self, names: list[str] | tuple[str, ...], forget: list[str] | tuple[str, ...] = ()) -> None:
+    def _end(self, names: Collection[str], forget: Collection[str] = ()) -> None:
         self._processes.end(names, forget)
         for name in names:
             self._nodes.stopped(name)
 
     def _report(self) -> None:
-        self._changed(self._nodes.report())
+        self._changed(self._nodes.reports())
 
 
 def _one_line(error: Exception) -> str:

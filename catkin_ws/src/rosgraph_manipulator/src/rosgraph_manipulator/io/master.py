@@ -30,21 +30,21 @@ class NodeApi:
             return None
 
     @classmethod
-    def pid(cls, name: str) -> int | None:
-        """Return a node's process id, or None where it is not registered or does not answer."""
+    def answer(cls, name: str) -> tuple[str, int] | None:
+        """Return a node's address and the process id that it says; None: it is not registered or does not answer."""
         uri = cls.address(name)
         if uri is None:
             return None
         try:
             with Client(uri, CALLER, CALL_TIMEOUT, peer="node") as node:
-                return int(node.call("getPid"))
+                return uri, int(node.call("getPid"))
         except (CallError, TypeError, ValueError):
             return None
 
     @classmethod
     def is_answering(cls, name: str) -> bool:
         """Tell whether a node is registered at the master and answers."""
-        return cls.pid(name) is not None
+        return cls.answer(name) is not None
 
     @classmethod
     def request_shutdown(cls, name: str, reason: str) -> bool:

@@ -14,6 +14,7 @@ from node_kit.io.xml_rpc import CallError
 
 from rosgraph_manipulator.io import processes
 from rosgraph_manipulator.io.master import NodeApi, forget_node
+from rosgraph_manipulator.io.ownership import look_up
 from rosgraph_manipulator.io.processes import Command, Process, StartError
 from rosgraph_manipulator.launching.managed_nodes import standby_changes
 from rosgraph_manipulator.launching.options import LauncherOptions
@@ -53,7 +54,7 @@ class NodeProcesses:
         return statuses
 
     def prepare(self, command: Command) -> Process | None:
-        """Return a process that does the imports of a Python node and then waits; None for any other node.
+        """Return a process that does imports of a Python node and then waits; None for any other node.
 
         Raises:
             StartError: the system refuses.
@@ -64,17 +65,18 @@ class NodeProcesses:
         """Begin a node, in a prepared process where there is one; return the time of its start (time.monotonic()).
 
         Raises:
-            StartError: the system refuses, or the prepared process has ended.
+            StartError: the system refuses.
         """
-        if prepared is None:
-            process = processes.start(command)
-        else:
-            process = prepared
+        process = prepared
+        if process is not None:
             try:
-                process.begin(command)
-            except StartError:
+                process.begin()
+            except StartError as error:
+                self._log(f"node {name} starts without imports in advance: {error}")
                 process.close()
-                raise
+                process = None
+        if process is None:
+            process = processes.start(command)
         self._running[name] = process
         return process.started
 
@@ -93,7 +95,7 @@ class NodeProcesses:
             return
         pool = ThreadPoolExecutor(ASK_THREADS, thread_name_prefix="ask to end")
         for name, process in asked.items():
-            pool.submit(_ask_to_end, name, process)
+            pool.submit(_ask_to_end, name, process, self._options.mark)
         pool.shutdown(wait=False)
 
     def end(self, names: Iterable[str], forget: Collection[str] = (), patience: bool = True) -> None:
@@ -124,12 +126,12 @@ class NodeProcesses:
     # -- standby --------------------------------------------------------------------------------------------------
 
     def stand_by(self, commands: Iterable[Command]) -> None:
-        """Keep one warm process of each kind of Python node among the commands, and none of another kind.
+        """Keep a warm process for each Python node among the commands, and none for another one.
 
         Raises:
             StartError: the system refuses.
         """
-        wanted = {_kind(command): command for command in commands if command.interpreter}
+        wanted = {_kind(command): command for command in commands if command.is_python}
         closed, missing = standby_changes(wanted, {kind: p.status is None for kind, p in self._warm.items()})
         for kind in closed:
             self._warm.pop(kind).close()
@@ -158,11 +160,14 @@ class NodeProcesses:
         return process
 
 
-def _ask_to_end(name: str, process: Process) -> None:
-    if not NodeApi.request_shutdown(name, REASON) and process.status is None:
-        process.signal(signal.SIGINT)  # it is not registered yet, or does not listen
+def _ask_to_end(name: str, process: Process, mark: str) -> None:
+    """Ask a node to end over its API, or by a signal where it does not listen, or somebody else has taken its name."""
+    answer = NodeApi.answer(name)
+    is_other = answer is None or (answer[1] != process.pid and not look_up(name).is_up(mark))
+    if (is_other or not NodeApi.request_shutdown(name, REASON)) and process.status is None:
+        process.signal(signal.SIGINT)
 
 
 def _kind(command: Command) -> tuple[Any, ...]:
-    """Return what a warm process must have in common with the command that it will carry out."""
-    return (command.words[0], command.interpreter, tuple(sorted(command.environment.items())))
+    """Return the command as a key: a warm process has taken arguments, environment and folder from it already."""
+    return (command.words, command.cwd, command.log, tuple(sorted(command.environment.items())))

@@ -10,20 +10,22 @@ Three things keep a dying owner from leaving processes behind:
 from __future__ import annotations
 
 import contextlib
-import json
 import os
+import re
 import select
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import psutil
+
+from rosgraph_manipulator.io.warm_start.sitecustomize import SETTING
 
 MARK = "MROS_LAUNCHER"
 """Environment variable of every process that a launcher starts; its value names the launcher and its master."""
@@ -32,7 +34,11 @@ DIE_WITH_OWNER = ("/usr/bin/setpriv", "--pdeathsig", "KILL", "--")
 """From util-linux, which every Debian has. The kernel sends the signal when the *thread* ends that started the process,
 so only a main thread may start one."""
 
-WARM_START = Path(__file__).with_name("warm_start.py")
+WARM_START = str(Path(__file__).with_name("warm_start"))
+"""The folder of the module `sitecustomize` that lets a Python node do imports in advance."""
+
+PYTHON = re.compile(r"python(3(\.\d+)?)?")
+HARMLESS_FLAGS = {"-u", "-B", "-O", "-OO"}  # of Python: they leave `sitecustomize` and PYTHONPATH as they are
 
 
 class StartError(Exception):
@@ -47,7 +53,7 @@ class Command:
         words: the executable and its arguments.
         cwd: the folder in which it is started.
         environment: its whole environment, with the mark.
-        log: file for its standard output; None: it shares the owner's standard output.
+        log: file to which its standard output is appended; None: it shares the owner's standard output.
         prefixed: whether the words begin with a launch-prefix.
     """
 
@@ -58,27 +64,33 @@ class Command:
     prefixed: bool = False
 
     @property
-    def interpreter(self) -> tuple[str, ...]:
-        """The Python that the executable names in its first line; empty where it is no Python script."""
+    def is_python(self) -> bool:
+        """Whether the executable is a script for Python 3 that may do imports in advance."""
         if self.prefixed:
-            return ()
+            return False
         try:
             with open(self.words[0], "rb") as file:
                 first = file.readline(256)
             words = shlex.split(first[2:].decode()) if first.startswith(b"#!") else []
         except (OSError, ValueError):
-            return ()
-        return tuple(words) if words and any("python" in os.path.basename(word) for word in words) else ()
+            return False
+        if words and os.path.basename(words[0]) == "env":
+            words = words[2:] if words[1:2] == ["-S"] else words[1:]
+        if not words or not PYTHON.fullmatch(os.path.basename(words[0])) or not HARMLESS_FLAGS.issuperset(words[1:]):
+            return False
+        found = shutil.which(words[0], path=self.environment.get("PATH"))
+        return found is not None and os.path.basename(os.path.realpath(found)).startswith("python3")
 
 
 @dataclass
 class Process:
-    """One process; `waiting` tells whether it still waits for its command."""
+    """One process; one that was prepared waits until `begin`."""
 
+    executable: str
     popen: subprocess.Popen[bytes]
     started: float  # time.monotonic()
-    waiting: bool = False
-    pidfd: int = field(default=-1)
+    pidfd: int
+    gate: int = -1  # file descriptor to which its permission to begin is written; -1: it has begun
 
     @property
     def pid(self) -> int:
@@ -90,20 +102,20 @@ class Process:
         """Exit status, negative for a signal; None while it runs."""
         return self.popen.poll()
 
-    def begin(self, command: Command) -> None:
-        """Give a waiting process its command.
+    def begin(self) -> None:
+        """Let a prepared process begin.
 
         Raises:
             StartError: the process has ended.
         """
-        role = {"arguments": command.words[1:], "cwd": command.cwd, "log": command.log}
-        assert self.popen.stdin is not None  # noqa: S101
+        gate, self.gate = self.gate, -1
         try:
-            self.popen.stdin.write(json.dumps(role).encode() + b"\n")
-            self.popen.stdin.close()
+            os.write(gate, b"\n")
         except OSError as error:
-            raise StartError(f"{command.words[0]}: its process has ended before it began: {error}") from error
-        self.waiting, self.started = False, time.monotonic()
+            raise StartError(f"{self.executable}: its process has ended before it began: {error}") from error
+        finally:
+            os.close(gate)
+        self.started = time.monotonic()
 
     def signal(self, number: int) -> None:
         """Send a signal to the process and to its children in the same process group."""
@@ -111,15 +123,13 @@ class Process:
             os.killpg(self.pid, number)
 
     def close(self) -> None:
-        """Kill what is left of the process group, and close the pipe and the file descriptor of the process."""
+        """Kill what is left of the process group, and close the file descriptors of the process."""
         self.signal(signal.SIGKILL)
         self.popen.wait()
-        if self.popen.stdin is not None:
-            with contextlib.suppress(OSError):
-                self.popen.stdin.close()
-        if self.pidfd >= 0:
-            os.close(self.pidfd)
-            self.pidfd = -1
+        for descriptor in (self.gate, self.pidfd):
+            if descriptor >= 0:
+                os.close(descriptor)
+        self.gate = self.pidfd = -1
 
 
 def start(command: Command) -> Process:
@@ -128,46 +138,57 @@ def start(command: Command) -> Process:
     Raises:
         StartError: the system refuses.
     """
-    log = None
-    if command.log:
-        with contextlib.suppress(OSError):  # a full disk must not keep a robot from driving
-            log = open(command.log, "wb")  # noqa: SIM115
-    try:
-        return _popen((*DIE_WITH_OWNER, *command.words), command, command.cwd, stdout=log)
-    finally:
-        if log:
-            log.close()
+    return _start(command, command.environment)
 
 
 def prepare(command: Command) -> Process | None:
-    """Start a process that does the imports of a Python node and then waits for `begin`; None for any other node.
+    """Start a process that does imports of a Python node and then waits for `begin`; None for any other node.
 
     Raises:
         StartError: the system refuses.
     """
-    interpreter = command.interpreter
-    if not interpreter:
+    if not command.is_python:
         return None
-    words = (*DIE_WITH_OWNER, *interpreter, str(WARM_START), command.words[0])
-    process = _popen(words, command, "/", stdin=subprocess.PIPE)
-    process.waiting = True
+    wait, gate = os.pipe()
+    try:
+        python_path = command.environment.get("PYTHONPATH")
+        environment = {
+            **command.environment,
+            SETTING: f"{wait}:1:{'' if python_path is None else f'={python_path}'}",
+            "PYTHONPATH": os.pathsep.join(filter(None, [WARM_START, python_path])),
+        }
+        process = _start(command, environment, (wait,))
+    except StartError:
+        os.close(gate)
+        raise
+    finally:
+        os.close(wait)
+    process.gate = gate
     return process
 
 
-def _popen(words: Sequence[str], command: Command, cwd: str, stdout: Any = None, stdin: int | None = None) -> Process:
+def _start(command: Command, environment: Mapping[str, str], pass_fds: tuple[int, ...] = ()) -> Process:
+    log = None
+    if command.log:
+        with contextlib.suppress(OSError):  # a full disk must not keep a robot from driving
+            log = open(command.log, "ab")  # noqa: SIM115
     try:
         os.makedirs(command.cwd, exist_ok=True)
         popen = subprocess.Popen(
-            words,
-            cwd=cwd,
-            env=dict(command.environment),
-            stdin=stdin if stdin is not None else subprocess.DEVNULL,
-            stdout=stdout,
+            (*DIE_WITH_OWNER, *command.words),
+            cwd=command.cwd,
+            env=dict(environment),
+            stdin=subprocess.DEVNULL,
+            stdout=log,
             start_new_session=True,
+            pass_fds=pass_fds,
         )
     except OSError as error:
         raise StartError(f"{command.words[0]}: {error.strerror or error}") from error
-    return Process(popen, time.monotonic(), pidfd=os.pidfd_open(popen.pid))
+    finally:
+        if log:
+            log.close()
+    return Process(command.words[0], popen, time.monotonic(), os.pidfd_open(popen.pid))
 
 
 def wait_for_ends(processes: Sequence[Process], timeout: float) -> bool:

@@ -1,6 +1,6 @@
-"""The nodes of the configuration that runs: which to stop, keep and start, and what follows when one ends.
+"""The nodes of the functions that run: which to stop, keep and start, and what follows when one ends.
 
-Times are arguments, in seconds of one clock that never goes back.
+A node runs once, however many functions share it. Times are arguments, in seconds of one clock that never goes back.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from collections.abc import Collection, Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
+from rosgraph_manipulator.configuration.description import NodeDescription
 from rosgraph_manipulator.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
-from rosgraph_manipulator.launching.restarts import DeathCounter, RestartPolicy
+from rosgraph_manipulator.launching.restarts import DeathCounter, Meaning, RestartPolicy, meaning_of_end
 
 Kind = TypeVar("Kind", bound=Hashable)
 
@@ -25,7 +25,7 @@ class Verdict(enum.Enum):
 
     FINISHED = "finished"  # it has done its work
     RESTART = "restart"  # it is started again after a delay
-    GIVE_UP = "give up"  # its configuration is stopped
+    GIVE_UP = "give up"  # at least one function is stopped
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,12 @@ class Ending:
     Attributes:
         verdict: what follows.
         text: a line for the operator.
+        stopped: the nodes to end, because a function that needs them is given up and no other one does.
     """
 
     verdict: Verdict
     text: str
+    stopped: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -59,18 +61,43 @@ class _Node:
     serves: bool | None = None
     finished: bool = False
 
+    @property
+    def is_available(self) -> bool:
+        """Whether it runs, is about to run again, or has done its work."""
+        return self.started is not None or self.restart_at is not None or self.finished
+
+
+@dataclass(frozen=True)
+class _Function:
+    """A function that has nodes.
+
+    Attributes:
+        deaths: counts those of its nodes.
+        configuration: the one that runs; empty: none.
+        change: number of its last change.
+        nodes: names of its nodes.
+        state: STABLE, CHANGING, RECOVERING or FAILED.
+        message: how its last node ended; empty where none did.
+        changed_at: when its last change ended.
+    """
+
+    deaths: DeathCounter
+    configuration: str = ""
+    change: int = 0
+    nodes: tuple[str, ...] = ()
+    state: str = STABLE
+    message: str = ""
+    changed_at: float = float("-inf")
+
 
 class ManagedNodes:
-    """The nodes of one configuration and the state that the launcher reports."""
+    """The nodes of all functions, and the state of each function that the launcher reports."""
 
     def __init__(self, policy: RestartPolicy) -> None:
         self._policy = policy
-        self._deaths = DeathCounter(policy)
         self._nodes: dict[str, _Node] = {}
-        self._configuration, self._message = "", ""
-        self._state = STABLE
+        self._functions: dict[str, _Function] = {}
         self._changes = 0
-        self._changed_at = float("-inf")
 
     # -- what runs ------------------------------------------------------------------------------------------------
 
@@ -81,71 +108,111 @@ class ManagedNodes:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All nodes of the configuration, also those that have done their work."""
+        """All nodes of all functions, also those that have done their work."""
         return tuple(self._nodes)
 
     def description(self, name: str) -> NodeDescription:
         """Return how a node is started."""
         return self._nodes[name].description
 
-    def report(self) -> LauncherReport:
-        """Return what the launcher tells."""
-        unfinished = {name: node for name, node in self._nodes.items() if not node.finished}
-        dead = tuple(name for name, node in unfinished.items() if node.started is None)
-        return LauncherReport(self._configuration, self._changes, self._state, tuple(unfinished), dead, self._message)
+    def reports(self) -> tuple[LauncherReport, ...]:
+        """Return what the launcher tells of each function."""
+        return tuple(self.report(name) for name in self._functions)
+
+    def report(self, name: str) -> LauncherReport:
+        """Return what the launcher tells of one function."""
+        function = self._functions[name]
+        unfinished = [node for node in function.nodes if not self._nodes[node].finished]
+        dead = tuple(node for node in unfinished if self._nodes[node].started is None)
+        return LauncherReport(
+            name,
+            function.configuration,
+            function.change,
+            function.state,
+            tuple(unfinished),
+            dead,
+            function.message,
+        )
 
     # -- changes --------------------------------------------------------------------------------------------------
 
-    def ask_for_change(self) -> None:
-        """Count a change that was asked for."""
+    def ask_for_change(self, name: str) -> None:
+        """Count a change of a function that was asked for."""
         self._changes += 1
+        self._set(name, change=self._changes)
 
-    def refusal(self, system: SystemDescription, start: Collection[str]) -> str:
+    def refusal(self, nodes: Mapping[str, NodeDescription], start: Collection[str]) -> str:
         """Return why a change can't be made; empty where it can.
 
         A change may have been planned for a launcher that died since and that had more nodes.
+
+        Args:
+            nodes: all nodes of the wanted configuration.
+            start: the nodes to start.
         """
-        unknown = [name for name in start if name not in system.nodes]
+        unknown = [name for name in start if name not in nodes]
         if unknown:
             return f"starts no node {', '.join(unknown)}"
-        lacking = [name for name in system.nodes if name not in start and name not in self._nodes]
+        available = {name for name, node in self._nodes.items() if node.is_available}
+        lacking = [name for name in nodes if name not in start and name not in available]
         return f"needs {', '.join(lacking)}, which does not run: start it, too" if lacking else ""
 
-    def begin_change(self, system: SystemDescription, start: Collection[str]) -> list[str]:
-        """Begin a change, and return the running nodes that must end.
+    def begin_change(self, name: str, stop: Collection[str], start: Collection[str]) -> list[str]:
+        """Begin a change of a function, and return the nodes that must end.
 
-        Nodes end that the configuration lacks or that are started anew. All others run on.
+        Those are the nodes in `start` that run, and those of the function in `stop` that no other function shares.
         """
-        self._state, self._message = CHANGING, ""
-        return [name for name in self._nodes if name in start or name not in system.nodes]
+        function = self._set(name, state=CHANGING, message="")
+        own = [node for node in function.nodes if node in stop and not self._sharers(node, name)]
+        return [node for node in self._nodes if node in start or node in own]
 
-    def adopt(self, configuration: str, system: SystemDescription, start: Collection[str]) -> None:
-        """Note that the nodes of a configuration are those in `start` and those that ran before and are kept."""
-        if configuration != self._configuration:
-            self._deaths.reset()
-        kept = {name: node for name, node in self._nodes.items() if name in system.nodes and name not in start}
-        self._nodes = {
-            name: replace(kept[name], description=description) if name in kept else _Node(description)
-            for name, description in system.nodes.items()
-            if name in kept or name in start
-        }
-        self._configuration, self._message = configuration, ""
+    def adopt(
+        self,
+        name: str,
+        configuration: str,
+        nodes: Mapping[str, NodeDescription],
+        stop: Collection[str],
+        start: Collection[str],
+    ) -> None:
+        """Note that a function has the nodes of a configuration.
 
-    def end_change(self, now: float, failed_to_start: Iterable[str] = ()) -> None:
-        """Note that a change is over; nodes that it could not start belong to the configuration no more."""
-        for name in failed_to_start:
-            self._nodes.pop(name, None)
-        self._state, self._changed_at = STABLE, now
+        Those are the ones in `start`, and those that ran before and are kept. A node that the configuration lacks and
+        that is not in `stop` stays until a later change stops it.
+        """
+        function = self._functions[name]
+        if configuration != function.configuration:
+            function.deaths.reset()
+        left = [node for node in function.nodes if node not in nodes and node not in stop]
+        kept = [node for node in nodes if node not in start and node in self._nodes]
+        for node in start:
+            self._nodes[node] = _Node(nodes[node])
+        for node in kept:
+            self._nodes[node] = replace(self._nodes[node], description=nodes[node])
+        names = tuple([node for node in nodes if node in start or node in kept] + left)
+        self._set(name, configuration=configuration, message="", nodes=names)
+        self._drop_unowned()
 
-    def begin_stop(self) -> None:
-        """Note that all nodes are being stopped."""
-        self._state = CHANGING
+    def end_change(self, name: str, now: float, failed_to_start: Iterable[str] = ()) -> None:
+        """Note that a change is over; nodes that it could not start belong to no configuration any more."""
+        failed = set(failed_to_start)
+        for node in failed:
+            for other in self._sharers(node, name):  # it was restarted, and the other function still needs it
+                self._nodes[node] = replace(self._nodes[node], restart_at=now)
+                self._set(other, state=RECOVERING, message=f"node {node} could not be restarted for {name}")
+        own = tuple(node for node in self._functions[name].nodes if node not in failed)
+        self._set(name, nodes=own, state=STABLE, changed_at=now)
+        self._drop_unowned()
 
-    def end_stop(self, now: float) -> None:
-        """Note that all nodes have been stopped, and no configuration runs."""
-        self._nodes, self._configuration = {}, ""
-        self._state, self._changed_at = STABLE, now
-        self._deaths.reset()
+    def begin_release(self, name: str) -> list[str]:
+        """Begin to release a function, and return the nodes that must end: those that no other function shares."""
+        function = self._set(name, state=CHANGING, message="")
+        return [node for node in function.nodes if not self._sharers(node, name)]
+
+    def end_release(self, name: str, now: float) -> None:
+        """Note that a function has no nodes any more."""
+        self._functions[name].deaths.reset()
+        self._set(name, configuration="", nodes=(), state=STABLE, message="", changed_at=now)
+        self._drop_unowned()
 
     def started(self, name: str, now: float) -> None:
         """Note that the process of a node has begun."""
@@ -171,43 +238,66 @@ class ManagedNodes:
         own = {offer for offer in advertised if not offer.startswith((f"{name}/get_logg", "/rosout"))}
         self._nodes[name] = replace(self._nodes[name], serves=bool(own - {f"{name}/set_logger_level"}))
 
-    def ended(self, name: str, status: int | None, now: float) -> Ending:
+    def ended(self, name: str, status: int | None, now: float, conflict: str = "") -> Ending:
         """Decide what follows from the end of a node's process.
 
         Args:
             name: of the node.
             status: exit status, negative for a signal.
             now: the time.
+            conflict: who has taken the node's name, with the remedy; empty: nobody has.
         """
         node = self._nodes[name]
         age = now - node.started if node.started is not None else 0.0
         node = self._nodes[name] = replace(node, started=None)
-        if status == 0 and not node.serves and not node.description.respawn:
+        meaning = meaning_of_end(node.description, status, bool(node.serves), bool(conflict))
+        if meaning is Meaning.FINISHED:
             self._nodes[name] = replace(node, finished=True)
             return Ending(Verdict.FINISHED, f"node {name} has finished, {age:.1f} s after its start")
         how = f"by signal {-status}" if status is not None and status < 0 else f"with status {status}"
-        self._message = f"node {name} ended {how}, {age:.1f} s after its start"
-        return self._count_death(name, now)
+        message = f"node {name} ended {how}, {age:.1f} s after its start{conflict and f': {conflict}'}"
+        if meaning is Meaning.FAILURE:
+            return self._give_up(self._needing(name), message, "it is required")
+        if meaning is Meaning.TURN:
+            restart_at = now + max(node.description.respawn_delay, self._policy.first_delay)
+            self._nodes[name] = replace(node, restart_at=restart_at)
+            return Ending(Verdict.RESTART, f"{message}: starting it again in {restart_at - now:.1f} s")
+        return self._count_death(name, message, now)
 
     def failed_to_restart(self, name: str, reason: str, now: float) -> Ending:
         """Decide what follows where a node can't be started again; it counts as one more death."""
-        self._message = f"node {name} can't be started again: {reason}"
-        return self._count_death(name, now)
+        return self._count_death(name, f"node {name} can't be started again: {reason}", now)
 
-    def _count_death(self, name: str, now: float) -> Ending:
-        restart_at = self._deaths.count(name, now)
+    def _count_death(self, name: str, message: str, now: float) -> Ending:
+        """Count a death for each function of the node: a function may give up while another one goes on."""
+        restarts, given_up = [], []
+        for owner in self._needing(name):
+            restart_at = self._functions[owner].deaths.count(name, now)
+            if restart_at is None:
+                given_up.append(owner)
+            else:
+                restarts.append(max(restart_at, now + self._nodes[name].description.respawn_delay))
+                self._set(owner, state=RECOVERING, message=message)
+        restart_at = max(restarts, default=None)
         self._nodes[name] = replace(self._nodes[name], restart_at=restart_at)
-        if restart_at is None:
-            deaths = f"{self._policy.intensity + 1} deaths in {self._policy.period:g} s"
-            self._message = f"{self._message}; {deaths} are too many: {self._configuration} is stopped"
-            return Ending(Verdict.GIVE_UP, self._message)
-        self._state = RECOVERING
-        return Ending(Verdict.RESTART, f"{self._message}: starting it again in {restart_at - now:.1f} s")
+        if not given_up:
+            delay = 0.0 if restart_at is None else restart_at - now
+            return Ending(Verdict.RESTART, f"{message}: starting it again in {delay:.1f} s")
+        deaths = f"{self._policy.intensity + 1} deaths in {self._policy.period:g} s are too many"
+        return self._give_up(given_up, message, deaths)
 
-    def given_up(self) -> None:
-        """Note that the configuration has failed and its nodes have been stopped."""
-        self._nodes = {name: replace(node, restart_at=None) for name, node in self._nodes.items()}
-        self._state = FAILED
+    def _give_up(self, given_up: list[str], message: str, reason: str) -> Ending:
+        """Fail functions, and return which of their nodes no other function needs."""
+        stopped: list[str] = []
+        for owner in given_up:
+            text = f"{message}; {reason}: {self._functions[owner].configuration} is stopped"
+            self._set(owner, state=FAILED, message=text)
+        for owner in given_up:
+            stopped += [n for n in self._functions[owner].nodes if n not in stopped and not self._needing(n)]
+        for node in stopped:
+            self._nodes[node] = replace(self._nodes[node], restart_at=None)
+        names = " and ".join(self._functions[owner].configuration for owner in given_up)
+        return Ending(Verdict.GIVE_UP, f"{message}; {reason}: {names} is stopped", tuple(stopped))
 
     def next_restart(self) -> float | None:
         """Return the time of the next restart; None where no node waits for one."""
@@ -218,17 +308,40 @@ class ManagedNodes:
         return [name for name, node in self._nodes.items() if node.restart_at is not None and node.restart_at <= now]
 
     def recovered(self) -> bool:
-        """Become STABLE where all nodes run again; return whether that is so."""
-        if self._state != RECOVERING or self.report().dead:
-            return False
-        self._state = STABLE
-        return True
+        """Make each function STABLE whose nodes all run again; return whether there is one."""
+        names = [name for name, f in self._functions.items() if f.state == RECOVERING and not self.report(name).dead]
+        for name in names:
+            self._set(name, state=STABLE)
+        return bool(names)
 
     # -- standby --------------------------------------------------------------------------------------------------
 
     def may_stand_by(self, now: float) -> bool:
         """Tell whether warm processes may be started: not during a change, and not right after one."""
-        return self._state == STABLE and now - self._changed_at > STANDBY_DELAY
+        functions = self._functions.values()
+        busy = any(f.state in (CHANGING, RECOVERING) or now - f.changed_at <= STANDBY_DELAY for f in functions)
+        return any(f.state == STABLE for f in functions) and not busy
+
+    # -- helpers --------------------------------------------------------------------------------------------------
+
+    def _set(self, name: str, **changes: object) -> _Function:
+        function = self._functions.get(name) or _Function(DeathCounter(self._policy))
+        self._functions[name] = function = replace(function, **changes)  # type: ignore[arg-type]
+        return function
+
+    def _owners(self, node: str) -> list[str]:
+        return [name for name, function in self._functions.items() if node in function.nodes]
+
+    def _needing(self, node: str) -> list[str]:
+        """Return the functions that have a node and were not given up."""
+        return [name for name in self._owners(node) if self._functions[name].state != FAILED]
+
+    def _sharers(self, node: str, name: str) -> list[str]:
+        """Return the functions other than `name` that need a node."""
+        return [other for other in self._needing(node) if other != name]
+
+    def _drop_unowned(self) -> None:
+        self._nodes = {name: node for name, node in self._nodes.items() if self._owners(name)}
 
 
 def standby_changes(wanted: Collection[Kind], warm: Mapping[Kind, bool]) -> tuple[list[Kind], list[Kind]]:

@@ -14,17 +14,19 @@ FAILED: str = LauncherState.FAILED
 
 @dataclass(frozen=True)
 class LauncherReport:
-    """The content of metacontrol_msgs/LauncherState.
+    """What the launcher runs for one function: the content of metacontrol_msgs/LaunchedFunction.
 
     Attributes:
+        function: name of the function.
         configuration: name of the configuration; empty where none runs.
-        change: number of the last change that was asked for.
+        change: number of the last change of this function that was asked for.
         state: STABLE, CHANGING, RECOVERING or FAILED.
         nodes: names of the nodes that should run.
         dead: names of those among them that do not run.
         message: how the last node ended; empty where none did.
     """
 
+    function: str = ""
     configuration: str = ""
     change: int = 0
     state: str = STABLE

@@ -2,8 +2,38 @@
 
 from __future__ import annotations
 
+import enum
 from collections import deque
 from dataclasses import dataclass
+
+from rosgraph_manipulator.configuration.description import NodeDescription
+
+
+class Meaning(enum.Enum):
+    """What the end of a node means."""
+
+    FINISHED = "finished"  # it has done its work
+    TURN = "turn"  # it has done its work for this time, and its launch file wants it again
+    DEATH = "death"  # it should run on
+    FAILURE = "failure"  # its configuration is nothing without it
+
+
+def meaning_of_end(node: NodeDescription, status: int | None, serves: bool, replaced: bool) -> Meaning:
+    """Return what the end of a node means.
+
+    Args:
+        node: how it was started.
+        status: its exit status, negative for a signal.
+        serves: whether it had topics or services of its own.
+        replaced: whether somebody else's node has taken its name, so that the master told it to end.
+    """
+    if node.required and not replaced:
+        return Meaning.FAILURE
+    if status != 0 or replaced:
+        return Meaning.DEATH
+    if node.respawn:
+        return Meaning.TURN
+    return Meaning.DEATH if serves else Meaning.FINISHED
 
 
 @dataclass(frozen=True)

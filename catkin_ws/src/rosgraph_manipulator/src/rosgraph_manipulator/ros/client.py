@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,13 +12,16 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
-    LauncherState,
+    ChangeFunctionAction,
+    ChangeFunctionGoal,
+    LaunchedFunctions,
     MvpReconfigurationAction,
     MvpReconfigurationGoal,
 )
 from node_kit.ros.action_server import wait_for_server
 
-from rosgraph_manipulator.configuration.configurations import KEYS
+from rosgraph_manipulator.configuration.configurations import DEFAULT_FUNCTION, KEYS
+from rosgraph_manipulator.ros.requests import CHANGE_FUNCTION
 
 FIND_TIMEOUT = 5.0  # s, wall, to find the manipulator
 NODE = "rosgraph_manipulator"
@@ -32,12 +36,12 @@ class Answer:
     """How a request ended.
 
     Attributes:
-        deployed: whether the configuration runs.
-        result: code of metacontrol_msgs/MvpReconfiguration; None: the action ended without one.
+        done: whether what was asked for is done.
+        result: one of metacontrol_msgs/ReconfigurationResult; None: the action ended without one.
         text: why, in one line.
     """
 
-    deployed: bool
+    done: bool
     result: int | None
     text: str
 
@@ -65,17 +69,41 @@ def manipulator_parameters() -> dict[str, Any]:
     return {key: rospy.get_param(f"{NODE}/{key}", rospy.get_param(key, None)) for key in KEYS}
 
 
-def request(configuration: str) -> Answer:
+def request(configuration: str, restart: Sequence[str] = ()) -> Answer:
     """Ask the manipulator for a configuration, and wait for the result; Ctrl-C takes the request back.
+
+    Args:
+        configuration: its name.
+        restart: nodes of it to restart even if they do not differ.
+
+    Raises:
+        ClientError: no manipulator answers, or nobody knows the function of the configuration.
+    """
+    if not restart:
+        action = rospy.get_param(f"{NODE}/reconfiguration_action_name", "rosgraph_manipulator_action_server")
+        return _ask(action, MvpReconfigurationAction, MvpReconfigurationGoal(configuration))
+    known = manipulator_parameters()["configurations"] or {}
+    if configuration not in known:
+        raise ClientError(f"unknown configuration '{configuration}'; known are: {', '.join(sorted(known))}")
+    function = known[configuration].get("function", DEFAULT_FUNCTION)
+    goal = ChangeFunctionGoal(function=function, configuration=configuration, restart=list(restart))
+    return _ask(CHANGE_FUNCTION, ChangeFunctionAction, goal)
+
+
+def release(function: str) -> Answer:
+    """Ask the manipulator to release a function, and wait for the result; Ctrl-C takes the request back.
 
     Raises:
         ClientError: no manipulator answers.
     """
-    action = rospy.get_param(f"{NODE}/reconfiguration_action_name", "rosgraph_manipulator_action_server")
-    client = actionlib.SimpleActionClient(action, MvpReconfigurationAction)
+    return _ask(CHANGE_FUNCTION, ChangeFunctionAction, ChangeFunctionGoal(function=function))
+
+
+def _ask(action: str, kind: Any, goal: Any) -> Answer:
+    client = actionlib.SimpleActionClient(action, kind)
     if not wait_for_server(client, FIND_TIMEOUT):
         raise ClientError(f"no manipulator answers at {rospy.resolve_name(action)}: start rosgraph_manipulator")
-    client.send_goal(MvpReconfigurationGoal(configuration))
+    client.send_goal(goal)
     try:
         client.wait_for_result()
     except KeyboardInterrupt:
@@ -83,7 +111,7 @@ def request(configuration: str) -> Answer:
         client.wait_for_result()
     result = client.get_result()
     return Answer(
-        deployed=client.get_state() == GoalStatus.SUCCEEDED,
+        done=client.get_state() == GoalStatus.SUCCEEDED,
         result=result.result if result is not None else None,
         text=client.get_goal_status_text(),
     )
@@ -94,9 +122,9 @@ def active_configuration() -> ActiveConfiguration | None:
     return _latest(f"{NODE}/active_configuration", ActiveConfiguration)
 
 
-def launcher_state() -> LauncherState | None:
+def launched_functions() -> LaunchedFunctions | None:
     """Return what the launcher runs; None where it does not say."""
-    return _latest("rosgraph_launcher/state", LauncherState)
+    return _latest("rosgraph_launcher/functions", LaunchedFunctions)
 
 
 def _latest(topic: str, kind: Any) -> Any:

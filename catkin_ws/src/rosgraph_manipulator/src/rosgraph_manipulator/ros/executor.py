@@ -1,10 +1,11 @@
-"""Carries out the steps of a change on the running system: the launcher, the nodes, the pending goal and the robot."""
+"""Carries out the steps of a change on the running system: the launcher, the nodes, the pending goals and the robot."""
 
 from __future__ import annotations
 
+import subprocess
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import rospy
@@ -12,20 +13,25 @@ from geometry_msgs.msg import Twist
 from node_kit.io.xml_rpc import CallError
 
 from rosgraph_manipulator.change.deployment import DeploymentError
+from rosgraph_manipulator.change.parameters import OverwrittenParameters
 from rosgraph_manipulator.change.progress import ChangeProgress
 from rosgraph_manipulator.change.tactics import Plan
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
-from rosgraph_manipulator.configuration.description import SystemDescription
-from rosgraph_manipulator.io.launch_files import LaunchFileError, command_line, read_launch_file
-from rosgraph_manipulator.io.master import NodeApi, advertised, publishers
+from rosgraph_manipulator.configuration.difference import same_value
+from rosgraph_manipulator.io.launch_files import LaunchFile
+from rosgraph_manipulator.io.master import NodeApi, advertised, get_parameters, publishers, set_parameters
+from rosgraph_manipulator.io.ownership import look_up
+from rosgraph_manipulator.io.scripts import script_is_at_work
 from rosgraph_manipulator.launching.report import LauncherReport
 from rosgraph_manipulator.ros.goal import PendingGoal
 from rosgraph_manipulator.ros.launcher_client import LauncherClient
-from rosgraph_manipulator.ros.reconfigure_client import ReconfigureClient
+from rosgraph_manipulator.ros.running_system import RunningSystem
 
 POLL_PERIOD = 0.01  # s, wall
 STATE_TIMEOUT = 2.0  # s, wall, for the launcher's state to follow its answer
 DELIVERY_TIMEOUT = 5.0  # s, wall, for the new server to have the pending goal
+COMMAND_TIMEOUT = 5.0  # s, wall, for a `rosparam` call of a launch file
+ASK_THREADS = 8  # nodes are asked side by side whether they hang
 
 
 def wait_until(condition: Callable[[], bool], timeout: float) -> bool:
@@ -44,7 +50,8 @@ class RosExecutor:
     def __init__(
         self,
         options: ManipulatorOptions,
-        goal: PendingGoal | None,
+        goals: Mapping[str, PendingGoal],
+        overwritten: OverwrittenParameters,
         ready_timeout: float,
         settle_time: float,
         launcher_timeout: float,
@@ -54,105 +61,87 @@ class RosExecutor:
 
         Args:
             options: the configurations, and the nodes to end before a start.
-            goal: the pending goal that is kept over a change; None: no goal is kept.
+            goals: the pending goal that is kept over a change of a function, by the function's name.
+            overwritten: what an earlier manipulator has left of the parameters' former values.
             ready_timeout: how long a configuration may take to be ready, s, wall.
             settle_time: how long started nodes must live after that, s, wall.
             launcher_timeout: how long to look for the launcher, s, wall.
             on_report: is called with each report of the launcher, in a thread of its own.
         """
-        self.nodes = ReconfigureClient()
         self.check: Callable[[], None] = lambda: None  # raises CancelledError where the change must be given up
         self.launcher_phases: dict[str, float] = {}  # durations of the launcher's last change, s
         self._options = options
-        self._goal = goal
+        self._goals = goals
+        self._overwritten = overwritten
         self._ready_timeout, self._settle_time = ready_timeout, settle_time
         self._on_report = on_report
         self._progress = ChangeProgress()
-        self._described: tuple[Configuration, SystemDescription] | None = None  # the last one read
-        self._deployed: tuple[Configuration, SystemDescription] | None = None  # the one that the launcher deployed
+        self.system = RunningSystem(options, self._progress)
+        self._servers_died: dict[str, bool] = {}  # by function: whether the kept action's server died
         self._news = threading.Condition()
+        self._follows = False  # whether the reports of the launcher that made the last change arrive
         self._cmd_vel = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         self._launcher = LauncherClient(launcher_timeout, self._follow)
 
-    # -- what runs ------------------------------------------------------------------------------------------------
+    def report(self, function: str) -> LauncherReport | None:
+        """Return the launcher's last report of a function; None: it has made none at all yet."""
+        return self._progress.report(function)
 
-    @property
-    def report(self) -> LauncherReport | None:
-        """The launcher's last report; None: it has made none yet."""
-        return self._progress.report
-
-    def suppose(self, report: LauncherReport) -> None:
-        """Take a report as the launcher's first one, where its topic has brought none yet."""
+    def suppose(self, reports: Iterable[LauncherReport]) -> None:
+        """Take reports as the launcher's first ones, where its topic has brought none yet."""
         with self._news:
-            if self._progress.report is None:
-                self._progress.take(report)
-
-    def running(self) -> SystemDescription:
-        """Return what runs, by the launcher's reports and the launch file as it was when it was deployed."""
-        configuration = self._options.configurations.get(self._progress.running)
-        if configuration is None:
-            return SystemDescription()
-        if self._deployed and self._deployed[0] == configuration:
-            return self._progress.running_system(self._deployed[1])
-        try:  # an earlier manipulator has deployed it
-            return self._progress.running_system(self._read(configuration))
-        except DeploymentError as error:
-            rospy.logwarn("%s", error)
-            return self._progress.running_system(None)
-
-    def describe(self, configuration: Configuration) -> SystemDescription:
-        """Return what a configuration's launch file starts.
-
-        Raises:
-            DeploymentError: it can't be read, or names an executable that does not exist.
-        """
-        system = self._read(configuration)
-        try:
-            for node in system.nodes.values():
-                command_line(node)
-        except LaunchFileError as error:
-            raise DeploymentError(f"{configuration.launch_file}: {error}") from error
-        self._described = (configuration, system)
-        return system
-
-    def ask_for_adjustable(self) -> None:
-        """Ask the running nodes what they take by dynamic_reconfigure, so that the next plan need not wait for that."""
-        for node in self._progress.launched:
-            self.nodes.adjustable(node)
+            if not self._progress.has_reports:
+                self._progress.take(reports)
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
     def begin(self, wanted: Configuration, plan: Plan) -> None:
         """Begin the change to a configuration by a plan; nothing is touched yet."""
         self.check()
+        self._follows = False
         rospy.loginfo("%s: %s", wanted.name, " ".join(str(plan).split()))
-        self._progress.begin(wanted, time.monotonic())
+        self._progress.begin(wanted.function, wanted, time.monotonic())
 
     def set_parameters(self, server: str, values: Mapping[str, Any]) -> None:
         """Set values at a dynamic_reconfigure server."""
         self._progress.parameters_change(server)
-        self.nodes.set(server, values)
+        self.system.nodes.set(server, values)
 
     def change_processes(self, stop: tuple[str, ...], start: tuple[str, ...]) -> None:
         """Set the wanted configuration's parameters, stop nodes, wait until they have ended, and start nodes."""
-        leaving = {*stop, *start}
+        wanted = self._progress.wanted
+        if wanted is None:
+            raise DeploymentError("no configuration is being deployed")
+        launch = self.system.launch_file(wanted)
+        leaving = {*stop, *start} - (self._progress.shared(wanted.function) - set(start))
         self._progress.start(start)
         if leaving:
-            self._end_foreign_nodes()
-            self._see_who_leaves(leaving)
-        self._call(self._progress.wanted, start)
+            self._end_foreign_nodes(wanted.function)
+            self._see_who_leaves(wanted.function, leaving)
+        self._store_parameters(wanted.function, launch)
+        self._call(wanted.function, wanted.name, launch, stop, start)
+        self.system.deployed(wanted, launch)
 
     def wait_until_ready(self) -> None:
         """Wait until the configuration is ready, and hand the pending goal to a new server of its action."""
+        function = self._progress.function
+        goal = self._goals.get(function)
         # An earlier manipulator may have stopped the action's server.
-        awaited = self._progress.awaited(self._goal is not None and self._goal.is_between_servers)
+        awaited = self._progress.awaited(goal is not None and goal.is_between_servers)
         for node in awaited.nodes:
-            self._wait(lambda: self._is_up(node), f"node {node} is not up")  # noqa: B023
+            what = f"node {node} is not up"
+            self._wait(lambda: self._is_up(node), what, lambda: self._conflict(node))  # noqa: B023
         topics = {rospy.resolve_name(topic) for topic in awaited.topics}
         if topics:
-            what = f"not all of the topics {', '.join(sorted(topics))} are published"
-            self._wait(lambda: topics <= advertised(self._progress.launched), what)
-        goal = self._goal
+            missing = set(topics)
+
+            def all_are_published() -> bool:
+                missing.clear()
+                missing.update(topics - advertised(self._progress.launched_for(function)))
+                return not missing
+
+            what = "not all of its topics are published"
+            self._wait(all_are_published, what, lambda: f", {', '.join(sorted(missing))} is missing")
         if goal is not None and awaited.server:
             self._wait(lambda: goal.server_is_new, "its action server is not up")
             goal.server_started()
@@ -167,77 +156,141 @@ class RosExecutor:
             time.sleep(POLL_PERIOD)
 
     def restore(self, configuration: Configuration) -> None:
-        """Stop all nodes that run, and start all of a configuration; this is not interrupted."""
+        """Stop what runs for a function alone, and start all nodes of a configuration; this is not interrupted."""
         check, self.check = self.check, lambda: None
         try:
-            self._progress.begin(configuration, time.monotonic())
-            nodes = tuple(self.describe(configuration).nodes)
-            self.change_processes(self._progress.launched, nodes)
+            function = configuration.function
+            self._progress.begin(function, configuration, time.monotonic())
+            system = self.system.describe(configuration)
+            # Where the launcher has died, nothing runs for the other functions either.
+            shared = self._progress.shared(function) if self._launcher.is_connected else frozenset()
+            stop = tuple(node for node in self._progress.launched_for(function) if node not in shared)
+            self.change_processes(stop, tuple(node for node in system.nodes if node not in shared))
             self.wait_until_ready()
         finally:
             self.check = check
 
-    def stop_everything(self) -> None:
-        """Stop what the launcher runs, and the robot."""
+    def release(self, function: str) -> None:
+        """Stop all nodes that only this function needs, and the robot if none of the others drives it."""
+        self._progress.begin(function, None, time.monotonic())
+        leaving = set(self._progress.launched_for(function)) - self._progress.shared(function)
         try:
-            self._call(None, ())
+            if leaving:
+                self._see_who_leaves(function, leaving)
+            self._call(function, "", None, tuple(leaving), ())
+            self.system.released(function)
+            self._store_parameters(function, None)
         finally:
-            self.stop_robot()
+            self.stop_robot(function)
 
-    def stop_robot(self) -> None:
-        """Command the base to stand still."""
-        self._cmd_vel.publish(Twist())
+    def forget_goal(self, function: str) -> None:
+        """Drop the pending goal of a function that is needed no longer."""
+        if function in self._goals:
+            self._goals[function].drop()
+
+    def stop_robot(self, function: str) -> None:
+        """Command the base to stand still, unless nodes of another function drive it."""
+        try:
+            drivers = publishers(self._cmd_vel.resolved_name)
+        except CallError:
+            drivers = set()
+        if not drivers & self._progress.shared(function):
+            self._cmd_vel.publish(Twist())
 
     # -- recovery -------------------------------------------------------------------------------------------------
 
-    def begin_recovery(self) -> None:
-        """Note that nodes have died, and that the launcher will start them again."""
-        if self._goal is None:
+    def begin_recovery(self, function: str) -> None:
+        """Note that nodes of a function have died, and that the launcher will start them again.
+
+        Their parameters are put back first, because somebody may have set others, such as the launch file of a robot
+        that was started again.
+        """
+        report = self._progress.report(function)
+        wanted = self.system.parameters_of(function, report.dead if report else ())
+        try:
+            live = get_parameters(wanted)
+            lost = {name: v for name, v in wanted.items() if name not in live or not same_value(live[name], v)}
+            if lost:
+                set_parameters(lost)
+                rospy.logwarn("%s: put back, because nodes start again: %s", function, ", ".join(sorted(lost)))
+        except CallError as error:
+            rospy.logwarn("parameters are not put back: %s", error)
+        goal = self._goals.get(function)
+        if goal is None:
             return
         try:
-            servers = publishers(self._goal.status_topic)
+            servers = publishers(goal.status_topic)
         except CallError as error:
             rospy.logwarn("%s", error)
             servers = set()
-        if self._progress.server_died(servers):
-            self._goal.server_stops()
+        self._servers_died[function] = self._progress.server_died(function, servers)
+        if self._servers_died[function]:
+            goal.server_stops()
 
-    def end_recovery(self) -> None:
-        """Wait until the nodes that the launcher has started again are ready.
+    def end_recovery(self, function: str) -> None:
+        """Wait until the nodes of a function that the launcher has started again are ready.
 
         Raises:
             DeploymentError: they are not.
         """
-        report = self._progress.report
+        report = self._progress.report(function)
         if report is not None:
             configuration = self._options.configurations.get(report.configuration)
-            self._progress.recover(configuration, time.monotonic())
+            new_server = self._servers_died.get(function, False)
+            self._progress.recover(function, configuration, time.monotonic(), new_server)
             self.wait_until_ready()
+            self._servers_died.pop(function, None)
 
     # -- helpers --------------------------------------------------------------------------------------------------
 
-    @staticmethod
-    def _read(configuration: Configuration) -> SystemDescription:
-        if configuration.problem:
-            raise DeploymentError(configuration.problem)
-        try:
-            return read_launch_file(configuration.launch_file, configuration.args).system
-        except LaunchFileError as error:
-            raise DeploymentError(str(error)) from error
+    def _store_parameters(self, function: str, launch: LaunchFile | None) -> None:
+        """Set the parameters of a configuration; None: only restore what the former one has overwritten.
 
-    def _call(self, wanted: Configuration | None, start: tuple[str, ...]) -> None:
-        """Have the launcher change to a configuration, or, without one, stop everything."""
-        # The nodes have all their time, however long the launcher could not be found.
-        answer = self._launcher.change(wanted, start, found=lambda: self._progress.restart_deadline(time.monotonic()))
+        Raises:
+            DeploymentError: the master refuses, or a command of the launch file fails.
+        """
+        wanted = launch.system.all_parameters() if launch else {}
+        others = [name for system in self.system.others(function).values() for name in system.all_parameters()]
+        try:
+            for command in launch.commands if launch else ():
+                subprocess.run(
+                    ["/usr/bin/env", *command], check=True, timeout=COMMAND_TIMEOUT, stdout=subprocess.DEVNULL
+                )
+            asked = self._overwritten.unknown(wanted)
+            self._overwritten.remember(asked, get_parameters(asked))
+            values, gone = self._overwritten.transition(wanted, others)
+            handover = {rospy.resolve_name("~overwritten"): self._overwritten.as_parameter()} if asked else {}
+            clear = launch.clear if launch else ()
+            set_parameters({**handover, **values}, delete=[*clear, *gone])
+        except (CallError, OSError, subprocess.SubprocessError) as error:
+            raise DeploymentError(" ".join(str(error).split())) from error
+
+    def _call(
+        self,
+        function: str,
+        configuration: str,
+        launch: LaunchFile | None,
+        stop: tuple[str, ...],
+        start: tuple[str, ...],
+    ) -> None:
+        """Have the launcher change the nodes of a function."""
+        answer = self._launcher.change(
+            function,
+            configuration,
+            launch.system.nodes.values() if launch else (),
+            stop,
+            start,
+            # The nodes have all their time, however long the launcher could not be found.
+            found=lambda: self._progress.restart_deadline(time.monotonic()),
+        )
         self.launcher_phases = {phase.name: phase.duration for phase in answer.phases}
-        self._deployed = self._described if self._described and self._described[0] == wanted else None
         self._progress.answered(answer.change)
         with self._news:
-            self._news.wait_for(lambda: self._progress.is_reported(answer.change), STATE_TIMEOUT)
+            self._follows = self._news.wait_for(lambda: self._progress.is_reported(answer.change), STATE_TIMEOUT)
 
-    def _end_foreign_nodes(self) -> None:
+    def _end_foreign_nodes(self, function: str) -> None:
         """End nodes of the same function that somebody else started."""
-        for node in self._options.kill_nodes:
+        for node in self._options.of(function).kill_nodes:
             name = rospy.resolve_name(node)
             ours = name in self._progress.launched
             if not ours and NodeApi.request_shutdown(name, "replaced by another configuration"):
@@ -245,27 +298,42 @@ class RosExecutor:
                 if not gone:
                     raise DeploymentError(f"node {name} does not end")
 
-    def _see_who_leaves(self, leaving: set[str]) -> None:
+    def _see_who_leaves(self, function: str, leaving: set[str]) -> None:
         """See whether the pending goal's server and the robot's last driver end or are started anew."""
+        goal = self._goals.get(function)
         try:
-            drivers = publishers(rospy.resolve_name("cmd_vel")) - {rospy.get_name()}
-            servers = publishers(self._goal.status_topic) if self._goal else None
+            drivers = publishers(self._cmd_vel.resolved_name) - {rospy.get_name()}
+            servers = publishers(goal.status_topic) if goal else None
         except CallError as error:
             raise DeploymentError(str(error)) from error
-        if self._progress.leave(leaving, drivers, servers) and self._goal is not None:
-            self._goal.server_stops()
+        if self._progress.leave(leaving, drivers, servers) and goal is not None:
+            goal.server_stops()
 
-    def _follow(self, report: LauncherReport) -> None:
+    def _follow(self, reports: tuple[LauncherReport, ...]) -> None:
         with self._news:
-            if self._progress.take(report):
-                self.stop_robot()
+            if self._progress.take(reports):
+                self._cmd_vel.publish(Twist())
             self._news.notify_all()
         self._on_report()
 
     def _is_up(self, node: str) -> bool:
-        return NodeApi.is_answering(node) or self._progress.has_finished(node)
+        return (
+            look_up(node).is_up(self._launcher.mark)
+            or self._progress.has_finished(node)
+            or self._is_script_at_work(node)
+        )
 
-    def _wait(self, condition: Callable[[], bool], what: str) -> None:
+    def _is_script_at_work(self, node: str) -> bool:
+        wanted = self._progress.wanted
+        description = self.system.launch_file(wanted).system.nodes.get(node) if wanted else None
+        return description is not None and script_is_at_work(description, self._launcher.mark)
+
+    def _conflict(self, node: str) -> str:
+        """Return who has taken a node's name, for the end of a line; empty where nobody has."""
+        conflict = look_up(node).conflict(self._launcher.mark)
+        return conflict and f" ({conflict})"
+
+    def _wait(self, condition: Callable[[], bool], what: str, why: Callable[[], str] = str) -> None:
         deadline = self._progress.deadline(self._ready_timeout)
         while True:
             self._raise_if_broken()
@@ -275,7 +343,7 @@ class RosExecutor:
             except CallError as error:
                 raise DeploymentError(str(error)) from error
             if time.monotonic() > deadline:
-                raise DeploymentError(f"{what} within {self._ready_timeout:g} s; see the nodes' logs")
+                raise DeploymentError(f"{what} within {self._ready_timeout:g} s{why()}; see the nodes' logs")
             time.sleep(POLL_PERIOD)
 
     def _raise_if_broken(self) -> None:
@@ -283,5 +351,7 @@ class RosExecutor:
         if rospy.is_shutdown():
             raise DeploymentError("the manipulator is shutting down")
         failure = self._progress.failure()
+        if failure is None and self._follows and not self._launcher.is_connected:
+            failure = "rosgraph_launcher has died, and its nodes with it: see its log"
         if failure is not None:
             raise DeploymentError(failure)

@@ -93,6 +93,13 @@ class PendingGoal:
         for goal_id in strays:
             self._cancel_publisher.publish(GoalID(id=goal_id))
 
+    def drop(self) -> None:
+        """Forget the pending goal: its function is needed no longer."""
+        with self._lock:
+            self._keeper.server_changes(False)
+            self._keeper.drop()
+            self._store()
+
     def deliver(self) -> bool:
         """Send the goal if it is time; return whether the server has it or no goal is pending."""
         with self._lock:

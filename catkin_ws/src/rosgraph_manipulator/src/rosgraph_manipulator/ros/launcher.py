@@ -9,18 +9,19 @@ import select
 import threading
 import time
 
-import rosgraph
 import rospy
-from metacontrol_msgs.msg import LauncherState, Phase
-from metacontrol_msgs.srv import ChangeConfiguration, ChangeConfigurationRequest, ChangeConfigurationResponse
+from metacontrol_msgs.msg import LaunchedFunctions, Phase
+from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, ChangeNodesResponse
 from node_kit.io.inbox import ClosedError, Inbox
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import LONGEST_END, Lifetime
 
 from rosgraph_manipulator.io.launcher import Launcher, LauncherError
+from rosgraph_manipulator.io.ownership import launcher_mark
 from rosgraph_manipulator.launching.options import LauncherOptions
 from rosgraph_manipulator.launching.report import LauncherReport
 from rosgraph_manipulator.launching.restarts import RestartPolicy
+from rosgraph_manipulator.ros.node_messages import from_message, report_message
 
 LOOK_PERIOD = 0.2  # s, wall, after which the main thread sees at the latest that the node must end
 
@@ -38,9 +39,9 @@ class LauncherNode:
         life.consequence = "its nodes are stopped, and it ends"
         # Twice: first for a change that is under way, then for the stop of all nodes.
         self._longest_end = LONGEST_END + 2 * (options.shutdown_timeout + options.sigint_timeout)
-        self._state = rospy.Publisher("~state", LauncherState, queue_size=10, latch=True)
+        self._functions = rospy.Publisher("~functions", LaunchedFunctions, queue_size=10, latch=True)
         self._launcher = Launcher(options, self._publish, rospy.logwarn)
-        self._service = rospy.Service("~change", ChangeConfiguration, self._on_change)
+        self._service = rospy.Service("~change", ChangeNodes, self._on_change)
 
     def end(self, reason: str) -> None:
         """Tell the main thread to stop the nodes and then to end this node."""
@@ -83,34 +84,26 @@ class LauncherNode:
         with contextlib.suppress(BlockingIOError):  # the pipe is full, so the main thread wakes up anyway
             os.write(self._wake_write, b"\0")
 
-    def _on_change(self, request: ChangeConfigurationRequest) -> ChangeConfigurationResponse:
+    def _on_change(self, request: ChangeNodesRequest) -> ChangeNodesResponse:
         try:
             return self._inbox.call(lambda: self._change(request))
         except ClosedError as error:
             raise rospy.ServiceException(str(error)) from error
 
-    def _change(self, request: ChangeConfigurationRequest) -> ChangeConfigurationResponse:
+    def _change(self, request: ChangeNodesRequest) -> ChangeNodesResponse:
         try:
-            phases = self._launcher.change(
-                request.configuration, request.launch_file, list(request.args), list(request.start)
-            )
-        except LauncherError as error:
-            return ChangeConfigurationResponse(ok=False, message=str(error), change=self._launcher.changes)
-        return ChangeConfigurationResponse(
+            nodes = {node.name: from_message(node) for node in request.nodes}
+            phases = self._launcher.change(request.function, request.configuration, nodes, request.stop, request.start)
+        except (LauncherError, ValueError) as error:
+            return ChangeNodesResponse(ok=False, message=str(error), change=self._launcher.changes)
+        return ChangeNodesResponse(
             ok=True, change=self._launcher.changes, phases=[Phase(*phase) for phase in phases.items()]
         )
 
-    def _publish(self, report: LauncherReport) -> None:
-        message = LauncherState(
-            configuration=report.configuration,
-            change=report.change,
-            state=report.state,
-            nodes=list(report.nodes),
-            dead=list(report.dead),
-            message=report.message,
-        )
+    def _publish(self, reports: tuple[LauncherReport, ...]) -> None:
+        message = LaunchedFunctions(functions=[report_message(report) for report in reports])
         message.header.stamp = rospy.Time.now()
-        self._state.publish(message)
+        self._functions.publish(message)
 
 
 def read_options() -> LauncherOptions:
@@ -122,7 +115,7 @@ def read_options() -> LauncherOptions:
     parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
     default, policy = LauncherOptions(mark=""), RestartPolicy()
     return LauncherOptions(
-        mark=f"{rosgraph.get_master_uri()}{rospy.get_name()}",
+        mark=launcher_mark(rospy.get_name()),
         run_id=str(rospy.get_param("/run_id", "")),
         shutdown_timeout=parameters.number("shutdown_timeout", default.shutdown_timeout, low=0.0),
         sigint_timeout=parameters.number("sigint_timeout", default.sigint_timeout, low=0.0),

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import rosgraph
 import rospy
-from metacontrol_msgs.msg import LauncherState
-from metacontrol_msgs.srv import ChangeConfiguration, ChangeConfigurationRequest, ChangeConfigurationResponse
+from metacontrol_msgs.msg import LaunchedFunctions
+from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, ChangeNodesResponse
 from rospy.exceptions import TransportException, TransportInitError
 
 from rosgraph_manipulator.change.deployment import DeploymentError
-from rosgraph_manipulator.configuration.configurations import Configuration
+from rosgraph_manipulator.configuration.description import NodeDescription
+from rosgraph_manipulator.io.ownership import launcher_mark
 from rosgraph_manipulator.launching.report import LauncherReport
+from rosgraph_manipulator.ros.node_messages import report_from, to_message
 
 REPEAT_PERIOD = 0.01  # s, wall
 
@@ -24,35 +26,53 @@ _NOT_REACHED = (TransportInitError, rosgraph.MasterError)
 class LauncherClient:
     """Asks the launcher for changes, and hands on its reports."""
 
-    def __init__(self, timeout: float, on_report: Callable[[LauncherReport], None]) -> None:
+    def __init__(self, timeout: float, on_reports: Callable[[tuple[LauncherReport, ...]], None]) -> None:
         """Begin to follow the launcher.
 
         Args:
             timeout: how long to look for the launcher, s, wall.
-            on_report: is called with each report of the launcher, in a thread of its own.
+            on_reports: is called with the launcher's reports of all functions, whenever one differs, in a thread of its
+                own.
         """
+        self.mark = launcher_mark(rospy.resolve_name("rosgraph_launcher"))
+        """What the launcher's processes have in their environment."""
         self._timeout = timeout
-        self._on_report = on_report
-        self._change = rospy.ServiceProxy("rosgraph_launcher/change", ChangeConfiguration)
-        self._subscriber = rospy.Subscriber("rosgraph_launcher/state", LauncherState, self._take, queue_size=20)
+        self._on_reports = on_reports
+        self._change = rospy.ServiceProxy("rosgraph_launcher/change", ChangeNodes)
+        self._subscriber = rospy.Subscriber("rosgraph_launcher/functions", LaunchedFunctions, self._take, queue_size=20)
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether a launcher is connected that publishes its reports."""
+        return bool(self._subscriber.get_num_connections())
 
     def change(
-        self, wanted: Configuration | None, start: tuple[str, ...], found: Callable[[], None]
-    ) -> ChangeConfigurationResponse:
-        """Have the launcher change to a configuration.
+        self,
+        function: str,
+        configuration: str,
+        nodes: Iterable[NodeDescription],
+        stop: Iterable[str],
+        start: Iterable[str],
+        found: Callable[[], None],
+    ) -> ChangeNodesResponse:
+        """Have the launcher change the nodes of a function.
 
         Args:
-            wanted: the configuration; None: stop everything.
+            function: its name.
+            configuration: name of the configuration; empty: stop what only this function needs.
+            nodes: all nodes of the configuration.
+            stop: the nodes to stop.
             start: the nodes to start.
             found: is called when a launcher is there, before it is asked.
 
         Raises:
             DeploymentError: no launcher is there, or it refuses, or it has died.
         """
-        request = ChangeConfigurationRequest(
-            configuration=wanted.name if wanted else "",
-            launch_file=wanted.launch_file if wanted else "",
-            args=list(wanted.args) if wanted else [],
+        request = ChangeNodesRequest(
+            function=function,
+            configuration=configuration,
+            nodes=[to_message(node) for node in nodes],
+            stop=list(stop),
             start=list(start),
         )
         try:
@@ -63,7 +83,7 @@ class LauncherClient:
             raise DeploymentError(answer.message)
         return answer
 
-    def _ask(self, request: ChangeConfigurationRequest, found: Callable[[], None]) -> ChangeConfigurationResponse:
+    def _ask(self, request: ChangeNodesRequest, found: Callable[[], None]) -> ChangeNodesResponse:
         """Return the launcher's answer to a request, which is made as soon as a launcher is there.
 
         A launcher that is being killed may accept the connection by which `wait_for_service` finds it and refuse the
@@ -81,12 +101,5 @@ class LauncherClient:
                     raise
                 time.sleep(REPEAT_PERIOD)
 
-    def _take(self, state: LauncherState) -> None:
-        self._on_report(report_from(state))
-
-
-def report_from(state: LauncherState) -> LauncherReport:
-    """Return the content of the launcher's message."""
-    return LauncherReport(
-        state.configuration, state.change, state.state, tuple(state.nodes), tuple(state.dead), state.message
-    )
+    def _take(self, message: LaunchedFunctions) -> None:
+        self._on_reports(tuple(report_from(function) for function in message.functions))

@@ -8,14 +8,8 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-import actionlib
 import rospy
-from metacontrol_msgs.msg import (
-    FunctionGrounding,
-    LauncherState,
-    MvpReconfigurationAction,
-    MvpReconfigurationResult,
-)
+from metacontrol_msgs.msg import FunctionGrounding, LaunchedFunctions
 from node_kit.io.inbox import Inbox
 from node_kit.io.master_watch import MasterWatch
 from node_kit.io.xml_rpc import CallError
@@ -24,17 +18,18 @@ from node_kit.plugins import PluginError
 from node_kit.ros.lifetime import Lifetime
 
 from rosgraph_manipulator.change.deployment import (
-    CancelledError,
     DeploymentError,
     Outcome,
     Result,
     Stopwatch,
     deploy,
     durations,
+    release,
 )
 from rosgraph_manipulator.change.journal import Journal, Resumption, parse_journal, resume
+from rosgraph_manipulator.change.parameters import OverwrittenParameters
 from rosgraph_manipulator.change.reactions import DeployedConfigurations, Reaction
-from rosgraph_manipulator.change.request_queue import Policy, RequestQueue
+from rosgraph_manipulator.change.request_queue import Policy
 from rosgraph_manipulator.change.tactics import Plan, Tactic, load_tactics, plan_change
 from rosgraph_manipulator.configuration.configurations import (
     KEYS,
@@ -44,110 +39,123 @@ from rosgraph_manipulator.configuration.configurations import (
 )
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.master import set_parameters
-from rosgraph_manipulator.launching.report import FAILED
+from rosgraph_manipulator.launching.report import FAILED, LauncherReport
 from rosgraph_manipulator.ros.announcer import Announcer
 from rosgraph_manipulator.ros.executor import RosExecutor
 from rosgraph_manipulator.ros.goal import PendingGoal
-from rosgraph_manipulator.ros.launcher_client import report_from
+from rosgraph_manipulator.ros.node_messages import report_from
+from rosgraph_manipulator.ros.requests import Order, RequestServer
 
 ASK_DELAY = 2.0  # s, wall, after a change: nodes may offer dynamic_reconfigure later than all else
 
 
 class Manipulator:
-    """The action server. One thread carries out everything, one thing after the other."""
+    """The functions that run, and the requests to change them. One thread carries out one thing after the other."""
 
-    def __init__(self, options: ManipulatorOptions, tactics: Mapping[str, Tactic], initial: str) -> None:
+    def __init__(self, options: ManipulatorOptions, tactics: Mapping[str, Tactic], initial: Mapping[str, str]) -> None:
+        """Look what the launcher runs and what an earlier manipulator has left, and begin to follow both.
+
+        Args:
+            options: what can be deployed.
+            tactics: the tactics, by name.
+            initial: the configuration to begin with, by function.
+        """
         parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
         self._options = options
         self._tactics = tactics
         policy = parameters.choice("concurrency", Policy.WAIT.value, [policy.value for policy in Policy])
         self._inbox = Inbox()
-        self._requests = RequestQueue(Policy(policy))
-        self._handles: dict[str, actionlib.ServerGoalHandle] = {}
-        self._lock = threading.Lock()  # requests, handles, interruption
-        self._interruption: CancelledError | None = None
-        self._deployments = DeployedConfigurations(parameters.number("probation", 5.0, low=0.0))
+        probation = parameters.number("probation", 5.0, low=0.0)
+        self._deployments = {name: DeployedConfigurations(probation) for name in options.all_functions}
         self._journal_lock = threading.Lock()
         self._announcer = Announcer()
-        self._resumption = self._find_resumption(initial, parameters)
-        self._server = actionlib.ActionServer(
-            options.reconfiguration_action_name,
-            MvpReconfigurationAction,
-            self._on_goal,
-            self._on_cancel,
-            auto_start=False,
-        )
-
-    def _find_resumption(self, initial: str, parameters: ParameterTree) -> Resumption:
-        """Look what the launcher runs and what an earlier manipulator has left, and begin to follow both."""
         launcher_timeout = parameters.number("launcher_timeout", 10.0)
+        reports = _first_reports(launcher_timeout)
         journal = parse_journal(parameters.value("journal"))
-        try:
-            state = rospy.wait_for_message("rosgraph_launcher/state", LauncherState, launcher_timeout)
-        except rospy.ROSException:
-            state = LauncherState()
-            rospy.logwarn("rosgraph_launcher is not there; start it beside this node: nothing can be deployed without")
-        report = report_from(state)
-        launched = report.configuration if report.configuration in self._options.configurations else ""
-        resumption = resume(journal, launched, report.state == FAILED, initial, time.time())
-        self._journal = Journal(wanted=resumption.deploy, attempts=resumption.attempts)
-        goal = None
-        if self._options.save_action:
-            goal = PendingGoal(
-                self._options.save_action,
-                str(self._options.action_type),
-                adopt=resumption.keep_goal,
-                changing=bool(resumption.deploy),
-            )
+        self._resumptions = self._resume(journal, reports, initial)
+        begun = next((r for r in self._resumptions.values() if r.deploy), Resumption())
+        self._journal = Journal(wanted=begun.deploy, attempts=begun.attempts)
         self._executor = RosExecutor(
-            self._options,
-            goal,
+            options,
+            {name: goal for name in options.all_functions if (goal := self._pending_goal(name))},
+            OverwrittenParameters.from_parameter(parameters.value("overwritten")),
             ready_timeout=parameters.number("ready_timeout", 15.0, low=0.1),
             settle_time=parameters.number("settle_time", 0.5, low=0.0),
             launcher_timeout=launcher_timeout,
             on_report=lambda: self._inbox.put(self._follow_launcher),
         )
-        self._executor.check = self._check
-        self._executor.suppose(report)
-        return resumption
+        if reports:
+            self._executor.suppose(reports.values())
+        self._requests = RequestServer(options, Policy(policy), self._inbox, self._carry_out)
+        self._executor.check = self._requests.check
+
+    def _resume(
+        self, journal: Journal, reports: Mapping[str, LauncherReport], initial: Mapping[str, str]
+    ) -> dict[str, Resumption]:
+        """Return how to begin with each function. A change that was under way comes first."""
+        known = {name: configuration.function for name, configuration in self._options.configurations.items()}
+        found = {}
+        for function in sorted(self._options.all_functions, key=lambda name: name != known.get(journal.wanted)):
+            report = reports.get(function, LauncherReport(function))
+            launched = report.configuration if known.get(report.configuration) == function else ""
+            failed = report.state == FAILED
+            found[function] = resume(journal, known, function, launched, failed, initial.get(function, ""), time.time())
+        return found
+
+    def _pending_goal(self, function: str) -> PendingGoal | None:
+        options, resumption = self._options.of(function), self._resumptions[function]
+        if options.save_action is None:
+            return None
+        return PendingGoal(
+            options.save_action,
+            str(options.action_type),
+            adopt=resumption.keep_goal,
+            changing=bool(resumption.deploy),
+        )
 
     # -- life -----------------------------------------------------------------------------------------------------
 
     def run(self, watch: MasterWatch) -> None:
-        """Resume or deploy a configuration, then serve requests until the node or the watched master ends."""
+        """Resume or deploy configurations, then serve requests until the node or the watched master ends."""
         known = self._options.configurations
-        running = known.get(self._resumption.running)
-        wanted = known.get(self._resumption.deploy)
-        self._deployments.resume(running, known.get(self._resumption.last_good))
+        for function, resumption in self._resumptions.items():
+            last_good = known.get(resumption.last_good)
+            self._deployments[function].resume(known.get(resumption.running), last_good)
         watch.heartbeat = self._heartbeat
         rospy.on_shutdown(lambda: self._note(ended=True))
-        if running:
-            self._note()
-            self._announcer.announce(running, FunctionGrounding.STABLE)
-            rospy.loginfo("took over the running configuration %s", running.name)
-        elif wanted:
-            self._deploy(wanted)
-        else:
+        states = {}
+        for resumption in self._resumptions.values():
+            running, wanted = known.get(resumption.running), known.get(resumption.deploy)
+            if running:
+                states[running] = FunctionGrounding.STABLE
+                rospy.loginfo("took over the running configuration %s", running.name)
+            elif wanted:
+                states[wanted] = FunctionGrounding.RECONFIGURING
+        self._announcer.begin(states)
+        if not any(resumption.deploy for resumption in self._resumptions.values()):
             self._note(wanted="")
-        refused = known.get(self._resumption.refused)
-        if refused:
-            self._refuse(refused)
-        self._server.start()
+        for resumption in self._resumptions.values():
+            wanted, refused = known.get(resumption.deploy), known.get(resumption.refused)
+            if wanted:
+                self._deploy(wanted)
+            if refused:
+                self._refuse(refused, resumption.reason)
+        self._requests.start()
         while not rospy.is_shutdown():
             self._inbox.do_next(wait_s=0.2)
 
-    def _refuse(self, refused: Configuration) -> None:
+    def _refuse(self, refused: Configuration, reason: str) -> None:
         """Tell that the change that was under way is not begun again, and what runs instead."""
-        running = self._deployments.running
+        running = self._deployments[refused.function].running
         message = (
-            f"{refused.name} is not deployed again: {self._resumption.reason}: see the node's log, correct the "
+            f"{refused.name} is not deployed again: {reason}: see the node's log, correct the "
             f"configuration, then request it; {running.name if running else 'nothing'} runs"
         )
         rospy.logerr("%s", message)
         outcome = Outcome(Result.FAILED if running else Result.GENERAL_ERROR, running, message)
         state = FunctionGrounding.STABLE if running else FunctionGrounding.FAILED
         self._announcer.announce(running or refused, state, outcome)
-        self._announcer.diagnose(False, message, refused)
+        self._announcer.diagnose(False, message, refused.name)
 
     def _heartbeat(self) -> None:
         if self._journal.needs_heartbeat(time.time()):
@@ -155,9 +163,9 @@ class Manipulator:
 
     def _note(self, wanted: str | None = None, ended: bool = False) -> None:
         """Write the journal."""
-        last_good = self._deployments.last_good
+        last_good = {name: d.last_good.name for name, d in self._deployments.items() if d.last_good}
         with self._journal_lock:
-            self._write(self._journal.noted(last_good.name if last_good else "", time.time(), wanted, ended))
+            self._write(self._journal.noted(last_good, time.time(), wanted, ended))
 
     def _write(self, journal: Journal) -> None:
         """Publish a journal as a parameter, where it differs from the present one."""
@@ -167,137 +175,106 @@ class Manipulator:
         with contextlib.suppress(CallError):  # without a master there is nobody to read it
             set_parameters({rospy.resolve_name("~journal"): journal.as_parameter()})
 
-    # -- requests -------------------------------------------------------------------------------------------------
-
-    def _on_goal(self, handle: actionlib.ServerGoalHandle) -> None:
-        name = handle.get_goal().desired_configuration_name
-        if name not in self._options.configurations:
-            message = f"unknown configuration '{name}'; known are: {', '.join(sorted(self._options.configurations))}"
-            rospy.logerr("%s", message)
-            handle.set_accepted()
-            handle.set_aborted(MvpReconfigurationResult(Result.UNKNOWN), message)
-            return
-        request = handle.get_goal_id().id
-        with self._lock:
-            arrival = self._requests.arrive(request)
-            dropped = [self._handles.pop(old) for old in arrival.dropped]
-            if arrival.accepted:
-                self._handles[request] = handle
-            if arrival.interrupts:
-                self._interruption = CancelledError(f"given up for {name}", superseded=True)
-        for old in dropped:
-            old.set_canceled(MvpReconfigurationResult(Result.FAILED), f"given up for {name}")
-        if not arrival.accepted:
-            handle.set_rejected(MvpReconfigurationResult(Result.FAILED), "another change is under way")
-            return
-        handle.set_accepted()
-        self._inbox.put(self._next_request)
-
-    def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
-        request = handle.get_goal_id().id
-        with self._lock:
-            waited = self._requests.take_back(request)
-            if waited:
-                self._handles.pop(request, None)
-            elif self._requests.running == request and self._interruption is None:
-                self._interruption = CancelledError("the request was taken back")
-        if waited:
-            handle.set_canceled(MvpReconfigurationResult(Result.FAILED), "taken back before its turn came")
-
-    def _next_request(self) -> None:
-        with self._lock:
-            request = self._requests.next()
-            handle = self._handles.pop(request, None) if request else None
-            self._interruption = None
-        if handle is None:
-            return
-        try:
-            outcome = self._deploy(self._options.configurations[handle.get_goal().desired_configuration_name])
-        finally:
-            with self._lock:
-                self._requests.finish()
-                self._interruption = None
-        result = MvpReconfigurationResult(int(outcome.result))
-        if outcome.result is Result.OK:
-            handle.set_succeeded(result, outcome.message)
-        elif outcome.cancelled:
-            handle.set_canceled(result, outcome.message)
-        else:
-            handle.set_aborted(result, outcome.message)
-
-    def _check(self) -> None:
-        interruption = self._interruption
-        if interruption is not None:
-            raise interruption
-
     # -- changes --------------------------------------------------------------------------------------------------
 
-    def _deploy(self, wanted: Configuration) -> Outcome:
+    def _carry_out(self, order: Order) -> Outcome:
+        if order.configuration:
+            return self._deploy(self._options.configurations[order.configuration], order.restart)
+        return self._release(order.function)
+
+    def _deploy(self, wanted: Configuration, restart: tuple[str, ...] = ()) -> Outcome:
         """Deploy a configuration. An error that nobody expects ends the node; the next one does not begin it again."""
         self._note(wanted=wanted.name)
         try:
-            return self._change_to(wanted)
+            return self._change_to(wanted, restart)
         except (Exception, SystemExit) as error:
             reason = " ".join(f"{type(error).__name__}: {error}".split())
             with self._journal_lock:
                 self._write(self._journal.broken(reason, time.time()))
             raise
 
-    def _change_to(self, wanted: Configuration) -> Outcome:
+    def _change_to(self, wanted: Configuration, restart: tuple[str, ...]) -> Outcome:
         watch = Stopwatch(time.monotonic)
         began = time.monotonic()
+        deployments = self._deployments[wanted.function]
         self._announcer.announce(wanted, FunctionGrounding.RECONFIGURING)
         try:
             with watch.phase("plan"):
-                found = self._plans(wanted)
-            outcome = deploy(self._executor, wanted, found, self._deployments.fallback(wanted), watch)
+                found = self._plans(wanted, restart)
+            outcome = deploy(self._executor, wanted, found, deployments.fallback(wanted), watch)
         except (DeploymentError, rospy.ROSException, OSError) as error:
-            outcome = self._deployments.refused(wanted, " ".join(str(error).split()))
+            outcome = deployments.refused(wanted, " ".join(str(error).split()))
         phases = durations(watch.phases, self._executor.launcher_phases, outcome.result is Result.OK)
         self._finish(wanted, outcome, {**phases, "total": time.monotonic() - began})
         return outcome
 
-    def _plans(self, wanted: Configuration) -> list[Plan]:
-        executor = self._executor
-        found, problems = plan_change(executor.running(), executor.describe(wanted), executor.nodes, self._tactics)
+    def _plans(self, wanted: Configuration, restart: tuple[str, ...]) -> list[Plan]:
+        system = self._executor.system
+        found = system.compare(wanted, restart)
+        plans, problems = plan_change(found.running, found.wanted, system.nodes, self._tactics, found.shared)
         for problem in problems:
             rospy.logwarn("%s", problem)
-        return found
+        return plans
 
     def _finish(self, wanted: Configuration, outcome: Outcome, phases: Mapping[str, float]) -> None:
         """Note how a change ended, and tell it."""
-        self._deployments.finished(outcome, time.monotonic())
+        self._deployments[wanted.function].finished(outcome, time.monotonic())
         if outcome.running:
             self._announcer.announce(outcome.running, FunctionGrounding.STABLE, outcome, phases)
-            ask = threading.Timer(ASK_DELAY, self._executor.ask_for_adjustable)
+            ask = threading.Timer(ASK_DELAY, self._executor.system.ask_for_adjustable)
             ask.daemon = True
             ask.start()
         elif outcome.result is Result.GENERAL_ERROR:
-            self._executor.stop_robot()
+            self._executor.stop_robot(wanted.function)
             self._announcer.announce(wanted, FunctionGrounding.FAILED, outcome, phases)
         self._note(wanted="")
+        self._tell(outcome, wanted.name, phases)
+
+    def _release(self, function: str) -> Outcome:
+        """Stop what only one function needs."""
+        watch = Stopwatch(time.monotonic)
+        deployments = self._deployments[function]
+        try:
+            outcome = release(self._executor, function, deployments.running, watch)
+        except (rospy.ROSException, OSError) as error:
+            outcome = Outcome(Result.GENERAL_ERROR, None, f"{function} could not be released: {error}")
+        if outcome.result is Result.OK:
+            self._executor.forget_goal(function)
+            deployments.released()
+            self._announcer.announce_release(function, outcome, watch.phases)
+            self._note(wanted="")
+        self._tell(outcome, function, watch.phases)
+        return outcome
+
+    def _tell(self, outcome: Outcome, what: str, phases: Mapping[str, float]) -> None:
         log = rospy.loginfo if outcome.result is Result.OK else rospy.logerr
         log("%s (s: %s)", outcome.message, ", ".join(f"{name} {duration:.3f}" for name, duration in phases.items()))
-        self._announcer.diagnose(outcome.result is Result.OK, outcome.message, wanted)
+        self._announcer.diagnose(outcome.result is Result.OK, outcome.message, what)
 
     # -- the launcher's part --------------------------------------------------------------------------------------
 
     def _follow_launcher(self) -> None:
-        """React to the launcher's last report."""
-        report, running, previous = self._executor.report, self._deployments.running, self._deployments.previous
-        reaction = self._deployments.react(report, time.monotonic())
+        """React to the launcher's last reports."""
+        for function in self._deployments:
+            self._follow_function(function)
+
+    def _follow_function(self, function: str) -> None:
+        deployments, report = self._deployments[function], self._executor.report(function)
+        running, previous = deployments.running, deployments.previous
+        reaction = deployments.react(report, time.monotonic())
         if report is None or running is None:
             return
         if reaction is Reaction.DEPLOY_AGAIN:
             rospy.logwarn("rosgraph_launcher runs %s: deploying %s", report.configuration or "nothing", running.name)
-            self._deployments.lost()
+            deployments.lost()
             self._deploy(running)
         elif reaction is Reaction.GIVE_UP:
             self._give_up(running, report.message)
         elif reaction is Reaction.GO_BACK and previous is not None:
+            message = f"{running.name}: {report.message}; {previous.name} is restored"
             rospy.logerr("%s soon after the change: %s: going back to %s", running.name, report.message, previous.name)
-            self._announcer.diagnose(False, f"{running.name}: {report.message}; {previous.name} is restored", running)
-            self._deployments.failed()
+            self._announcer.diagnose(False, message, running.name)
+            deployments.failed()
             self._deploy(previous)
         elif reaction is Reaction.BEGIN_RECOVERY:
             self._begin_recovery(running, report.message)
@@ -305,30 +282,40 @@ class Manipulator:
             self._end_recovery(running)
 
     def _begin_recovery(self, running: Configuration, reason: str) -> None:
-        self._deployments.begin_recovery()
-        self._executor.begin_recovery()
+        self._deployments[running.function].begin_recovery()
+        self._executor.begin_recovery(running.function)
         self._announcer.announce(running, FunctionGrounding.RECOVERING, Outcome(Result.OK, running, reason))
-        self._announcer.diagnose(False, reason, running)
+        self._announcer.diagnose(False, reason, running.name)
 
     def _end_recovery(self, running: Configuration) -> None:
         try:
-            self._executor.end_recovery()
+            self._executor.end_recovery(running.function)
         except DeploymentError as error:
             rospy.logwarn("%s", error)
             return  # the launcher's next report tells how it goes on
-        self._deployments.end_recovery()
+        self._deployments[running.function].end_recovery()
         outcome = Outcome(Result.OK, running, "recovered", "recovery")
         self._announcer.announce(running, FunctionGrounding.STABLE, outcome)
-        self._announcer.diagnose(True, outcome.message, running)
+        self._announcer.diagnose(True, outcome.message, running.name)
 
     def _give_up(self, running: Configuration, reason: str) -> None:
-        self._deployments.failed()
-        self._executor.stop_robot()
+        self._deployments[running.function].failed()
+        self._executor.stop_robot(running.function)
         self._note(wanted="")
         rospy.logerr("%s has failed: %s", running.name, reason)
         outcome = Outcome(Result.GENERAL_ERROR, None, reason)
         self._announcer.announce(running, FunctionGrounding.FAILED, outcome)
-        self._announcer.diagnose(False, reason, running)
+        self._announcer.diagnose(False, reason, running.name)
+
+
+def _first_reports(timeout: float) -> dict[str, LauncherReport]:
+    """Return what the launcher runs, by function; wait at most so long (s) for it."""
+    try:
+        message = rospy.wait_for_message("rosgraph_launcher/functions", LaunchedFunctions, timeout)
+    except rospy.ROSException:
+        rospy.logwarn("rosgraph_launcher is not there; start it beside this node: nothing can be deployed without")
+        return {}
+    return {function.function: report_from(function) for function in message.functions}
 
 
 def read_parameters(arguments: list[str]) -> dict[str, Any]:
@@ -355,9 +342,6 @@ def main() -> None:
         for configuration in options.configurations.values():
             if configuration.problem:
                 rospy.logwarn("%s is refused when it is requested: %s", configuration.name, configuration.problem)
-        initial = str(rospy.get_param("~initial_configuration", ""))
-        if initial and initial not in options.configurations:
-            known = ", ".join(sorted(options.configurations))
-            raise ConfigurationError(f"parameter '~initial_configuration' is '{initial}'; known are: {known}")
+        initial = options.one_per_function(rospy.get_param("~initial_configuration", ""), "~initial_configuration")
         manipulator = Manipulator(options, load_tactics(), initial)
         manipulator.run(life.watch)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from metacontrol_bags import ownership
 from metacontrol_msgs.msg import DiagnosticWords as Words
 
 COMPONENT, QUALITY, GRAPH, USAGE = "Component ", "Quality ", "Graph ", "Usage "
@@ -22,9 +23,16 @@ _OF_USAGE = (Words.CPU_USAGE, Words.MEMORY_USAGE)
 def unique_name(status: Any) -> str:
     """Return a name that nothing else has; statuses of other nodes keep their names.
 
+    The name of what is of a robot in a namespace ends with the namespace.
+
     Args:
         status: with the fields of diagnostic_msgs/DiagnosticStatus.
     """
+    robot = ownership.robot_of(status.hardware_id) or "/"
+    return _name(status) + (f" in {robot}" if robot != "/" else "")
+
+
+def _name(status: Any) -> str:
     message, name = status.message, status.name
     key, value = (status.values[0].key, status.values[0].value) if status.values else ("", "")
     names = {

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rosgraph_monitor.diagnostics import status as s
+from rosgraph_monitor.graph.names import relative
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -96,6 +97,17 @@ class Overview:
         for (name, message, _), row in sorted(self.findings.items()):
             table.add_row(Text(name), Text(message, _STYLE.get(s.Level(row.level), "")), Text(row.text))
         return table
+
+
+def of_robot(
+    nodes: Iterable[str], parameters: Mapping[str, Any], namespace: str
+) -> tuple[list[str], Mapping[str, Any]]:
+    """Return the names of nodes and the tree of parameters of the robot in a namespace, relative to it."""
+    tree: Any = parameters
+    for part in filter(None, namespace.split("/")):
+        tree = tree.get(part, {}) if isinstance(tree, dict) else {}
+    names = (relative(name, namespace) for name in nodes)
+    return [name for name in names if name], tree if isinstance(tree, dict) else {}
 
 
 def thresholds(parameters: Mapping[str, Any]) -> dict[str, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from rosgraph_monitor.graph.defaults import Defaults, default_of
 from rosgraph_monitor.graph.findings import (
     NO_NODE,
     NOT_SET,
@@ -45,6 +46,7 @@ class Scope:
         ignored_nodes: shell patterns of names of nodes that may run beside the model.
         ignored_ports: shell patterns of topics, services and actions that nodes may have beside the model.
         types: of ports, by `.ros` models.
+        defaults: of parameters in the code of nodes, by `.ros` models.
         topic_types: of topics, by name relative to the namespace.
         namespace: where the system lives; nodes outside it are none of its business.
     """
@@ -52,6 +54,7 @@ class Scope:
     ignored_nodes: tuple[str, ...] = IGNORED_NODES
     ignored_ports: tuple[str, ...] = IGNORED_PORTS
     types: PortTypes = field(default_factory=dict)
+    defaults: Defaults = field(default_factory=dict)
     topic_types: Mapping[str, str] = field(default_factory=dict)
     namespace: str = "/"
 
@@ -98,7 +101,11 @@ def compare(
     ]
     return (
         *missing,
-        *(wrong for entry in live.values() for wrong in _wrong_parameters(snapshot, entry.component, entry.node.name)),
+        *(
+            wrong
+            for entry in live.values()
+            for wrong in _wrong_parameters(snapshot, entry.component, entry.node.name, scope.defaults)
+        ),
         *(() if excused else _wrong_system_parameters(snapshot, desired, scope.namespace)),
         *compare_ports(
             snapshot, desired, live, ignored=scope.ignored_ports, types=scope.types, namespace=scope.namespace
@@ -119,15 +126,22 @@ def wrong_topic_types(snapshot: GraphSnapshot, types: Mapping[str, str], namespa
     return found
 
 
-def _wrong_parameters(snapshot: GraphSnapshot, component: Component, node: str) -> list[WrongParameter]:
+def _wrong_parameters(
+    snapshot: GraphSnapshot, component: Component, node: str, defaults: Defaults
+) -> list[WrongParameter]:
+    """Compare a node's parameters with the model. A node takes its code's default for what nobody has set."""
     wrong = []
     for parameter in component.parameters:
         if parameter.value is None:
             continue
         parts = (node, parameter.namespace or "", parameter.key)
         actual = _actual(snapshot, "/".join(part.strip("/") for part in parts if part.strip("/")))
-        if not same_value(parameter.value, actual):
-            wrong.append(WrongParameter(component.graph_name, parameter.key, parameter.value, actual))
+        default = default_of(parameter, component, defaults) if actual is NOT_SET else None
+        if default is not None and not same_value(parameter.value, default):
+            actual = f"{default} (not set: the code's default)"
+        elif default is not None or same_value(parameter.value, actual):
+            continue
+        wrong.append(WrongParameter(component.graph_name, parameter.key, parameter.value, actual))
     return wrong
 
 

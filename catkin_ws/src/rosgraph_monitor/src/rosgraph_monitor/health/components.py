@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from metacontrol_msgs.msg import DiagnosticWords as Words
+from node_kit.parameters import named_entries
 
 from rosgraph_monitor.diagnostics.status import Level, Status
 from rosgraph_monitor.health.battery import BatterySpec
@@ -15,6 +16,10 @@ from rosgraph_monitor.health.topics import DEFAULT_MAX_AGE, TopicSpec, parse_spe
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping
+
+
+DEFAULT_RECOVERY = 2.5
+"""Wall s for which a recovery is told: the published reasoner looks at what it was told every 2 s."""
 
 
 class ComponentStatus(enum.Enum):
@@ -36,11 +41,21 @@ class NodeCondition(enum.Enum):
 
 @dataclass(frozen=True)
 class _Seen:
-    """History of a node: absent since when (None: it runs), whether it ever ran, whether FALSE was said."""
+    """History of a node.
+
+    Attributes:
+        absent_since: since when it is absent; None: it runs.
+        ever_alive: whether it ever ran.
+        failed: whether FALSE was said, and nothing since then.
+        is_replaced: whether it has been reconfigured since then: what is true of its predecessor tells nothing of it.
+        recovered_at: when it came back; None: not lately.
+    """
 
     absent_since: float | None
     ever_alive: bool = False
     failed: bool = False
+    is_replaced: bool = False
+    recovered_at: float | None = None
 
 
 @dataclass(frozen=True)
@@ -70,7 +85,7 @@ def parse_components(value: Any) -> ComponentMap:
     if not isinstance(value, dict):
         raise ValueError(f"components: must map each component to {{node: NAME}} or {{topic: NAME}}, not {value!r}")
     of_node, topics, batteries = {}, {}, []
-    for component, entry in value.items():
+    for component, entry in named_entries(value):
         settings = dict(entry) if isinstance(entry, dict) else {}
         node, topic = settings.pop("node", None), settings.pop("topic", None)
         if not (node or topic) or not all(isinstance(n, str) and n.strip("/") for n in (node, topic) if n is not None):
@@ -107,18 +122,22 @@ class ComponentTracker:
 
     A node that ran and went has failed at once, unless somebody may restart it (it has patience then); one that never
     ran, after a grace; one that runs but does not do what it should, at once. A node that is excused (being
-    reconfigured) is not judged; if it had failed before and runs afterwards, it has recovered.
+    reconfigured) is not judged; if it had failed before and runs afterwards, it has recovered. A recovery is told for
+    a while, so that a reader that looks once in a second or two does not miss it.
     """
 
-    def __init__(self, component_of: Mapping[str, str], grace: float = 10.0) -> None:
+    def __init__(
+        self, component_of: Mapping[str, str], grace: float = 10.0, recovery: float = DEFAULT_RECOVERY
+    ) -> None:
         """Start with nothing known.
 
         Args:
             component_of: component of each node, by name of the node; others bear their node's name.
             grace: wall seconds in which an expected node may come up for the first time.
+            recovery: wall seconds for which RECOVERED is told, and not yet TRUE.
         """
         self._component_of = dict(component_of)
-        self._grace = grace
+        self._grace, self._recovery = grace, recovery
         self._seen: dict[str, _Seen] = {}
         self._waited_for: frozenset[str] = frozenset()
 
@@ -147,7 +166,7 @@ class ComponentTracker:
             patience: wall seconds by node for which its absence is no failure yet; 0 for those not given.
 
         Returns:
-            Status of each component that is judged now. RECOVERED appears once per return.
+            Status of each component that is judged now.
         """
         statuses = []
         waited_for = []
@@ -156,7 +175,7 @@ class ComponentTracker:
             before = self._seen.get(name, _Seen(absent_since=now))
             if name in excused:
                 # The wait for a first sign of life begins when the excuse ends.
-                seen[name] = _Seen(now, before.ever_alive, before.failed)
+                seen[name] = _Seen(now, before.ever_alive, before.failed, is_replaced=before.failed)
                 continue
             seen[name], status = self._judge(before, condition, now, (patience or {}).get(name, 0.0))
             if status:
@@ -171,17 +190,20 @@ class ComponentTracker:
         self, before: _Seen, condition: NodeCondition, now: float, patience: float
     ) -> tuple[_Seen, ComponentStatus | None]:
         if condition is NodeCondition.ALIVE:
-            status = ComponentStatus.RECOVERED if before.failed else ComponentStatus.TRUE
-            return _Seen(None, ever_alive=True), status
-        if before.failed:
+            back = now if before.failed else before.recovered_at
+            is_told = back is not None and now - back <= self._recovery
+            seen = _Seen(None, ever_alive=True, recovered_at=back if is_told else None)
+            return seen, ComponentStatus.RECOVERED if is_told else ComponentStatus.TRUE
+        if before.failed and not before.is_replaced:
             return before, ComponentStatus.FALSE
         if condition is NodeCondition.UNKNOWN:
             return before, None
         if condition is NodeCondition.FAILED:
             return _Seen(now, ever_alive=True, failed=True), ComponentStatus.FALSE
         since = now if before.absent_since is None else before.absent_since
-        failed = now - since >= (patience if before.ever_alive else self._grace)
-        return _Seen(since, before.ever_alive, failed), ComponentStatus.FALSE if failed else None
+        if now - since >= (patience if before.ever_alive else self._grace):
+            return _Seen(since, before.ever_alive, failed=True), ComponentStatus.FALSE
+        return replace(before, absent_since=since), None
 
 
 def component_statuses(components: Iterable[tuple[str, ComponentStatus]]) -> list[Status]:

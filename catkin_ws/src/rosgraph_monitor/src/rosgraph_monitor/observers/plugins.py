@@ -5,6 +5,7 @@ from __future__ import annotations
 from node_kit.plugins import Plugin, PluginError, find, named
 
 from rosgraph_monitor.observer import Observer
+from rosgraph_monitor.observers import published
 
 PACKAGE = "rosgraph_monitor"
 _KIND = "observer"
@@ -24,7 +25,7 @@ def make(name: str) -> Observer:
     plugin = named(PACKAGE, _KIND, name) or _exported().get(name)
     if plugin is None:
         raise PluginError(f"observer {name!r}: no package exports it to {PACKAGE}: there are {', '.join(available())}")
-    observer_class = plugin.load()
+    observer_class = published.load(plugin)
     if not (isinstance(observer_class, type) and issubclass(observer_class, Observer)):
         raise plugin.error("is no observer", "derive it from rosgraph_monitor.observer.Observer")
     with plugin.guard():

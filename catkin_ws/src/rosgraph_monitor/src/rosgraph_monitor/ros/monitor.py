@@ -12,7 +12,7 @@ import click
 import diagnostic_updater
 import rosgraph
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.master import PATIENCE
 from node_kit.parameters import ParameterError
@@ -32,6 +32,7 @@ from rosgraph_monitor.io.graph_poller import GraphPoller, PolledGraph
 from rosgraph_monitor.io.node_connections import NodeConnections
 from rosgraph_monitor.io.usage import UsageMeter
 from rosgraph_monitor.ros import parameters as parameters_node
+from rosgraph_monitor.ros.diagnostics import DiagnosticsTopic
 from rosgraph_monitor.ros.observers import ObserverHost
 from rosgraph_monitor.ros.topics import BatteryListener, TopicListener
 
@@ -101,9 +102,9 @@ class MonitorNode:
         self._running_observers = 0
         self._evaluation = 0.0
         observers = dict.fromkeys((*parameters_node.names("observers", []), *load))
-        self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=50)
+        self._diagnostics = DiagnosticsTopic()
         self._updater = diagnostic_updater.Updater()
-        self._updater.setHardwareID("none")
+        self._updater.setHardwareID(self._diagnostics.robot)
         self._updater.add("look at the graph", self._tell_poll)
         self._observers = ObserverHost(self._diagnostics)
         self._observers.follow(self._model.current.system)
@@ -206,11 +207,8 @@ class MonitorNode:
         return local
 
     def _publish(self, statuses: list[Status]) -> None:
-        if not statuses:
-            return
-        array = DiagnosticArray(status=[_message(status) for status in statuses])
-        array.header.stamp = rospy.Time.now()
-        self._diagnostics.publish(array)
+        if statuses:
+            self._diagnostics.publish([_message(status) for status in statuses], rospy.Time.now())
 
     def _follow(self, msg: ActiveConfiguration) -> None:
         """Take the desired model from the active configuration."""

@@ -8,7 +8,6 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from metacontrol_msgs.srv import (
     ListObservers,
     ListObserversResponse,
@@ -25,9 +24,11 @@ from rosgraph_monitor.ros.topics import unpacked
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from diagnostic_msgs.msg import DiagnosticStatus
     from ros_model.language.metamodel import RosSystem
 
     from rosgraph_monitor.observer import Observer
+    from rosgraph_monitor.ros.diagnostics import DiagnosticsTopic
 
 _LARGEST_MESSAGE = 1 << 24
 _WARNING_PERIOD = 10.0
@@ -42,8 +43,8 @@ _BASE = "Observer"
 class ObserverHost:
     """Loads, runs and unloads observers, and offers the four services. A failing observer never stops another."""
 
-    def __init__(self, diagnostics: rospy.Publisher) -> None:
-        """Publish statuses with this publisher of DiagnosticArray."""
+    def __init__(self, diagnostics: DiagnosticsTopic) -> None:
+        """Publish statuses on this topic."""
         self._diagnostics = diagnostics
         self._runners: dict[str, _Runner] = {}
         self._system: RosSystem | None = None
@@ -121,7 +122,7 @@ class _Runner:
     never wait for the observer.
     """
 
-    def __init__(self, observer: Observer, diagnostics: rospy.Publisher) -> None:
+    def __init__(self, observer: Observer, diagnostics: DiagnosticsTopic) -> None:
         self.observer = observer
         self._diagnostics = diagnostics
         self._subscribers: dict[tuple[str, type], rospy.Subscriber] = {}
@@ -204,9 +205,7 @@ class _Runner:
             for topic, msg in outputs:
                 self._publishers[topic].publish(msg)
             if statuses:
-                array = DiagnosticArray(status=statuses)
-                array.header.stamp = now
-                self._diagnostics.publish(array)
+                self._diagnostics.publish(statuses, now)
         except rospy.ROSException:
             if not (rospy.is_shutdown() or self._stopped.is_set()):
                 raise

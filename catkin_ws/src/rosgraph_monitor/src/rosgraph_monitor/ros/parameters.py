@@ -10,14 +10,17 @@ from ros_model.io.files import resolve
 
 from rosgraph_monitor.evaluation import Patience
 from rosgraph_monitor.graph.comparison import Scope
+from rosgraph_monitor.graph.defaults import parameter_defaults
 from rosgraph_monitor.graph.names import IGNORED_NODES, IGNORED_PORTS
-from rosgraph_monitor.graph.wiring import PortTypes, port_types
+from rosgraph_monitor.graph.wiring import port_types
 from rosgraph_monitor.health.components import ComponentMap, parse_components
 from rosgraph_monitor.health.liveness import Timing
 from rosgraph_monitor.health.topics import TopicSpec, parse_topics
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from ros_model.language.packages import PackageSet
 
 
 def number(name: str, default: float) -> float:
@@ -65,6 +68,7 @@ def patience() -> Patience:
         startup=number("startup_grace", Patience.startup),
         restart=number("restart_patience", Patience.restart),
         ports=number("port_patience", Patience.ports),
+        recovery=number("recovery_time", Patience.recovery),
     )
 
 
@@ -75,10 +79,12 @@ def scope(specs: Mapping[str, TopicSpec]) -> Scope:
         ParameterError: a parameter has the wrong type.
         ModelError: a `.ros` model can't be read.
     """
+    models = _models(names("ros_models", []))
     return Scope(
         ignored_nodes=(*IGNORED_NODES, *names("ignore", [])),
         ignored_ports=(*IGNORED_PORTS, *names("ignore_ports", [])),
-        types=_port_types(names("ros_models", [])),
+        types=port_types(models),
+        defaults=parameter_defaults(models),
         topic_types={name: spec.type for name, spec in specs.items() if spec.type},
         namespace=rospy.get_namespace(),
     )
@@ -88,9 +94,9 @@ def _own() -> ParameterTree:
     return ParameterTree(rospy.get_param("~", {}), rospy.get_name())
 
 
-def _port_types(paths: list[str]) -> PortTypes:
+def _models(paths: list[str]) -> list[PackageSet]:
     if not paths:
-        return {}
+        return []
     from ros_model.io.models import read_packages  # grammars take a while to load: only where they are needed
 
-    return port_types(read_packages(resolve(path)) for path in paths)
+    return [read_packages(resolve(path)) for path in paths]

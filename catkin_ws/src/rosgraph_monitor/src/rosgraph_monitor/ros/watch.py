@@ -10,6 +10,7 @@ import click
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
+from metacontrol_bags import ownership
 from node_kit.io.xml_rpc import CallError
 from node_kit.ros.lifetime import BAD_START, LONGEST_END, Lifetime
 from rich.console import Console
@@ -17,7 +18,7 @@ from rich.live import Live
 from ros_model.graph.snapshot import GraphSnapshot
 from ros_model.io.master import MasterClient
 
-from rosgraph_monitor.diagnostics.overview import Overview
+from rosgraph_monitor.diagnostics.overview import Overview, of_robot
 
 _REFRESH = 0.5
 
@@ -32,6 +33,8 @@ def main() -> None:
 def command(once: float | None) -> None:
     """Show a live table of what the monitor says, until Ctrl-C.
 
+    For a robot in a namespace, set ROS_NAMESPACE.
+
     Exit status: 2 without a ROS master.
     """
     life = Lifetime("watch")  # not begun: signals are the terminal's, which is put in order at the end
@@ -44,20 +47,22 @@ def command(once: float | None) -> None:
     rospy.on_shutdown(lambda: life.cut_off(LONGEST_END))
     rospy.init_node("rosgraph_watch", anonymous=True, disable_signals=True)
     overview, lock = Overview(), threading.Lock()
+    topic, robot = rospy.resolve_name(ownership.TOPIC), rospy.get_namespace()
 
     def take(msg: DiagnosticArray) -> None:
+        own = ownership.own(msg.status, robot, msg._connection_header.get("callerid", ""), topic)
         with lock:
-            overview.take(msg.status, time.monotonic())
+            overview.take(own, time.monotonic())
 
-    rospy.Subscriber("/diagnostics", DiagnosticArray, take, queue_size=100)
+    rospy.Subscriber(ownership.TOPIC, DiagnosticArray, take, queue_size=100)
     console = Console()
     try:
         if once is not None:
             time.sleep(once)
             with lock:
-                console.print(overview.render(graph.nodes, graph.parameters, time.monotonic()))
+                console.print(overview.render(*of_robot(graph.nodes, graph.parameters, robot), time.monotonic()))
         else:
-            _show(console, client, graph, overview, lock)
+            _show(console, client, graph, robot, overview, lock)
     except KeyboardInterrupt:
         return
     except CallError as error:
@@ -65,12 +70,17 @@ def command(once: float | None) -> None:
 
 
 def _show(
-    console: Console, client: MasterClient, graph: GraphSnapshot, overview: Overview, lock: threading.Lock
+    console: Console,
+    client: MasterClient,
+    graph: GraphSnapshot,
+    robot: str,
+    overview: Overview,
+    lock: threading.Lock,
 ) -> None:
     with Live(console=console, screen=console.is_terminal, auto_refresh=False) as live:
         while True:
             with lock:
-                tables = overview.render(graph.nodes, graph.parameters, time.monotonic())
+                tables = overview.render(*of_robot(graph.nodes, graph.parameters, robot), time.monotonic())
             live.update(tables, refresh=True)
             time.sleep(_REFRESH)
             graph = client.snapshot()

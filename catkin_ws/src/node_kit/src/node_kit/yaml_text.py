@@ -1,0 +1,101 @@
+"""YAML as plain data: it never runs code, and what is nested or expanded too far is refused in one line."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+if TYPE_CHECKING:  # Python 3.8 can't evaluate them
+    Keys = tuple[str | int, ...]
+    """Keys of mappings and numbers in lists that lead to a value."""
+    Place = tuple[int, int]
+    """Line and column, counted from 1."""
+
+MAX_SIZE = 4_000_000
+"""Characters of the largest text that is read."""
+MAX_VALUES = 200_000
+"""Values of the largest text that is read, aliases counted as often as they stand."""
+
+_MERGE = "tag:yaml.org,2002:merge"
+_BAD_SCALARS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+"""What PyYAML's constructors raise beside YAMLError, for dates that do not exist, `!!bool x` and the like."""
+
+
+class YamlError(ValueError):
+    """A text is no YAML that can be used; `problem` says why, with the remedy, and `place` says where."""
+
+    def __init__(self, problem: str, place: Place = (1, 1)) -> None:
+        super().__init__(f"{place[0]}:{place[1]}: {problem}")
+        self.problem = problem
+        self.place = place
+
+
+def parse_yaml(text: str) -> Any:
+    """Return what a text says. A key that stands twice has its last value, as roslaunch reads it.
+
+    Raises:
+        YamlError: it is no YAML, or is nested or expanded too far.
+    """
+    return _parse(text, {}, is_unique=False)
+
+
+def parse_marked_yaml(text: str) -> tuple[Any, dict[Keys, Place]]:
+    """Return what a text says, and where each value stands: for an entry of a mapping, where its key stands.
+
+    Raises:
+        YamlError: as `parse_yaml`, or a key stands twice.
+    """
+    places: dict[Keys, Place] = {}
+    return _parse(text, places, is_unique=True), places
+
+
+def _parse(text: str, places: dict[Keys, Place], is_unique: bool) -> Any:
+    if len(text) > MAX_SIZE:
+        raise YamlError(f"{len(text)} characters are too many (at most {MAX_SIZE})")
+    try:
+        loader = yaml.SafeLoader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        _walk(node, (), places, _Count(), is_unique)
+        return loader.construct_document(node)
+    except YamlError:
+        raise
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+        what = getattr(error, "problem", None) or getattr(error, "reason", None) or "is no YAML"
+        raise YamlError(f"{what}: correct the YAML", place) from error
+    except RecursionError:
+        raise YamlError("is nested too deep: correct the YAML") from None
+    except _BAD_SCALARS as error:
+        raise YamlError(f"a value is not of its type ({error}): correct the YAML") from error
+
+
+class _Count:
+    """Counts values."""
+
+    def __init__(self) -> None:
+        self.values = 0
+
+
+def _walk(node: yaml.Node, keys: Keys, places: dict[Keys, Place], count: _Count, is_unique: bool) -> None:
+    places.setdefault(keys, _place(node))
+    count.values += 1
+    if count.values > MAX_VALUES:
+        raise YamlError(f"holds more than {MAX_VALUES} values: correct its aliases", _place(node))
+    if isinstance(node, yaml.SequenceNode):
+        for number, item in enumerate(node.value):
+            _walk(item, (*keys, number), places, count, is_unique)
+    elif isinstance(node, yaml.MappingNode):
+        for key, item in node.value:
+            inner = (*keys, str(key.value))
+            if is_unique and inner in places and key.tag != _MERGE:
+                raise YamlError(f"the key {key.value!r} stands twice: take one out", _place(key))
+            places[inner] = _place(key)
+            _walk(item, inner, places, count, is_unique)
+
+
+def _place(node: yaml.Node) -> Place:
+    return node.start_mark.line + 1, node.start_mark.column + 1

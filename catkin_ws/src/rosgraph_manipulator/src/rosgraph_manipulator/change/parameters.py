@@ -1,0 +1,56 @@
+"""Which parameters to set and to restore when one configuration takes the place of another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+
+class OverwrittenParameters:
+    """The values that the parameter server had before configurations set others."""
+
+    def __init__(self, before: Mapping[str, Any] | None = None, absent: Iterable[str] = ()) -> None:
+        """Begin with what is known.
+
+        Args:
+            before: former values, by full name.
+            absent: names of parameters that were not set.
+        """
+        self._before: dict[str, Any] = dict(before or {})
+        self._absent: set[str] = set(absent)
+
+    def unknown(self, wanted: Iterable[str]) -> list[str]:
+        """Return the parameters whose former values `remember` must be told before they are set."""
+        return [name for name in wanted if name not in self._before and name not in self._absent]
+
+    def remember(self, asked: Iterable[str], found: Mapping[str, Any]) -> None:
+        """Keep the former values of parameters; those in `asked` that are not in `found` were not set."""
+        for name in asked:
+            if name in found:
+                self._before[name] = found[name]
+            else:
+                self._absent.add(name)
+
+    def transition(self, wanted: Mapping[str, Any], others: Iterable[str] = ()) -> tuple[dict[str, Any], list[str]]:
+        """Return the parameters to set and those to delete, so that no value of another configuration is left.
+
+        Args:
+            wanted: the parameters of the configuration to deploy.
+            others: names of the parameters of other functions, which are left alone.
+        """
+        kept = {*wanted, *others}
+        restored = {name: value for name, value in self._before.items() if name not in kept}
+        return {**restored, **wanted}, sorted(self._absent - kept)
+
+    def as_parameter(self) -> dict[str, list[Any]]:
+        """Return the value of the parameter that hands this over to the next manipulator."""
+        return {"before": [[name, value] for name, value in self._before.items()], "absent": sorted(self._absent)}
+
+    @classmethod
+    def from_parameter(cls, value: object) -> OverwrittenParameters:
+        """Read the parameter; know nothing where it has another form."""
+        try:
+            before, absent = value["before"], value["absent"]  # type: ignore[index]
+            return cls({str(name): former for name, former in before}, map(str, absent))
+        except (KeyError, TypeError, ValueError):
+            return cls()

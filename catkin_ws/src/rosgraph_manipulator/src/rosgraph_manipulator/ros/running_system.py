@@ -1,0 +1,186 @@
+"""What runs, as the launcher, the launch files and the nodes themselves tell."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import rospy
+from node_kit.io.xml_rpc import CallError
+
+from rosgraph_manipulator.change.deployment import DeploymentError
+from rosgraph_manipulator.change.progress import ChangeProgress
+from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
+from rosgraph_manipulator.configuration.description import SystemDescription
+from rosgraph_manipulator.configuration.difference import same_value
+from rosgraph_manipulator.configuration.sharing import disagreement, seen_by
+from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError, command_line, read_launch_file
+from rosgraph_manipulator.io.master import NodeApi, get_parameters
+from rosgraph_manipulator.ros.reconfigure_client import ReconfigureClient
+
+ASK_THREADS = 8  # nodes are asked side by side whether they hang
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What a change has to go by.
+
+    Attributes:
+        running: what runs, as the function that changes sees it.
+        wanted: the configuration to deploy.
+        shared: nodes of both that another function needs, too.
+    """
+
+    running: SystemDescription
+    wanted: SystemDescription
+    shared: frozenset[str]
+
+
+class RunningSystem:
+    """The running configurations of all functions, and those that can be deployed."""
+
+    def __init__(self, options: ManipulatorOptions, progress: ChangeProgress) -> None:
+        """Look at what the launcher's reports in `progress` say."""
+        self.nodes = ReconfigureClient()
+        self._options = options
+        self._progress = progress
+        self._described: tuple[Configuration, LaunchFile] | None = None  # the last one read
+        self._deployed: dict[str, tuple[Configuration, LaunchFile]] = {}  # what the launcher deployed, by function
+
+    def compare(self, wanted: Configuration, restart: Collection[str] = ()) -> Comparison:
+        """Return what runs and what is wanted, as far as a change of the function may touch it.
+
+        Where the configuration runs already, nodes that do not answer count as nodes that do not run.
+
+        Args:
+            wanted: the configuration to deploy.
+            restart: nodes that count as nodes that do not run.
+
+        Raises:
+            DeploymentError: the wanted configuration can't be read, or can't run beside the other functions.
+        """
+        function = wanted.function
+        system = self.describe(wanted)
+        others = self.others(function)
+        reason = disagreement(function, system, others)
+        if reason:
+            raise DeploymentError(f"{wanted.name}: {reason}")
+        lost = set(restart)
+        if self._progress.running(function) == wanted.name:
+            lost |= self._silent(self._progress.launched_for(function))
+        running = seen_by(self._with_live_values(function, self._runs(function)), system, others)
+        nodes = {name: node for name, node in running.nodes.items() if name not in lost}
+        shared = self._progress.shared(function) & set(nodes) & set(system.nodes)
+        return Comparison(SystemDescription(nodes, running.parameters), system, shared)
+
+    def describe(self, configuration: Configuration) -> SystemDescription:
+        """Return what a configuration's launch file starts.
+
+        Raises:
+            DeploymentError: it can't be read, or names an executable that does not exist.
+        """
+        launch = _read(configuration)
+        try:
+            for node in launch.system.nodes.values():
+                command_line(node)
+        except LaunchFileError as error:
+            raise DeploymentError(f"{configuration.launch_file}: {error}") from error
+        self._described = (configuration, launch)
+        return launch.system
+
+    def ask_for_adjustable(self) -> None:
+        """Ask the running nodes what they take by dynamic_reconfigure, so that the next plan need not wait for that."""
+        for node in self._progress.launched:
+            self.nodes.adjustable(node)
+
+    def launch_file(self, configuration: Configuration) -> LaunchFile:
+        """Return the launch file of a configuration, as it was described last.
+
+        Raises:
+            DeploymentError: it can't be read.
+        """
+        if self._described is None or self._described[0] != configuration:
+            self._described = configuration, _read(configuration)
+        return self._described[1]
+
+    def deployed(self, configuration: Configuration, launch: LaunchFile) -> None:
+        """Note that the launcher has deployed a configuration, and by which content of its launch file."""
+        self._deployed[configuration.function] = configuration, launch
+
+    def released(self, function: str) -> None:
+        """Note that nothing runs for a function."""
+        self._deployed.pop(function, None)
+
+    def others(self, function: str) -> dict[str, SystemDescription]:
+        """Return what runs for each other function, by its name."""
+        progress = self._progress
+        return {
+            other: self._runs(other) for other in progress.functions if other != function and progress.running(other)
+        }
+
+    def parameters_of(self, function: str, nodes: Collection[str]) -> dict[str, Any]:
+        """Return the parameters of what runs for a function that these nodes may read, by full name."""
+        runs = self._described_as_deployed(function)
+        own = {name: node for name, node in runs.nodes.items() if name in nodes}
+        return SystemDescription(own, runs.parameters if own else {}).all_parameters()
+
+    def _described_as_deployed(self, function: str) -> SystemDescription:
+        self._runs(function)  # reads what an earlier manipulator has deployed
+        found = self._deployed.get(function)
+        return found[1].system if found else SystemDescription()
+
+    def _runs(self, function: str) -> SystemDescription:
+        """Return what runs for a function, by the launcher's reports and the launch file as it was when deployed."""
+        configuration = self._options.configurations.get(self._progress.running(function))
+        if configuration is None:
+            return SystemDescription()
+        if function not in self._deployed or self._deployed[function][0] != configuration:
+            try:  # an earlier manipulator has deployed it
+                self._deployed[function] = configuration, _read(configuration)
+            except DeploymentError as error:
+                rospy.logwarn("%s", error)
+                return self._progress.running_system(function, None)
+        return self._progress.running_system(function, self._deployed[function][1].system)
+
+    def _with_live_values(self, function: str, system: SystemDescription) -> SystemDescription:
+        """Return what runs, with the values that somebody has set by dynamic_reconfigure since.
+
+        Other parameters on the server are no sign of what a node works with: it has read them at its start.
+        """
+        described = {
+            f"{node.name}/{key}": value for node in system.nodes.values() for key, value in node.parameters.items()
+        }
+        try:
+            live = get_parameters(described)
+        except CallError as error:
+            rospy.logwarn("parameters are not compared with what the nodes have: %s", error)
+            return system
+        drifted = {name: value for name, value in live.items() if not same_value(value, described[name])}
+        values = {
+            name: value
+            for node in system.nodes
+            for name, value in drifted.items()
+            if name.startswith(f"{node}/") and name.removeprefix(f"{node}/") in self.nodes.adjustable(node)
+        }
+        if not values:
+            return system
+        return self._progress.running_system(function, self._deployed[function][1].system, values)
+
+    def _silent(self, nodes: Collection[str]) -> set[str]:
+        """Return the nodes that do not answer, though their processes run."""
+        if not nodes:
+            return set()
+        with ThreadPoolExecutor(ASK_THREADS, thread_name_prefix="ask whether it hangs") as pool:
+            answers = dict(zip(nodes, pool.map(NodeApi.is_answering, nodes), strict=True))
+        return {node for node, answers_now in answers.items() if not answers_now}
+
+
+def _read(configuration: Configuration) -> LaunchFile:
+    if configuration.problem:
+        raise DeploymentError(configuration.problem)
+    try:
+        return read_launch_file(configuration.launch_file, configuration.args)
+    except LaunchFileError as error:
+        raise DeploymentError(str(error)) from error

@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+"""An assembly station: assembling needs grasping, which needs looking; each level breaks and is repaired.
+
+Its package is generated from its models, and all parts of the meta-controller run.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+from helpers.waiting import DEADLINE_S, wait_for
+from metacontrol_msgs.msg import ActiveConfiguration, Decision
+from metacontrol_msgs.srv import AddObjective, RemoveObjective
+from reasoner_harness import node_pid
+
+STATION = Path(__file__).resolve().parent / "station"
+DRIVERS = ("/eye_left", "/eye_right", "/screwdriver")
+PARTS = {"f_assemble": "/assembler", "f_grasp": "/grasper", "f_look": "/looker"}
+BEST = {"f_assemble": "screw", "f_grasp": "grasp_fine", "f_look": "look_left"}
+
+
+class HierarchyTest(unittest.TestCase):
+    def setUp(self):
+        rospy.init_node("hierarchy_test")
+        self.active, self.decisions = {}, []
+        rospy.Subscriber("mros1_reasoner/decision", Decision, self.decisions.append, queue_size=100)
+        rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self.take)
+        folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        station = folder / "station"
+        shutil.copytree(STATION, station)
+        subprocess.run(["rosmodel", "generate", "all", station / "models", "-o", station], check=True)
+        environment = {**os.environ, "ROS_PACKAGE_PATH": f"{folder}:{os.environ['ROS_PACKAGE_PATH']}"}
+        launch = ["roslaunch", "--wait", "station", "station.launch"]
+        self.process = subprocess.Popen(launch, env=environment, stdin=subprocess.DEVNULL)
+        self.addCleanup(self.end)
+
+    def end(self):
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait(DEADLINE_S)
+
+    def take(self, message):
+        self.active = {f.function: (f.configuration, f.state) for f in message.functions}
+
+    def wait_for_configurations(self, **configurations):
+        expected = {function: (name, "STABLE") for function, name in {**BEST, **configurations}.items()}
+        wait_for(lambda: self.active == expected, f"exactly {expected} run; the last: {self.active}")
+
+    def pids(self, *functions):
+        return {function: node_pid(PARTS[function]) for function in functions}
+
+    def kill(self, node, how=signal.SIGKILL):
+        pid = node_pid(node)
+        os.kill(pid, how)
+        return pid
+
+    def test_each_level_is_deployed_repaired_and_released(self):
+        self.wait_for_configurations()
+        started = [d.to_configuration for d in self.decisions if d.state == "EXECUTED"]
+        self.assertEqual(started, ["look_left", "grasp_fine", "screw"], "the deepest requirement comes first")
+
+        above = self.pids("f_assemble", "f_grasp")
+        self.kill("/eye_left")  # the lowest level: its driver is gone
+        self.wait_for_configurations(f_look="look_right")
+        self.assertEqual(self.pids("f_assemble", "f_grasp"), above)
+
+        others = self.pids("f_assemble", "f_look")
+        hung = self.kill("/grasper", signal.SIGSTOP)  # the middle: its node hangs
+        wait_for(lambda: self.answers("/grasper") not in (None, hung), "the grasper is restarted")
+        self.wait_for_configurations(f_look="look_right")
+        self.assertEqual(self.pids("f_assemble", "f_look"), others)
+
+        while self.active["f_grasp"][0] == "grasp_fine":  # the middle: its node dies again and again
+            if self.active["f_grasp"] == ("grasp_fine", "STABLE") and (pid := self.answers("/grasper")):
+                os.kill(pid, signal.SIGKILL)
+                wait_for(lambda: self.answers("/grasper") != pid, "it is gone")
+        self.wait_for_configurations(f_look="look_right", f_grasp="grasp_rough")
+        self.assertEqual(self.pids("f_assemble", "f_look"), others)
+        self.assertEqual(rospy.get_param("/grasper/force"), 9)
+
+        below = self.pids("f_grasp", "f_look")
+        self.kill("/screwdriver")  # the top
+        self.wait_for_configurations(f_look="look_right", f_grasp="grasp_rough", f_assemble="glue")
+        self.assertEqual(self.pids("f_grasp", "f_look"), below)
+
+        answer = rospy.ServiceProxy("reasoner/remove_objective", RemoveObjective)("o_assemble")
+        self.assertTrue(answer.ok, answer.message)
+        wait_for(lambda: self.active == {}, "everything is released")
+        for node in PARTS.values():
+            self.assertIsNone(self.answers(node), node)
+        answer = rospy.ServiceProxy("reasoner/add_objective", AddObjective)("o_look", "f_look", [])
+        self.assertTrue(answer.ok, answer.message)
+        wait_for(lambda: self.active == {"f_look": ("look_right", "STABLE")}, "what the new objective needs runs")
+
+    @staticmethod
+    def answers(node):
+        """Process id of a node that answers, else None."""
+        try:
+            return node_pid(node)
+        except Exception:
+            return None
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "hierarchy", HierarchyTest)

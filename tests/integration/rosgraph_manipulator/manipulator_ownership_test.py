@@ -1,0 +1,64 @@
+#!/usr/bin/env python3
+"""A node that somebody else's launch file starts, too, under the same name: it is told, and never called stable."""
+
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+import rostest
+from helpers.waiting import DEADLINE_S, wait_for
+from manipulator_harness import HERE, PairTest, pid_of
+from rosgraph_manipulator.io.ownership import launcher_mark, look_up
+from rosgraph_manipulator.launching.ownership import Owner
+
+
+class OwnershipTest(PairTest):
+    manipulator_parameters = {"ready_timeout": 10.0, "probation": 0.0}
+
+    def setUp(self):
+        self.mark = launcher_mark("/rosgraph_launcher")
+        wait_for(lambda: self.is_in("slow", "STABLE") or self.request("slow") == 1, "slow runs")
+
+    def owner(self):
+        return look_up("/wait_server").owner(self.mark)
+
+    def start_foreign(self):
+        """Start a user's roslaunch, which starts its node whenever that ends."""
+        process = subprocess.Popen(
+            ["/usr/bin/roslaunch", str(HERE / "respawned.launch")], stdout=subprocess.DEVNULL, start_new_session=True
+        )
+
+        def end():
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+                process.wait(DEADLINE_S)
+
+        self.addCleanup(end)
+        return end
+
+    def test_node_that_another_launch_file_respawns_fails_with_the_remedy(self):
+        self.assertIs(self.owner(), Owner.LAUNCHER)
+        ours = pid_of("/wait_server")
+        end_foreign = self.start_foreign()
+        wait_for(lambda: self.launcher_states[-1].state == "FAILED", "the launcher gives up")
+        self.assertIn("its name is taken by process", self.launcher_states[-1].message)
+        self.assertIn("respawned.launch", self.launcher_states[-1].message)
+        self.assertIn('remove the node from that launch file, or its respawn="true"', self.launcher_states[-1].message)
+        self.assertNotEqual(pid_of("/wait_server"), ours)
+
+        wait_for(lambda: self.states[-1].functions[0].state == "FAILED", "the configuration has failed")
+        wait_for(lambda: self.owner() is Owner.FOREIGN, "the other node runs alone")
+        self.request("fast")  # the name is free for the moment in which the other node is replaced
+        wait_for(lambda: self.states[-1].functions[0].state == "FAILED", "it has failed, too")
+        self.assertIs(self.owner(), Owner.FOREIGN)
+        self.assertIn("its name is taken by process", self.launcher_states[-1].message or self.text)
+
+        end_foreign()
+        self.assertEqual(self.request("fast"), 1, self.text)
+        self.assertIs(self.owner(), Owner.LAUNCHER)
+
+
+if __name__ == "__main__":
+    os.chdir(Path(__file__).parent)
+    rostest.rosrun("metacontrol_tests", "manipulator_ownership", OwnershipTest)

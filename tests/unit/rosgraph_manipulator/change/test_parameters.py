@@ -1,0 +1,39 @@
+"""What stood on the parameter server comes back when a configuration that wrote over it leaves."""
+
+import pytest
+from rosgraph_manipulator.change.parameters import OverwrittenParameters
+
+
+def adopt(memory, server, wanted):
+    asked = memory.unknown(wanted)
+    memory.remember(asked, {name: server[name] for name in asked if name in server})
+    values, gone = memory.transition(wanted)
+    for name in gone:
+        server.pop(name, None)
+    server.update(values)
+
+
+def test_nothing_is_left_of_an_earlier_configuration():
+    memory, server = OverwrittenParameters(), {"/a/x": "base"}
+    adopt(memory, server, {"/a/x": 1, "/a/y": 1})
+    assert server == {"/a/x": 1, "/a/y": 1}
+    adopt(memory, server, {"/a/z": 2})
+    assert server == {"/a/x": "base", "/a/z": 2}
+    adopt(memory, server, {"/a/x": 3})
+    assert server == {"/a/x": 3}
+
+
+def test_parameters_of_other_functions_are_left_alone():
+    overwritten = OverwrittenParameters({"/speed": 1, "/width": 2}, ["/a", "/b"])
+    assert overwritten.transition({"/x": 0}, others=["/speed", "/a"]) == ({"/width": 2, "/x": 0}, ["/b"])
+
+
+def test_former_values_survive_the_parameter_server():
+    overwritten = OverwrittenParameters({"/speed": {"x": 1}}, ["/a"])
+    again = OverwrittenParameters.from_parameter(overwritten.as_parameter())
+    assert again.transition({}) == ({"/speed": {"x": 1}}, ["/a"])
+
+
+@pytest.mark.parametrize("value", [None, 3, {}, {"before": 3, "absent": []}, {"before": [["/a"]], "absent": []}])
+def test_parameter_of_another_form_tells_nothing(value):
+    assert OverwrittenParameters.from_parameter(value).transition({}) == ({}, [])
