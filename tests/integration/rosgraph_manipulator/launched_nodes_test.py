@@ -252,9 +252,7 @@ class LaunchedNodesTest(PairTest):
         self.assertFalse(set(before.values()) & {pid_of(real) for real in names().values()})
 
         wait_for(lambda: len(self.launched()) > len(ALL) + len(RECORDED), "processes stand by")
-        # The first one is required. What a nodelet does after the death of its loader depends on when the manager
-        # notices it, whoever starts the loader again.
-        kept = ("/right/twin", "/cpp/manager", "/cpp/counter")
+        kept = ("/right/twin", "/cpp/manager")  # the first one is required, the other one still has the nodelet
         killed = {name: pid_of(real) for name, real in names().items() if name not in kept}
         for key in tree_keys("/launched_records"):
             if plain(key) in killed:

@@ -18,8 +18,11 @@ from rosgraph_manipulator.io.node_processes import NodeProcesses
 from rosgraph_manipulator.io.ownership import look_up
 from rosgraph_manipulator.io.processes import Command, Process, StartError
 from rosgraph_manipulator.launching.managed_nodes import Ending, ManagedNodes, Verdict
+from rosgraph_manipulator.launching.nodelets import unloading
 from rosgraph_manipulator.launching.options import LauncherOptions
 from rosgraph_manipulator.launching.report import LauncherReport
+
+UNLOAD_TIMEOUT = 2.0  # s, for a nodelet's manager to answer; it takes about 0.1
 
 
 class LauncherError(Exception):
@@ -195,7 +198,11 @@ class Launcher:
 
     def _restart(self, name: str) -> tuple[str, ...]:
         try:
-            command = self._commands.command(self._nodes.description(name))
+            node = self._nodes.description(name)
+            command = self._commands.command(node)
+            unload = unloading(node)
+            if unload:
+                self._processes.run(self._commands.command(unload), UNLOAD_TIMEOUT)
             self._nodes.started(name, self._processes.begin_again(name, command))
         except (LaunchFileError, StartError, OSError) as error:
             return self._follow(self._nodes.failed_to_restart(name, _one_line(error), time.monotonic()))

@@ -88,6 +88,16 @@ class NodeProcesses:
         """
         return self.begin(name, command, self._take_warm(command))
 
+    def run(self, command: Command, timeout: float) -> None:
+        """Run a command to its end, or for `timeout` (s).
+
+        Raises:
+            StartError: the system refuses.
+        """
+        process = processes.start(command)
+        processes.wait_for_ends([process], timeout)
+        process.close()
+
     def ask_to_end(self, names: Iterable[str]) -> None:
         """Ask nodes to end over their own API, side by side, so that one that hangs does not delay the others."""
         asked = {name: self._running[name] for name in names if name in self._running}
