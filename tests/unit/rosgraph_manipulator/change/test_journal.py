@@ -2,7 +2,7 @@
 
 import pytest
 from rosgraph_manipulator.change import journal as module
-from rosgraph_manipulator.change.journal import MAX_ATTEMPTS, Journal, Resumption, parse_journal
+from rosgraph_manipulator.change.journal import MAX_ATTEMPTS, Journal, Resumption, begin_journal, parse_journal
 
 NOW = 1000.0
 GOOD = {"f_pick": "good"}
@@ -33,12 +33,11 @@ def test_killed_pair_brings_the_mission_back():
     )
 
 
-def die(journal):
-    """Return the journal of a manipulator that begins as `journal` says, and dies while it deploys."""
+def die(journal, deploys):
+    """Return the journal of a manipulator that begins as `journal` says, and dies before or while it deploys."""
     begun = resume(journal, "good", False, "first", NOW)
-    return Journal(wanted=begun.deploy, attempts=begun.attempts).noted(
-        {"f_pick": begun.last_good}, NOW, wanted=begun.deploy
-    )
+    told = begin_journal([Resumption(running="far"), begun]).noted({"f_pick": begun.last_good}, NOW)
+    return told.noted({"f_pick": begun.last_good}, NOW, wanted=begun.deploy) if deploys else told
 
 
 @pytest.mark.parametrize("launched", ["good", ""])
@@ -50,11 +49,12 @@ def test_change_that_ended_the_manipulator_by_an_error_is_not_begun_again(launch
     assert resumption.keep_goal
 
 
-def test_change_during_which_manipulators_die_without_an_error_is_begun_a_few_times_only():
+@pytest.mark.parametrize("deploys", [True, False])
+def test_change_during_which_manipulators_die_without_an_error_is_begun_a_few_times_only(deploys):
     journal = Journal().noted(GOOD, NOW, wanted="better")
     for _ in range(MAX_ATTEMPTS - 1):
         assert resume(journal, "good", False, "first", NOW).deploy == "better"
-        journal = die(journal)
+        journal = die(journal, deploys)
     resumption = resume(journal, "good", False, "first", NOW)
     assert (resumption.running, resumption.refused) == ("good", "better")
     assert f"{MAX_ATTEMPTS} times" in resumption.reason
@@ -89,6 +89,10 @@ def test_refused_change_that_the_launcher_gave_up_is_not_taken_over():
 def test_refusal_of_another_time_is_not_believed():
     resumption = resume(BROKEN, "good", False, "first", NOW + 3600.0)
     assert resumption == Resumption(running="good")
+
+
+def test_manipulator_with_nothing_to_deploy_begins_without_a_change():
+    assert begin_journal([Resumption(running="good")]) == Journal()
 
 
 def test_error_is_kept_when_the_manipulator_ends_of_it():

@@ -5,7 +5,7 @@ It is a parameter with a heartbeat, so that the next manipulator can tell a rece
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -55,7 +55,7 @@ class Journal:
             return self
         attempts = self.attempts
         if wanted is not None:  # a change begins, or has ended
-            attempts = (self.attempts if wanted == self.wanted else 0) + 1 if wanted else 0
+            attempts = (self.attempts if wanted == self.wanted else 1) if wanted else 0
         return replace(
             self,
             configurations=dict(configurations),
@@ -129,6 +129,12 @@ class Resumption:
     attempts: int = 0
     refused: str = ""
     reason: str = ""
+
+
+def begin_journal(resumptions: Iterable[Resumption]) -> Journal:
+    """Return the journal with which a manipulator begins; it counts the first of its changes as begun."""
+    begun = next((resumption for resumption in resumptions if resumption.deploy), None)
+    return Journal(wanted=begun.deploy, attempts=begun.attempts + 1) if begun else Journal()
 
 
 def resume(

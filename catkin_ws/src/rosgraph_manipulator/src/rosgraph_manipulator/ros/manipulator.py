@@ -26,7 +26,7 @@ from rosgraph_manipulator.change.deployment import (
     durations,
     release,
 )
-from rosgraph_manipulator.change.journal import Journal, Resumption, parse_journal, resume
+from rosgraph_manipulator.change.journal import Journal, Resumption, begin_journal, parse_journal, resume
 from rosgraph_manipulator.change.parameters import OverwrittenParameters
 from rosgraph_manipulator.change.reactions import DeployedConfigurations, Reaction
 from rosgraph_manipulator.change.request_queue import Policy
@@ -73,8 +73,7 @@ class Manipulator:
         reports = _first_reports(launcher_timeout)
         journal = parse_journal(parameters.value("journal"))
         self._resumptions = self._resume(journal, reports, initial)
-        begun = next((r for r in self._resumptions.values() if r.deploy), Resumption())
-        self._journal = Journal(wanted=begun.deploy, attempts=begun.attempts)
+        self._journal = begin_journal(self._resumptions.values())
         self._executor = RosExecutor(
             options,
             {name: goal for name in options.all_functions if (goal := self._pending_goal(name))},
@@ -131,9 +130,8 @@ class Manipulator:
                 rospy.loginfo("took over the running configuration %s", running.name)
             elif wanted:
                 states[wanted] = FunctionGrounding.RECONFIGURING
+        self._note()  # a death from now on counts as one during the change: nobody has heard of it before
         self._announcer.begin(states)
-        if not any(resumption.deploy for resumption in self._resumptions.values()):
-            self._note(wanted="")
         for resumption in self._resumptions.values():
             wanted, refused = known.get(resumption.deploy), known.get(resumption.refused)
             if wanted:
