@@ -3,7 +3,6 @@
 
 import contextlib
 import math
-import time
 import unittest
 
 import rosgraph
@@ -12,8 +11,8 @@ import rostest
 import tf2_ros
 from dynamic_reconfigure.client import Client
 from geometry_msgs.msg import Point32, Polygon, PolygonStamped, TransformStamped
+from helpers.waiting import DEADLINE_S, wait_for
 
-DEADLINE_S = 100
 NODE = "/yard/pilot"
 
 ACTION = {f"/yard/move_base/{name}" for name in ("goal", "cancel", "status", "feedback", "result")}
@@ -62,16 +61,6 @@ SERVICES = {
     f"{NODE}/GlobalPlanner/make_plan",
     *(f"{NODE}/{server}set_parameters" for server in SERVERS),
 }
-
-
-def wait_for(condition, what, seconds=DEADLINE_S):
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.02)
-    raise AssertionError(f"not within {seconds} s: {what}")
 
 
 class InterfacesTest(unittest.TestCase):

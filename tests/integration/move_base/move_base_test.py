@@ -21,6 +21,7 @@ import rostest
 import tf2_ros
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import PolygonStamped, PoseStamped, TransformStamped, Twist
+from helpers.waiting import DEADLINE_S, wait_for
 from map_msgs.msg import OccupancyGridUpdate
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseGoal
 from nav_msgs.msg import OccupancyGrid, Odometry, Path
@@ -29,19 +30,8 @@ from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Empty
 
-DEADLINE_S = 150
 HALF_ROOM = 5.0
 PERIOD = 0.02
-
-
-def wait_for(condition, what, seconds=DEADLINE_S):
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.02)
-    raise AssertionError(f"not within {seconds} s: {what}")
 
 
 def pose(x, y, frame="map"):
@@ -192,7 +182,7 @@ class MoveBaseTest(unittest.TestCase):
         self.send(1.5, 1.0)
         self.assertEqual(self.finish(), (GoalStatus.SUCCEEDED, "Goal reached."))
         self.assertLess(math.hypot(self.robot.x - 1.5, self.robot.y - 1.0), 0.3)
-        wait_for(lambda: self.robot.command == Twist(), "the last command is zero", 1.0)
+        wait_for(lambda: self.robot.command == Twist(), "the last command is zero")
 
     def test_goal_survives_a_restart_unnoticed_by_its_client(self):
         states = set()
@@ -260,7 +250,7 @@ class MoveBaseTest(unittest.TestCase):
         other.cancel_goal()
         self.assertTrue(other.wait_for_result(rospy.Duration(DEADLINE_S)))
         self.assertEqual(other.get_state(), GoalStatus.PREEMPTED)
-        wait_for(lambda: self.robot.command == Twist(), "the base stands", 1.0)
+        wait_for(lambda: self.robot.command == Twist(), "the base stands")
 
     def test_simple_goal_becomes_an_action_goal_and_a_plan(self):
         plans = []

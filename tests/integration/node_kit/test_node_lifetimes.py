@@ -7,16 +7,15 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 import xmlrpc.client
 from pathlib import Path
 
 import psutil
 import pytest
 import yaml
+from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_experiments.io.processes import free_port
 
-DEADLINE_S = 150
 HERE = Path(__file__).resolve().parent
 INTEGRATION = HERE.parent
 PACKAGES = HERE.parents[2] / "catkin_ws" / "src"
@@ -44,14 +43,6 @@ PARAMETERS = {
     "/simulator": {"initial_pose_x": -8.0, "initial_pose_y": -8.0},
 }
 every_node = pytest.mark.parametrize("node", NODES, ids=lambda node: node.rpartition("/")[2])
-
-
-def wait_for(condition, what):
-    until = time.monotonic() + DEADLINE_S
-    while not (found := condition()):
-        assert time.monotonic() < until, f"not within {DEADLINE_S} s: {what}"
-        time.sleep(0.02)
-    return found
 
 
 def has_ended(child):

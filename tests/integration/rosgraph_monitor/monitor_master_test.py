@@ -12,20 +12,13 @@ import unittest
 import xmlrpc.client
 
 import rostest
+from helpers.waiting import wait_for
 
 
 def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
-
-
-def wait_for(condition, timeout):
-    end = time.monotonic() + timeout
-    while not condition():
-        if time.monotonic() > end:
-            raise AssertionError(f"condition not met within {timeout} s")
-        time.sleep(0.02)
 
 
 def answers(master):
@@ -110,7 +103,7 @@ class MonitorMasterTest(unittest.TestCase):
     def start_master(self):
         master = self.start("rosmaster", "--core", "-p", str(self.master_port))
         self.master = xmlrpc.client.ServerProxy(self.uri)
-        wait_for(lambda: answers(self.master), 30.0)
+        wait_for(lambda: answers(self.master), "the master answers")
         return master
 
     def start_proxy(self):
@@ -126,7 +119,7 @@ class MonitorMasterTest(unittest.TestCase):
         """Start it, and wait until it has registered a service (2), or a subscription (1)."""
         monitor = self.start("rosrun", "rosgraph_monitor", "monitor", f"__ns:={namespace}")
         if until:
-            wait_for(lambda: self.registered(*until), 30.0)
+            wait_for(lambda: self.registered(*until), "the registrations")
         return monitor
 
     def expect_end(self, process, *words, status=0):
@@ -143,7 +136,7 @@ class MonitorMasterTest(unittest.TestCase):
         monitor = self.start_monitor()
         port = free_port()
         self.start("rosmaster", "--core", "-p", str(port))
-        wait_for(lambda: answers(xmlrpc.client.ServerProxy(f"http://localhost:{port}")), 30.0)
+        wait_for(lambda: answers(xmlrpc.client.ServerProxy(f"http://localhost:{port}")), "the master answers")
         proxy.master_port = port
         proxy.drop()
         self.expect_end(monitor, "another one")
@@ -159,7 +152,7 @@ class MonitorMasterTest(unittest.TestCase):
         self.start_master()
         proxy = self.start_proxy()
         monitor = self.start_monitor(until=None)
-        wait_for(lambda: proxy.passed, 30.0)
+        wait_for(lambda: proxy.passed, "a request passes")
         proxy.mode = "silent"
         self.expect_end(monitor, "does not answer")
 
@@ -167,9 +160,9 @@ class MonitorMasterTest(unittest.TestCase):
         self.start_master()
         proxy = self.start_proxy()
         monitor = self.start_monitor(until=None)
-        wait_for(lambda: proxy.passed, 30.0)
+        wait_for(lambda: proxy.passed, "a request passes")
         proxy.mode = "silent"
-        wait_for(lambda: proxy.swallowed, 30.0)
+        wait_for(lambda: proxy.swallowed, "a request is swallowed")
         monitor.terminate()
         monitor.communicate(timeout=150.0)
         self.assertIn(monitor.returncode, (0, -signal.SIGTERM))
@@ -183,7 +176,7 @@ class MonitorMasterTest(unittest.TestCase):
         self.assertIn("garbage", monitor.stderr.readline())
         proxy.mode = "pass"
         before = proxy.passed
-        wait_for(lambda: proxy.passed > before + 20, 40.0)  # looks at the graph, and more
+        wait_for(lambda: proxy.passed > before + 20, "requests pass")  # looks at the graph, and more
         monitor.terminate()
         self.expect_end(monitor)
 

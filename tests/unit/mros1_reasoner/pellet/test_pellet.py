@@ -2,9 +2,9 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
+from helpers.waiting import wait_for
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, ReasonerError
@@ -12,15 +12,6 @@ from mros1_reasoner.pellet import process as pellet_module
 from mros1_reasoner.pellet.owlready import OwlreadyReasoner
 from mros1_reasoner.pellet.process import ChildLostError, NoJavaError, PelletReasoner, PelletWithFallback, make_reasoner
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
-
-DEADLINE_S = 150.0
-
-
-def wait_for(condition):
-    until = time.monotonic() + DEADLINE_S
-    while not condition():
-        assert time.monotonic() < until
-        time.sleep(0.02)
 
 
 def test_facts_of_one_analysis_do_not_stay_for_the_next(knowledge_base, reasoner):
@@ -75,7 +66,7 @@ def test_child_dies_with_its_parent():
         except (FileNotFoundError, ProcessLookupError):
             return True
 
-    wait_for(is_gone)
+    wait_for(is_gone, "the child has ended")
 
 
 def test_no_java_is_told_with_the_remedy(monkeypatch, tmp_path):

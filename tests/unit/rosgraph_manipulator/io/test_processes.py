@@ -4,24 +4,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import psutil
 import pytest
+from helpers.waiting import DEADLINE_S, wait_for
 from rosgraph_manipulator.io import processes
 from rosgraph_manipulator.io.processes import MARK, Command, StartError
-
-DEADLINE_S = 150.0
-
-
-def wait_for(condition, what):
-    deadline = time.monotonic() + DEADLINE_S
-    while time.monotonic() < deadline:
-        if condition():
-            return
-        time.sleep(0.01)
-    raise AssertionError(f"not within {DEADLINE_S} s: {what}")
 
 
 def is_alive(pid):
