@@ -263,7 +263,14 @@ class LaunchedNodesTest(PairTest):
         self.assert_same("the launcher has started them again", expected[1])
         self.wait_for_state("shared_2")
 
+        loader = pid_of("/cpp/counter")
+        os.kill(pid_of("/cpp/manager"), signal.SIGKILL)
+        wait_for(lambda: not is_alive(loader), "the nodelet's loader has ended")
+        self.assert_same("the launcher has started manager and nodelet again", expected[1])
+        self.wait_for_state("shared_2")
+
         said = self.launcher.said()
+        self.assertEqual(said.count("node /cpp/counter ended"), 1)  # not with its manager
         for line in ("/eye says 1", "/eye says 2", "/eye warns", "/right/twin warns"):
             self.assertIn(line, said)
             self.assertIn(line, "".join(output))

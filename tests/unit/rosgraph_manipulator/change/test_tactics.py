@@ -67,6 +67,17 @@ def test_exactly_the_nodes_that_differ_are_restarted():
     assert second.steps == (ChangeProcesses(("/a", "/b", "/gone"), ("/a", "/b", "/new")),)
 
 
+def test_nodelets_are_loaded_again_when_their_manager_is_restarted():
+    def camera(threads):
+        manager = NodeDescription(
+            "/m", "/", "nodelet", "nodelet", "manager", parameters={"num_worker_threads": threads}
+        )
+        return SystemDescription({"/m": manager, "/l": NodeDescription("/l", "/", "nodelet", "nodelet", "load a/B m")})
+
+    assert found(camera(1), camera(2))[0].steps == (ChangeProcesses(("/m", "/l"), ("/m", "/l")),)
+    assert found(camera(1), camera(1))[0].touched == ()
+
+
 def test_node_that_takes_its_parameters_runs_on_while_another_is_restarted():
     running, wanted = system(a={"speed": 1}, b={}, gone={}), system(a={"speed": 2}, b={}, new={})
     first = found(running, wanted, Nodes(a=SPEED))[0]

@@ -302,3 +302,43 @@ def test_after_any_changes_exactly_the_nodes_kept_and_started_run(configurations
         assert set(nodes.names) == running
         assert {name for report in nodes.reports() for name in report.nodes} == running
         assert not any(report.dead for report in nodes.reports())
+
+
+def nodelet(name, args, **options):
+    return {name: NodeDescription(name, "/", "nodelet", "nodelet", args, **options)}
+
+
+@pytest.fixture
+def camera():
+    managed = ManagedNodes(POLICY)
+    wanted = {**nodelet("/m", "manager"), **nodelet("/l1", "load a/B m"), **nodelet("/l2", "load a/C /m")}
+    change(managed, "camera", {**wanted, **described("/other")}, [*wanted, "/other"])
+    return managed
+
+
+def test_nodelets_are_loaded_again_with_their_manager_and_that_is_one_death(camera):
+    ending = camera.ended("/m", -9, 10.0)
+    assert (ending.verdict, ending.stopped) == (Verdict.RESTART, ("/l1", "/l2"))
+    assert "starting it again with /l1, /l2 in 0.5 s" in ending.text
+    for name in ending.stopped:
+        camera.stopped(name)
+    assert camera.report("f").dead == ("/m", "/l1", "/l2")
+    assert camera.to_restart(10.5) == ["/m", "/l1", "/l2"]
+    for name in ("/m", "/l1", "/l2"):
+        camera.started(name, 10.5)
+    assert camera.ended("/m", -9, 11.0).verdict is Verdict.RESTART  # the policy allows two deaths
+
+
+def test_only_the_loader_that_died_leaves_a_nodelet_behind(camera):
+    camera.ended("/l1", -9, 10.0)
+    camera.stopped("/l2")
+    assert camera.has_died("/l1")
+    assert not camera.has_died("/l2")
+    camera.started("/l1", 10.5)
+    assert not camera.has_died("/l1")
+
+
+def test_required_manager_fails_its_configuration(camera):
+    wanted = {**nodelet("/m", "manager", required=True), **nodelet("/l1", "load a/B m")}
+    change(camera, "other", wanted, list(wanted))
+    assert camera.ended("/m", -9, 10.0).verdict is Verdict.GIVE_UP

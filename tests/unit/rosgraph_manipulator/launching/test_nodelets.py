@@ -2,7 +2,7 @@
 
 import pytest
 from rosgraph_manipulator.configuration.description import NodeDescription
-from rosgraph_manipulator.launching.nodelets import unloading
+from rosgraph_manipulator.launching.nodelets import loaders, unloading
 
 
 def loader(args, package="nodelet", executable="nodelet"):
@@ -34,3 +34,27 @@ def test_other_nodelet_commands_leave_nothing_in_a_manager(args):
 def test_other_nodes_that_load_leave_nothing_in_a_manager():
     assert unloading(loader("load a b", package="my_tools")) is None
     assert unloading(loader("load a b", executable="declared_nodelets")) is None
+
+
+@pytest.mark.parametrize(
+    ("manager", "remaps"),
+    [
+        ("manager", ()),
+        ("/camera/manager", ()),
+        ("m", (("m", "manager"),)),
+        ("/m", (("/m", "/camera/manager"), ("other", "/manager"))),
+    ],
+)
+def test_loader_belongs_to_its_manager_by_the_full_name(manager, remaps):
+    nodes = {
+        "/camera/debayer": NodeDescription(
+            "/camera/debayer", "/camera", "nodelet", "nodelet", f"load a/B {manager}", remaps
+        ),
+        "/manager": NodeDescription("/manager", "/", "nodelet", "nodelet", "manager"),
+    }
+    assert loaders(nodes, ["/camera/manager"]) == ["/camera/debayer"]
+    assert loaders(nodes, ["/manager", "/camera/debayer"]) == []
+
+
+def test_nodes_that_load_no_nodelet_belong_to_no_manager():
+    assert loaders({"/camera/debayer": loader("standalone a/B manager")}, ["/camera/manager"]) == []

@@ -18,6 +18,7 @@ from node_kit.plugins import find
 
 from rosgraph_manipulator.configuration.description import SystemDescription
 from rosgraph_manipulator.configuration.difference import Difference, compare
+from rosgraph_manipulator.launching.nodelets import loaders
 
 PACKAGE = "rosgraph_manipulator"
 
@@ -217,7 +218,7 @@ def plan_change(
 
     A plan with the same steps as a cheaper one is left out. A tactic that raises does not keep the others from
     planning. Each plan ends with a step that stops the nodes that the wanted configuration lacks, where no earlier step
-    of it does.
+    of it does. A step that starts a nodelet's manager also restarts the nodes whose nodelets it has.
 
     Args:
         running: the configuration that runs.
@@ -237,7 +238,7 @@ def plan_change(
         except (Exception, SystemExit) as error:  # the code of a plug-in is not ours: the other tactics still plan
             problems.append(f"tactic {name} makes no plan: {type(error).__name__}: {error}")
         else:
-            proposed += [_completed(plan, difference)] if plan else []
+            proposed += [_completed(_with_nodelets(plan, difference), difference)] if plan else []
     kept: list[Plan] = []
     for plan in sorted(proposed, key=lambda plan: plan.cost):
         if plan.steps not in [other.steps for other in kept]:
@@ -251,6 +252,19 @@ def _completed(plan: Plan, difference: Difference) -> Plan:
     if not left and plan.steps and isinstance(plan.steps[-1], ChangeProcesses):
         return plan
     return with_changes(plan, steps=(*plan.steps, ChangeProcesses(stop=left)))
+
+
+def _with_nodelets(plan: Plan, difference: Difference) -> Plan:
+    """Return a plan that restarts the nodes whose nodelets end with a manager that it restarts."""
+    kept = {name: node for name, node in difference.wanted.nodes.items() if name not in plan.touched}
+
+    def completed(step: Step) -> Step:
+        if not isinstance(step, ChangeProcesses):
+            return step
+        left = tuple(loaders(kept, step.start))
+        return ChangeProcesses((*step.stop, *left), (*step.start, *left))
+
+    return with_changes(plan, steps=tuple(map(completed, plan.steps)))
 
 
 def load_tactics() -> dict[str, Tactic]:

@@ -187,12 +187,14 @@ class Launcher:
         """Do what follows from the end of a node, except for the restart, which is not due yet.
 
         Returns:
-            The nodes that were stopped, because a function was given up.
+            The nodes that were stopped.
         """
         self._log(ending.text)
         if ending.verdict is Verdict.GIVE_UP:
             self._processes.ask_to_end(ending.stopped)
             self._end(ending.stopped, forget=ending.stopped)
+        elif ending.stopped:
+            self._end(ending.stopped, patience=False)
         self._report()
         return ending.stopped
 
@@ -200,7 +202,7 @@ class Launcher:
         try:
             node = self._nodes.description(name)
             command = self._commands.command(node)
-            unload = unloading(node)
+            unload = unloading(node) if self._nodes.has_died(name) else None
             if unload:
                 self._processes.run(self._commands.command(unload), UNLOAD_TIMEOUT)
             self._nodes.started(name, self._processes.begin_again(name, command))
@@ -220,8 +222,8 @@ class Launcher:
         except LaunchFileError as error:
             raise LauncherError(str(error)) from error
 
-    def _end(self, names: Collection[str], forget: Collection[str] = ()) -> None:
-        self._processes.end(names, forget)
+    def _end(self, names: Collection[str], forget: Collection[str] = (), patience: bool = True) -> None:
+        self._processes.end(names, forget, patience)
         for name in names:
             self._nodes.stopped(name)
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from rosgraph_manipulator.configuration.description import NodeDescription
+from rosgraph_manipulator.launching.nodelets import loaders
 from rosgraph_manipulator.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 from rosgraph_manipulator.launching.restarts import DeathCounter, Meaning, RestartPolicy, meaning_of_end
 
@@ -35,7 +36,8 @@ class Ending:
     Attributes:
         verdict: what follows.
         text: a line for the operator.
-        stopped: the nodes to end, because a function that needs them is given up and no other one does.
+        stopped: the nodes to end: a function that needs them is given up and no other one does, or they are started
+            again together with the node that ended.
     """
 
     verdict: Verdict
@@ -53,6 +55,7 @@ class _Node:
         restart_at: when it is started again; None: it is not due.
         serves: whether it has topics or services of its own; None: nobody has looked yet.
         finished: whether it has done its work and ended.
+        has_died: whether its last process ended by itself.
     """
 
     description: NodeDescription
@@ -60,6 +63,7 @@ class _Node:
     restart_at: float | None = None
     serves: bool | None = None
     finished: bool = False
+    has_died: bool = False
 
     @property
     def is_available(self) -> bool:
@@ -223,6 +227,10 @@ class ManagedNodes:
         if name in self._nodes:
             self._nodes[name] = replace(self._nodes[name], started=None)
 
+    def has_died(self, name: str) -> bool:
+        """Tell whether the last process of a node ended by itself."""
+        return self._nodes[name].has_died
+
     # -- supervision ----------------------------------------------------------------------------------------------
 
     def to_inspect(self, now: float) -> list[str]:
@@ -249,7 +257,7 @@ class ManagedNodes:
         """
         node = self._nodes[name]
         age = now - node.started if node.started is not None else 0.0
-        node = self._nodes[name] = replace(node, started=None)
+        node = self._nodes[name] = replace(node, started=None, has_died=True)
         meaning = meaning_of_end(node.description, status, bool(node.serves), bool(conflict))
         if meaning is Meaning.FINISHED:
             self._nodes[name] = replace(node, finished=True)
@@ -282,9 +290,19 @@ class ManagedNodes:
         self._nodes[name] = replace(self._nodes[name], restart_at=restart_at)
         if not given_up:
             delay = 0.0 if restart_at is None else restart_at - now
-            return Ending(Verdict.RESTART, f"{message}: starting it again in {delay:.1f} s")
+            with_it = self._restart_loaders(name, restart_at)
+            its = f" with {', '.join(with_it)}" if with_it else ""
+            return Ending(Verdict.RESTART, f"{message}: starting it again{its} in {delay:.1f} s", with_it)
         deaths = f"{self._policy.intensity + 1} deaths in {self._policy.period:g} s are too many"
         return self._give_up(given_up, message, deaths)
+
+    def _restart_loaders(self, manager: str, restart_at: float | None) -> tuple[str, ...]:
+        """Have the nodes started again whose nodelets have ended with their manager, and return them."""
+        described = {name: node.description for name, node in self._nodes.items() if node.started is not None}
+        with_it = tuple(loaders(described, [manager]))
+        for name in with_it:
+            self._nodes[name] = replace(self._nodes[name], restart_at=restart_at)
+        return with_it
 
     def _give_up(self, given_up: list[str], message: str, reason: str) -> Ending:
         """Fail functions, and return which of their nodes no other function needs."""
