@@ -48,11 +48,16 @@ TOOLS = [
 ]
 """Commands that the documents use: rosrun, rospack, rostopic and so on."""
 
-META_CONTROLLER = ("mros1_reasoner", "ros_model", "ros_model_extraction", "rosgraph_manipulator", "rosgraph_monitor")
+META_CONTROLLER = (
+    *("mros1_reasoner", "ros_model", "ros_model_extraction"),
+    *("rosgraph_launcher", "rosgraph_manipulator", "rosgraph_monitor"),
+)
 """What goes beside a robot. The rest is the demonstrator, with its own robot and its stand-in for move_base."""
 
 DEPENDENCIES = ("depend", "exec_depend", "build_export_depend")
 BUILD_ONLY = {"catkin", "message_generation"}
+OF_PYTHON = "python3-"
+"""How rosdep's names of Python packages begin; ours are in the virtual environment."""
 
 
 class PackagingError(Exception):
@@ -157,7 +162,7 @@ def read_manifest(path: Path) -> Manifest:
     maintainer = root.find("maintainer")
     mail = maintainer.get("email") if maintainer is not None else ""
     found = [element.text or "" for tag in DEPENDENCIES for element in root.findall(tag)]
-    needed = sorted(set(found) - BUILD_ONLY)
+    needed = sorted(name for name in set(found) - BUILD_ONLY if not name.startswith(OF_PYTHON))
     return Manifest(
         *(text("name"), text("version"), text("description"), f"{text('maintainer')} <{mail}>", needed),
         has_code=(path.parent / "src").exists(),

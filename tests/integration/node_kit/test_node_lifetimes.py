@@ -25,7 +25,7 @@ NODES = {  # its package, and a service or topic that it offers, or listens to, 
     "rosgraph_monitor/monitor": "/rosgraph_manipulator/active_configuration",
     "rosgraph_monitor/diagnostic_names": "/diagnostics",
     "mros1_reasoner/reasoner": "/reasoner/save_knowledge_base",
-    "rosgraph_manipulator/rosgraph_launcher": "/rosgraph_launcher/change",
+    "rosgraph_launcher/rosgraph_launcher": "/rosgraph_launcher/change",
     "rosgraph_manipulator/rosgraph_manipulator": "/rosgraph_manipulator_action_server/status",
     "rosgraph_manipulator/action_relay": "/a/status",
     "move_base/move_base": "/move_base/status",
@@ -282,7 +282,7 @@ def test_without_a_master_it_says_so_in_one_line_and_ends_with_2(world, node):
 def test_manipulator_ends_when_told_to_though_its_launcher_hangs(world, number):
     node = "rosgraph_manipulator/rosgraph_manipulator"
     world.start_master({"/rosgraph_manipulator/initial_configuration": "slow"})
-    launcher = world.start_until_ready("rosgraph_manipulator/rosgraph_launcher")
+    launcher = world.start_until_ready("rosgraph_launcher/rosgraph_launcher")
     launcher.send_signal(signal.SIGSTOP)
     process = world.start(node)
     wait_for(lambda: "rosgraph_launcher is not there" in world.said(node), "it asks the launcher")

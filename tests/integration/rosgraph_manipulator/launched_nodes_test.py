@@ -17,8 +17,8 @@ import rospy
 import rostest
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import HERE, PairTest, is_alive, pid_of
-from rosgraph_manipulator.io.processes import MARK
-from rosgraph_manipulator.io.warm_start.sitecustomize import SETTING
+from rosgraph_launcher.io.processes import MARK
+from rosgraph_launcher.io.warm_start.sitecustomize import SETTING
 
 RECORDED = ("/eye", "/left/twin", "/left/deeper/twin", "/right/twin", "/someone", "/shell/wrapped")
 ALL = (

@@ -25,7 +25,7 @@ from metacontrol_msgs.msg import (
     MvpReconfigurationAction,
     MvpReconfigurationGoal,
 )
-from rosgraph_manipulator.io.processes import MARK
+from rosgraph_launcher.io.processes import MARK
 
 HERE = Path(__file__).resolve().parent / "data"
 SERVER = str(HERE / "server.launch")
@@ -140,7 +140,7 @@ class PairTest(unittest.TestCase):
 
     @classmethod
     def start_launcher(cls):
-        cls.launcher = Node("rosgraph_manipulator", "rosgraph_launcher", environment=cls.environment)
+        cls.launcher = Node("rosgraph_launcher", "rosgraph_launcher", environment=cls.environment)
 
     @classmethod
     def start_manipulator(cls):

@@ -9,8 +9,8 @@ from pathlib import Path
 import rostest
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import HERE, PairTest, pid_of
-from rosgraph_manipulator.io.ownership import launcher_mark, look_up
-from rosgraph_manipulator.launching.ownership import Owner
+from rosgraph_launcher.io.ownership import launcher_mark, look_up
+from rosgraph_launcher.launching.ownership import Owner
 
 
 class OwnershipTest(PairTest):

@@ -33,7 +33,7 @@ class RobotTest(unittest.TestCase):
         self.goals = {entry.goal_id.id: entry.status for entry in message.status_list}
 
     def start_pair(self):
-        self.pair = [Node("rosgraph_manipulator", name) for name in ("rosgraph_launcher", "rosgraph_manipulator")]
+        self.pair = [Node(name, name) for name in ("rosgraph_launcher", "rosgraph_manipulator")]
 
     def test_robot_stops_by_its_time_out_and_the_next_pair_brings_the_mission_back(self):
         self.start_pair()

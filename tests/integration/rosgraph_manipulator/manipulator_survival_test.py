@@ -195,7 +195,7 @@ class SurvivalTest(PairTest):
             api = rosgraph.Master("/test", environment["ROS_MASTER_URI"])
             wait_for(lambda: answers(api), "the master answers")
             api.setParam("/rosgraph_manipulator", rospy.get_param("/rosgraph_manipulator"))
-            launcher = Node("rosgraph_manipulator", "rosgraph_launcher", environment=environment)
+            launcher = Node("rosgraph_launcher", "rosgraph_launcher", environment=environment)
             manipulator = Node("rosgraph_manipulator", "rosgraph_manipulator", environment=environment)
             mark = environment["ROS_MASTER_URI"]
             wait_for(lambda: "is deployed" in manipulator.said(), "a configuration is deployed")

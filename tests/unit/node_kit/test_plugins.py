@@ -9,8 +9,8 @@ from node_kit.plugins import PluginError, find, named
 from ros_model.cli import rosmodel as cli
 from ros_model.errors import ModelError
 from ros_model.generators import find_generators
+from rosgraph_launcher.description import SystemDescription
 from rosgraph_manipulator.change.tactics import NoRunningNodes, load_tactics, plan_change
-from rosgraph_manipulator.configuration.description import SystemDescription
 from rosgraph_monitor.observers import plugins as observers
 
 

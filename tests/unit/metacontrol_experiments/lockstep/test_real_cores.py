@@ -18,9 +18,9 @@ from pybullet_simulator.physics.simulation import Simulation
 from robot_formulas.geometry import Pose
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import RosSystem
+from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_manipulator.change.tactics import load_tactics
 from rosgraph_manipulator.configuration.configurations import Configuration
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
 from rosgraph_monitor.observer import Observer, ServiceObserver, TopicObserver
 from rosgraph_monitor.observers.localization import LocalizationQualityObserver
 from std_msgs.msg import Bool, Float32

@@ -196,7 +196,7 @@ def test_nodes_of_the_meta_controller_and_their_parameters_are_left_out_and_said
     tree = {name.lstrip("/"): {"rate": 2} for name in ("/rosgraph_monitor", "/my_launcher", "/reasoner")}
     tree |= {"kill_nodes": ["/x"], "configurations": {"a": {"launch": "b"}}, "max_vel": 0.5}
     origins = {
-        "/my_launcher": Origin("rosgraph_manipulator", "rosgraph_launcher"),
+        "/my_launcher": Origin("rosgraph_launcher", "rosgraph_launcher"),
         "/reasoner": Origin("logic", "reasoner"),  # somebody else's node of that name
     }
     snapshot = graph([["/diagnostics", [*watching, "/eye"]]], parameters=tree)

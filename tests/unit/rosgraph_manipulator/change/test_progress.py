@@ -1,11 +1,11 @@
 """What a change waits for, when it has failed, and what is known to run."""
 
 import pytest
+from rosgraph_launcher.description import NodeDescription, SystemDescription
+from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 from rosgraph_manipulator.change.progress import Awaited, ChangeProgress
 from rosgraph_manipulator.configuration.configurations import Configuration
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
 from rosgraph_manipulator.configuration.difference import compare
-from rosgraph_manipulator.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 
 NEW = Configuration("new", "f", "new.launch", topics=("plan",))
 

@@ -1,10 +1,10 @@
 """Which configuration is restored, and what follows from a report of the launcher."""
 
 import pytest
+from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 from rosgraph_manipulator.change.deployment import Outcome, Result
 from rosgraph_manipulator.change.reactions import DeployedConfigurations, Reaction
 from rosgraph_manipulator.configuration.configurations import Configuration
-from rosgraph_manipulator.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 
 A, B = Configuration("a", "f", "a.launch"), Configuration("b", "f", "b.launch")
 PROBATION = 5.0

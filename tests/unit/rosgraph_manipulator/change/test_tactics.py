@@ -1,8 +1,8 @@
 """Which plans lead from one configuration to another, and in which order."""
 
 import pytest
+from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_manipulator.change.tactics import Adjustable, ChangeProcesses, SetParameters, load_tactics, plan_change
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
 
 TACTICS = load_tactics()
 

@@ -1,7 +1,7 @@
 """What differs between two configurations."""
 
 import pytest
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
+from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_manipulator.configuration.difference import compare, same_value
 
 

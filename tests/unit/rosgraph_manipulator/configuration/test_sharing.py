@@ -3,8 +3,8 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_manipulator.change.tactics import ChangeProcesses, NoRunningNodes, load_tactics, plan_change
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
 from rosgraph_manipulator.configuration.difference import compare
 from rosgraph_manipulator.configuration.sharing import disagreement, seen_by
 

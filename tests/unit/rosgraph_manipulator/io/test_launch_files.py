@@ -1,17 +1,9 @@
-"""Reading launch files through roslaunch, and turning nodes into commands."""
-
-import os
+"""Reading launch files through roslaunch."""
 
 import pytest
 from ros_model.io.files import resolve
 from rosgraph_manipulator.configuration.difference import compare
-from rosgraph_manipulator.io.launch_files import (
-    LaunchFileError,
-    command_line,
-    process_environment,
-    read_launch_file,
-    read_model,
-)
+from rosgraph_manipulator.io.launch_files import LaunchFileError, read_launch_file, read_model
 
 NODE = '<node name="n" pkg="move_base" type="move_base"'
 
@@ -158,34 +150,6 @@ def test_model_and_its_launch_file_are_the_same_configuration():
     difference = compare(model.system, launch.system)
     assert not difference.touches_nodes
     assert not difference.shared
-
-
-def test_command_names_executable_and_node(tmp_path):
-    body = f'<group ns="robot">{NODE} args="--fast 1"><remap from="a" to="b"/></node></group>'
-    node = read_launch_file(write(tmp_path, body)).system.nodes["/robot/n"]
-    words, prefixed = command_line(node)
-    assert os.path.basename(words[0]) == "move_base"
-    assert words[1:] == ["--fast", "1", "a:=b", "__name:=n"]
-    assert prefixed == 0
-    assert process_environment(node, {"HOME": "/x"})["ROS_NAMESPACE"].strip("/") == "robot"
-
-
-def test_launch_prefix_comes_first(tmp_path):
-    node = read_launch_file(write(tmp_path, f'{NODE} launch-prefix="nice -n 5"/>')).system.nodes["/n"]
-    words, prefixed = command_line(node)
-    assert (words[:3], prefixed) == (["nice", "-n", "5"], 3)
-
-
-def test_launch_prefix_that_does_not_exist_is_refused(tmp_path):
-    node = read_launch_file(write(tmp_path, f'{NODE} launch-prefix="no-such-command -e"/>')).system.nodes["/n"]
-    with pytest.raises(LaunchFileError, match=r"node /n: no command 'no-such-command', .*: install it"):
-        command_line(node)
-
-
-def test_executable_that_does_not_exist_is_refused(tmp_path):
-    path = write(tmp_path, '<node name="n" pkg="move_base" type="no_such_node"/>')
-    with pytest.raises(LaunchFileError, match=r"/n: .*no_such_node"):
-        command_line(read_launch_file(path).system.nodes["/n"])
 
 
 def test_parameters_to_clear_are_kept(tmp_path):

@@ -9,7 +9,7 @@ from ros_model.language.metamodel import PortKind
 NODES = frozenset({"/rosout"})
 """Nodes that come with the master."""
 
-_METACONTROL_PACKAGES = frozenset({"mros1_reasoner", "rosgraph_manipulator", "rosgraph_monitor"})
+_METACONTROL_PACKAGES = frozenset({"mros1_reasoner", "rosgraph_launcher", "rosgraph_manipulator", "rosgraph_monitor"})
 _METACONTROL_NODES = frozenset({"reasoner", "rosgraph_launcher", "rosgraph_manipulator", "rosgraph_monitor"})
 _METACONTROL_PARAMETERS = frozenset(
     {"configs", "goal_msg_type", "kill_nodes", "reconfiguration_action_name", "save_action"}

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from ros_model.language.metamodel import RosSystem
-    from rosgraph_manipulator.configuration.description import SystemDescription
+    from rosgraph_launcher.description import SystemDescription
     from rosgraph_monitor.observer import Observer
 
     from metacontrol_experiments.mission.settings import Settings

@@ -16,7 +16,7 @@ from metacontrol_experiments.lockstep.system import LockstepError, parameter_tre
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rosgraph_manipulator.configuration.description import NodeDescription
+    from rosgraph_launcher.description import NodeDescription
 
     from metacontrol_experiments.lockstep.system import System
 

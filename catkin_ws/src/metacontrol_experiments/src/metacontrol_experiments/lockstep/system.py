@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from ros_model.language.metamodel import RosSystem
+    from rosgraph_launcher.description import SystemDescription
     from rosgraph_manipulator.configuration.configurations import Configuration
-    from rosgraph_manipulator.configuration.description import SystemDescription
 
 
 class LockstepError(RuntimeError):

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
+from rosgraph_launcher.description import NodeDescription, SystemDescription
+from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, LauncherReport
+
 from rosgraph_manipulator.configuration.configurations import Configuration
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
-from rosgraph_manipulator.launching.report import CHANGING, FAILED, RECOVERING, LauncherReport
 
 
 @dataclass(frozen=True)

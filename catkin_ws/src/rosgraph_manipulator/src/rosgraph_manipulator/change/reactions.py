@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import enum
 
+from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
+
 from rosgraph_manipulator.change.deployment import Outcome, Result
 from rosgraph_manipulator.configuration.configurations import Configuration
-from rosgraph_manipulator.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 
 
 class Reaction(enum.Enum):

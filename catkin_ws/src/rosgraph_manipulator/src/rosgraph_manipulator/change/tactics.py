@@ -15,10 +15,10 @@ from dataclasses import replace as with_changes
 from typing import Any, Protocol
 
 from node_kit.plugins import find
+from rosgraph_launcher.description import SystemDescription
+from rosgraph_launcher.launching.nodelets import loaders
 
-from rosgraph_manipulator.configuration.description import SystemDescription
 from rosgraph_manipulator.configuration.difference import Difference, compare
-from rosgraph_manipulator.launching.nodelets import loaders
 
 PACKAGE = "rosgraph_manipulator"
 

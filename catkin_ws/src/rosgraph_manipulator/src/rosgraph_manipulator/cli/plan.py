@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import click
 from ros_model.io.files import resolve
+from rosgraph_launcher.description import SystemDescription
 
 from rosgraph_manipulator.change.tactics import NoRunningNodes, load_tactics, plan_change
 from rosgraph_manipulator.cli.invocation import HELP, run
 from rosgraph_manipulator.configuration.configurations import ConfigurationError
-from rosgraph_manipulator.configuration.description import SystemDescription
 from rosgraph_manipulator.configuration.difference import compare
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.launch_files import read_launch_file, read_model

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rosgraph_manipulator.configuration.description import QUALITY_PREFIX, NodeDescription, SystemDescription
+from rosgraph_launcher.description import QUALITY_PREFIX, NodeDescription, SystemDescription
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rosgraph_manipulator.configuration.description import SystemDescription
+from rosgraph_launcher.description import SystemDescription
+
 from rosgraph_manipulator.configuration.difference import is_quality, same_value
 
 

@@ -1,1 +1,1 @@
-"""Launch files, the configuration file, processes, and calls to the master and to nodes."""
+"""Launch files, the configuration file, and calls to the master."""

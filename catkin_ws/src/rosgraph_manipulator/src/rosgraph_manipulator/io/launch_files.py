@@ -1,9 +1,8 @@
-"""Reads launch files through roslaunch, and makes commands of their nodes."""
+"""Reads launch files through roslaunch."""
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,16 +14,14 @@ import rosgraph.names
 import roslaunch.config
 import roslaunch.core
 import roslaunch.loader
-import roslaunch.node_args
 import roslaunch.substitution_args
 import roslaunch.xmlloader
-import rospkg
 from node_kit.io.input_files import InputFileError, read_bytes
 from ros_model.errors import ModelError
 from ros_model.generators.launch import launch_file
 from ros_model.io.models import read_system
-
-from rosgraph_manipulator.configuration.description import NodeDescription, SystemDescription
+from rosgraph_launcher.description import NodeDescription, SystemDescription
+from rosgraph_launcher.io.command_lines import EXPLAINED, reason
 
 
 class LaunchFileError(Exception):
@@ -70,46 +67,11 @@ def read_model(path: Path) -> LaunchFile:
         return _checked(path, config)
 
 
-def command_line(node: NodeDescription) -> tuple[list[str], int]:
-    """Return the command line that starts a node, without `__log:=`, and the number of words of its launch-prefix.
-
-    Raises:
-        LaunchFileError: there is no such package, executable or command of the launch-prefix.
-    """
-    prefix = node.launch_prefix or ""
-    with _refusing(f"node {node.name}"):
-        words = roslaunch.node_args.create_local_process_args(_roslaunch_node(node), roslaunch.core.local_machine())
-        bare = roslaunch.node_args._launch_prefix_args(_roslaunch_node(node)) if prefix else []
-        if bare and shutil.which(bare[0]) is None:
-            raise LaunchFileError(
-                f"node {node.name}: no command '{bare[0]}', which its launch-prefix names: install it, or correct the "
-                "launch-prefix"
-            )
-        return list(words), len(bare)
-
-
-def process_environment(node: NodeDescription, environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the whole environment of a node's process.
-
-    Raises:
-        LaunchFileError: it can't be made.
-    """
-    with _refusing(f"node {node.name}"):
-        return dict(
-            roslaunch.core.setup_env(
-                _roslaunch_node(node), roslaunch.core.local_machine(), rosgraph.get_master_uri(), env=dict(environment)
-            )
-        )
-
-
 _EXPLAINED = (
+    *EXPLAINED,
     ModelError,
-    roslaunch.core.RLException,
-    roslaunch.node_args.NodeParamsException,
     roslaunch.loader.LoadException,
     roslaunch.substitution_args.SubstitutionException,
-    rospkg.ResourceNotFound,
-    OSError,
 )
 """Errors whose message says what is wrong. Any other one is named by its class, too."""
 
@@ -126,14 +88,7 @@ def _refusing(what: str) -> Iterator[None]:
     except LaunchFileError:
         raise
     except (Exception, SystemExit) as error:
-        raise LaunchFileError(f"{what}: {_reason(error).removeprefix(f'{what}: ')}") from error
-
-
-def _reason(error: BaseException) -> str:
-    text = " ".join(str(error).split())
-    if isinstance(error, _EXPLAINED) and text:
-        return text
-    return f"{type(error).__name__}: {text or 'no reason given'}: correct the launch file"
+        raise LaunchFileError(f"{what}: {reason(error, _EXPLAINED).removeprefix(f'{what}: ')}") from error
 
 
 class _StableNames(dict[str, str]):
@@ -244,19 +199,4 @@ def _description(name: str, node: Any, parameters: dict[str, Any]) -> NodeDescri
         launch_prefix=node.launch_prefix or None,
         machine="" if roslaunch.core.is_machine_local(node.machine) else str(node.machine.address),
         parameters=parameters,
-    )
-
-
-def _roslaunch_node(node: NodeDescription) -> Any:
-    return roslaunch.core.Node(
-        node.package,
-        node.executable,
-        name=node.name.rpartition("/")[2],
-        namespace=node.namespace,
-        args=node.args,
-        remap_args=list(node.remaps),
-        env_args=list(node.environment),
-        output=node.output,
-        cwd=node.cwd,
-        launch_prefix=node.launch_prefix,
     )

@@ -1,1 +1,1 @@
-"""The nodes rosgraph_manipulator, rosgraph_launcher and action_relay, and the clients of nodes."""
+"""The nodes rosgraph_manipulator and action_relay, and the clients of nodes."""

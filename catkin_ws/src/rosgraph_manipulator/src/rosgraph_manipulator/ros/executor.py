@@ -11,6 +11,10 @@ from typing import Any
 import rospy
 from geometry_msgs.msg import Twist
 from node_kit.io.xml_rpc import CallError
+from rosgraph_launcher.io.master import NodeApi, advertised
+from rosgraph_launcher.io.ownership import look_up
+from rosgraph_launcher.io.scripts import script_is_at_work
+from rosgraph_launcher.launching.report import LauncherReport
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.parameters import OverwrittenParameters
@@ -19,10 +23,7 @@ from rosgraph_manipulator.change.tactics import Plan
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
 from rosgraph_manipulator.configuration.difference import same_value
 from rosgraph_manipulator.io.launch_files import LaunchFile
-from rosgraph_manipulator.io.master import NodeApi, advertised, get_parameters, publishers, set_parameters
-from rosgraph_manipulator.io.ownership import look_up
-from rosgraph_manipulator.io.scripts import script_is_at_work
-from rosgraph_manipulator.launching.report import LauncherReport
+from rosgraph_manipulator.io.master import get_parameters, publishers, set_parameters
 from rosgraph_manipulator.ros.goal import PendingGoal
 from rosgraph_manipulator.ros.launcher_client import LauncherClient
 from rosgraph_manipulator.ros.running_system import RunningSystem

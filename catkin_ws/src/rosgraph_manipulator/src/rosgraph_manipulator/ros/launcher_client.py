@@ -9,13 +9,13 @@ import rosgraph
 import rospy
 from metacontrol_msgs.msg import LaunchedFunctions
 from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, ChangeNodesResponse
+from rosgraph_launcher.description import NodeDescription
+from rosgraph_launcher.io.ownership import launcher_mark
+from rosgraph_launcher.launching.report import LauncherReport
+from rosgraph_launcher.ros.node_messages import report_from, to_message
 from rospy.exceptions import TransportException, TransportInitError
 
 from rosgraph_manipulator.change.deployment import DeploymentError
-from rosgraph_manipulator.configuration.description import NodeDescription
-from rosgraph_manipulator.io.ownership import launcher_mark
-from rosgraph_manipulator.launching.report import LauncherReport
-from rosgraph_manipulator.ros.node_messages import report_from, to_message
 
 REPEAT_PERIOD = 0.01  # s, wall
 

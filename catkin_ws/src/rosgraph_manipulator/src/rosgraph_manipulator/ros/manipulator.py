@@ -16,6 +16,8 @@ from node_kit.io.xml_rpc import CallError
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.plugins import PluginError
 from node_kit.ros.lifetime import Lifetime
+from rosgraph_launcher.launching.report import FAILED, LauncherReport
+from rosgraph_launcher.ros.node_messages import report_from
 
 from rosgraph_manipulator.change.deployment import (
     DeploymentError,
@@ -39,11 +41,9 @@ from rosgraph_manipulator.configuration.configurations import (
 )
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.master import set_parameters
-from rosgraph_manipulator.launching.report import FAILED, LauncherReport
 from rosgraph_manipulator.ros.announcer import Announcer
 from rosgraph_manipulator.ros.executor import RosExecutor
 from rosgraph_manipulator.ros.goal import PendingGoal
-from rosgraph_manipulator.ros.node_messages import report_from
 from rosgraph_manipulator.ros.requests import Order, RequestServer
 
 ASK_DELAY = 2.0  # s, wall, after a change: nodes may offer dynamic_reconfigure later than all else

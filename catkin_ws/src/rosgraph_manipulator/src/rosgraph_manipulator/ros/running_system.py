@@ -9,15 +9,17 @@ from typing import Any
 
 import rospy
 from node_kit.io.xml_rpc import CallError
+from rosgraph_launcher.description import SystemDescription
+from rosgraph_launcher.io.command_lines import CommandLineError, command_line
+from rosgraph_launcher.io.master import NodeApi
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.progress import ChangeProgress
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
-from rosgraph_manipulator.configuration.description import SystemDescription
 from rosgraph_manipulator.configuration.difference import same_value
 from rosgraph_manipulator.configuration.sharing import disagreement, seen_by
-from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError, command_line, read_launch_file
-from rosgraph_manipulator.io.master import NodeApi, get_parameters
+from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError, read_launch_file
+from rosgraph_manipulator.io.master import get_parameters
 from rosgraph_manipulator.ros.reconfigure_client import ReconfigureClient
 
 ASK_THREADS = 8  # nodes are asked side by side whether they hang
@@ -85,7 +87,7 @@ class RunningSystem:
         try:
             for node in launch.system.nodes.values():
                 command_line(node)
-        except LaunchFileError as error:
+        except CommandLineError as error:
             raise DeploymentError(f"{configuration.launch_file}: {error}") from error
         self._described = (configuration, launch)
         return launch.system

@@ -1,0 +1,1 @@
+"""Processes, commands that start them, and calls to the master and to nodes."""

@@ -1,0 +1,235 @@
+"""Owns the nodes of the functions that run: changes them, and starts again those that die.
+
+The decisions are in `launching`. For one thread only: the main thread of the node rosgraph_launcher.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+from node_kit.io.xml_rpc import CallError
+
+from rosgraph_launcher.description import NodeDescription
+from rosgraph_launcher.io.command_lines import CommandLineError
+from rosgraph_launcher.io.master import advertised
+from rosgraph_launcher.io.node_commands import NodeCommands
+from rosgraph_launcher.io.node_processes import NodeProcesses
+from rosgraph_launcher.io.ownership import look_up
+from rosgraph_launcher.io.processes import Command, Process, StartError
+from rosgraph_launcher.launching.managed_nodes import Ending, ManagedNodes, Verdict
+from rosgraph_launcher.launching.nodelets import unloading
+from rosgraph_launcher.launching.options import LauncherOptions
+from rosgraph_launcher.launching.report import LauncherReport
+
+UNLOAD_TIMEOUT = 2.0  # s, for a nodelet's manager to answer; it takes about 0.1
+
+
+class LauncherError(Exception):
+    """A change can't be made; the message says why, in one line."""
+
+
+class Launcher:
+    """The nodes of all functions, and the warm processes that wait for the next ones."""
+
+    def __init__(
+        self,
+        options: LauncherOptions,
+        changed: Callable[[tuple[LauncherReport, ...]], None],
+        log: Callable[[str], None],
+    ) -> None:
+        """Begin without nodes.
+
+        Args:
+            options: the launcher's parameters.
+            changed: is called with the reports of all functions, whenever one differs.
+            log: takes a line for the operator.
+        """
+        self._options = options
+        self._changed = changed
+        self._log = log
+        self._nodes = ManagedNodes(options.policy)
+        self._commands = NodeCommands(options.mark, options.run_id, log)
+        self._processes = NodeProcesses(options, log)
+        self._report()
+
+    @property
+    def changes(self) -> int:
+        """Number of the changes that were asked for."""
+        return self._nodes.changes
+
+    def pidfds(self) -> dict[int, str]:
+        """Return the file descriptors that become readable when a node ends, with the node's name."""
+        return self._processes.pidfds()
+
+    def next_restart(self) -> float | None:
+        """Return the time (time.monotonic()) of the next restart; None where no node waits for one."""
+        return self._nodes.next_restart()
+
+    # -- changes --------------------------------------------------------------------------------------------------
+
+    def change(
+        self,
+        function: str,
+        configuration: str,
+        nodes: Mapping[str, NodeDescription],
+        stop: Collection[str],
+        start: Sequence[str],
+    ) -> dict[str, float]:
+        """Change the nodes of a function: end those in `stop`, start those in `start`, keep all others.
+
+        The executables are found before anything is touched. The new processes do their imports while the old nodes
+        end. A node that another function needs does not end, unless it is in `start` too.
+
+        Args:
+            function: its name.
+            configuration: the name of its configuration; empty: end all nodes that no other function needs.
+            nodes: all nodes of the configuration, by full name.
+            stop: the nodes to end.
+            start: the nodes to start; those that run already are restarted.
+
+        Returns:
+            The durations of the phases, s.
+
+        Raises:
+            LauncherError: the change failed. Nodes may have been stopped; none of those in `start` runs.
+        """
+        began = time.monotonic()
+        self._nodes.ask_for_change(function)
+        if not configuration:
+            self._release(function)
+            return {"stop": time.monotonic() - began}
+        commands = self._look_up(nodes, start)
+        leaving = self._nodes.begin_change(function, stop, start)
+        self._report()
+        self._processes.ask_to_end(leaving)
+        prepared: dict[str, Process] = {}
+        try:
+            for name, command in commands.items():
+                process = self._processes.prepare(command)
+                if process:
+                    prepared[name] = process
+            prepared_at = time.monotonic()
+            self._end(leaving, forget=[name for name in leaving if name not in start])
+            stopped_at = time.monotonic()
+            self._nodes.adopt(function, configuration, nodes, stop, start)
+            self._report()
+            for name, command in commands.items():
+                self._nodes.started(name, self._processes.begin(name, command, prepared.pop(name, None)))
+        except (CallError, StartError, OSError) as error:
+            self._end(start)
+            self._nodes.end_change(function, time.monotonic(), failed_to_start=start)
+            self._report()
+            raise LauncherError(_one_line(error)) from error
+        finally:
+            for process in prepared.values():
+                process.close()
+        ended_at = time.monotonic()
+        self._nodes.end_change(function, ended_at)
+        self._report()
+        return {"prepare": prepared_at - began, "stop": stopped_at - prepared_at, "start": ended_at - stopped_at}
+
+    def close(self, gently: bool = True) -> None:
+        """Stop everything, because the launcher ends.
+
+        Args:
+            gently: ask the nodes first. Without a master they can't be asked; then begin with SIGINT.
+        """
+        names = self._nodes.names
+        if gently:
+            self._processes.ask_to_end(names)
+        self._processes.end(names, forget=names if gently else (), patience=gently)
+        self._processes.end_standby()
+        self._processes.close()
+
+    def _release(self, function: str) -> None:
+        leaving = self._nodes.begin_release(function)
+        self._report()
+        self._processes.ask_to_end(leaving)
+        self._end(leaving, forget=leaving)
+        self._nodes.end_release(function, time.monotonic())
+        if not self._nodes.names:
+            self._processes.end_standby()
+        self._report()
+
+    # -- supervision ----------------------------------------------------------------------------------------------
+
+    def look_after(self) -> None:
+        """Deal with the nodes that have ended, and start again those that are due."""
+        now = time.monotonic()
+        self._inspect(now)
+        stopped: set[str] = set()
+        for name, status in self._processes.take_ended().items():
+            if name not in stopped:
+                conflict = look_up(name).conflict(self._options.mark)
+                stopped.update(self._follow(self._nodes.ended(name, status, now, conflict)))
+        for name in self._nodes.to_restart(now):
+            if name not in stopped:
+                stopped.update(self._restart(name))
+        if self._nodes.recovered():
+            self._report()
+
+    def stand_by(self) -> None:
+        """Keep a warm process for each kind of Python node that runs, where that is wanted and no change is recent."""
+        if self._options.standby and self._nodes.may_stand_by(time.monotonic()):
+            self._processes.stand_by(
+                [self._commands.command(self._nodes.description(name)) for name in self._nodes.names]
+            )
+
+    def _inspect(self, now: float) -> None:
+        for name in self._nodes.to_inspect(now):
+            try:
+                self._nodes.inspected(name, advertised([name]))
+            except CallError:
+                return
+
+    def _follow(self, ending: Ending) -> tuple[str, ...]:
+        """Do what follows from the end of a node, except for the restart, which is not due yet.
+
+        Returns:
+            The nodes that were stopped.
+        """
+        self._log(ending.text)
+        if ending.verdict is Verdict.GIVE_UP:
+            self._processes.ask_to_end(ending.stopped)
+            self._end(ending.stopped, forget=ending.stopped)
+        elif ending.stopped:
+            self._end(ending.stopped, patience=False)
+        self._report()
+        return ending.stopped
+
+    def _restart(self, name: str) -> tuple[str, ...]:
+        try:
+            node = self._nodes.description(name)
+            command = self._commands.command(node)
+            unload = unloading(node) if self._nodes.has_died(name) else None
+            if unload:
+                self._processes.run(self._commands.command(unload), UNLOAD_TIMEOUT)
+            self._nodes.started(name, self._processes.begin_again(name, command))
+        except (CommandLineError, StartError, OSError) as error:
+            return self._follow(self._nodes.failed_to_restart(name, _one_line(error), time.monotonic()))
+        self._report()
+        return ()
+
+    # -- steps ----------------------------------------------------------------------------------------------------
+
+    def _look_up(self, nodes: Mapping[str, NodeDescription], start: Sequence[str]) -> dict[str, Command]:
+        reason = self._nodes.refusal(nodes, start)
+        if reason:
+            raise LauncherError(f"the configuration {reason}")
+        try:
+            return {name: self._commands.command(nodes[name]) for name in start}
+        except CommandLineError as error:
+            raise LauncherError(str(error)) from error
+
+    def _end(self, names: Collection[str], forget: Collection[str] = (), patience: bool = True) -> None:
+        self._processes.end(names, forget, patience)
+        for name in names:
+            self._nodes.stopped(name)
+
+    def _report(self) -> None:
+        self._changed(self._nodes.reports())
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,183 @@
+"""The processes of the launcher's nodes: begun, asked to end, killed; and the warm ones that stand by.
+
+For one thread only: the main thread of the node rosgraph_launcher.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Collection, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from node_kit.io.xml_rpc import CallError
+
+from rosgraph_launcher.io import processes
+from rosgraph_launcher.io.master import NodeApi, forget_node
+from rosgraph_launcher.io.ownership import look_up
+from rosgraph_launcher.io.processes import Command, Process, StartError
+from rosgraph_launcher.launching.managed_nodes import standby_changes
+from rosgraph_launcher.launching.options import LauncherOptions
+
+ASK_THREADS = 8  # nodes are asked to end side by side
+REASON = "replaced by another configuration"
+
+
+class NodeProcesses:
+    """The processes of nodes, by the nodes' names."""
+
+    def __init__(self, options: LauncherOptions, log: Callable[[str], None]) -> None:
+        """Begin without processes, and kill those that an earlier launcher of the same mark left behind.
+
+        Args:
+            options: the launcher's parameters.
+            log: takes a line for the operator.
+        """
+        self._options = options
+        self._log = log
+        self._running: dict[str, Process] = {}
+        self._warm: dict[tuple[Any, ...], Process] = {}
+        for pid in processes.kill_marked(options.mark):
+            log(f"killed process {pid}, which an earlier launcher had left behind")
+        self._reaper = processes.start_reaper(options.mark)
+
+    def pidfds(self) -> dict[int, str]:
+        """Return the file descriptors that become readable when a node ends, with the node's name."""
+        return {process.pidfd: name for name, process in self._running.items()}
+
+    def take_ended(self) -> dict[str, int]:
+        """Return the exit status of each node that has ended by itself, and forget its process."""
+        ended = {name: process.status for name, process in self._running.items()}
+        statuses = {name: status for name, status in ended.items() if status is not None}
+        for name in statuses:
+            self._running.pop(name).close()
+        return statuses
+
+    def prepare(self, command: Command) -> Process | None:
+        """Return a process that does imports of a Python node and then waits; None for any other node.
+
+        Raises:
+            StartError: the system refuses.
+        """
+        return self._take_warm(command) or processes.prepare(command)
+
+    def begin(self, name: str, command: Command, prepared: Process | None) -> float:
+        """Begin a node, in a prepared process where there is one; return the time of its start (time.monotonic()).
+
+        Raises:
+            StartError: the system refuses.
+        """
+        process = prepared
+        if process is not None:
+            try:
+                process.begin()
+            except StartError as error:
+                self._log(f"node {name} starts without imports in advance: {error}")
+                process.close()
+                process = None
+        if process is None:
+            process = processes.start(command)
+        self._running[name] = process
+        return process.started
+
+    def begin_again(self, name: str, command: Command) -> float:
+        """Begin a node that died, in a warm process where one stands by; return the time of its start.
+
+        Raises:
+            StartError: the system refuses.
+        """
+        return self.begin(name, command, self._take_warm(command))
+
+    def run(self, command: Command, timeout: float) -> None:
+        """Run a command to its end, or for `timeout` (s).
+
+        Raises:
+            StartError: the system refuses.
+        """
+        process = processes.start(command)
+        processes.wait_for_ends([process], timeout)
+        process.close()
+
+    def ask_to_end(self, names: Iterable[str]) -> None:
+        """Ask nodes to end over their own API, side by side, so that one that hangs does not delay the others."""
+        asked = {name: self._running[name] for name in names if name in self._running}
+        if not asked:
+            return
+        pool = ThreadPoolExecutor(ASK_THREADS, thread_name_prefix="ask to end")
+        for name, process in asked.items():
+            pool.submit(_ask_to_end, name, process, self._options.mark)
+        pool.shutdown(wait=False)
+
+    def end(self, names: Iterable[str], forget: Collection[str] = (), patience: bool = True) -> None:
+        """Wait until nodes that were asked to end are gone. Send SIGINT, then SIGKILL, to those that stay.
+
+        Args:
+            names: the nodes.
+            forget: nodes that the master shall list no more.
+            patience: whether to wait before SIGINT.
+        """
+        leaving = {name: self._running.pop(name) for name in list(names) if name in self._running}
+        alive = list(leaving.values())
+        if not processes.wait_for_ends(alive, self._options.shutdown_timeout if patience else 0.0):
+            for process in alive:
+                if process.status is None:
+                    process.signal(signal.SIGINT)
+            processes.wait_for_ends(alive, self._options.sigint_timeout)
+        for name, process in leaving.items():
+            if process.status is None:
+                self._log(f"node {name} (process {process.pid}) does not end by itself: killing it")
+            process.close()
+        for name in forget:
+            try:
+                forget_node(name)
+            except CallError as error:
+                self._log(f"node {name} may still be listed: {error}")
+
+    # -- standby --------------------------------------------------------------------------------------------------
+
+    def stand_by(self, commands: Iterable[Command]) -> None:
+        """Keep a warm process for each Python node among the commands, and none for another one.
+
+        Raises:
+            StartError: the system refuses.
+        """
+        wanted = {_kind(command): command for command in commands if command.is_python}
+        closed, missing = standby_changes(wanted, {kind: p.status is None for kind, p in self._warm.items()})
+        for kind in closed:
+            self._warm.pop(kind).close()
+        for kind in missing:
+            warm = processes.prepare(wanted[kind])
+            if warm is not None:
+                self._warm[kind] = warm
+
+    def end_standby(self) -> None:
+        """End all warm processes."""
+        for process in self._warm.values():
+            process.close()
+        self._warm.clear()
+
+    def close(self) -> None:
+        """Kill what is left of all that was started; the launcher ends."""
+        self._reaper.kill()
+        self._reaper.wait()
+        processes.kill_marked(self._options.mark)
+
+    def _take_warm(self, command: Command) -> Process | None:
+        process = self._warm.pop(_kind(command), None)
+        if process is not None and process.status is not None:
+            process.close()
+            return None
+        return process
+
+
+def _ask_to_end(name: str, process: Process, mark: str) -> None:
+    """Ask a node to end over its API, or by a signal where it does not listen, or somebody else has taken its name."""
+    answer = NodeApi.answer(name)
+    is_other = answer is None or (answer[1] != process.pid and not look_up(name).is_up(mark))
+    if (is_other or not NodeApi.request_shutdown(name, REASON)) and process.status is None:
+        process.signal(signal.SIGINT)
+
+
+def _kind(command: Command) -> tuple[Any, ...]:
+    """Return the command as a key: a warm process has taken arguments, environment and folder from it already."""
+    return (command.words, command.cwd, command.log, tuple(sorted(command.environment.items())))

@@ -1,0 +1,77 @@
+"""Looks up who answers under the name of a node; `launching.ownership` judges it."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import socket
+from urllib.parse import urlsplit
+
+import psutil
+import rosgraph
+
+from rosgraph_launcher.io.master import NodeApi
+from rosgraph_launcher.io.processes import MARK
+from rosgraph_launcher.launching.ownership import Answer, ProcessFacts
+
+
+def look_up(node: str) -> Answer:
+    """Ask the master and the node itself who answers under a name, and look at that process and its parents."""
+    found = NodeApi.answer(node)
+    if found is None:
+        return Answer()
+    address, pid = found
+    parts = urlsplit(address)
+    if not _is_this_host(parts.hostname or ""):
+        return Answer(answers=True)
+    try:
+        process = psutil.Process(pid)
+        lineage = _lineage(process)
+    except psutil.Error:  # it has ended, or it has another number here than in its container
+        return Answer(answers=True)
+    return Answer(True, bool(lineage[-1].mark) or _may_serve(process, parts.port), lineage)
+
+
+def launcher_mark(name: str) -> str:
+    """Return the mark of the launcher that has a name."""
+    return f"{rosgraph.get_master_uri()}{name}"
+
+
+@functools.lru_cache(maxsize=256)
+def _is_this_host(host: str) -> bool:
+    try:
+        addresses = {str(entry[4][0]) for entry in socket.getaddrinfo(host, None)}
+    except OSError:
+        return False
+    return any(one.startswith("127.") or one == "::1" for one in addresses) or bool(
+        addresses & set(rosgraph.network.get_local_addresses())
+    )
+
+
+def _lineage(process: psutil.Process) -> tuple[ProcessFacts, ...]:
+    """Return a process, its parent, and so on, up to the first that bears a launcher's mark."""
+    found = [_facts(process)]
+    parent = process.parent()
+    while parent is not None and not found[-1].mark:
+        found.append(_facts(parent))
+        parent = parent.parent()
+    return tuple(found)
+
+
+def _facts(process: psutil.Process) -> ProcessFacts:
+    command = mark = ""
+    with contextlib.suppress(psutil.Error, OSError):
+        command = " ".join(process.cmdline())
+    with contextlib.suppress(psutil.Error, OSError):
+        mark = process.environ().get(MARK, "")
+    return ProcessFacts(process.pid, command, mark)
+
+
+def _may_serve(process: psutil.Process, port: int | None) -> bool:
+    """Tell whether a process may be the one that serves a port: False where another one of a container must be."""
+    list_connections = getattr(process, "net_connections", None) or process.connections  # psutil before 6.0 has these
+    try:
+        connections = list_connections("tcp")
+    except psutil.Error:  # of another user
+        return True
+    return any(one.laddr and one.laddr.port == port for one in connections)

@@ -1,0 +1,254 @@
+"""Processes of nodes: each has its own session, and none outlives the process that started it, its owner.
+
+Three things keep a dying owner from leaving processes behind:
+
+- The kernel kills the nodes (parent-death signal).
+- A reaper process kills all that carry the owner's mark in their environment, also the children of nodes.
+- An owner that starts kills what an earlier owner with the same mark left.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import select
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from rosgraph_launcher.io.pidfds import open_pidfd
+from rosgraph_launcher.io.warm_start.sitecustomize import SETTING
+
+MARK = "MROS_LAUNCHER"
+"""Environment variable of every process that a launcher starts; its value names the launcher and its master."""
+
+DIE_WITH_OWNER = ("/usr/bin/setpriv", "--pdeathsig", "KILL", "--")
+"""From util-linux, which every Debian has. The kernel sends the signal when the *thread* ends that started the process,
+so only a main thread may start one."""
+
+WARM_START = str(Path(__file__).with_name("warm_start"))
+"""The folder of the module `sitecustomize` that lets a Python node do imports in advance."""
+
+PYTHON = re.compile(r"python(3(\.\d+)?)?")
+HARMLESS_FLAGS = {"-u", "-B", "-O", "-OO"}  # of Python: they leave `sitecustomize` and PYTHONPATH as they are
+
+
+class StartError(Exception):
+    """A process can't be started; the message says why."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command to start.
+
+    Attributes:
+        words: the executable and its arguments.
+        cwd: the folder in which it is started.
+        environment: its whole environment, with the mark.
+        log: file to which its standard output is appended; None: it shares the owner's standard output.
+        prefixed: whether the words begin with a launch-prefix.
+    """
+
+    words: tuple[str, ...]
+    cwd: str
+    environment: Mapping[str, str]
+    log: str | None = None
+    prefixed: bool = False
+
+    @property
+    def is_python(self) -> bool:
+        """Whether the executable is a script for Python 3 that may do imports in advance."""
+        if self.prefixed:
+            return False
+        try:
+            with open(self.words[0], "rb") as file:
+                first = file.readline(256)
+            words = shlex.split(first[2:].decode()) if first.startswith(b"#!") else []
+        except (OSError, ValueError):
+            return False
+        if words and os.path.basename(words[0]) == "env":
+            words = words[2:] if words[1:2] == ["-S"] else words[1:]
+        if not words or not PYTHON.fullmatch(os.path.basename(words[0])) or not HARMLESS_FLAGS.issuperset(words[1:]):
+            return False
+        found = shutil.which(words[0], path=self.environment.get("PATH"))
+        return found is not None and os.path.basename(os.path.realpath(found)).startswith("python3")
+
+
+@dataclass
+class Process:
+    """One process; one that was prepared waits until `begin`."""
+
+    executable: str
+    popen: subprocess.Popen[bytes]
+    started: float  # time.monotonic()
+    pidfd: int
+    gate: int = -1  # file descriptor to which its permission to begin is written; -1: it has begun
+
+    @property
+    def pid(self) -> int:
+        """Process id, which is also the id of its session and of its process group."""
+        return self.popen.pid
+
+    @property
+    def status(self) -> int | None:
+        """Exit status, negative for a signal; None while it runs."""
+        return self.popen.poll()
+
+    def begin(self) -> None:
+        """Let a prepared process begin.
+
+        Raises:
+            StartError: the process has ended.
+        """
+        gate, self.gate = self.gate, -1
+        try:
+            os.write(gate, b"\n")
+        except OSError as error:
+            raise StartError(f"{self.executable}: its process has ended before it began: {error}") from error
+        finally:
+            os.close(gate)
+        self.started = time.monotonic()
+
+    def signal(self, number: int) -> None:
+        """Send a signal to the process and to its children in the same process group."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.pid, number)
+
+    def close(self) -> None:
+        """Kill what is left of the process group, and close the file descriptors of the process."""
+        self.signal(signal.SIGKILL)
+        self.popen.wait()
+        for descriptor in (self.gate, self.pidfd):
+            if descriptor >= 0:
+                os.close(descriptor)
+        self.gate = self.pidfd = -1
+
+
+def check_host() -> None:
+    """Refuse a host that lacks what keeps processes from outliving their owner.
+
+    Raises:
+        StartError: it does; with the remedy.
+    """
+    if not os.access(DIE_WITH_OWNER[0], os.X_OK):
+        raise StartError(f"there is no {DIE_WITH_OWNER[0]}: install util-linux")
+    try:
+        os.close(open_pidfd(os.getpid()))
+    except OSError as error:
+        raise StartError(f"the kernel has no pidfd_open ({error.strerror}): use Linux 5.3 or newer") from error
+
+
+def start(command: Command) -> Process:
+    """Start a process.
+
+    Raises:
+        StartError: the system refuses.
+    """
+    return _start(command, command.environment)
+
+
+def prepare(command: Command) -> Process | None:
+    """Start a process that does imports of a Python node and then waits for `begin`; None for any other node.
+
+    Raises:
+        StartError: the system refuses.
+    """
+    if not command.is_python:
+        return None
+    wait, gate = os.pipe()
+    try:
+        python_path = command.environment.get("PYTHONPATH")
+        environment = {
+            **command.environment,
+            SETTING: f"{wait}:1:{'' if python_path is None else f'={python_path}'}",
+            "PYTHONPATH": os.pathsep.join(filter(None, [WARM_START, python_path])),
+        }
+        process = _start(command, environment, (wait,))
+    except StartError:
+        os.close(gate)
+        raise
+    finally:
+        os.close(wait)
+    process.gate = gate
+    return process
+
+
+def _start(command: Command, environment: Mapping[str, str], pass_fds: tuple[int, ...] = ()) -> Process:
+    log = None
+    if command.log:
+        with contextlib.suppress(OSError):  # a full disk must not keep a robot from driving
+            log = open(command.log, "ab")  # noqa: SIM115
+    try:
+        os.makedirs(command.cwd, exist_ok=True)
+        popen = subprocess.Popen(
+            (*DIE_WITH_OWNER, *command.words),
+            cwd=command.cwd,
+            env=dict(environment),
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            start_new_session=True,
+            pass_fds=pass_fds,
+        )
+    except OSError as error:
+        raise StartError(f"{command.words[0]}: {error.strerror or error}") from error
+    finally:
+        if log:
+            log.close()
+    return Process(command.words[0], popen, time.monotonic(), open_pidfd(popen.pid))
+
+
+def wait_for_ends(processes: Sequence[Process], timeout: float) -> bool:
+    """Wait until all processes have ended; return False where some still run after `timeout` (s)."""
+    deadline = time.monotonic() + timeout
+    left = [process for process in processes if process.status is None]
+    while left:
+        remaining = deadline - time.monotonic()
+        if remaining <= 0:
+            return False
+        poll = select.poll()
+        for process in left:
+            poll.register(process.pidfd, select.POLLIN)
+        poll.poll(1000.0 * remaining)
+        left = [process for process in left if process.status is None]
+    return True
+
+
+def kill_marked(mark: str, spared: frozenset[int] = frozenset()) -> list[int]:
+    """Kill every process with this mark in its environment; return their ids."""
+    killed = []
+    for process in psutil.process_iter():
+        if process.pid in spared or process.pid == os.getpid():
+            continue
+        with contextlib.suppress(psutil.Error, OSError):
+            if process.environ().get(MARK) == mark and process.status() != psutil.STATUS_ZOMBIE:
+                process.kill()
+                killed.append(process.pid)
+    return killed
+
+
+def start_reaper(mark: str) -> subprocess.Popen[bytes]:
+    """Start the reaper: it waits until this process has ended, and then kills every process with the mark."""
+    return subprocess.Popen(
+        [sys.executable, "-m", __name__, str(os.getpid()), mark], start_new_session=True, stdin=subprocess.DEVNULL
+    )
+
+
+def main() -> None:
+    """Wait until process argv[1] has ended, then kill every process with the mark argv[2]."""
+    with contextlib.suppress(ProcessLookupError):
+        select.select([open_pidfd(int(sys.argv[1]))], [], [])
+    while kill_marked(sys.argv[2]):  # again: a dying process may have started another one
+        time.sleep(0.05)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,377 @@
+"""The nodes of the functions that run: which to stop, keep and start, and what follows when one ends.
+
+A node runs once, however many functions share it. Times are arguments, in seconds of one clock that never goes back.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Collection, Hashable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from rosgraph_launcher.description import NodeDescription
+from rosgraph_launcher.launching.nodelets import loaders
+from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
+from rosgraph_launcher.launching.restarts import DeathCounter, Meaning, RestartPolicy, meaning_of_end
+
+Kind = TypeVar("Kind", bound=Hashable)
+
+OFFER_AGE = 1.0  # s after a node's start: by then it has advertised its topics and services
+STANDBY_DELAY = 0.5  # s after a change: the imports of a warm process must not slow the new nodes down
+
+
+class Verdict(enum.Enum):
+    """What follows from the end of a node."""
+
+    FINISHED = "finished"  # it has done its work
+    RESTART = "restart"  # it is started again after a delay
+    GIVE_UP = "give up"  # at least one function is stopped
+
+
+@dataclass(frozen=True)
+class Ending:
+    """The end of a node.
+
+    Attributes:
+        verdict: what follows.
+        text: a line for the operator.
+        stopped: the nodes to end: a function that needs them is given up and no other one does, or they are started
+            again together with the node that ended.
+    """
+
+    verdict: Verdict
+    text: str
+    stopped: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Node:
+    """A node that should run.
+
+    Attributes:
+        description: how it is started.
+        started: when its process began; None: it has no process.
+        restart_at: when it is started again; None: it is not due.
+        serves: whether it has topics or services of its own; None: nobody has looked yet.
+        finished: whether it has done its work and ended.
+        has_died: whether its last process ended by itself.
+    """
+
+    description: NodeDescription
+    started: float | None = None
+    restart_at: float | None = None
+    serves: bool | None = None
+    finished: bool = False
+    has_died: bool = False
+
+    @property
+    def is_available(self) -> bool:
+        """Whether it runs, is about to run again, or has done its work."""
+        return self.started is not None or self.restart_at is not None or self.finished
+
+
+@dataclass(frozen=True)
+class _Function:
+    """A function that has nodes.
+
+    Attributes:
+        deaths: counts those of its nodes.
+        configuration: the one that runs; empty: none.
+        change: number of its last change.
+        nodes: names of its nodes.
+        state: STABLE, CHANGING, RECOVERING or FAILED.
+        message: how its last node ended; empty where none did.
+        changed_at: when its last change ended.
+    """
+
+    deaths: DeathCounter
+    configuration: str = ""
+    change: int = 0
+    nodes: tuple[str, ...] = ()
+    state: str = STABLE
+    message: str = ""
+    changed_at: float = float("-inf")
+
+
+class ManagedNodes:
+    """The nodes of all functions, and the state of each function that the launcher reports."""
+
+    def __init__(self, policy: RestartPolicy) -> None:
+        self._policy = policy
+        self._nodes: dict[str, _Node] = {}
+        self._functions: dict[str, _Function] = {}
+        self._changes = 0
+
+    # -- what runs ------------------------------------------------------------------------------------------------
+
+    @property
+    def changes(self) -> int:
+        """Number of the changes that were asked for."""
+        return self._changes
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All nodes of all functions, also those that have done their work."""
+        return tuple(self._nodes)
+
+    def description(self, name: str) -> NodeDescription:
+        """Return how a node is started."""
+        return self._nodes[name].description
+
+    def reports(self) -> tuple[LauncherReport, ...]:
+        """Return what the launcher tells of each function."""
+        return tuple(self.report(name) for name in self._functions)
+
+    def report(self, name: str) -> LauncherReport:
+        """Return what the launcher tells of one function."""
+        function = self._functions[name]
+        unfinished = [node for node in function.nodes if not self._nodes[node].finished]
+        dead = tuple(node for node in unfinished if self._nodes[node].started is None)
+        return LauncherReport(
+            name,
+            function.configuration,
+            function.change,
+            function.state,
+            tuple(unfinished),
+            dead,
+            function.message,
+        )
+
+    # -- changes --------------------------------------------------------------------------------------------------
+
+    def ask_for_change(self, name: str) -> None:
+        """Count a change of a function that was asked for."""
+        self._changes += 1
+        self._set(name, change=self._changes)
+
+    def refusal(self, nodes: Mapping[str, NodeDescription], start: Collection[str]) -> str:
+        """Return why a change can't be made; empty where it can.
+
+        A change may have been planned for a launcher that died since and that had more nodes.
+
+        Args:
+            nodes: all nodes of the wanted configuration.
+            start: the nodes to start.
+        """
+        unknown = [name for name in start if name not in nodes]
+        if unknown:
+            return f"starts no node {', '.join(unknown)}"
+        available = {name for name, node in self._nodes.items() if node.is_available}
+        lacking = [name for name in nodes if name not in start and name not in available]
+        return f"needs {', '.join(lacking)}, which does not run: start it, too" if lacking else ""
+
+    def begin_change(self, name: str, stop: Collection[str], start: Collection[str]) -> list[str]:
+        """Begin a change of a function, and return the nodes that must end.
+
+        Those are the nodes in `start` that run, and those of the function in `stop` that no other function shares.
+        """
+        function = self._set(name, state=CHANGING, message="")
+        own = [node for node in function.nodes if node in stop and not self._sharers(node, name)]
+        return [node for node in self._nodes if node in start or node in own]
+
+    def adopt(
+        self,
+        name: str,
+        configuration: str,
+        nodes: Mapping[str, NodeDescription],
+        stop: Collection[str],
+        start: Collection[str],
+    ) -> None:
+        """Note that a function has the nodes of a configuration.
+
+        Those are the ones in `start`, and those that ran before and are kept. A node that the configuration lacks and
+        that is not in `stop` stays until a later change stops it.
+        """
+        function = self._functions[name]
+        if configuration != function.configuration:
+            function.deaths.reset()
+        left = [node for node in function.nodes if node not in nodes and node not in stop]
+        kept = [node for node in nodes if node not in start and node in self._nodes]
+        for node in start:
+            self._nodes[node] = _Node(nodes[node])
+        for node in kept:
+            self._nodes[node] = replace(self._nodes[node], description=nodes[node])
+        names = tuple([node for node in nodes if node in start or node in kept] + left)
+        self._set(name, configuration=configuration, message="", nodes=names)
+        self._drop_unowned()
+
+    def end_change(self, name: str, now: float, failed_to_start: Iterable[str] = ()) -> None:
+        """Note that a change is over; nodes that it could not start belong to no configuration any more."""
+        failed = set(failed_to_start)
+        for node in failed:
+            for other in self._sharers(node, name):  # it was restarted, and the other function still needs it
+                self._nodes[node] = replace(self._nodes[node], restart_at=now)
+                self._set(other, state=RECOVERING, message=f"node {node} could not be restarted for {name}")
+        own = tuple(node for node in self._functions[name].nodes if node not in failed)
+        self._set(name, nodes=own, state=STABLE, changed_at=now)
+        self._drop_unowned()
+
+    def begin_release(self, name: str) -> list[str]:
+        """Begin to release a function, and return the nodes that must end: those that no other function shares."""
+        function = self._set(name, state=CHANGING, message="")
+        return [node for node in function.nodes if not self._sharers(node, name)]
+
+    def end_release(self, name: str, now: float) -> None:
+        """Note that a function has no nodes any more."""
+        self._functions[name].deaths.reset()
+        self._set(name, configuration="", nodes=(), state=STABLE, message="", changed_at=now)
+        self._drop_unowned()
+
+    def started(self, name: str, now: float) -> None:
+        """Note that the process of a node has begun."""
+        self._nodes[name] = _Node(self._nodes[name].description, started=now)
+
+    def stopped(self, name: str) -> None:
+        """Note that the process of a node has been ended on purpose."""
+        if name in self._nodes:
+            self._nodes[name] = replace(self._nodes[name], started=None)
+
+    def has_died(self, name: str) -> bool:
+        """Tell whether the last process of a node ended by itself."""
+        return self._nodes[name].has_died
+
+    # -- supervision ----------------------------------------------------------------------------------------------
+
+    def to_inspect(self, now: float) -> list[str]:
+        """Return the nodes that are old enough for `inspected`, and were not inspected yet."""
+        return [
+            name
+            for name, node in self._nodes.items()
+            if node.serves is None and node.started is not None and now - node.started > OFFER_AGE
+        ]
+
+    def inspected(self, name: str, advertised: Iterable[str]) -> None:
+        """Note the topics and services of a node. A node with none of its own may end when its work is done."""
+        own = {offer for offer in advertised if not offer.startswith((f"{name}/get_logg", "/rosout"))}
+        self._nodes[name] = replace(self._nodes[name], serves=bool(own - {f"{name}/set_logger_level"}))
+
+    def ended(self, name: str, status: int | None, now: float, conflict: str = "") -> Ending:
+        """Decide what follows from the end of a node's process.
+
+        Args:
+            name: of the node.
+            status: exit status, negative for a signal.
+            now: the time.
+            conflict: who has taken the node's name, with the remedy; empty: nobody has.
+        """
+        node = self._nodes[name]
+        age = now - node.started if node.started is not None else 0.0
+        node = self._nodes[name] = replace(node, started=None, has_died=True)
+        meaning = meaning_of_end(node.description, status, bool(node.serves), bool(conflict))
+        if meaning is Meaning.FINISHED:
+            self._nodes[name] = replace(node, finished=True)
+            return Ending(Verdict.FINISHED, f"node {name} has finished, {age:.1f} s after its start")
+        how = f"by signal {-status}" if status is not None and status < 0 else f"with status {status}"
+        message = f"node {name} ended {how}, {age:.1f} s after its start{conflict and f': {conflict}'}"
+        if meaning is Meaning.FAILURE:
+            return self._give_up(self._needing(name), message, "it is required")
+        if meaning is Meaning.TURN:
+            restart_at = now + max(node.description.respawn_delay, self._policy.first_delay)
+            self._nodes[name] = replace(node, restart_at=restart_at)
+            return Ending(Verdict.RESTART, f"{message}: starting it again in {restart_at - now:.1f} s")
+        return self._count_death(name, message, now)
+
+    def failed_to_restart(self, name: str, reason: str, now: float) -> Ending:
+        """Decide what follows where a node can't be started again; it counts as one more death."""
+        return self._count_death(name, f"node {name} can't be started again: {reason}", now)
+
+    def _count_death(self, name: str, message: str, now: float) -> Ending:
+        """Count a death for each function of the node: a function may give up while another one goes on."""
+        restarts, given_up = [], []
+        for owner in self._needing(name):
+            restart_at = self._functions[owner].deaths.count(name, now)
+            if restart_at is None:
+                given_up.append(owner)
+            else:
+                restarts.append(max(restart_at, now + self._nodes[name].description.respawn_delay))
+                self._set(owner, state=RECOVERING, message=message)
+        restart_at = max(restarts, default=None)
+        self._nodes[name] = replace(self._nodes[name], restart_at=restart_at)
+        if not given_up:
+            delay = 0.0 if restart_at is None else restart_at - now
+            with_it = self._restart_loaders(name, restart_at)
+            its = f" with {', '.join(with_it)}" if with_it else ""
+            return Ending(Verdict.RESTART, f"{message}: starting it again{its} in {delay:.1f} s", with_it)
+        deaths = f"{self._policy.intensity + 1} deaths in {self._policy.period:g} s are too many"
+        return self._give_up(given_up, message, deaths)
+
+    def _restart_loaders(self, manager: str, restart_at: float | None) -> tuple[str, ...]:
+        """Have the nodes started again whose nodelets have ended with their manager, and return them."""
+        described = {name: node.description for name, node in self._nodes.items() if node.started is not None}
+        with_it = tuple(loaders(described, [manager]))
+        for name in with_it:
+            self._nodes[name] = replace(self._nodes[name], restart_at=restart_at)
+        return with_it
+
+    def _give_up(self, given_up: list[str], message: str, reason: str) -> Ending:
+        """Fail functions, and return which of their nodes no other function needs."""
+        stopped: list[str] = []
+        for owner in given_up:
+            text = f"{message}; {reason}: {self._functions[owner].configuration} is stopped"
+            self._set(owner, state=FAILED, message=text)
+        for owner in given_up:
+            stopped += [n for n in self._functions[owner].nodes if n not in stopped and not self._needing(n)]
+        for node in stopped:
+            self._nodes[node] = replace(self._nodes[node], restart_at=None)
+        names = " and ".join(self._functions[owner].configuration for owner in given_up)
+        return Ending(Verdict.GIVE_UP, f"{message}; {reason}: {names} is stopped", tuple(stopped))
+
+    def next_restart(self) -> float | None:
+        """Return the time of the next restart; None where no node waits for one."""
+        return min((node.restart_at for node in self._nodes.values() if node.restart_at is not None), default=None)
+
+    def to_restart(self, now: float) -> list[str]:
+        """Return the nodes whose restart is due."""
+        return [name for name, node in self._nodes.items() if node.restart_at is not None and node.restart_at <= now]
+
+    def recovered(self) -> bool:
+        """Make each function STABLE whose nodes all run again; return whether there is one."""
+        names = [name for name, f in self._functions.items() if f.state == RECOVERING and not self.report(name).dead]
+        for name in names:
+            self._set(name, state=STABLE)
+        return bool(names)
+
+    # -- standby --------------------------------------------------------------------------------------------------
+
+    def may_stand_by(self, now: float) -> bool:
+        """Tell whether warm processes may be started: not during a change, and not right after one."""
+        functions = self._functions.values()
+        busy = any(f.state in (CHANGING, RECOVERING) or now - f.changed_at <= STANDBY_DELAY for f in functions)
+        return any(f.state == STABLE for f in functions) and not busy
+
+    # -- helpers --------------------------------------------------------------------------------------------------
+
+    def _set(self, name: str, **changes: object) -> _Function:
+        function = self._functions.get(name) or _Function(DeathCounter(self._policy))
+        self._functions[name] = function = replace(function, **changes)  # type: ignore[arg-type]
+        return function
+
+    def _owners(self, node: str) -> list[str]:
+        return [name for name, function in self._functions.items() if node in function.nodes]
+
+    def _needing(self, node: str) -> list[str]:
+        """Return the functions that have a node and were not given up."""
+        return [name for name in self._owners(node) if self._functions[name].state != FAILED]
+
+    def _sharers(self, node: str, name: str) -> list[str]:
+        """Return the functions other than `name` that need a node."""
+        return [other for other in self._needing(node) if other != name]
+
+    def _drop_unowned(self) -> None:
+        self._nodes = {name: node for name, node in self._nodes.items() if self._owners(name)}
+
+
+def standby_changes(wanted: Collection[Kind], warm: Mapping[Kind, bool]) -> tuple[list[Kind], list[Kind]]:
+    """Decide which warm processes to close and which to start, so that there is one of each wanted kind.
+
+    Args:
+        wanted: the kinds of the nodes that run.
+        warm: for each kind of which there is a warm process, whether that process still runs.
+
+    Returns:
+        The kinds of which to close the process, and the kinds of which to start one.
+    """
+    closed = [kind for kind, runs in warm.items() if kind not in wanted or not runs]
+    kept = set(warm) - set(closed)
+    return closed, [kind for kind in wanted if kind not in kept]

@@ -1,0 +1,1 @@
+"""The node rosgraph_launcher, and its messages."""

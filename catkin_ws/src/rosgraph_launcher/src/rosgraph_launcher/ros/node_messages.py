@@ -1,0 +1,74 @@
+"""Converts node descriptions and the launcher's reports from and to messages."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+from metacontrol_msgs.msg import LaunchedFunction
+from metacontrol_msgs.msg import NodeDescription as Message
+
+from rosgraph_launcher.description import NodeDescription
+from rosgraph_launcher.launching.report import LauncherReport
+
+_OPTIONAL = ("cwd", "launch_prefix")  # None in the description is empty in the message
+_PLAIN = tuple(
+    field.name for field in fields(NodeDescription) if field.name not in ("remaps", "environment", "parameters")
+)
+
+
+def to_message(node: NodeDescription) -> Message:
+    """Return the message of a node; its parameters are no part of it, because they are on the parameter server."""
+    return Message(
+        remaps=[f"{source}:={target}" for source, target in node.remaps],
+        environment=[f"{name}={value}" for name, value in node.environment],
+        **{name: "" if getattr(node, name) is None else getattr(node, name) for name in _PLAIN},
+    )
+
+
+def from_message(message: Message) -> NodeDescription:
+    """Return the node that a message describes, without parameters.
+
+    Raises:
+        ValueError: a remapping or a variable has another form.
+    """
+    plain: dict[str, Any] = {name: getattr(message, name) for name in _PLAIN}
+    plain.update({name: plain[name] or None for name in _OPTIONAL})
+    return NodeDescription(
+        remaps=_pairs(message.remaps, ":=", message.name),
+        environment=_pairs(message.environment, "=", message.name),
+        **plain,
+    )
+
+
+def _pairs(texts: list[str], between: str, node: str) -> tuple[tuple[str, str], ...]:
+    for text in texts:
+        if between not in text:
+            raise ValueError(f"node {node}: '{text}' is not NAME{between}VALUE")
+    return tuple((text.partition(between)[0], text.partition(between)[2]) for text in texts)
+
+
+def report_message(report: LauncherReport) -> LaunchedFunction:
+    """Return the message of a report."""
+    return LaunchedFunction(
+        function=report.function,
+        configuration=report.configuration,
+        change=report.change,
+        state=report.state,
+        nodes=list(report.nodes),
+        dead=list(report.dead),
+        message=report.message,
+    )
+
+
+def report_from(message: LaunchedFunction) -> LauncherReport:
+    """Return the report that a message holds."""
+    return LauncherReport(
+        function=message.function,
+        configuration=message.configuration,
+        change=message.change,
+        state=message.state,
+        nodes=tuple(message.nodes),
+        dead=tuple(message.dead),
+        message=message.message,
+    )

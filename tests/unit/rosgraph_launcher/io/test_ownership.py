@@ -1,0 +1,84 @@
+"""Looking up, with real processes, who answers under a node's name."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from rosgraph_launcher.io import ownership
+from rosgraph_launcher.io.processes import MARK
+from rosgraph_launcher.launching.ownership import Owner
+
+LAUNCHER = "http://localhost:11311/rosgraph_launcher"
+NODE = "import os, socket, sys; s = socket.create_server(('127.0.0.1', 0)); print(s.getsockname()[1], os.getpid())"
+SERVES = [sys.executable, "-c", f"{NODE}; sys.stdout.flush(); sys.stdin.read()"]
+
+
+@pytest.fixture
+def answer(monkeypatch):
+    """Have a node answer with an address and a process id."""
+
+    def have(address, pid):
+        monkeypatch.setattr(ownership.NodeApi, "answer", lambda _name: (address, pid))
+
+    monkeypatch.setattr(ownership.NodeApi, "answer", lambda _name: None)
+    return have
+
+
+@pytest.fixture
+def serve():
+    """Start a process that serves a port; return both."""
+    started = []
+
+    def begin(words, mark):
+        environment = {**os.environ, MARK: mark}
+        process = subprocess.Popen(
+            words, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+        )
+        started.append(process)
+        return map(int, process.stdout.readline().split())
+
+    yield begin
+    for process in started:
+        process.communicate("")
+
+
+def owner():
+    return ownership.look_up("/n").owner(LAUNCHER)
+
+
+def test_nobody_answers(answer):
+    assert owner() is Owner.NOBODY
+
+
+def test_process_with_the_mark_is_the_launchers(answer, serve):
+    port, pid = serve(SERVES, LAUNCHER)
+    answer(f"http://localhost:{port}/", pid)
+    assert owner() is Owner.LAUNCHER
+
+
+def test_child_that_lost_the_mark_is_the_launchers(answer, serve):
+    shell = ["/bin/sh", "-c", 'env -u MROS_LAUNCHER "$@"; true', "sh", *SERVES]
+    port, pid = serve(shell, LAUNCHER)
+    assert MARK == "MROS_LAUNCHER"
+    answer(f"http://localhost:{port}/", pid)
+    assert owner() is Owner.LAUNCHER
+
+
+def test_process_of_somebody_else_is_foreign(answer, serve):
+    port, pid = serve(SERVES, "")
+    answer(f"http://localhost:{port}/", pid)
+    assert owner() is Owner.FOREIGN
+    assert f"process {pid} " in ownership.look_up("/n").conflict(LAUNCHER)
+
+
+def test_process_that_does_not_serve_the_port_cannot_be_compared(answer, serve):
+    port, _ = serve(SERVES, "")
+    answer(f"http://localhost:{port}/", os.getpid())  # the number that a node in a container says
+    assert owner() is Owner.UNKNOWN
+
+
+@pytest.mark.parametrize("address", ["http://192.0.2.1:1234/", "http://no-such-host.invalid:1234/"])
+def test_process_of_another_host_cannot_be_compared(answer, address):
+    answer(address, os.getpid())
+    assert owner() is Owner.UNKNOWN

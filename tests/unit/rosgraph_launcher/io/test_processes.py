@@ -1,0 +1,189 @@
+"""Processes of nodes: started, given their role, ended; none left behind."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+import pytest
+from helpers.waiting import DEADLINE_S, wait_for
+from rosgraph_launcher.io import processes
+from rosgraph_launcher.io.processes import MARK, Command, StartError
+
+
+def is_alive(pid):
+    try:
+        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
+@pytest.fixture
+def command(tmp_path):
+    def make(text, *arguments, log=None, python=True):
+        script = tmp_path / "node"
+        script.write_text((f"#!{sys.executable}\n" if python else "#!/bin/sh\n") + text)
+        script.chmod(0o755)
+        environment = {**os.environ, MARK: str(tmp_path)}
+        return Command((str(script), *arguments), str(tmp_path), environment, log=log and str(log))
+
+    return make
+
+
+def test_process_runs_in_its_folder_with_its_log(command, tmp_path):
+    process = processes.start(command("echo $1 in $PWD", "hello", log=tmp_path / "log", python=False))
+    assert processes.wait_for_ends([process], DEADLINE_S)
+    assert process.status == 0
+    process.close()
+    assert (tmp_path / "log").read_text().split() == ["hello", "in", str(tmp_path)]
+
+
+def test_prepared_process_imports_first_and_begins_when_told(command, tmp_path):
+    text = "import sys\nimport decimal\nprint(*sys.argv[1:], __file__)\n"
+    wanted = command(text, "a", "__name:=n", log=tmp_path / "log")
+    process = processes.prepare(wanted)
+    maps = Path(f"/proc/{process.pid}/maps")
+    wait_for(lambda: "_decimal" in maps.read_text(), "the import is done")
+    assert (tmp_path / "log").read_text() == ""
+    process.begin()
+    assert processes.wait_for_ends([process], DEADLINE_S)
+    process.close()
+    assert (tmp_path / "log").read_text().split() == ["a", "__name:=n", str(tmp_path / "node")]
+
+
+def test_log_of_an_earlier_process_is_continued(command, tmp_path):
+    wanted = command("print('hello')\n", log=tmp_path / "log")
+    for process in (processes.start(wanted), processes.prepare(wanted)):
+        if process.gate >= 0:
+            process.begin()
+        assert processes.wait_for_ends([process], DEADLINE_S)
+        process.close()
+    assert (tmp_path / "log").read_text().split() == ["hello", "hello"]
+
+
+def test_prepared_process_that_is_closed_never_runs_its_script(command, tmp_path):
+    process = processes.prepare(command("open('ran', 'w')\n"))
+    process.close()
+    assert not (tmp_path / "ran").exists()
+
+
+def test_prepared_process_that_was_killed_is_told(command):
+    process = processes.prepare(command("pass\n"))
+    process.signal(signal.SIGKILL)
+    assert processes.wait_for_ends([process], DEADLINE_S)
+    with pytest.raises(StartError, match="node: its process has ended before it began"):
+        process.begin()
+    process.close()
+
+
+def test_prepared_process_keeps_the_exit_status_of_its_script(command):
+    wanted = command("import sys\nsys.exit(3)\n")
+    process = processes.prepare(wanted)
+    process.begin()
+    assert processes.wait_for_ends([process], DEADLINE_S)
+    assert process.status == 3
+    process.close()
+
+
+def test_script_that_cannot_be_imported_fails_when_it_runs(command):
+    wanted = command("import no_such_module\n")
+    process = processes.prepare(wanted)
+    process.begin()
+    assert processes.wait_for_ends([process], DEADLINE_S)
+    assert process.status == 1
+    process.close()
+
+
+@pytest.mark.parametrize(
+    ("first", "is_python"),
+    [
+        ("#!/usr/bin/python3", True),
+        ("#!/usr/bin/python3 -u", True),
+        ("#!/usr/bin/env python3", True),
+        ("#!/usr/bin/env -S python3 -u", True),
+        (f"#!{sys.executable}", True),
+        ("#!/usr/bin/python3 -I", False),
+        ("#!/usr/bin/python3 -S", False),
+        ("#!/usr/bin/env no_python3", False),
+        ("#!/usr/bin/env", False),
+        ("#!/bin/sh", False),
+        ("#!", False),
+        ("import sys", False),
+        ("#!/usr/bin/python3 'open", False),
+    ],
+)
+def test_only_scripts_for_a_plain_python_3_are_prepared(tmp_path, first, is_python):
+    script = tmp_path / "node"
+    script.write_text(f"{first}\n")
+    assert Command((str(script),), "/", {"PATH": os.environ["PATH"]}).is_python is is_python
+    assert not Command(("nice", str(script)), "/", {"PATH": os.environ["PATH"]}, prefixed=1).is_python
+
+
+def test_executable_that_is_no_script_is_not_prepared(tmp_path):
+    assert processes.prepare(Command((sys.executable,), str(tmp_path), {})) is None
+    assert processes.prepare(Command((str(tmp_path / "missing"),), str(tmp_path), {})) is None
+
+
+def test_log_that_cannot_be_written_stops_nothing(command, tmp_path):
+    for log in ("/dev/full", tmp_path / "no" / "folder" / "log"):
+        process = processes.start(command("echo hello\nexit 0", log=log, python=False))
+        assert processes.wait_for_ends([process], DEADLINE_S)
+        assert process.status == 0
+        process.close()
+
+
+def test_missing_executable_is_told(tmp_path):
+    with pytest.raises(StartError, match="/no/such/node"):
+        # setpriv itself exists, so the folder is what the system refuses
+        processes.start(Command(("/no/such/node",), "/proc/no/such/node", {}))
+
+
+def test_children_of_a_node_end_with_it(command, tmp_path):
+    process = processes.start(command("sleep 1000 & echo $! > child; wait", python=False))
+    wait_for(lambda: (tmp_path / "child").exists() and (tmp_path / "child").read_text(), "the child runs")
+    child = int((tmp_path / "child").read_text())
+    process.close()
+    wait_for(lambda: not is_alive(child), "the child has ended")
+
+
+OWNER = """
+import os, sys, time
+from rosgraph_launcher.io import processes
+from rosgraph_launcher.io.processes import Command, MARK
+environment = {**os.environ, MARK: sys.argv[2]}
+processes.start_reaper(sys.argv[2])
+node = processes.start(Command((sys.argv[1],), "/", environment))
+print(node.pid, flush=True)
+time.sleep(1000)
+"""
+
+
+def test_nothing_outlives_an_owner_that_is_killed(command, tmp_path):
+    node = command("setsid sleep 1000 & echo $! > child; wait", python=False)
+    owner = subprocess.Popen([sys.executable, "-c", OWNER, node.words[0], str(tmp_path)], stdout=subprocess.PIPE)
+    pid = int(owner.stdout.readline())
+    # the node's folder is /, so the child's id is looked up
+    wait_for(lambda: psutil.Process(pid).children(), "the child runs")
+    child = psutil.Process(pid).children()[0].pid
+    owner.send_signal(signal.SIGKILL)
+    owner.wait()
+    owner.stdout.close()
+    wait_for(lambda: not is_alive(pid), "the node has ended")
+    wait_for(lambda: not is_alive(child), "its child in another session has ended")
+
+
+def test_what_an_earlier_owner_left_is_killed_and_nothing_else(tmp_path):
+    left = subprocess.Popen(["sleep", "1000"], env={MARK: str(tmp_path), "PATH": os.environ["PATH"]})
+    other = subprocess.Popen(["sleep", "1000"], env={MARK: "another", "PATH": os.environ["PATH"]})
+    try:
+        wait_for(lambda: psutil.Process(left.pid).environ().get(MARK) == str(tmp_path), "it runs")
+        assert processes.kill_marked(str(tmp_path)) == [left.pid]
+        assert left.wait(DEADLINE_S) == -signal.SIGKILL
+        assert other.poll() is None
+    finally:
+        left.kill()
+        other.kill()
+        left.wait()
+        other.wait()
