@@ -21,6 +21,7 @@ import rostest
 import tf2_ros
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import PolygonStamped, PoseStamped, TransformStamped, Twist
+from helpers.cases import case
 from helpers.waiting import DEADLINE_S, wait_for
 from map_msgs.msg import OccupancyGridUpdate
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseGoal
@@ -232,7 +233,7 @@ class MoveBaseTest(unittest.TestCase):
             (50.0, "map", GoalStatus.ABORTED, "outside the map"),
             (5.2, "map", GoalStatus.ABORTED, "in a wall"),
         ):
-            with self.subTest(words):
+            with case(words):
                 self.send(x, 0.0, frame)
                 got, text = self.finish()
                 self.assertEqual(got, state, text)

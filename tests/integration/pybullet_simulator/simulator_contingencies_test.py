@@ -9,6 +9,7 @@ import unittest
 import psutil
 import rospy
 import rostest
+from helpers.cases import case
 from metacontrol_msgs.msg import MissionEvent
 from metacontrol_sim.srv import Contingency
 from move_base_msgs.msg import MoveBaseActionGoal
@@ -108,7 +109,7 @@ class ContingenciesTest(unittest.TestCase):
             ({"kind": "light", "value": 3.0}, "from 0"),
             ({"kind": "clutter", "value": 1e6}, "whole number"),
         ):
-            with self.subTest(request=request):
+            with case(request=request):
                 answer = self.strike(**request)
                 self.assertFalse(answer.success)
                 self.assertIn(reason, answer.message)

@@ -6,6 +6,7 @@ import unittest
 
 import rospy
 import rostest
+from helpers.cases import case
 
 DEADLINE_S = 150
 REFUSED = (
@@ -20,7 +21,7 @@ REFUSED = (
 class SimulatorParametersTest(unittest.TestCase):
     def test_wrong_value_ends_the_start_with_one_line_that_names_it(self):
         for number, (node, argument, said) in enumerate(REFUSED):
-            with self.subTest(node=node, argument=argument):
+            with case(node=node, argument=argument):
                 # One name for each start: a name's parameters stay on the server.
                 command = ["rosrun", "metacontrol_sim", node, argument, f"__name:=start_{number}"]
                 done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)

@@ -13,6 +13,7 @@ import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Twist
+from helpers.cases import case
 from metacontrol_sim.srv import DeleteObstacle, IncreaseConsumptionFactor, SetLight, SpawnObstacle
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
@@ -98,7 +99,7 @@ class SimulatorTest(unittest.TestCase):
     def test_every_topic_speaks(self):
         latest = {topic: Latest(topic, kind) for topic, kind in TOPICS.items()}
         for topic, heard in latest.items():
-            with self.subTest(topic=topic):
+            with case(topic=topic):
                 self.assertIsNotNone(heard.wait(or_latest=True))
         scan, grid, cloud = (latest[topic].message for topic in ("front/scan", "map", "camera/depth/points"))
         self.assertEqual(scan.header.frame_id, "front_laser")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import rosgraph
 import rostest
+from helpers.cases import case
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import HERE, PairTest, pid_of
 
@@ -87,7 +88,7 @@ class LaunchedEndsTest(PairTest):
 
     def test_end_of_a_required_node_ends_all_nodes(self):
         for name, status in (("required", 0), ("required_failing", 3)):
-            with self.subTest(name):
+            with case(name):
                 with self.roslaunch(name) as process:
                     let_end()
                     process.wait(DEADLINE_S)

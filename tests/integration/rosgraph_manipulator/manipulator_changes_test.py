@@ -11,6 +11,7 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
 from dynamic_reconfigure.msg import Config
+from helpers.cases import case
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import PairTest, is_alive, pid_of
 
@@ -33,7 +34,7 @@ class ChangesTest(PairTest):
         usage = []
         for number in range(RANDOM_REQUESTS):
             name = generator.choice(names)
-            with self.subTest(number, name=name):
+            with case(number, name=name):
                 self.assertEqual(self.request(name), expected.get(name, 1), self.text)
             wait_for(lambda: self.states[-1].functions[0].state == "STABLE", "a configuration is stable")
             usage.append(self.usage())

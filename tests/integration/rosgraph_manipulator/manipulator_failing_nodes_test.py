@@ -6,6 +6,7 @@ from pathlib import Path
 
 import rospy
 import rostest
+from helpers.cases import case
 from helpers.waiting import wait_for
 from manipulator_harness import PairTest, is_alive, pid_of
 
@@ -19,7 +20,7 @@ class FailingNodesTest(PairTest):
 
     def test_nodes_that_exit_early_are_rolled_back_with_the_reason(self):
         for name, words in (("exits", "ended with status 1"), ("dies", "ended with status 3")):
-            with self.subTest(name):
+            with case(name):
                 self.assertEqual(self.request(name), 0)
                 self.assertIn(words, self.text)
                 self.assertIn("slow was restored", self.text)

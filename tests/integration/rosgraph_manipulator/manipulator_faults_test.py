@@ -9,6 +9,7 @@ from pathlib import Path
 
 import rostest
 from geometry_msgs.msg import Twist
+from helpers.cases import case
 from helpers.waiting import wait_for
 from manipulator_harness import CONFIGURATIONS, SERVER, PairTest, configuration, is_alive, pid_of
 
@@ -57,7 +58,7 @@ class FaultsTest(PairTest):
             ("no_package", "no_such_package"),
             ("vanishes", "vanishes"),
         ):
-            with self.subTest(name):
+            with case(name):
                 self.assertEqual(self.request(name), 0)
                 self.assertIn(words, self.text)
                 self.wait_for_state("slow")

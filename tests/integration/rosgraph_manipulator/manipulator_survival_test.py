@@ -15,6 +15,7 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist
+from helpers.cases import case
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import Node, PairTest, is_alive, later, pid_of
 from metacontrol_experiments.io.processes import free_port
@@ -102,7 +103,7 @@ class SurvivalTest(PairTest):
 
     def test_manipulator_killed_in_the_middle_of_a_change_finishes_it(self):
         for delay in (0.05, 0.3):
-            with self.subTest(delay):
+            with case(delay):
                 self.assertEqual(self.request("slow"), 1)
                 goal_id, _ = self.send_goal()
                 server, before = self.server, pid_of("/wait_server")

@@ -10,6 +10,7 @@ import rospy
 import rostest
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
+from helpers.cases import case
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import is_alive, pid_of
 from metacontrol_msgs.msg import ActiveConfiguration, MvpReconfigurationAction, MvpReconfigurationGoal
@@ -81,7 +82,7 @@ class ManipulatorTest(unittest.TestCase):
 
     def test_configuration_that_does_not_come_up_is_rolled_back(self):
         for name in ("exits", "malformed"):
-            with self.subTest(name):
+            with case(name):
                 self.assertEqual(self.request(name), 0)
                 wait_for(lambda: self.is_stable("slow"), "slow is restored")
                 self.assertIsNotNone(pid_of("/wait_server"))
