@@ -107,13 +107,18 @@ def test_current_design_counts_with_what_was_observed():
 
 def test_where_all_were_tried_in_vain_they_are_tried_again():
     result = choose(design("a"), design("b", use=0.9), tried={"a": "x", "b": "x"})
-    assert result.choice == "b"
-    assert result.degraded
+    assert (result.choice, result.degraded, result.is_retry) == ("b", False, True)
     assert (
-        result.reason == "degraded: all designs that keep every limit have failed recently; b is taken: it is the "
+        result.reason == "all designs that keep every limit have failed recently; b is tried again: it is the "
         "most useful of them"
     )
     assert reasons(result)["a"] == "x"
+
+
+def test_design_at_a_limit_that_it_must_not_reach_keeps_it_no_more_when_it_has_failed():
+    at_limit = {"qualities": {"risk": Quality(reaching_violates=True)}, "tried": {"a": "x"}}
+    result = choose(design("a", risk=0.6), **at_limit)
+    assert (result.choice, result.degraded, result.is_retry) == ("a", True, False)
 
 
 def test_nothing_can_be_deployed():

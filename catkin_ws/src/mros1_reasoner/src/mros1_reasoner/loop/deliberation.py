@@ -85,7 +85,7 @@ class Deliberation:
         while queue:
             objective = queue.pop(0)
             outcomes[objective] = outcome = self._plan(objective, now)
-            if self._is_change(objective, outcome) and not outcome.degraded:
+            if self._is_change(objective, outcome) and not outcome.is_makeshift:
                 return objective, outcome
             if climbs:
                 queue += [o for o in self._state.requirers(objective) if o not in outcomes and o not in queue]
@@ -220,7 +220,7 @@ class Deliberation:
         return [*found, *better] if heeds or found else []
 
     def _improves(self, running: Running, outcome: Plan) -> bool:
-        if running.degraded and not outcome.degraded:
+        if running.degraded and not outcome.is_makeshift:
             return True
         now = self._utility(self._state.kb.designs[running.design]) if running.design else -math.inf
         return not running.degraded and outcome.candidates[0].utility >= now + self._state.settings.improvement
@@ -236,7 +236,7 @@ class Deliberation:
             for required in design.requires:
                 provider = self._state.provider(required)
                 outcome = None if self._state.is_fine(provider) else self._plan(provider, now, required)
-                if outcome and (outcome.choice is None or outcome.degraded):
+                if outcome and (outcome.choice is None or outcome.is_makeshift):
                     kind = unfulfilled if outcome.choice is None else strained
                     kind.setdefault(design.name, []).append(required)
         is_tried = (running.design or "", name) in self._state.error_log
@@ -259,7 +259,7 @@ class Deliberation:
             same = plan(
                 objective, [self._state.kb.designs[running.design or ""]], situation, self._utility, self._distance
             )
-            return replace(same, degraded=False, reason=f"{running.design} is deployed again")
+            return replace(same, degraded=False, is_retry=False, reason=f"{running.design} is deployed again")
         desired = self._state.settings.desired
         is_possible = situation.can_deploy(desired) and desired not in strained and desired not in situation.tried
         if running.design is None and is_possible:
@@ -312,4 +312,4 @@ class Deliberation:
 def _gist(causes: list[Cause], outcome: Plan) -> tuple[object, ...]:
     """Return the part of an outcome that distinguishes it from another one."""
     wrong = tuple(cause.trigger for cause in causes if not is_chance(cause))
-    return wrong, outcome.choice, outcome.degraded
+    return wrong, outcome.choice, outcome.degraded, outcome.is_retry

@@ -23,12 +23,19 @@ class Plan:
         degraded: no design keeps every limit; the choice is the least violating one.
         candidates: all that were considered, best first.
         reason: why the choice was made, in words.
+        is_retry: all designs that keep every limit have failed recently; the choice is one of them.
     """
 
     choice: str | None
     degraded: bool
     candidates: tuple[Candidate, ...]
     reason: str
+    is_retry: bool = False
+
+    @property
+    def is_makeshift(self) -> bool:
+        """Return whether the choice is only better than nothing."""
+        return self.degraded or self.is_retry
 
 
 @dataclass(frozen=True)
@@ -95,32 +102,33 @@ def plan(
     deployable = [c for c in candidates if situation.can_deploy(c.design.name)]
     fresh = [c for c in deployable if c.design.name not in situation.tried or c.design.name == situation.current]
     if fit:
-        degraded, best = False, fit[0]
+        best = fit[0]
         reason = f"{best.design.name} has the highest utility ({best.utility:g}) of the {len(fit)} (out of "
         reason += f"{len(candidates)}) designs that can be deployed and keep every limit"
         if len(fit) > 1 and fit[1].utility == best.utility and running:
             reason += f", and is a smaller change than {fit[1].design.name}, which is as useful"
     elif deployable:
-        degraded, best = True, min(fresh or deployable, key=by_violation)
+        best = min(fresh or deployable, key=by_violation)
         now = next((c for c in fresh if c.design.name == situation.current), None)
         stays = now is not None and (best is now or now.violation - best.violation < situation.worth)
-        keeps = best.violation <= 0.0  # then only failures speak against it
-        cause = "all designs that keep every limit have failed recently" if keeps else "no design keeps every limit"
-        reason = f"degraded: {cause}; {(now if now and stays else best).design.name} "
-        if now and stays and best is not now:
-            reason += f"stays: {best.design.name} would violate them hardly less"
+        if best.keeps_limits:
+            does = "stays" if stays else "is tried again"
+            reason = "all designs that keep every limit have failed recently; "
+            reason += f"{best.design.name} {does}: it is the most useful of them"
+        elif now and stays and best is not now:
+            reason = f"degraded: no design keeps every limit; {now.design.name} stays: "
+            reason += f"{best.design.name} would violate them hardly less"
             best = now
         else:
-            merit = "the most useful of them" if keeps else "the least violating"
-            reason += f"{'stays' if stays else 'is taken'}: it is {merit}"
-        if not fresh and not keeps:
-            reason += ", and all were tried before"
+            reason = f"degraded: no design keeps every limit; {best.design.name} {'stays' if stays else 'is taken'}: "
+            reason += f"it is the least violating{'' if fresh else ', and all were tried before'}"
     else:
         ranked = sorted(candidates, key=by_violation)
         return Plan(None, False, tuple(c.lost(c.refused_because) for c in ranked), _nothing(situation))
     others = sorted((c for c in candidates if c is not best), key=lambda c: (bool(c.refused_because), *by_use(c)))
+    degraded = not best.keeps_limits
     lost = (c.lost(_loss(c, best, degraded)) for c in others)
-    return Plan(best.design.name, degraded, (best.chosen(), *lost), reason)
+    return Plan(best.design.name, degraded, (best.chosen(), *lost), reason, is_retry=not fit and not degraded)
 
 
 def feasible_designs(
@@ -162,6 +170,7 @@ class _Judged:
         utility: how useful it is expected to be.
         violation: by how much its levels pass the objective's limits, as a sum of shares of the limits.
         refused_because: why it can't be taken; empty where it can.
+        keeps_limits: whether it provides its function in full, and no level passes a limit.
         levels: the levels that were compared with the limits.
     """
 
@@ -169,6 +178,7 @@ class _Judged:
     utility: float
     violation: float
     refused_because: str
+    keeps_limits: bool
     levels: Mapping[str, float]
 
     def chosen(self) -> Candidate:
@@ -217,7 +227,8 @@ def _judge(objective: Objective, design: Design, situation: Situation, utility: 
         # A lucky or unlucky moment of the deployed design must not weigh more than what is expected of the others.
         lasting = kind.direction.better(level, expected.get(quality, level)) if quality in factors else level
         violation += max(0.0, kind.excess(lasting, limit)) / (abs(limit) or 1.0)
-    return _Judged(design, utility(design), violation, "; ".join(reasons), levels)
+    keeps_limits = len(reasons) == int(name in situation.tried)
+    return _Judged(design, utility(design), violation, "; ".join(reasons), keeps_limits, levels)
 
 
 def _factor(factor: float) -> str:
