@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from metacontrol_bags.bag import read_record
-from metacontrol_bags.ownership import hardware_id_of, is_own, robot_of
+from metacontrol_bags.ownership import hardware_id_of, is_of_another, is_own, robot_of, robots_inside
 
 NAMES = st.text("ab_1", min_size=1, max_size=3)
 NAMESPACES = st.lists(NAMES, max_size=3).map(lambda parts: "/" + "/".join(parts))
@@ -32,6 +32,26 @@ FOREIGN = st.sampled_from(["", "none", "Hokuyo H0905365", "/dev/ttyUSB0", "192.1
 )
 def test_publisher_and_hardware_tell_whose_a_status_is(namespace, publisher, hardware_id, expected):
     assert is_own(namespace, publisher, hardware_id) is expected
+
+
+@pytest.mark.parametrize(
+    ("namespace", "nodes", "expected"),
+    [
+        ("/", ["/rosgraph_monitor", "/rosgraph_manipulator", "/arm/driver", "/arm/reasoner"], set()),
+        ("/", ["/cell_2/rosgraph_monitor", "/cell_3/rosgraph_manipulator", "/cell_4/driver"], {"/cell_2", "/cell_3"}),
+        ("/cell_1/", ["/cell_1/rosgraph_monitor", "/cell_2/rosgraph_monitor"], set()),
+        ("/cell_1", ["/cell_1/arm/rosgraph_monitor", "/cell_10/rosgraph_monitor"], {"/cell_1/arm"}),
+        ("/cell_1", ["/rosgraph_monitor"], set()),
+    ],
+)
+def test_namespace_with_a_meta_controller_is_another_robots(namespace, nodes, expected):
+    assert robots_inside(namespace, nodes) == expected
+
+
+def test_node_is_of_the_robot_whose_namespace_it_is_in():
+    assert is_of_another("/cell_2/arm/driver", {"/cell_2"})
+    assert not is_of_another("/cell_20/driver", {"/cell_2"})
+    assert not is_of_another("/driver", set())
 
 
 def test_topic_of_another_name_is_the_robots_own():

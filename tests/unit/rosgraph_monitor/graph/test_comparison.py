@@ -74,6 +74,18 @@ def test_additional_node_is_a_warning():
     assert (status.level, status.name, status.message) == (Level.WARN, "stray", "Additional node")
 
 
+def test_nodes_of_a_second_robot_are_not_additional_but_strays_of_the_own_one_are():
+    nodes = ("/rosgraph_monitor", "/arm/stray", "/stray", "/cell_2/rosgraph_monitor", "/cell_2/eye/driver")
+    assert compare(graph(*nodes), system(), dead={}) == (AdditionalNode("arm/stray"), AdditionalNode("stray"))
+
+
+def test_modelled_node_in_the_namespace_of_a_second_robot_is_still_missed():
+    live = graph("/cell_2/rosgraph_monitor", "/cell_2/eye")
+    assert compare(live, system(Component("cell_2/lamp")), dead={}) == (
+        MissingNode("cell_2/lamp", "absent", "not registered with the master"),
+    )
+
+
 def test_dead_node_is_not_additional():
     assert compare(graph("/stray"), system(), dead={"/stray": ("dead", "no answer")}) == ()
 

@@ -8,6 +8,8 @@ care of the robot in its own namespace:
 - Without it, the robot's own are the statuses that a node in its namespace publishes, and those whose hardware_id is
   the namespace or a name in it. In `/`, these are all statuses.
 - A topic of another name, by a remapping, is the robot's own.
+
+Nodes are those of the innermost namespace around them that has a meta-controller.
 """
 
 from __future__ import annotations
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 TOPIC = "/diagnostics"
 _OWNER = "robot:"
+_META_CONTROLLER = ("rosgraph_monitor", "rosgraph_manipulator")
+"""Nodes that tell where a meta-controller is. The name of its third node, reasoner, is one that others have, too."""
 
 
 def hardware_id_of(namespace: str) -> str:
@@ -29,6 +33,24 @@ def hardware_id_of(namespace: str) -> str:
 def robot_of(hardware_id: str) -> str | None:
     """Return the namespace of the robot that a hardware_id names; None where it names none."""
     return _absolute(hardware_id.removeprefix(_OWNER)) if hardware_id.startswith(_OWNER) else None
+
+
+def robots_inside(namespace: str, nodes: Iterable[str]) -> frozenset[str]:
+    """Return the namespaces of other robots inside a robot's namespace: those with a meta-controller of their own.
+
+    Args:
+        namespace: of the robot.
+        nodes: resolved names of all nodes.
+    """
+    robot = _absolute(namespace)
+    parts = (node.rpartition("/") for node in nodes)
+    homes = {_absolute(home) for home, _, name in parts if name in _META_CONTROLLER}
+    return frozenset(home for home in homes if home != robot and _is_in(home, robot))
+
+
+def is_of_another(node: str, robots: Iterable[str]) -> bool:
+    """Return whether a node, by its resolved name, is of one of the robots with these namespaces."""
+    return any(_is_in(node, robot) for robot in robots)
 
 
 def is_own(namespace: str, publisher: str = "", hardware_id: str = "", topic: str = TOPIC) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from metacontrol_bags.ownership import is_of_another, robots_inside
+
 from rosgraph_monitor.graph.defaults import Defaults, default_of
 from rosgraph_monitor.graph.findings import (
     NO_NODE,
@@ -48,7 +50,8 @@ class Scope:
         types: of ports, by `.ros` models.
         defaults: of parameters in the code of nodes, by `.ros` models.
         topic_types: of topics, by name relative to the namespace.
-        namespace: where the system lives; nodes outside it are none of its business.
+        namespace: where the system lives; nodes outside it are none of its business, nor are those of a robot inside
+            it that has a meta-controller of its own.
     """
 
     ignored_nodes: tuple[str, ...] = IGNORED_NODES
@@ -94,9 +97,11 @@ def compare(
         else:
             state = dead.get(instance(name, dead) or name, NOT_REGISTERED)
             missing.append(MissingNode(component.graph_name, *state))
+    others = robots_inside(scope.namespace, snapshot.nodes)
+    own = (node for node in sorted(alive - expected) if not is_of_another(node, others))
     additional = [
         AdditionalNode(name)
-        for name in (relative(node, scope.namespace) for node in sorted(alive - expected))
+        for name in (relative(node, scope.namespace) for node in own)
         if name is not None and name not in excused and not is_ignored_node(name, scope.ignored_nodes)
     ]
     return (
