@@ -47,6 +47,15 @@ def test_meter_survives_a_clock_that_stands_or_runs_backwards():
     assert meter.tick(4.0) == pytest.approx(1.3)
 
 
+def test_meter_whose_clock_comes_late_does_not_count_the_time_before_it():
+    meter = PowerMeter(None)
+    meter.add_speed(5.0)
+    assert meter.tick(1000.0) is None
+    for _ in range(20):
+        meter.add_command()
+    assert meter.tick(1001.0) == pytest.approx(0.04 * 20.0)
+
+
 def test_meter_refuses_what_is_not_finite():
     meter = PowerMeter(0.0)
     for take in (meter.add_speed, meter.add_acceleration):

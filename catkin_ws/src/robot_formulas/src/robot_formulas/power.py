@@ -71,16 +71,16 @@ def energy_level(load: float) -> float:
 class PowerMeter:
     """Collects speed, acceleration and commands between two ticks, and turns them into a load at each."""
 
-    _since: float
+    _since: float | None
     _speed: float
     _acceleration: float
     _commands: int
 
-    def __init__(self, now: float) -> None:
+    def __init__(self, now: float | None) -> None:
         """Start to measure.
 
         Args:
-            now: ROS time in s.
+            now: ROS time in s; None while there is no clock yet: then the first tick starts it.
         """
         self.factor = 1.0
         self._start(now)
@@ -111,15 +111,15 @@ class PowerMeter:
 
     def tick(self, now: float) -> float | None:
         """Return the load since the last tick, and start anew; None if no time has passed or time ran backwards."""
-        elapsed = now - self._since
-        if elapsed <= 0.0:
+        if self._since is None or now <= self._since:
             self._start(now)
             return None
-        load = power_load(self._speed, self._acceleration, self._commands / elapsed, self.factor)
+        rate = self._commands / (now - self._since)
+        load = power_load(self._speed, self._acceleration, rate, self.factor)
         self._start(now)
         return load
 
-    def _start(self, now: float) -> None:
+    def _start(self, now: float | None) -> None:
         self._since = now
         self._speed = 0.0
         self._acceleration = 0.0

@@ -28,7 +28,7 @@ class BatteryLoadControlNode:
     def __init__(self) -> None:
         """Connect."""
         self._lock = threading.Lock()
-        self._meter = PowerMeter(rospy.get_time())
+        self._meter = PowerMeter(rospy.get_time() or None)  # ROS time is 0 before the first /clock
         self._load = rospy.Publisher("power_load", Float32, queue_size=1)
         self._factor = rospy.Publisher("power_consumption_factor", Float32, queue_size=1, latch=True)
         self._factor.publish(self._meter.factor)
