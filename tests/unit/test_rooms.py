@@ -10,6 +10,7 @@ REACHING_OUT = {"io", "ros", "cli", "pellet"}
 """Rooms that may touch files, in any package."""
 ALSO = {
     "metacontrol_bags/bag.py": "reads a bag",
+    "node_kit/plugins.py": "reads the package.xml of all packages",
     "ros_model/generators": "generators write files, and ask what is there already",
     "ros_model/language/parser.py": "reads the grammars of its own package",
     "ros_model/project/schema_check.py": "reads the schema of its own package",
