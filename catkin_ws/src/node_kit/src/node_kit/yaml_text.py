@@ -16,6 +16,8 @@ MAX_SIZE = 4_000_000
 """Characters of the largest text that is read."""
 MAX_VALUES = 200_000
 """Values of the largest text that is read, aliases counted as often as they stand."""
+MAX_DEPTH = 200
+"""Brackets and braces inside each other. PyYAML looks at all open ones for every token: 1,000 take it seconds."""
 
 _MERGE = "tag:yaml.org,2002:merge"
 _BAD_SCALARS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
@@ -54,7 +56,7 @@ def _parse(text: str, places: dict[Keys, Place], is_unique: bool) -> Any:
     if len(text) > MAX_SIZE:
         raise YamlError(f"{len(text)} characters are too many (at most {MAX_SIZE})")
     try:
-        loader = yaml.SafeLoader(text)
+        loader = _Loader(text)
         node = loader.get_single_node()
         if node is None:
             return None
@@ -71,6 +73,16 @@ def _parse(text: str, places: dict[Keys, Place], is_unique: bool) -> Any:
         raise YamlError("is nested too deep: correct the YAML") from None
     except _BAD_SCALARS as error:
         raise YamlError(f"a value is not of its type ({error}): correct the YAML") from error
+
+
+class _Loader(yaml.SafeLoader):
+    """A loader that gives up where brackets are nested too deep."""
+
+    def fetch_flow_collection_start(self, token: Any) -> None:
+        """Take an opening bracket or brace."""
+        if self.flow_level >= MAX_DEPTH:
+            raise RecursionError
+        super().fetch_flow_collection_start(token)
 
 
 class _Count:
