@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 import yaml
+from helpers import launch_files
 from ros_model.io.models import read_system
 from ros_model.io.project import load_project
 from ros_model.language.metamodel import compose
-from roslaunch.config import load_config_default
 
 SOURCES = Path(__file__).parents[4] / "catkin_ws" / "src"
 BASE = """RosSystem { Name base
@@ -56,9 +56,7 @@ def test_optional_component_is_no_part_of_the_base_that_the_monitor_expects(run,
     assert [component.name for component in compose(core, safe).components] == ["robot", "guard", "nav"]
     assert [component.name for component in compose(core, bold).components] == ["robot", "nav"]
     nodes = {
-        name: [
-            node.name for node in load_config_default([str(tmp_path / f"launch/variants/{name}.launch")], None).nodes
-        ]
+        name: [node.name for node in launch_files.read(tmp_path / f"launch/variants/{name}.launch").nodes]
         for name in ("safe", "bold")
     }
     assert nodes == {"safe": ["guard", "nav"], "bold": ["nav"]}
@@ -100,7 +98,7 @@ def test_lone_system_gets_a_launch_file(run, models, tmp_path):
     folder = models({"a": {"speed": 1}})
     status, out, _ = run("generate", "launch", folder / "base.rossystem", "-o", tmp_path)
     assert (status, out) == (0, f"launch: {tmp_path / 'launch/base.launch'}\n")
-    config = load_config_default([str(tmp_path / "launch/base.launch")], None)
+    config = launch_files.read(tmp_path / "launch/base.launch")
     assert [node.name for node in config.nodes] == ["robot", "guard", "nav"]
 
 

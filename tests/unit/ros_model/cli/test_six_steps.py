@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 import yaml
+from helpers import launch_files
 from mros1_reasoner.io.ontology_files import read_knowledge_base
 from ros_model.io.files import resolve
 from ros_model.io.project import load_project
 from rosgraph_monitor.observers.plugins import available
-from roslaunch.config import load_config_default
 
 README = Path(__file__).parents[4] / "catkin_ws" / "src" / "ros_model" / "README.md"
 
@@ -63,7 +63,7 @@ def test_package_can_be_found_with_its_models_and_its_observer(robot, monkeypatc
 
 
 def test_variants_load_with_their_values(robot):
-    config = load_config_default([str(robot / "launch/variants/calm.launch")], None)
+    config = launch_files.read(robot / "launch/variants/calm.launch")
     assert [node.name for node in config.nodes] == ["move_base"]
     assert config.params["/move_base/TrajectoryPlannerROS/max_vel_x"].value == 0.3
     assert repr(config.params["/move_base/controller_frequency"].value) == "10.0"

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 import yaml
 from catkin_pkg.packages import find_packages
+from helpers import launch_files
 from ros_model.cli.rosmodel import main
 from ros_model.io.models import read_system
 from ros_model.io.project import load_project
 from rosgraph_manipulator.io.configuration_file import options_from
-from roslaunch.config import load_config_default
 from roslaunch.rlutil import resolve_launch_arguments
 
 SOURCES = Path(__file__).parents[4] / "catkin_ws" / "src"
@@ -63,7 +63,7 @@ def test_roslaunch_finds_and_loads_each_by_its_published_command(workspace, name
     for name in names:
         (path,) = resolve_launch_arguments([name, f"{name}.launch"])
         assert Path(path) == (workspace / name / "launch" / f"{name}.launch").resolve()
-        config = load_config_default([path], port=None, verbose=False)
+        config = launch_files.read(path)
         assert [node.name for node in config.nodes] == ["move_base"]
 
 

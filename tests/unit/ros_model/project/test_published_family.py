@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 import yaml
+from helpers import launch_files
 from mros1_reasoner.io.ontology_files import read_knowledge_base
 from ros_model.cli.rosmodel import main
 from ros_model.io.project import load_project
-from roslaunch.config import load_config_default
 
 CORPUS = os.environ.get("MROS_CORPUS")
 SOURCES = Path(__file__).parents[4] / "catkin_ws" / "src"
@@ -85,7 +85,7 @@ def test_values_of_parameters_say_what_variants_require(models):
 
 def test_both_costmaps_get_their_value(models):
     generate(models)
-    config = load_config_default([str(models.parent / "launch/variants/slow.launch")], None)
+    config = launch_files.read(models.parent / "launch/variants/slow.launch")
     assert config.params["/move_base/local_costmap/obstacles_layer/observation_sources"].value == "scan"
     assert config.params["/move_base/global_costmap/inflater_layer/inflation_radius"].value == 0.5
     assert config.params["/qa_safety"].value == 0.7
@@ -121,6 +121,6 @@ def test_published_variants_give_a_whole_deployment(models):
     required = required_by(models / "robot.owl")
     for variant in project.variants:
         assert f"#{variant.name}" in required["#camera" if variant.name.endswith("_k") else "#front_laser"]
-        config = load_config_default([str(models.parent / f"launch/variants/{variant.name}.launch")], None)
+        config = launch_files.read(models.parent / f"launch/variants/{variant.name}.launch")
         assert [(node.package, node.type, node.name) for node in config.nodes] == [("move_base",) * 3]
         assert f"{variant.name}_safety" in (models / "robot.owl").read_text()

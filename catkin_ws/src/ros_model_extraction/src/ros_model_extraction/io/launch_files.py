@@ -95,9 +95,10 @@ def load(path: Path, arguments: Sequence[str]) -> tuple[list[LaunchedNode], dict
         if ":=" not in argument:
             raise ModelError(f"argument {argument!r} is not NAME:=VALUE")
     try:
-        config = roslaunch.config.load_config_default(
-            [(str(path), list(arguments))], None, verbose=False, assign_machines=False
-        )
+        config = roslaunch.config.ROSLaunchConfig()  # without what a roscore has: that runs two programs
+        loader = roslaunch.xmlloader.XmlLoader()
+        loader.ignore_unset_args = False
+        loader.load(str(path), config, argv=list(arguments), verbose=False)
     except (roslaunch.core.RLException, roslaunch.xmlloader.XmlParseException, rospkg.ResourceNotFound) as error:
         raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(error).split())}") from error
     except Exception as error:  # whatever `$(eval ...)`, an encoding or the file's size makes of it
