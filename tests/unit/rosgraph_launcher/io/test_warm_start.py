@@ -73,7 +73,7 @@ STATEMENTS = (
     "NUMBER: int = 3",
     "def function(x, *, y=2):\n    return x",
     "class Thing(dict):\n    name = 'thing'\n    def method(self):\n        raise ValueError",
-    "import os; os.environ['PYTHONTZPATH'] = '/tmp/zone_{0}'",
+    "import os; os.environ['PYTHONTZPATH'] = '/zones/{0}'",
     "import os; os.environ['ROS_NAMESPACE'] = 'space_{0}'",
     "import os, sys; sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), 'more'))",
     "import sys; sys.argv.append('a:=b_{0}')",
@@ -129,7 +129,7 @@ class Workspace:
         world, record, log = (self.work / name for name in ("world", "record", "log"))
         for path in (record, log):
             path.write_text("")
-        environment = {**os.environ, MARK: str(self.work), "ROS_NAMESPACE": "/ns", "PYTHONTZPATH": "/tmp/cold"}
+        environment = {**os.environ, MARK: str(self.work), "ROS_NAMESPACE": "/ns", "PYTHONTZPATH": "/zones/cold"}
         command = Command((str(self.script), *arguments), str(self.work), environment, str(log))
         world.write_text("before" if prepared else "after")
         if prepared:
@@ -183,7 +183,7 @@ def test_generated_script_sees_the_same_cold_and_prepared(tmp_path_factory, data
     [
         "import rospy\nfrom own_0 import VALUE",
         "import os\nos.environ['ROS_NAMESPACE'] = 'changed'\nimport rospy",
-        "import os\nos.environ['PYTHONTZPATH'] = '/tmp/changed'\nimport zoneinfo",
+        "import os\nos.environ['PYTHONTZPATH'] = '/zones/changed'\nimport zoneinfo",
         "import sys\nsys.argv.append('c:=d')\nimport rospy",
         "import rospy\n1/0",
     ],

@@ -6,10 +6,10 @@ published launch files and YAML files load unchanged; `DEFAULT_UPDATE_PERIOD` is
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from node_kit.parameters import ParameterTree
 
 from move_base.parameters.costmaps import blind, plugin, read_costmap
@@ -88,8 +88,8 @@ def _planner(top: ParameterTree, name: str, default: str, known: tuple[str, ...]
 def _read_recovery(top: ParameterTree, local: CostmapParameters) -> tuple[RecoveryBehavior, ...]:
     """Return the behaviours that `recovery_behaviors` lists; the default without it, or if it has mistakes."""
     if not top.has("recovery_behaviors") or _mistake_of_recovery(top):
-        actual = float(np.hypot(*np.array(local.footprint).T).max())
-        radius = top.child("local_costmap").number("circumscribed_radius", actual, low=0.0)
+        of_footprint = max(math.hypot(x, y) for x, y in local.footprint)
+        radius = top.child("local_costmap").number("circumscribed_radius", of_footprint, low=0.0)
         near = top.number("conservative_reset_dist", 3.0, low=0.0)
         rotate = [RecoveryBehavior("rotate_recovery", "rotate")] if top.flag(_ROTATION, True) else []
         conservative = _read_clearing(top, "conservative_reset", near)

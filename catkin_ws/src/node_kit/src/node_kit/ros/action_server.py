@@ -12,7 +12,7 @@ from typing import Any
 
 import rospy
 
-LOOK_PERIOD = 0.01  # s, wall, as in actionlib
+_LOOK_PERIOD = 0.01  # s, wall, as in actionlib
 
 
 class _OneLook(rospy.Duration):
@@ -44,5 +44,5 @@ def wait_for_server(client: Any, patience_s: float) -> bool:
     while not is_connected(client):
         if time.monotonic() >= deadline or rospy.is_shutdown():
             return False
-        time.sleep(LOOK_PERIOD)
+        time.sleep(_LOOK_PERIOD)
     return True

@@ -50,25 +50,10 @@ def _pairs(texts: list[str], between: str, node: str) -> tuple[tuple[str, str], 
 
 def report_message(report: LauncherReport) -> LaunchedFunction:
     """Return the message of a report."""
-    return LaunchedFunction(
-        function=report.function,
-        configuration=report.configuration,
-        change=report.change,
-        state=report.state,
-        nodes=list(report.nodes),
-        dead=list(report.dead),
-        message=report.message,
-    )
+    return LaunchedFunction(**vars(report))
 
 
 def report_from(message: LaunchedFunction) -> LauncherReport:
     """Return the report that a message holds."""
-    return LauncherReport(
-        function=message.function,
-        configuration=message.configuration,
-        change=message.change,
-        state=message.state,
-        nodes=tuple(message.nodes),
-        dead=tuple(message.dead),
-        message=message.message,
-    )
+    content = {field.name: getattr(message, field.name) for field in fields(LauncherReport)}
+    return LauncherReport(**content | {"nodes": tuple(message.nodes), "dead": tuple(message.dead)})

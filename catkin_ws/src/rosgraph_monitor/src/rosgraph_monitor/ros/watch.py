@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_bags import ownership
 from node_kit.io.xml_rpc import CallError
 from node_kit.ros.lifetime import BAD_START, LONGEST_END, Lifetime
-from rich.console import Console
+from rich.console import Console, Group
 from rich.live import Live
 from ros_model.graph.snapshot import GraphSnapshot
 from ros_model.io.master import MasterClient
@@ -55,32 +55,23 @@ def command(once: float | None) -> None:
             overview.take(own, time.monotonic())
 
     rospy.Subscriber(ownership.TOPIC, DiagnosticArray, take, queue_size=100)
+
+    def tables(graph: GraphSnapshot) -> Group:
+        with lock:
+            return overview.render(*of_robot(graph.nodes, graph.parameters, robot), time.monotonic())
+
     console = Console()
     try:
         if once is not None:
             time.sleep(once)
-            with lock:
-                console.print(overview.render(*of_robot(graph.nodes, graph.parameters, robot), time.monotonic()))
-        else:
-            _show(console, client, graph, robot, overview, lock)
+            console.print(tables(graph))
+            return
+        with Live(console=console, screen=console.is_terminal, auto_refresh=False) as live:
+            while True:
+                live.update(tables(graph), refresh=True)
+                time.sleep(_REFRESH)
+                graph = client.snapshot()
     except KeyboardInterrupt:
         return
     except CallError as error:
         life.say(str(error))
-
-
-def _show(
-    console: Console,
-    client: MasterClient,
-    graph: GraphSnapshot,
-    robot: str,
-    overview: Overview,
-    lock: threading.Lock,
-) -> None:
-    with Live(console=console, screen=console.is_terminal, auto_refresh=False) as live:
-        while True:
-            with lock:
-                tables = overview.render(*of_robot(graph.nodes, graph.parameters, robot), time.monotonic())
-            live.update(tables, refresh=True)
-            time.sleep(_REFRESH)
-            graph = client.snapshot()
