@@ -2,16 +2,20 @@
 """Requests that cross each other or are taken back, at any moment."""
 
 import random
+import threading
 import time
+from unittest import mock
 
 import actionlib
 import rospy
 import rostest
+from actionlib.action_client import GoalManager
 from actionlib_msgs.msg import GoalID, GoalStatus
 from helpers.cases import case
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import CONFIGURATIONS, PairTest, pid_of
 from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
+from rosgraph_manipulator.ros import client
 
 
 class RequestsTest(PairTest):
@@ -66,6 +70,21 @@ class RequestsTest(PairTest):
         self.assertIn("not all of its topics are published", self.text)
         self.assertIn("/cmd_vel is missing", self.text)
         self.wait_for_state("slow")
+
+    def test_answer_that_comes_while_the_command_still_sends_is_taken(self):
+        send = GoalManager.init_goal
+
+        def send_slowly(*arguments):
+            handle = send(*arguments)
+            self.finish(handle)
+            return handle
+
+        answers = []
+        command = threading.Thread(target=lambda: answers.append(client.request("no_such_configuration")), daemon=True)
+        with mock.patch.object(GoalManager, "init_goal", send_slowly):
+            command.start()
+            wait_for(lambda: answers, "the end of the command")
+        self.assertEqual((answers[0].done, answers[0].result), (False, -1))
 
     def test_requests_wait_for_their_turn(self):
         self.restart_with(concurrency="wait")

@@ -6,6 +6,8 @@ import rospy
 from metacontrol_bags import messages
 from metacontrol_bags.decision import Decision
 from metacontrol_msgs import msg
+from node_kit.io.xml_rpc import CallError
+from node_kit.ros import command
 
 from mros1_reasoner.replay.recording import RecordingError
 from mros1_reasoner.ros.messages import fill_decision
@@ -38,9 +40,12 @@ def last_decision(topic: str, wait: float) -> Decision:
         RecordingError: there is no master, or none has come.
     """
     try:
-        rospy.init_node("explain", anonymous=True, disable_signals=True, disable_rosout=True)
+        command.join("explain")
+    except CallError as error:
+        raise RecordingError(f"{error}: start roscore or set ROS_MASTER_URI, or name a bag") from error
+    try:
         return messages.decision(rospy.wait_for_message(topic, msg.Decision, wait), rospy.get_time())
-    except (OSError, rospy.ROSException, rospy.exceptions.ROSInitException) as error:
+    except (OSError, rospy.ROSException) as error:
         name = rospy.resolve_name(topic)
         say = f"no decision on {name} within {wait:g} s: no reasoner runs, or it has decided nothing yet"
         raise RecordingError(f"{say} ({error})") from error

@@ -74,13 +74,17 @@ class Lifetime:
         rospy.on_shutdown(self._on_shutdown)
         return self
 
-    def start(self) -> None:
-        """Become a node, and watch the master from now on."""
+    def start(self, anonymous: bool = False) -> None:
+        """Become a node, and watch the master from now on.
+
+        Args:
+            anonymous: whether the node's name gets an addition that makes it unique.
+        """
         try:
             self.watch.start(rosgraph.get_master_uri())
             if not self.watch.confirm():
                 self.end("there is no master", BAD_START)
-            rospy.init_node(self._name, disable_signals=True)
+            rospy.init_node(self._name, anonymous=anonymous, disable_signals=True)
         except (CallError, OSError, rospy.ROSInitException) as error:
             raise _StartError(str(error)) from error
         self._name = rospy.get_name()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,8 @@ from typing import Any
 import actionlib
 import rosgraph
 import rospy
-from actionlib_msgs.msg import GoalStatus
+from actionlib import CommState
+from actionlib_msgs.msg import GoalID, GoalStatus
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
     ChangeFunctionAction,
@@ -18,12 +20,15 @@ from metacontrol_msgs.msg import (
     MvpReconfigurationAction,
     MvpReconfigurationGoal,
 )
+from node_kit.io.xml_rpc import CallError, GoneError
+from node_kit.ros import command
 from node_kit.ros.action_server import wait_for_server
 
 from rosgraph_manipulator.configuration.configurations import DEFAULT_FUNCTION, KEYS
 from rosgraph_manipulator.ros.requests import CHANGE_FUNCTION
 
 FIND_TIMEOUT = 5.0  # s, wall, to find the manipulator
+_LOOK_PERIOD = 0.1  # s, wall, after which a shutdown is seen
 NODE = "rosgraph_manipulator"
 
 
@@ -47,10 +52,17 @@ class Answer:
 
 
 def join(name: str) -> bool:
-    """Become an anonymous node; return False where there is no master."""
-    if not rosgraph.is_master_online():
+    """Become an anonymous node; return False where there is no master.
+
+    Raises:
+        ClientError: the master does not answer.
+    """
+    try:
+        command.join(name)
+    except GoneError:
         return False
-    rospy.init_node(name, anonymous=True, disable_signals=True)
+    except CallError as error:
+        raise ClientError(f"{error}: start roscore or set ROS_MASTER_URI") from error
     return True
 
 
@@ -58,7 +70,7 @@ def join_or_refuse(name: str) -> None:
     """Become an anonymous node.
 
     Raises:
-        ClientError: there is no master.
+        ClientError: there is no master, or it does not answer.
     """
     if not join(name):
         raise ClientError(f"no ROS master at {rosgraph.get_master_uri()}: start roscore or set ROS_MASTER_URI")
@@ -100,21 +112,28 @@ def release(function: str) -> Answer:
 
 
 def _ask(action: str, kind: Any, goal: Any) -> Answer:
-    client = actionlib.SimpleActionClient(action, kind)
+    client = actionlib.ActionClient(action, kind)
     if not wait_for_server(client, FIND_TIMEOUT):
         raise ClientError(f"no manipulator answers at {rospy.resolve_name(action)}: start rosgraph_manipulator")
-    client.send_goal(goal)
+    done = threading.Event()
+    # SimpleActionClient has no handle until the goal is sent, and drops what the server has answered by then.
+    handle = client.send_goal(goal, lambda goal: done.set() if goal.get_comm_state() == CommState.DONE else None)
     try:
-        client.wait_for_result()
+        _wait_for(done)
     except KeyboardInterrupt:
-        client.cancel_goal()
-        client.wait_for_result()
-    result = client.get_result()
+        client.pub_cancel.publish(GoalID(id=handle.comm_state_machine.action_goal.goal_id.id))
+        _wait_for(done)
+    result = handle.get_result()
     return Answer(
-        done=client.get_state() == GoalStatus.SUCCEEDED,
+        done=handle.get_goal_status() == GoalStatus.SUCCEEDED,
         result=result.result if result is not None else None,
-        text=client.get_goal_status_text(),
+        text=handle.get_goal_status_text(),
     )
+
+
+def _wait_for(done: threading.Event) -> None:
+    while not done.wait(_LOOK_PERIOD) and not rospy.is_shutdown():
+        pass
 
 
 def active_configuration() -> ActiveConfiguration | None:

@@ -1,0 +1,78 @@
+"""Commands end with one line, whatever their master does."""
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from xmlrpc.server import SimpleXMLRPCServer
+
+import pytest
+from helpers.waiting import DEADLINE_S
+
+PACKAGES = Path(__file__).resolve().parents[3] / "catkin_ws" / "src"
+COMMANDS = {
+    "explain": ("mros1_reasoner", "explain"),
+    "plan": ("rosgraph_manipulator", "plan", "a", "b"),
+    "request": ("rosgraph_manipulator", "request", "a"),
+    "release": ("rosgraph_manipulator", "release", "f"),
+    "status": ("rosgraph_manipulator", "status"),
+    "snapshot": ("rosgraph_monitor", "snapshot"),
+    "watch": ("rosgraph_monitor", "watch", "--once", "1"),
+}
+NODES = {name: COMMANDS[name] for name in COMMANDS if name not in ("snapshot", "watch")}
+
+
+@contextlib.contextmanager
+def master(answers):
+    """Stand in for a master: it answers so many calls, and accepts all others without an answer. Gives its address."""
+    left, end = [answers], threading.Event()
+
+    class Calls:
+        def _dispatch(self, method, _):
+            if left[0] == 0 or method != "getPid":
+                end.wait()
+            left[0] -= 1
+            return [1, "", os.getpid()]
+
+    with SimpleXMLRPCServer(("localhost", 0), logRequests=False) as server:
+        server.socket.listen(20)
+        server.register_instance(Calls())
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        try:
+            yield f"http://localhost:{server.server_address[1]}"
+        finally:
+            end.set()
+            server.shutdown()
+            thread.join()
+
+
+def ends(commands, uri, folder):
+    """Run commands at the same time; return their exit statuses and what they say on stderr."""
+    own = {"ROS_MASTER_URI": uri, "ROS_LOG_DIR": str(folder), "ROS_HOME": str(folder)}
+    processes = {}
+    with contextlib.ExitStack() as stack:
+        for name, (package, script, *arguments) in commands.items():
+            process = subprocess.Popen(
+                [sys.executable, str(PACKAGES / package / "nodes" / script), *arguments],
+                env={**os.environ, **own},
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            processes[name] = process
+        said = {name: process.communicate(timeout=DEADLINE_S)[1] for name, process in processes.items()}
+        return {name: (process.returncode, said[name]) for name, process in processes.items()}
+
+
+@pytest.mark.parametrize("commands, answers", [(COMMANDS, 0), (NODES, len(NODES))], ids=["never", "at_first"])
+def test_master_that_does_not_answer_is_told_in_one_line(tmp_path, commands, answers):
+    with master(answers) as uri:
+        found = ends(commands, uri, tmp_path)
+    for name, (status, said) in found.items():
+        assert status == 2, (name, said)
+        assert "does not answer" in said and said.count("\n") == 1, (name, said)
