@@ -15,7 +15,10 @@ SOURCES = Path(__file__).parents[2] / "catkin_ws" / "src"
 VENV = Path(sys.executable).parent
 LIMIT_S = 600.0
 SIMULATOR_SERVICES = ["DeleteObstacle", "SetLight", "SpawnObstacle"]
-ROUTE = ("--route", "r1", "--failure-at", "0.4")
+SHORT = "short: {start: [-8, -8, 0.78], goal: [-3, -4.2, 0]}\n"
+ROUTE = ("--routes", "routes.yaml", "--route", "short", "--failure-at", "0.4")
+OTHER_LANGUAGES = "gencpp:genlisp"
+"""Generators of messages whose files no test here looks at; `./mros setup` runs them."""
 
 
 def run(*command: str, environment: dict[str, str], folder: Path) -> subprocess.CompletedProcess[str]:
@@ -34,7 +37,7 @@ def bare_environment(home: Path) -> dict[str, str]:
 def installed(tmp_path_factory) -> tuple[Path, dict[str, str]]:
     """Build and install a copy of all packages, delete the rest; return the prefix and its environment."""
     folder = tmp_path_factory.mktemp("installed")
-    environment = bare_environment(folder)
+    environment = {**bare_environment(folder), "ROS_LANG_DISABLE": OTHER_LANGUAGES}
     shutil.copytree(SOURCES, folder / "src", symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     prefix, build = folder / "prefix", folder / "build"
     configure = (
@@ -89,6 +92,7 @@ def test_services_of_the_simulator_are_installed_as_files_under_both_names(insta
 
 def test_mission_in_lockstep_runs_from_the_prefix(installed, tmp_path):
     _, environment = installed
+    (tmp_path / "routes.yaml").write_text(SHORT)
     done = run(
         *("metacontrol", "run", "--engine", "lockstep", "--quiet", *ROUTE, "--output", "mission"),
         environment=environment,
@@ -96,6 +100,13 @@ def test_mission_in_lockstep_runs_from_the_prefix(installed, tmp_path):
     )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     assert json.loads((tmp_path / "mission" / "summary.json").read_text())["goal_reached"] is True
+
+
+def test_routes_are_found_from_the_prefix(installed, tmp_path):
+    _, environment = installed
+    done = run("metacontrol", "run", "--engine", "lockstep", "--route", "r0", environment=environment, folder=tmp_path)
+    assert done.returncode == 2
+    assert "r1, r2, r3" in done.stderr
 
 
 @pytest.mark.parametrize(
