@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from helpers.rosmodel_command import run  # noqa: F401
 from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.knowledge.model import Direction
+from mros1_reasoner.pellet.owlready import OwlreadyReasoner
 from mros1_reasoner.pellet.process import PelletReasoner
 from reasoner_helpers import application
 
@@ -21,6 +22,13 @@ def pellet():
     reasoner = PelletReasoner()
     yield reasoner
     reasoner.close()
+
+
+@pytest.fixture
+def reference(monkeypatch):
+    """Return the reasoner that starts a JVM for each analysis, which ends before a second stage of compilation pays."""
+    monkeypatch.setenv("JDK_JAVA_OPTIONS", "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC")
+    return OwlreadyReasoner()
 
 
 @pytest.fixture

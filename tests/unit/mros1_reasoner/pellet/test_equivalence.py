@@ -9,7 +9,6 @@ from mros1_reasoner.knowledge.model import Facts
 from mros1_reasoner.knowledge.reasoner import Assertion
 from mros1_reasoner.knowledge.triples import assertion_triple, parse_ntriples
 from mros1_reasoner.pellet.equivalence import EquivalentIndividuals
-from mros1_reasoner.pellet.owlready import OwlreadyReasoner
 from ontology_text import APP, OWL, assertion, typed
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
@@ -124,11 +123,10 @@ def test_pellet_gets_every_statement_but_those_that_name_somebody_left_out(text,
     assert handed_over - notes == {triple for triple in triples if left_out.isdisjoint(triple)} - notes
 
 
-def test_inferences_are_those_of_the_whole_ontology_whichever_design_runs(load, pellet):
+def test_inferences_are_those_of_the_whole_ontology_whichever_design_runs(load, pellet, reference):
     designs = {f"d{i}": ({}, [["laser"], ["camera"], ["laser", "base"]][i % 3]) for i in range(12)}
     knowledge_base = load(application(designs))
     pellet.load(knowledge_base.ontology)
-    reference = OwlreadyReasoner()
     reference.load(knowledge_base.ontology)
     for design in ("d0", "d11"):
         facts = Facts(

@@ -4,7 +4,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Facts, Objective
-from mros1_reasoner.pellet.owlready import OwlreadyReasoner
 from reasoner_helpers import HEAD, value
 
 COMPONENTS = ("laser", "camera", "base")
@@ -75,11 +74,10 @@ def facts(draw, ups, downs, requiring):
 
 @settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(drawn=models())
-def test_child_infers_what_owlready2_infers(load, pellet, drawn):
+def test_child_infers_what_owlready2_infers(load, pellet, reference, drawn):
     text, known = drawn
     knowledge_base = load(text)
     pellet.load(knowledge_base.ontology)
-    reference = OwlreadyReasoner()
     reference.load(knowledge_base.ontology)
     assertions = knowledge_base.assertions(known)
     assert pellet.infer(assertions, v.CONCLUSIONS) == reference.infer(assertions, v.CONCLUSIONS)
