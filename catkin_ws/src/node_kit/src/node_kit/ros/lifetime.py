@@ -20,6 +20,7 @@ import rospy
 from node_kit.io.master_watch import MasterWatch
 from node_kit.io.xml_rpc import CallError
 from node_kit.master import View
+from node_kit.ros.quick_start import quick_start
 
 BAD_START = 2
 """Exit status of a start that failed. The loss of the master ends a node with 0: it has done all it could."""
@@ -84,7 +85,8 @@ class Lifetime:
             self.watch.start(rosgraph.get_master_uri())
             if not self.watch.confirm():
                 self.end("there is no master", BAD_START)
-            rospy.init_node(self._name, anonymous=anonymous, disable_signals=True)
+            with quick_start():
+                rospy.init_node(self._name, anonymous=anonymous, disable_signals=True)
         except (CallError, OSError, rospy.ROSInitException) as error:
             raise _StartError(str(error)) from error
         self._name = rospy.get_name()
