@@ -6,10 +6,14 @@ import os
 from collections.abc import Callable
 
 import rospkg
+from catkin_pkg.package import InvalidPackage
 
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io.command_lines import command_line, process_environment
 from rosgraph_launcher.io.processes import MARK, Command
+
+EXPORT = "rosgraph_launcher"
+"""The element in a package's <export> that tells the launcher about its nodes."""
 
 
 class NodeCommands:
@@ -41,7 +45,8 @@ class NodeCommands:
             log = f"{folder}/{file_name}-stdout.log" if node.output != "screen" else None
         cwd = {"node": os.path.dirname(words[prefixed]), "cwd": os.getcwd()}.get(node.cwd or "", rospkg.get_ros_home())
         environment = process_environment(node, {**os.environ, MARK: self._mark})
-        return Command(tuple(words), cwd, environment, log, prefixed=bool(prefixed))
+        safe = safe_imports(node.package)
+        return Command(tuple(words), cwd, environment, log, prefixed=bool(prefixed), safe_imports=safe)
 
     def _log_folder(self) -> str:
         folder = os.path.join(rospkg.get_log_dir(), self._run_id)
@@ -51,3 +56,12 @@ class NodeCommands:
             self._log(f"nodes run without logs: {folder}: {error.strerror or error}")
             return ""
         return folder
+
+
+def safe_imports(package: str) -> tuple[str, ...]:
+    """Return the modules that a package declares to be safe to import before its node begins, by their first names."""
+    try:
+        declared = rospkg.RosPack.get_instance().get_manifest(package).get_export(EXPORT, "safe_imports")
+    except (rospkg.InvalidManifest, rospkg.ResourceNotFound, InvalidPackage):
+        return ()
+    return tuple(name for name in " ".join(declared).split() if name.isidentifier())

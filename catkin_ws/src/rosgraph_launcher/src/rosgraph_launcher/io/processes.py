@@ -56,6 +56,7 @@ class Command:
         environment: its whole environment, with the mark.
         log: file to which its standard output is appended; None: it shares the owner's standard output.
         prefixed: whether the words begin with a launch-prefix.
+        safe_imports: modules that its package declares to be safe to import in advance, by their first names.
     """
 
     words: tuple[str, ...]
@@ -63,6 +64,7 @@ class Command:
     environment: Mapping[str, str]
     log: str | None = None
     prefixed: bool = False
+    safe_imports: tuple[str, ...] = ()
 
     @property
     def is_python(self) -> bool:
@@ -169,7 +171,7 @@ def prepare(command: Command) -> Process | None:
         python_path = command.environment.get("PYTHONPATH")
         environment = {
             **command.environment,
-            SETTING: f"{wait}:1:{'' if python_path is None else f'={python_path}'}",
+            SETTING: f"{wait}:1:{' '.join(command.safe_imports)}:{'' if python_path is None else f'={python_path}'}",
             "PYTHONPATH": os.pathsep.join(filter(None, [WARM_START, python_path])),
         }
         process = _start(command, environment, (wait,))

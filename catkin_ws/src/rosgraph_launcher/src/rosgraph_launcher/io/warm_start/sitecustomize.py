@@ -1,15 +1,16 @@
 """Lets a Python node do imports in advance, and wait until it may begin.
 
 Python imports a module of this name at its start, before it runs a script. The launcher puts this folder in front of
-PYTHONPATH, and sets `MROS_WARM_START` to `DESCRIPTOR:IMPORTS:=PYTHON_PATH`. This module takes both back, does imports
-that the script would do first, and waits for a line on the descriptor. After that, Python runs the script as ever, so
-that nothing in it can tell this start from a cold one. Where the descriptor ends without a line, the process ends.
+PYTHONPATH, and sets `MROS_WARM_START` to `DESCRIPTOR:IMPORTS:SAFE:=PYTHON_PATH`. This module takes both back, does
+imports that the script would do first, and waits for a line on the descriptor. After that, Python runs the script as
+ever, so that nothing in it can tell this start from a cold one. Where the descriptor ends without a line, the process
+ends.
 
 Arguments, environment, folder and output are the node's own from the beginning. What may still differ is the state of
 the world: parameters, files, devices, other nodes. So only modules that read none of it are imported in advance: the
-standard library, those in `KNOWN`, and generated messages. No module of the node's own is executed. It is read, to find
-the imports that it will do. The reading stops at the first statement that might do more than import, define or name
-something, because what follows it may depend on it.
+standard library, those in `KNOWN`, generated messages, and those in SAFE, which the node's package declares to be so.
+No other module of the node's own is executed. It is read, to find the imports that it will do. The reading stops at the
+first statement that might do more than import, define or name something, because what follows it may depend on it.
 
 This module imports nothing that Python has not imported by then: a node may have modules of its own by any name.
 """
@@ -98,8 +99,9 @@ def _library_folders() -> "tuple[tuple[str, ...], tuple[str, ...]]":
 class Modules:
     """Finds modules without executing any, and tells which may be imported in advance."""
 
-    def __init__(self, script_folder: str) -> None:
+    def __init__(self, script_folder: str, safe: "Iterable[str]" = ()) -> None:
         self._own = script_folder
+        self._safe = frozenset(safe)
         self._standard, self._installed = _library_folders()
         self._generated: dict[str, bool] = {}
 
@@ -130,6 +132,8 @@ class Modules:
         if self.is_standard(spec):
             return True
         package = name.partition(".")[0]
+        if package in self._safe:
+            return True
         if self._is_own(spec):
             return False
         return package in KNOWN or self._is_generated(package, spec)
@@ -385,13 +389,13 @@ def imports_in_advance(script: str, modules: Modules) -> "list[tuple[str, tuple[
 # -- the wait ---------------------------------------------------------------------------------------------------------
 
 
-def import_in_advance(script: str) -> bool:
+def import_in_advance(script: str, safe: "Sequence[str]" = ()) -> bool:
     """Do a script's imports that may be done in advance; return False where this process is spoiled by that."""
     folder = os.path.dirname(os.path.realpath(script))
     first = not getattr(sys.flags, "safe_path", False)
     if first:
         sys.path.insert(0, folder)  # as Python does when it runs the script
-    modules = Modules(folder)
+    modules = Modules(folder, safe)
     guard: Any = Guard(modules)
     path = list(sys.path)
     try:
@@ -401,8 +405,8 @@ def import_in_advance(script: str) -> bool:
             __import__(name, {}, {}, wanted)
     except (_Unknown, Exception):
         return False
-    if sys.path != path:
-        return False
+    if sys.path[-len(path) :] != path or not (safe or len(sys.path) == len(path)):
+        return False  # only relays of catkin, which safe modules may have, put folders in front
     sys.meta_path.remove(guard)
     if first:
         sys.path.remove(folder)
@@ -413,7 +417,7 @@ def wait(setting: str) -> None:
     """Take back the changes of the environment, import in advance, and wait until the script may begin."""
     here = os.path.dirname(__file__)
     changed = os.environ["PYTHONPATH"]
-    descriptor, imports, python_path = setting.split(":", 2)
+    descriptor, imports, safe, python_path = setting.split(":", 3)
     if python_path:
         os.environ["PYTHONPATH"] = python_path[1:]
     else:
@@ -422,10 +426,10 @@ def wait(setting: str) -> None:
         sys.path.remove(here)
     sys.path_importer_cache.pop(here, None)
     script = sys.argv[0]
-    if imports == "1" and not import_in_advance(script):
+    if imports == "1" and not import_in_advance(script, safe.split()):
         # An import has failed half-way, has reached for a module of the node's own, or has changed where modules are
         # found. Begin anew, without imports.
-        os.environ.update({SETTING: f"{descriptor}:0:{python_path}", "PYTHONPATH": changed})
+        os.environ.update({SETTING: f"{descriptor}:0::{python_path}", "PYTHONPATH": changed})
         os.execv(script, sys.argv)  # noqa: S606, the words that this process was started with
     if os.read(int(descriptor), 1) != b"\n":
         os._exit(0)
