@@ -150,8 +150,8 @@ def test_goal_that_a_new_server_lacks_is_sent_again_and_again_until_it_has_it(ke
     keeper.server_changes(True)
     keeper.server_changes(False)
     assert keeper.to_send(10.0).goal_id.id == "a"
-    assert keeper.to_send(10.4) is None  # the server has not had the time to tell that it has it
-    assert keeper.to_send(10.6).goal_id.id == "a"
+    assert keeper.to_send(10.05) is None  # the server has not had the time to tell that it has it
+    assert keeper.to_send(10.15).goal_id.id == "a"
     assert not keeper.is_delivered
     keeper.on_status(status("a", GoalStatus.ACTIVE))
     assert keeper.to_send(20.0) is None

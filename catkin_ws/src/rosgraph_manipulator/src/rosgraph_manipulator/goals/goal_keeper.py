@@ -18,7 +18,7 @@ TERMINAL = frozenset(
 # What a server says of a goal that it drops because it is being shut down.
 DROPPED_BY_SHUTDOWN = frozenset({GoalStatus.PREEMPTED, GoalStatus.ABORTED, GoalStatus.RECALLED})
 REMEMBERED = 1000  # ids of goals that have ended: many more than can be told twice
-SEND_PERIOD = 0.5  # s, after which a goal is sent again: a server tells every 0.2 s which goals it has
+SEND_PERIOD = 0.1  # s, after which a goal is sent again: the first one is mostly lost, before the server listens
 CONFIRMATIONS = 3  # statuses with a goal at work, every 0.2 s: more than a server needs to heed a cancellation
 
 
