@@ -70,19 +70,16 @@ class MoveBaseNode:
         self._goals = GoalServer(
             self._frames, parameters.global_costmap.global_frame, self._begin_goal, self._cancel_goal, resumed
         )
+        rospy.on_shutdown(self._stop_base)
+        self._subscribe()
+        self._goals.start()
         self._path_display = PathDisplay(parameters)
         self._displays = [
             CostmapDisplay("global_costmap", parameters.global_costmap),
             CostmapDisplay("local_costmap", parameters.local_costmap),
         ]
-        rospy.on_shutdown(self._stop_base)
-        self._subscribe()
-        self._goals.start()
-        for name in ("~make_plan", f"~{parameters.global_planner}/make_plan"):
-            rospy.Service(name, GetPlan, self._on_make_plan)
-        rospy.Service("~clear_costmaps", Empty, self._on_clear_costmaps)
-        # Beside the control loop: the first command must not wait for a score of registrations.
-        threading.Thread(target=self._offer_reconfiguration, daemon=True).start()
+        # Beside the control loop: the first command must not wait for scores of registrations.
+        threading.Thread(target=self._offer_the_rest, daemon=True).start()
 
     def run(self) -> None:
         """Step until shutdown."""
@@ -124,13 +121,17 @@ class MoveBaseNode:
         ):
             display.publish(now, snapshot, self._frames)
 
-    # -- parameters that change on the way -------------------------------------------------------------------------
-
-    def _offer_reconfiguration(self) -> None:
-        from move_base.ros.reconfigure import offer  # not needed for the first command
+    def _offer_the_rest(self) -> None:
+        """Offer what the first command does not need: services and dynamic_reconfigure."""
+        from move_base.ros.reconfigure import offer
 
         with contextlib.suppress(rospy.ROSException, OSError):  # the node ends while it starts
+            for name in ("~make_plan", f"~{self._parameters.global_planner}/make_plan"):
+                rospy.Service(name, GetPlan, self._on_make_plan)
+            rospy.Service("~clear_costmaps", Empty, self._on_clear_costmaps)
             offer(servers(self._parameters), self._present_values, self._reconfigure)
+
+    # -- parameters that change on the way -------------------------------------------------------------------------
 
     def _present_values(self, server: ServerDescription, names: Iterable[str]) -> dict[str, Any]:
         with self._tree_lock:
