@@ -29,6 +29,7 @@ from rosgraph_manipulator.ros.launcher_client import LauncherClient
 from rosgraph_manipulator.ros.running_system import RunningSystem
 
 POLL_PERIOD = 0.01  # s, wall
+LOOK_PERIOD = 0.03  # s, wall, where a look calls the master and nodes: new nodes need the processor, and the master
 STATE_TIMEOUT = 2.0  # s, wall, for the launcher's state to follow its answer
 DELIVERY_TIMEOUT = 5.0  # s, wall, for the new server to have the pending goal
 COMMAND_TIMEOUT = 5.0  # s, wall, for a `rosparam` call of a launch file
@@ -131,7 +132,7 @@ class RosExecutor:
         awaited = self._progress.awaited(goal is not None and goal.is_between_servers)
         for node in awaited.nodes:
             what = f"node {node} is not up"
-            self._wait(lambda: self._is_up(node), what, lambda: self._conflict(node))  # noqa: B023
+            self._wait(lambda: self._is_up(node), what, lambda: self._conflict(node), LOOK_PERIOD)  # noqa: B023
         topics = {rospy.resolve_name(topic) for topic in awaited.topics}
         if topics:
             missing = set(topics)
@@ -142,7 +143,7 @@ class RosExecutor:
                 return not missing
 
             what = "not all of its topics are published"
-            self._wait(all_are_published, what, lambda: f", {', '.join(sorted(missing))} is missing")
+            self._wait(all_are_published, what, lambda: f", {', '.join(sorted(missing))} is missing", LOOK_PERIOD)
         if goal is not None and awaited.server:
             self._wait(lambda: goal.server_is_new, "its action server is not up")
             goal.server_started()
@@ -334,7 +335,9 @@ class RosExecutor:
         conflict = look_up(node).conflict(self._launcher.mark)
         return conflict and f" ({conflict})"
 
-    def _wait(self, condition: Callable[[], bool], what: str, why: Callable[[], str] = str) -> None:
+    def _wait(
+        self, condition: Callable[[], bool], what: str, why: Callable[[], str] = str, period: float = POLL_PERIOD
+    ) -> None:
         deadline = self._progress.deadline(self._ready_timeout)
         while True:
             self._raise_if_broken()
@@ -345,7 +348,7 @@ class RosExecutor:
                 raise DeploymentError(str(error)) from error
             if time.monotonic() > deadline:
                 raise DeploymentError(f"{what} within {self._ready_timeout:g} s{why()}; see the nodes' logs")
-            time.sleep(POLL_PERIOD)
+            time.sleep(period)
 
     def _raise_if_broken(self) -> None:
         self.check()

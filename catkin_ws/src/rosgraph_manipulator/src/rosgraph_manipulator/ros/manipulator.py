@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import threading
 import time
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any
 
 import rospy
@@ -209,7 +211,8 @@ class Manipulator:
     def _plans(self, wanted: Configuration, restart: tuple[str, ...]) -> list[Plan]:
         system = self._executor.system
         found = system.compare(wanted, restart)
-        plans, problems = plan_change(found.running, found.wanted, system.nodes, self._tactics, found.shared)
+        nodes = SimpleNamespace(adjustable=functools.cache(system.nodes.adjustable))  # several tactics ask the same
+        plans, problems = plan_change(found.running, found.wanted, nodes, self._tactics, found.shared)
         for problem in problems:
             rospy.logwarn("%s", problem)
         return plans

@@ -160,12 +160,11 @@ class RunningSystem:
             rospy.logwarn("parameters are not compared with what the nodes have: %s", error)
             return system
         drifted = {name: value for name, value in live.items() if not same_value(value, described[name])}
-        values = {
-            name: value
-            for node in system.nodes
-            for name, value in drifted.items()
-            if name.startswith(f"{node}/") and name.removeprefix(f"{node}/") in self.nodes.adjustable(node)
-        }
+        values = {}
+        for node in system.nodes:
+            own = {name: value for name, value in drifted.items() if name.startswith(f"{node}/")}
+            adjustable = self.nodes.adjustable(node) if own else {}
+            values.update({name: value for name, value in own.items() if name.removeprefix(f"{node}/") in adjustable})
         if not values:
             return system
         return self._progress.running_system(function, self._deployed[function][1].system, values)
