@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import math
 import os
+import re
 import statistics
 import tempfile
 import threading
@@ -29,6 +30,7 @@ DEADLINE_S = 60.0
 PAPER_S = 4.3  # mean time of a reconfiguration in the paper
 PAPER = "published system (paper, another machine)"
 GOALS = (5.4, 6.0), (-8.0, -8.0)  # of a long way to and fro
+SERVER, STATUS = "/move_base", "/move_base/status"
 NEAR_M = 5.0  # so near to its goal a robot is sent to the other one: the goal is not reached meanwhile
 UNDER_WAY_M = 1.0  # so much nearer to its goal than at first a robot no longer turns round
 
@@ -42,6 +44,8 @@ class Change:
         result: from the request to the manipulator's result.
         tactic: by which it was made.
         phases: as the manipulator tells them.
+        began: when it was asked for, s since the epoch.
+        parts: consecutive parts of `accepted`, by the master's log; none where the server was not restarted.
         slowest: least speed of the robot from the request to the result, m/s.
     """
 
@@ -50,6 +54,8 @@ class Change:
     tactic: str
     phases: dict[str, float] = field(default_factory=dict)
     slowest: float = 0.0
+    began: float = 0.0
+    parts: dict[str, float] = field(default_factory=dict)
 
 
 class System:
@@ -85,7 +91,7 @@ class System:
         """Have a configuration deployed, and wait until the goal is at work in it and the robot moves."""
         with self._condition:
             server, self._slowest = self._active[1], self._speed
-        began = time.monotonic()
+        began, began_at = time.monotonic(), time.time()
         self._manipulator.send_goal(MvpReconfigurationGoal(name))
         if not self._manipulator.wait_for_result(rospy.Duration(DEADLINE_S)):
             raise RuntimeError(f"no result for {name} within {DEADLINE_S:g} s")
@@ -107,7 +113,7 @@ class System:
                 raise RuntimeError(f"{name}: the navigation goal was lost")
             accepted = self._active[2] if replaced else finished
             phases = {phase.name: phase.duration for phase in self._configuration.phases}
-        return Change(accepted - began, finished - began, tactic, phases, slowest)
+        return Change(accepted - began, finished - began, tactic, phases, slowest, began_at)
 
     def drives(self) -> bool:
         """Wait until the robot drives towards its goal: turning round, it stands for a moment whatever is changed."""
@@ -155,27 +161,54 @@ class System:
         self._position = position.x, position.y
 
 
+_PARTS = (
+    ("end", "-", STATUS),  # the old server has said goodbye
+    ("imports", "+", "/rosout"),  # the new one registers: rospy's first topic
+    ("construction", "+", STATUS),
+)
+_REGISTRATION = re.compile(r"(\d+-\d+-\d+ \d+:\d+:\d+),(\d+): ([+-])PUB \[(\S+)\] (\S+) ")
+
+
+def _parts(changes: list[Change], logs: Path) -> None:
+    """Fill in the parts of changes that have restarted the navigation server, by the master's log."""
+    events = [
+        (time.mktime(time.strptime(second, "%Y-%m-%d %H:%M:%S")) + int(ms) / 1000.0, sign, topic)
+        for path in logs.glob("*/master.log")
+        for second, ms, sign, topic, node in _REGISTRATION.findall(path.read_text())
+        if node == SERVER
+    ]
+    for change in changes:
+        now = change.began
+        later = [event for event in events if now <= event[0] < now + DEADLINE_S]
+        for name, sign, topic in _PARTS:
+            found = [stamp for stamp, *what in later if what == [sign, topic]]
+            if not found:
+                break
+            change.parts[name], now = found[0] - now, found[0]
+        else:
+            change.parts["connection"] = change.began + change.accepted - now
+
+
 @contextlib.contextmanager
-def running_system(profile: str, parameters: dict[str, Any] | None = None) -> Iterator[System]:
-    """Start D2 in a configuration, with parameters set before; end it."""
+def running_system(logs: Path, profile: str, parameters: dict[str, Any] | None = None) -> Iterator[System]:
+    """Start D2 in a configuration, with parameters set before and logs in a folder; end it."""
     port = free_port()
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
-    with tempfile.TemporaryDirectory() as folder:
-        logs = Path(folder)
-        tree = ProcessTree({"ROS_MASTER_URI": os.environ["ROS_MASTER_URI"], "ROS_LOG_DIR": folder, "ROS_HOME": folder})
-        try:
-            tree.start(["roscore", "-p", str(port)], logs / "master.log")
-            if not wait_until(_master_answers, DEADLINE_S):
-                raise RuntimeError("the master did not come up")
-            for name, value in (parameters or {}).items():
-                rospy.get_master().target.setParam("/bench", name, value)
-            command = ["roslaunch", "--wait", "metacontrol_sim", "MVP_metacontrol_world.launch"]
-            tree.start([*command, f"nav_profile:={profile}"], logs / "console.log")
-            rospy.init_node("bench_changes", disable_signals=True, anonymous=True)
-            yield System()
-        finally:
-            rospy.signal_shutdown("measured")
-            tree.close()
+    folder = str(logs)
+    tree = ProcessTree({"ROS_MASTER_URI": os.environ["ROS_MASTER_URI"], "ROS_LOG_DIR": folder, "ROS_HOME": folder})
+    try:
+        tree.start(["roscore", "-p", str(port)], logs / "master.log")
+        if not wait_until(_master_answers, DEADLINE_S):
+            raise RuntimeError("the master did not come up")
+        for name, value in (parameters or {}).items():
+            rospy.get_master().target.setParam("/bench", name, value)
+        command = ["roslaunch", "--wait", "metacontrol_sim", "MVP_metacontrol_world.launch"]
+        tree.start([*command, f"nav_profile:={profile}"], logs / "console.log")
+        rospy.init_node("bench_changes", disable_signals=True, anonymous=True)
+        yield System()
+    finally:
+        rospy.signal_shutdown("measured")
+        tree.close()
 
 
 def _master_answers() -> bool:
@@ -197,14 +230,16 @@ def changes(
         pause: from the robot driving again to the next change, s: failures do not come in salvos.
     """
     found = []
-    with running_system(configurations[0], parameters) as system:
-        for number in range(count):
-            if system.distance() < NEAR_M:
-                system.set_off()
-            if not system.drives():
-                raise RuntimeError("the robot does not drive")
-            time.sleep(pause)
-            found.append(system.change(configurations[(number + 1) % 2]))
+    with tempfile.TemporaryDirectory() as folder:
+        with running_system(Path(folder), configurations[0], parameters) as system:
+            for number in range(count):
+                if system.distance() < NEAR_M:
+                    system.set_off()
+                if not system.drives():
+                    raise RuntimeError("the robot does not drive")
+                time.sleep(pause)
+                found.append(system.change(configurations[(number + 1) % 2]))
+        _parts(found, Path(folder))
     return found
 
 
