@@ -8,6 +8,7 @@ from support.changes import PAPER, PAPER_S, changes, entries
 
 _CHANGES = 30
 _CONFIGURATIONS = ("f2_v1_r3", "f2_v1_r3_k")  # laser and camera: no running node takes that as a parameter
+_PAUSE_S = 3.0  # 2 s after a change the manipulator asks the new node what it takes by dynamic_reconfigure
 
 
 def run() -> list[dict[str, Any]]:
@@ -22,7 +23,7 @@ def measure(name: str, standby: bool) -> list[dict[str, Any]]:
     the new one begins to register (its imports are done), its action registers (it is constructed), and the goal is at
     work. All others are the manipulator's phases.
     """
-    found = changes(_CONFIGURATIONS, _CHANGES, {"/rosgraph_launcher/standby": standby}, pause=2.0)
+    found = changes(_CONFIGURATIONS, _CHANGES, {"/rosgraph_launcher/standby": standby}, _PAUSE_S)
     if {change.tactic for change in found} != {"restart"}:
         raise RuntimeError(f"not all changes were made by restart: {[change.tactic for change in found]}")
     times = [change.accepted for change in found]
