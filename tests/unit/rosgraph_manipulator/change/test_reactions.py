@@ -103,3 +103,29 @@ def test_failed_configuration_is_not_restored_but_a_lost_one_is():
     assert deployments.fallback(B) == A
     deployments.failed()
     assert deployments.fallback(B) is None
+
+
+def test_what_a_lost_host_has_stopped_is_deployed_again_when_it_is_back():
+    deployments = deployed(A)
+    assert deployments.react(report(A, FAILED), 1.0) is Reaction.GIVE_UP
+    deployments.failed(waits=True)
+    assert deployments.react(report(A, FAILED), 2.0) is Reaction.NONE
+    for back in (report(None, STABLE), report(A, STABLE)):
+        assert deployments.react(back, 3.0) is Reaction.RETURN
+    assert deployments.waiting == A
+
+
+@pytest.mark.parametrize(
+    "meanwhile",
+    [
+        lambda deployments: deployments.finished(Outcome(Result.OK, B, ""), 2.0),
+        lambda deployments: deployments.released(),
+        lambda deployments: deployments.failed(),
+    ],
+)
+def test_what_was_decided_meanwhile_counts_more_than_the_return_of_a_host(meanwhile):
+    deployments = deployed(A)
+    deployments.failed(waits=True)
+    meanwhile(deployments)
+    assert deployments.waiting is None
+    assert deployments.react(report(B, STABLE), 3.0) is Reaction.NONE

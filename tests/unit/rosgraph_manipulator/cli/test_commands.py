@@ -40,6 +40,15 @@ def test_plan_prints_each_way(run, launch_files):
     assert output == "restart\n  1. stop /a; start /b; store the configuration's parameters\n"
 
 
+def test_plan_names_the_hosts_that_need_a_launcher(run, launch_files, tmp_path):
+    path = tmp_path / "far.launch"
+    node = NODE.format("n").replace("/>", ' machine="arm"/>')
+    path.write_text(f'<launch><machine name="arm" address="192.0.2.7"/>{node}</launch>')
+    code, output, _ = run(plan, "", str(path))
+    assert code == 0
+    assert "node /n is for host 192.0.2.7: a rosgraph_launcher must run there" in output.splitlines()
+
+
 @pytest.mark.parametrize("remapping", ["__ns:=/robot", "__name:=x", "a:=b", "_rate:=1"])
 def test_remapping_arguments_are_left_to_ros(run, launch_files, remapping):
     assert run(plan, remapping, *launch_files)[0] == 0

@@ -10,7 +10,9 @@ NODES = frozenset({"/rosout"})
 """Nodes that come with the master."""
 
 _METACONTROL_PACKAGES = frozenset({"mros1_reasoner", "rosgraph_launcher", "rosgraph_manipulator", "rosgraph_monitor"})
-_METACONTROL_NODES = frozenset({"reasoner", "rosgraph_launcher", "rosgraph_manipulator", "rosgraph_monitor"})
+_METACONTROL_NODES = frozenset({"reasoner", "rosgraph_manipulator", "rosgraph_monitor"})
+_LAUNCHER = "rosgraph_launcher"
+"""How the names of launchers begin, of which each host has one."""
 _METACONTROL_PARAMETERS = frozenset(
     {"configs", "goal_msg_type", "kill_nodes", "reconfiguration_action_name", "save_action"}
 )
@@ -58,7 +60,8 @@ def is_metacontrol(node: str, package: str | None) -> bool:
     """Return whether a node is one of the meta-controller's, by its package, or by its name if that is not known."""
     if package is not None:
         return package in _METACONTROL_PACKAGES
-    return node.rpartition("/")[2] in _METACONTROL_NODES
+    name = node.rpartition("/")[2]
+    return name in _METACONTROL_NODES or name.startswith(_LAUNCHER)
 
 
 def is_metacontrol_parameter(name: str) -> bool:

@@ -17,6 +17,7 @@ from rosgraph_launcher.io.node_commands import NodeCommands
 from rosgraph_launcher.io.node_processes import NodeProcesses
 from rosgraph_launcher.io.ownership import look_up
 from rosgraph_launcher.io.processes import Command, Process, StartError
+from rosgraph_launcher.io.scripts import script_is_at_work
 from rosgraph_launcher.launching.managed_nodes import Ending, ManagedNodes, Verdict
 from rosgraph_launcher.launching.nodelets import unloading
 from rosgraph_launcher.launching.options import LauncherOptions
@@ -65,6 +66,16 @@ class Launcher:
     def next_restart(self) -> float | None:
         """Return the time (time.monotonic()) of the next restart; None where no node waits for one."""
         return self._nodes.next_restart()
+
+    def is_up(self, name: str) -> bool:
+        """Tell, in any thread, whether a node of the launcher is up."""
+        node = self._nodes.find(name)
+        mark = self._options.mark
+        return node is not None and (look_up(name).is_up(mark) or script_is_at_work(node, mark))
+
+    def conflict(self, name: str) -> str:
+        """Return, in any thread, who has taken the name of a node; empty where nobody has."""
+        return look_up(name).conflict(self._options.mark)
 
     # -- changes --------------------------------------------------------------------------------------------------
 

@@ -38,11 +38,15 @@ class NodeApi:
     def answer(cls, name: str) -> tuple[str, int] | None:
         """Return a node's address and the process id that it says; None: it is not registered or does not answer."""
         uri = cls.address(name)
-        if uri is None:
-            return None
+        pid = cls.pid(uri) if uri else None
+        return None if uri is None or pid is None else (uri, pid)
+
+    @classmethod
+    def pid(cls, uri: str) -> int | None:
+        """Return the process id that the node at an address says; None: it does not answer."""
         try:
             with Client(uri, CALLER, CALL_TIMEOUT, peer="node") as node:
-                return uri, int(node.call("getPid"))
+                return int(node.call("getPid"))
         except (CallError, TypeError, ValueError):
             return None
 

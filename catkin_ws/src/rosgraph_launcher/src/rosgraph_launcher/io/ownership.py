@@ -22,7 +22,7 @@ def look_up(node: str) -> Answer:
         return Answer()
     address, pid = found
     parts = urlsplit(address)
-    if not _is_this_host(parts.hostname or ""):
+    if not is_this_host(parts.hostname or ""):
         return Answer(answers=True)
     try:
         process = psutil.Process(pid)
@@ -38,7 +38,8 @@ def launcher_mark(name: str) -> str:
 
 
 @functools.lru_cache(maxsize=256)
-def _is_this_host(host: str) -> bool:
+def is_this_host(host: str) -> bool:
+    """Tell whether a name or an address is one of this host."""
     try:
         addresses = {str(entry[4][0]) for entry in socket.getaddrinfo(host, None)}
     except OSError:

@@ -119,6 +119,11 @@ class ManagedNodes:
         """Return how a node is started."""
         return self._nodes[name].description
 
+    def find(self, name: str) -> NodeDescription | None:
+        """Return how a node is started; None: the launcher has no such node."""
+        node = self._nodes.get(name)
+        return node.description if node else None
+
     def reports(self) -> tuple[LauncherReport, ...]:
         """Return what the launcher tells of each function."""
         return tuple(self.report(name) for name in self._functions)

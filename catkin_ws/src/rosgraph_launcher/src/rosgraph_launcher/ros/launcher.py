@@ -11,7 +11,14 @@ import time
 
 import rospy
 from metacontrol_msgs.msg import LaunchedFunctions, Phase
-from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, ChangeNodesResponse
+from metacontrol_msgs.srv import (
+    ChangeNodes,
+    ChangeNodesRequest,
+    ChangeNodesResponse,
+    CheckNodes,
+    CheckNodesRequest,
+    CheckNodesResponse,
+)
 from node_kit.io.inbox import ClosedError, Inbox
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import LONGEST_END, Lifetime
@@ -19,10 +26,14 @@ from node_kit.ros.lifetime import LONGEST_END, Lifetime
 from rosgraph_launcher.io.launcher import Launcher, LauncherError
 from rosgraph_launcher.io.ownership import launcher_mark
 from rosgraph_launcher.io.processes import StartError, check_host
+from rosgraph_launcher.io.this_host import addresses
 from rosgraph_launcher.launching.options import LauncherOptions
 from rosgraph_launcher.launching.report import LauncherReport
 from rosgraph_launcher.launching.restarts import RestartPolicy
 from rosgraph_launcher.ros.node_messages import from_message, report_message
+
+TOPIC = "rosgraph_launcher/functions"
+"""The launchers of all hosts share it, whatever their names are, so that all are found there."""
 
 LOOK_PERIOD = 0.2  # s, wall, after which the main thread sees at the latest that the node must end
 
@@ -40,9 +51,12 @@ class LauncherNode:
         life.consequence = "its nodes are stopped, and it ends"
         # Twice: first for a change that is under way, then for the stop of all nodes.
         self._longest_end = LONGEST_END + 2 * (options.shutdown_timeout + options.sigint_timeout)
-        self._functions = rospy.Publisher("~functions", LaunchedFunctions, queue_size=10, latch=True)
+        self._functions = rospy.Publisher(TOPIC, LaunchedFunctions, queue_size=10, latch=True)
         self._launcher = Launcher(options, self._publish, rospy.logwarn)
-        self._service = rospy.Service("~change", ChangeNodes, self._on_change)
+        self._services = (
+            rospy.Service("~change", ChangeNodes, self._on_change),
+            rospy.Service("~check", CheckNodes, self._on_check),
+        )
 
     def end(self, reason: str) -> None:
         """Tell the main thread to stop the nodes and then to end this node."""
@@ -91,6 +105,11 @@ class LauncherNode:
         except ClosedError as error:
             raise rospy.ServiceException(str(error)) from error
 
+    def _on_check(self, request: CheckNodesRequest) -> CheckNodesResponse:
+        up = [self._launcher.is_up(name) for name in request.nodes]
+        conflicts = ["" if is_up else self._launcher.conflict(name) for name, is_up in zip(request.nodes, up)]
+        return CheckNodesResponse(up=up, conflicts=conflicts)
+
     def _change(self, request: ChangeNodesRequest) -> ChangeNodesResponse:
         try:
             nodes = {node.name: from_message(node) for node in request.nodes}
@@ -134,4 +153,6 @@ def main() -> None:
     with Lifetime("rosgraph_launcher", ParameterError, StartError) as life:
         check_host()
         life.start()
-        LauncherNode(read_options(), life).spin()
+        options = read_options()
+        rospy.set_param("~addresses", addresses(str(rospy.get_param("~host", ""))))
+        LauncherNode(options, life).spin()

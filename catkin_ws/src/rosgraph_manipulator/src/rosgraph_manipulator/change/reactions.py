@@ -22,6 +22,7 @@ class Reaction(enum.Enum):
     BEGIN_RECOVERY = "begin recovery"  # a node died, and the launcher starts it again
     END_RECOVERY = "end recovery"  # the launcher has started all dead nodes again
     GIVE_UP = "give up"  # the launcher has stopped the configuration
+    RETURN = "return"  # the hosts are back whose loss has stopped the configuration: deploy it again
 
 
 class DeployedConfigurations:
@@ -37,8 +38,14 @@ class DeployedConfigurations:
         self._running: Configuration | None = None
         self._last_good: Configuration | None = None
         self._previous: Configuration | None = None  # what the running one has replaced
+        self._waiting: Configuration | None = None
         self._recovering = False
         self._deployed_at = float("-inf")
+
+    @property
+    def waiting(self) -> Configuration | None:
+        """The configuration that is deployed again when a lost host is back; None: there is none."""
+        return self._waiting
 
     @property
     def running(self) -> Configuration | None:
@@ -71,7 +78,7 @@ class DeployedConfigurations:
 
     def finished(self, outcome: Outcome, now: float) -> None:
         """Note how a change ended."""
-        self._running, self._recovering = outcome.running, False
+        self._running, self._waiting, self._recovering = outcome.running, None, False
         if outcome.running:
             replaces = outcome.result is Result.OK and self._last_good != outcome.running
             self._previous = self._last_good if replaces else None
@@ -79,8 +86,10 @@ class DeployedConfigurations:
 
     def react(self, report: LauncherReport | None, now: float) -> Reaction:
         """Return what to do about a report of the launcher; None: it has made none yet."""
-        if report is None or self._running is None or report.state == CHANGING:
+        if report is None or report.state == CHANGING:
             return Reaction.NONE
+        if self._running is None:
+            return Reaction.RETURN if self._waiting and report.state != FAILED else Reaction.NONE
         if report.configuration != self._running.name:
             return Reaction.DEPLOY_AGAIN
         if report.state == FAILED:
@@ -94,14 +103,19 @@ class DeployedConfigurations:
         """Note that the running configuration runs no more, though it was the last good one."""
         self._running = None
 
-    def failed(self) -> None:
-        """Note that the running configuration has failed: it is not restored."""
+    def failed(self, waits: bool = False) -> None:
+        """Note that the running configuration has failed: it is not restored.
+
+        Args:
+            waits: whether a host was lost, so that it is deployed again when the host is back.
+        """
+        self._waiting = self._running if waits else None
         self._running = self._last_good = None
         self._recovering = False
 
     def released(self) -> None:
         """Note that the function is needed no longer: nothing is restored."""
-        self._running = self._last_good = self._previous = None
+        self._running = self._last_good = self._previous = self._waiting = None
         self._recovering = False
 
     def begin_recovery(self) -> None:

@@ -33,6 +33,9 @@ def plan(a: str, b: str, config: str | None) -> None:
         click.echo(problem)
     if not online and compare(running, wanted).parameters:
         click.echo("no ROS master: nodes are not asked what they take by dynamic_reconfigure")
+    for name, node in wanted.nodes.items():
+        if node.machine:
+            click.echo(f"node {name} is for host {node.machine}: a rosgraph_launcher must run there")
     for number, way in enumerate(found):
         click.echo(f"{'' if number == 0 else 'else '}{way}")
 

@@ -12,15 +12,16 @@ from rosgraph_manipulator.ros import client
 def status() -> None:
     """Print what runs, and how the last change went."""
     client.join_or_refuse("status")
-    active, launcher = client.active_configuration(), client.launched_functions()
-    if active is None and launcher is None:
+    active, launchers = client.active_configuration(), client.launched_functions()
+    if active is None and not launchers:
         raise client.ClientError("neither manipulator nor launcher answers: start manipulator.launch")
     if active is not None:
         for grounding in active.functions:
             click.echo(f"{grounding.function}: {grounding.configuration} {grounding.state}")
         print_last_change(active)
-    if launcher is not None:
-        click.echo(f"processes: {'' if launcher.functions else 'none'}".rstrip())
+    for name, launcher in launchers.items():
+        of = "" if len(launchers) == 1 else f" of {name}"
+        click.echo(f"processes{of}: {'' if launcher.functions else 'none'}".rstrip())
         for function in launcher.functions:
             click.echo(f"  {function.function}: {function.configuration or 'none'} {function.state}")
             for node in function.nodes:

@@ -36,18 +36,20 @@ class LaunchFile:
         system: its nodes and parameters.
         clear: full names of the parameters to delete before any is set.
         commands: the `rosparam` calls to make before that, each as a tuple of words.
+        remarks: lines for the operator about what it says and what has no effect.
     """
 
     system: SystemDescription
     clear: tuple[str, ...] = ()
     commands: tuple[tuple[str, ...], ...] = ()
+    remarks: tuple[str, ...] = ()
 
 
 def read_launch_file(path: str | Path, args: Sequence[str] = ()) -> LaunchFile:
     """Read a launch file with its arguments (`NAME:=VALUE`).
 
     Raises:
-        LaunchFileError: the file is missing or malformed, starts no node, or has nodes for another machine.
+        LaunchFileError: the file is missing or malformed, or starts no node.
     """
     with _refusing(str(path)):
         config = roslaunch.config.ROSLaunchConfig()
@@ -169,17 +171,24 @@ def _checked(path: str | Path, config: Any) -> LaunchFile:
         name = rosgraph.names.ns_join(node.namespace, node.name)
         private = {key: left.pop(key) for key in list(left) if key.startswith(f"{name}/")}
         parameters = {key.removeprefix(f"{name}/"): value for key, value in private.items()}
-        nodes[name] = description = _description(name, node, parameters)
-        if description.machine:
-            raise LaunchFileError(
-                f"{path}: node {name} is for machine '{node.machine.name}' ({description.machine}), and only nodes of "
-                "this host can be started: remove its machine, or start it by a launch file of that machine"
-            )
+        nodes[name] = _description(name, node, parameters)
     return LaunchFile(
         SystemDescription(nodes, left),
         clear=tuple(config.clear_params),
         commands=tuple((str(e.command), *map(str, e.args)) for e in config.executables),
+        remarks=tuple(dict.fromkeys(_ignored(node.machine) for node in config.nodes if _ignored(node.machine))),
     )
+
+
+def _ignored(machine: Any) -> str:
+    """Return what has no effect in the machine of a node, in one line; empty where all has."""
+    if roslaunch.core.is_machine_local(machine):
+        return ""
+    given = (("env-loader", machine.env_loader), ("user", machine.user), ("password", machine.password))
+    names = [name for name, value in given if value]
+    if not names:
+        return ""
+    return f"machine '{machine.name}': {', '.join(names)} are ignored: a rosgraph_launcher runs there, and needs no ssh"
 
 
 def _description(name: str, node: Any, parameters: dict[str, Any]) -> NodeDescription:

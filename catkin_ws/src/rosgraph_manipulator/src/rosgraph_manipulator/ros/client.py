@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -25,6 +26,8 @@ from node_kit.ros import command
 from node_kit.ros.action_server import wait_for_server
 
 from rosgraph_manipulator.configuration.configurations import DEFAULT_FUNCTION, KEYS
+from rosgraph_manipulator.io.master import publishers
+from rosgraph_manipulator.ros.launcher_reports import TOPIC
 from rosgraph_manipulator.ros.requests import CHANGE_FUNCTION
 
 FIND_TIMEOUT = 5.0  # s, wall, to find the manipulator
@@ -141,9 +144,25 @@ def active_configuration() -> ActiveConfiguration | None:
     return _latest(f"{NODE}/active_configuration", ActiveConfiguration)
 
 
-def launched_functions() -> LaunchedFunctions | None:
-    """Return what the launcher runs; None where it does not say."""
-    return _latest("rosgraph_launcher/functions", LaunchedFunctions)
+def launched_functions() -> dict[str, LaunchedFunctions]:
+    """Return what each launcher runs, by the launcher's name, as far as they say.
+
+    Raises:
+        ClientError: the master does not answer.
+    """
+    found: dict[str, LaunchedFunctions] = {}
+    subscriber = rospy.Subscriber(
+        TOPIC, LaunchedFunctions, lambda message: found.update({message._connection_header["callerid"]: message})
+    )
+    deadline = time.monotonic() + FIND_TIMEOUT
+    try:
+        awaited = publishers(subscriber.resolved_name)
+    except CallError as error:
+        raise ClientError(str(error)) from error
+    while not (found and awaited <= set(found)) and time.monotonic() < deadline:
+        time.sleep(_LOOK_PERIOD)
+    subscriber.unregister()
+    return dict(sorted(found.items()))
 
 
 def _latest(topic: str, kind: Any) -> Any:

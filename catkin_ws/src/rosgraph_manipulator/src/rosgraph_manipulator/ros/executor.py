@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import rospy
 from geometry_msgs.msg import Twist
 from node_kit.io.xml_rpc import CallError
+from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io.master import NodeApi, advertised
 from rosgraph_launcher.io.ownership import look_up
 from rosgraph_launcher.io.scripts import script_is_at_work
@@ -25,7 +27,7 @@ from rosgraph_manipulator.configuration.difference import same_value
 from rosgraph_manipulator.io.launch_files import LaunchFile
 from rosgraph_manipulator.io.master import get_parameters, publishers, set_parameters
 from rosgraph_manipulator.ros.goal import PendingGoal
-from rosgraph_manipulator.ros.launcher_client import LauncherClient
+from rosgraph_manipulator.ros.launchers import Launchers
 from rosgraph_manipulator.ros.running_system import RunningSystem
 
 POLL_PERIOD = 0.01  # s, wall
@@ -56,10 +58,10 @@ class RosExecutor:
         overwritten: OverwrittenParameters,
         ready_timeout: float,
         settle_time: float,
-        launcher_timeout: float,
+        launchers: Launchers,
         on_report: Callable[[], object],
     ) -> None:
-        """Begin to follow the launcher.
+        """Begin to follow the launchers.
 
         Args:
             options: the configurations, and the nodes to end before a start.
@@ -67,8 +69,8 @@ class RosExecutor:
             overwritten: what an earlier manipulator has left of the parameters' former values.
             ready_timeout: how long a configuration may take to be ready, s, wall.
             settle_time: how long started nodes must live after that, s, wall.
-            launcher_timeout: how long to look for the launcher, s, wall.
-            on_report: is called with each report of the launcher, in a thread of its own.
+            launchers: those of all hosts.
+            on_report: is called after each report of a launcher, in a thread of its own.
         """
         self.check: Callable[[], None] = lambda: None  # raises CancelledError where the change must be given up
         self.launcher_phases: dict[str, float] = {}  # durations of the launcher's last change, s
@@ -78,22 +80,38 @@ class RosExecutor:
         self._ready_timeout, self._settle_time = ready_timeout, settle_time
         self._on_report = on_report
         self._progress = ChangeProgress()
-        self.system = RunningSystem(options, self._progress)
+        self._launchers = launchers
+        self.system = RunningSystem(options, self._progress, launchers.is_here)
         self._servers_died: dict[str, bool] = {}  # by function: whether the kept action's server died
         self._news = threading.Condition()
         self._follows = False  # whether the reports of the launcher that made the last change arrive
         self._cmd_vel = rospy.Publisher("cmd_vel", Twist, queue_size=1)
-        self._launcher = LauncherClient(launcher_timeout, self._follow)
+        launchers.on_reports = self._follow
+        if launchers.reports():
+            self._follow()
 
     def report(self, function: str) -> LauncherReport | None:
         """Return the launcher's last report of a function; None: it has made none at all yet."""
         return self._progress.report(function)
 
-    def suppose(self, reports: Iterable[LauncherReport]) -> None:
-        """Take reports as the launcher's first ones, where its topic has brought none yet."""
-        with self._news:
-            if not self._progress.has_reports:
-                self._progress.take(reports)
+    def adopt(self, configuration: Configuration) -> None:
+        """Note that a configuration runs that an earlier manipulator has deployed."""
+        with contextlib.suppress(DeploymentError):  # what the launchers tell is all that is known of it
+            nodes = self.system.launch_file(configuration).system.nodes.values()
+            self._launchers.adopt(configuration.function, nodes)
+
+    def stop_rest(self, function: str) -> None:
+        """Stop the nodes of a function that has failed on one host on all others, too."""
+        self._launchers.stop_rest(function)
+
+    def clear(self, function: str) -> None:
+        """Stop what runs for a function on hosts where it should not, because they were lost when it changed."""
+        for host in self._launchers.clear(function):
+            rospy.logwarn("%s: stopped what was left of it on host %s", function, host)
+
+    def lost_hosts(self, function: str) -> list[str]:
+        """Return the lost hosts that have a part of what should run for a function."""
+        return self._launchers.lost_hosts(function)
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
@@ -165,7 +183,7 @@ class RosExecutor:
             self._progress.begin(function, configuration, time.monotonic())
             system = self.system.describe(configuration)
             # Where the launcher has died, nothing runs for the other functions either.
-            shared = self._progress.shared(function) if self._launcher.is_connected else frozenset()
+            shared = frozenset() if self._launchers.unconnected(function) else self._progress.shared(function)
             stop = tuple(node for node in self._progress.launched_for(function) if node not in shared)
             self.change_processes(stop, tuple(node for node in system.nodes if node not in shared))
             self.wait_until_ready()
@@ -276,7 +294,7 @@ class RosExecutor:
         start: tuple[str, ...],
     ) -> None:
         """Have the launcher change the nodes of a function."""
-        answer = self._launcher.change(
+        made = self._launchers.change(
             function,
             configuration,
             launch.system.nodes.values() if launch else (),
@@ -285,10 +303,10 @@ class RosExecutor:
             # The nodes have all their time, however long the launcher could not be found.
             found=lambda: self._progress.restart_deadline(time.monotonic()),
         )
-        self.launcher_phases = {phase.name: phase.duration for phase in answer.phases}
-        self._progress.answered(answer.change)
+        self.launcher_phases = dict(made.phases)
+        self._progress.answered(made.number)
         with self._news:
-            self._follows = self._news.wait_for(lambda: self._progress.is_reported(answer.change), STATE_TIMEOUT)
+            self._follows = self._news.wait_for(lambda: self._progress.is_reported(made.number), STATE_TIMEOUT)
 
     def _end_foreign_nodes(self, function: str) -> None:
         """End nodes of the same function that somebody else started."""
@@ -311,28 +329,35 @@ class RosExecutor:
         if self._progress.leave(leaving, drivers, servers) and goal is not None:
             goal.server_stops()
 
-    def _follow(self, reports: tuple[LauncherReport, ...]) -> None:
+    def _follow(self) -> None:
         with self._news:
-            if self._progress.take(reports):
+            if self._progress.take(self._launchers.reports().values()):
                 self._cmd_vel.publish(Twist())
             self._news.notify_all()
         self._on_report()
 
     def _is_up(self, node: str) -> bool:
+        description = self._description(node)
+        if description and not self._launchers.is_here(description):
+            return self._launchers.check(description)[0] or self._progress.has_finished(node)
+        mark = self._launchers.mark(description)
         return (
-            look_up(node).is_up(self._launcher.mark)
+            look_up(node).is_up(mark)
             or self._progress.has_finished(node)
-            or self._is_script_at_work(node)
+            or (description is not None and script_is_at_work(description, mark))
         )
 
-    def _is_script_at_work(self, node: str) -> bool:
+    def _description(self, node: str) -> NodeDescription | None:
         wanted = self._progress.wanted
-        description = self.system.launch_file(wanted).system.nodes.get(node) if wanted else None
-        return description is not None and script_is_at_work(description, self._launcher.mark)
+        return self.system.launch_file(wanted).system.nodes.get(node) if wanted else None
 
     def _conflict(self, node: str) -> str:
         """Return who has taken a node's name, for the end of a line; empty where nobody has."""
-        conflict = look_up(node).conflict(self._launcher.mark)
+        description = self._description(node)
+        if description and not self._launchers.is_here(description):
+            conflict = self._launchers.check(description)[1]
+        else:
+            conflict = look_up(node).conflict(self._launchers.mark(description))
         return conflict and f" ({conflict})"
 
     def _wait(
@@ -355,7 +380,8 @@ class RosExecutor:
         if rospy.is_shutdown():
             raise DeploymentError("the manipulator is shutting down")
         failure = self._progress.failure()
-        if failure is None and self._follows and not self._launcher.is_connected:
-            failure = "rosgraph_launcher has died, and its nodes with it: see its log"
+        gone = self._launchers.unconnected(self._progress.function) if failure is None and self._follows else ""
+        if gone:
+            failure = f"{gone.rpartition('/')[2]} has died, and its nodes with it: see its log"
         if failure is not None:
             raise DeploymentError(failure)

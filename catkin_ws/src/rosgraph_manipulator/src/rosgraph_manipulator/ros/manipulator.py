@@ -11,7 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import rospy
-from metacontrol_msgs.msg import FunctionGrounding, LaunchedFunctions
+from metacontrol_msgs.msg import FunctionGrounding
 from node_kit.io.inbox import Inbox
 from node_kit.io.master_watch import MasterWatch
 from node_kit.io.xml_rpc import CallError
@@ -19,7 +19,6 @@ from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.plugins import PluginError
 from node_kit.ros.lifetime import Lifetime
 from rosgraph_launcher.launching.report import FAILED, LauncherReport
-from rosgraph_launcher.ros.node_messages import report_from
 
 from rosgraph_manipulator.change.deployment import (
     DeploymentError,
@@ -46,6 +45,7 @@ from rosgraph_manipulator.io.master import set_parameters
 from rosgraph_manipulator.ros.announcer import Announcer
 from rosgraph_manipulator.ros.executor import RosExecutor
 from rosgraph_manipulator.ros.goal import PendingGoal
+from rosgraph_manipulator.ros.launchers import Launchers
 from rosgraph_manipulator.ros.requests import Order, RequestServer
 
 ASK_DELAY = 2.0  # s, wall, after a change: nodes may offer dynamic_reconfigure later than all else
@@ -72,9 +72,11 @@ class Manipulator:
         self._journal_lock = threading.Lock()
         self._announcer = Announcer()
         launcher_timeout = parameters.number("launcher_timeout", 10.0)
-        reports = _first_reports(launcher_timeout)
+        launchers = Launchers(launcher_timeout, parameters.number("host_timeout", 3.0, low=0.1))
+        if not launchers.find():
+            rospy.logwarn("rosgraph_launcher is not there; start it beside this node: nothing can be deployed without")
         journal = parse_journal(parameters.value("journal"))
-        self._resumptions = self._resume(journal, reports, initial)
+        self._resumptions = self._resume(journal, launchers.reports(), initial)
         self._journal = begin_journal(self._resumptions.values())
         self._executor = RosExecutor(
             options,
@@ -82,11 +84,9 @@ class Manipulator:
             OverwrittenParameters.from_parameter(parameters.value("overwritten")),
             ready_timeout=parameters.number("ready_timeout", 15.0, low=0.1),
             settle_time=parameters.number("settle_time", 0.5, low=0.0),
-            launcher_timeout=launcher_timeout,
+            launchers=launchers,
             on_report=lambda: self._inbox.put(self._follow_launcher),
         )
-        if reports:
-            self._executor.suppose(reports.values())
         self._requests = RequestServer(options, Policy(policy), self._inbox, self._carry_out)
         self._executor.check = self._requests.check
 
@@ -128,6 +128,7 @@ class Manipulator:
         for resumption in self._resumptions.values():
             running, wanted = known.get(resumption.running), known.get(resumption.deploy)
             if running:
+                self._executor.adopt(running)
                 states[running] = FunctionGrounding.STABLE
                 rospy.loginfo("took over the running configuration %s", running.name)
             elif wanted:
@@ -255,18 +256,23 @@ class Manipulator:
     # -- the launcher's part --------------------------------------------------------------------------------------
 
     def _follow_launcher(self) -> None:
-        """React to the launcher's last reports."""
+        """React to the launchers' last reports."""
         for function in self._deployments:
+            self._executor.clear(function)
             self._follow_function(function)
 
     def _follow_function(self, function: str) -> None:
         deployments, report = self._deployments[function], self._executor.report(function)
         running, previous = deployments.running, deployments.previous
         reaction = deployments.react(report, time.monotonic())
+        if reaction is Reaction.RETURN and deployments.waiting:
+            rospy.logwarn("%s: deploying it again, because its hosts are back", deployments.waiting.name)
+            self._deploy(deployments.waiting)
         if report is None or running is None:
             return
         if reaction is Reaction.DEPLOY_AGAIN:
-            rospy.logwarn("rosgraph_launcher runs %s: deploying %s", report.configuration or "nothing", running.name)
+            found = report.configuration or "not all of it"
+            rospy.logwarn("rosgraph_launcher runs %s: deploying %s", found, running.name)
             deployments.lost()
             self._deploy(running)
         elif reaction is Reaction.GIVE_UP:
@@ -300,23 +306,14 @@ class Manipulator:
         self._announcer.diagnose(True, outcome.message, running.name)
 
     def _give_up(self, running: Configuration, reason: str) -> None:
-        self._deployments[running.function].failed()
+        self._deployments[running.function].failed(waits=bool(self._executor.lost_hosts(running.function)))
+        self._executor.stop_rest(running.function)
         self._executor.stop_robot(running.function)
         self._note(wanted="")
         rospy.logerr("%s has failed: %s", running.name, reason)
         outcome = Outcome(Result.GENERAL_ERROR, None, reason)
         self._announcer.announce(running, FunctionGrounding.FAILED, outcome)
         self._announcer.diagnose(False, reason, running.name)
-
-
-def _first_reports(timeout: float) -> dict[str, LauncherReport]:
-    """Return what the launcher runs, by function; wait at most so long (s) for it."""
-    try:
-        message = rospy.wait_for_message("rosgraph_launcher/functions", LaunchedFunctions, timeout)
-    except rospy.ROSException:
-        rospy.logwarn("rosgraph_launcher is not there; start it beside this node: nothing can be deployed without")
-        return {}
-    return {function.function: report_from(function) for function in message.functions}
 
 
 def read_parameters(arguments: list[str]) -> dict[str, Any]:

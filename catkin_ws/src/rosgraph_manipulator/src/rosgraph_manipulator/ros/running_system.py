@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 import rospy
 from node_kit.io.xml_rpc import CallError
-from rosgraph_launcher.description import SystemDescription
+from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_launcher.io.command_lines import CommandLineError, command_line
 from rosgraph_launcher.io.master import NodeApi
 
@@ -43,8 +43,17 @@ class Comparison:
 class RunningSystem:
     """The running configurations of all functions, and those that can be deployed."""
 
-    def __init__(self, options: ManipulatorOptions, progress: ChangeProgress) -> None:
-        """Look at what the launcher's reports in `progress` say."""
+    def __init__(
+        self, options: ManipulatorOptions, progress: ChangeProgress, is_here: Callable[[NodeDescription], bool]
+    ) -> None:
+        """Look at what the launchers' reports in `progress` say.
+
+        Args:
+            options: the configurations.
+            progress: has the reports.
+            is_here: tells whether a node is started on this host, so that its executable must be here.
+        """
+        self._is_here = is_here
         self.nodes = ReconfigureClient()
         self._options = options
         self._progress = progress
@@ -84,9 +93,12 @@ class RunningSystem:
             DeploymentError: it can't be read, or names an executable that does not exist.
         """
         launch = _read(configuration)
+        for remark in launch.remarks:
+            rospy.logwarn_once("%s: %s", configuration.launch_file, remark)
         try:
             for node in launch.system.nodes.values():
-                command_line(node)
+                if self._is_here(node):
+                    command_line(node)
         except CommandLineError as error:
             raise DeploymentError(f"{configuration.launch_file}: {error}") from error
         self._described = (configuration, launch)

@@ -1,0 +1,224 @@
+"""What the launchers of all hosts tell, as the reports of one launcher, and which hosts are lost."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import rosgraph
+import rospy
+from metacontrol_msgs.msg import LaunchedFunctions
+from node_kit.io.xml_rpc import CallError
+from rosgraph_launcher.description import NodeDescription
+from rosgraph_launcher.io.master import NodeApi
+from rosgraph_launcher.io.ownership import is_this_host, launcher_mark
+from rosgraph_launcher.launching.report import LauncherReport
+from rosgraph_launcher.ros.node_messages import report_from
+
+from rosgraph_manipulator.hosts.directory import HostLauncher, launcher_at
+from rosgraph_manipulator.hosts.merging import merged
+from rosgraph_manipulator.io.master import get_parameters, publishers
+
+TOPIC = "rosgraph_launcher/functions"
+REPEAT_PERIOD = 0.01  # s, wall
+WATCH_PERIOD = 0.5  # s, wall, between two questions whether a host is there
+
+
+@dataclass
+class _Known:
+    """A launcher that has been heard of.
+
+    Attributes:
+        place: its name and its host.
+        is_here: whether it runs on this host, so that its end shows at once by its closed connection.
+        reports: what it tells, by function.
+        answered: when it was heard last, monotonic wall s.
+        pid: of its process, as it says itself; None: nobody has asked.
+        uri: address of its API; None: unknown.
+        lost: whether its host is lost.
+    """
+
+    place: HostLauncher
+    is_here: bool
+    reports: dict[str, LauncherReport] = field(default_factory=dict)
+    answered: float = field(default_factory=time.monotonic)
+    pid: int | None = None
+    uri: str | None = None
+    lost: bool = False
+
+
+class LauncherReports:
+    """Follows the launchers of all hosts. Callbacks of rospy and a thread of its own keep it up to date."""
+
+    def __init__(self, timeout: float, host_timeout: float) -> None:
+        """Begin to follow the launchers.
+
+        Args:
+            timeout: how long to look for a launcher, s, wall.
+            host_timeout: how long the launcher of another host may be silent, before that host counts as lost, s, wall.
+        """
+        self.on_reports: Callable[[], object] = lambda: None  # called whenever something differs, in any thread
+        self._timeout, self._host_timeout = timeout, host_timeout
+        self._main = rospy.resolve_name("rosgraph_launcher")
+        self._lock = threading.RLock()
+        self._known: dict[str, _Known] = {}
+        self._parts: dict[str, frozenset[str]] = {}  # by function: the launchers that should have a part of it
+        self._subscriber = rospy.Subscriber(TOPIC, LaunchedFunctions, self._take, queue_size=20)
+        threading.Thread(target=self._watch, name="hosts", daemon=True).start()
+
+    # -- what they tell -------------------------------------------------------------------------------------------
+
+    def find(self) -> bool:
+        """Wait for all launchers that are registered, and at most the time to look; tell whether one was heard."""
+        begun = time.monotonic()
+        while not rospy.is_shutdown():
+            try:
+                awaited = publishers(rospy.resolve_name(TOPIC))
+            except CallError:
+                awaited = set()
+            with self._lock:
+                heard = set(self._known)
+            waited = time.monotonic() - begun
+            if heard and (awaited <= heard or waited > min(self._host_timeout, self._timeout)):
+                return True
+            if waited > self._timeout:
+                return False
+            time.sleep(REPEAT_PERIOD)
+        return False
+
+    def reports(self) -> dict[str, LauncherReport]:
+        """Return what all launchers tell together, by function."""
+        with self._lock:
+            functions = {name for known in self._known.values() for name in known.reports} | set(self._parts)
+            lost = {name: self._line(known) for name, known in self._known.items() if known.lost}
+            return {name: merged(name, self._of(name), self._parts.get(name), lost) for name in sorted(functions)}
+
+    def lost_hosts(self, function: str) -> list[str]:
+        """Return the lost hosts that should have a part of what runs for a function."""
+        with self._lock:
+            names = self._parts.get(function, ())
+            known = [self._known[name] for name in names if name in self._known]
+            return sorted(launcher.place.host for launcher in known if launcher.lost)
+
+    def unconnected(self, function: str) -> str:
+        """Return a launcher that should have a part of what runs for a function and has ended; empty: none has."""
+        connected = {connection.callerid_pub for connection in list(self._subscriber.impl.connections)}
+        with self._lock:
+            return next((name for name in sorted(self._parts.get(function, ())) if name not in connected), "")
+
+    def adopt(self, function: str, nodes: Iterable[NodeDescription]) -> None:
+        """Note that what runs for a function has been started by an earlier manipulator."""
+        places = {self._find(node.machine) or f"the launcher of {node.machine}" for node in nodes}
+        with self._lock:
+            self._parts[function] = frozenset(places)
+
+    # -- where nodes are ------------------------------------------------------------------------------------------
+
+    def is_here(self, node: NodeDescription) -> bool:
+        """Tell whether a node runs on this host, as far as is known."""
+        name = self._find(node.machine)
+        with self._lock:
+            return self._known[name].is_here if name in self._known else not node.machine
+
+    def mark(self, node: NodeDescription | None) -> str:
+        """Return what the processes of a node's launcher have in their environment."""
+        return launcher_mark((node and self._find(node.machine)) or self._main)
+
+    def _find(self, machine: str) -> str:
+        """Return the launcher of a host by its name or address; empty: there is none."""
+        if not machine:
+            return self._main
+        with self._lock:
+            places = [known.place for known in self._known.values()]
+        found = launcher_at(machine, places) or launcher_at(machine, places, _resolved(machine))
+        return found.name if found else ""
+
+    # -- the hosts ------------------------------------------------------------------------------------------------
+
+    def _take(self, message: LaunchedFunctions) -> None:
+        name = message._connection_header["callerid"]
+        with self._lock:
+            unknown = name not in self._known
+        place = _place_of(name) if unknown else None
+        with self._lock:
+            if place:
+                self._known[name] = _Known(place, _is_here(place))
+            known = self._known[name]
+            known.reports = {function.function: report_from(function) for function in message.functions}
+            self._heard(known)
+        self.on_reports()
+
+    def _heard(self, known: _Known) -> None:
+        known.answered = time.monotonic()
+        if known.lost:
+            known.lost = False
+            rospy.logwarn("host %s is back", known.place.host)
+
+    def _line(self, known: _Known) -> str:
+        nodes = ", ".join(sorted({node for report in known.reports.values() for node in report.nodes}))
+        return (
+            f"host {known.place.host} is lost: {known.place.name} has not answered for {self._host_timeout:g} s"
+            f"{nodes and f', and ran {nodes}'}: check its power and its network"
+        )
+
+    def _host(self, name: str) -> str:
+        with self._lock:
+            return f"host {self._known[name].place.host}" if name in self._known else name
+
+    def _of(self, function: str) -> dict[str, LauncherReport]:
+        return {name: k.reports[function] for name, k in self._known.items() if function in k.reports}
+
+    def _watch(self) -> None:
+        """Ask the launchers of other hosts again and again whether they are there."""
+        while not rospy.is_shutdown():
+            time.sleep(WATCH_PERIOD)
+            with self._lock:
+                far = [known for known in self._known.values() if not known.is_here]
+            for known in far:
+                self._look(known)
+
+    def _look(self, known: _Known) -> None:
+        pid = NodeApi.pid(known.uri) if known.uri else None  # without the master, which may be slow itself
+        if pid is None:
+            known.uri = NodeApi.address(known.place.name)
+            pid = NodeApi.pid(known.uri) if known.uri else None
+        with self._lock:
+            was_lost = known.lost
+            if pid is not None:
+                if was_lost and known.pid not in (None, pid):
+                    known.reports = {}  # it is another process, which tells what it has as soon as it is connected
+                known.pid = pid
+                self._heard(known)
+            elif time.monotonic() - known.answered > self._host_timeout:
+                known.lost = True
+            differs = known.lost is not was_lost
+            concerns = any(known.place.name in parts for parts in self._parts.values())
+        if differs and known.lost and not concerns:  # the failure of a function tells it, too
+            rospy.logwarn("%s", self._line(known))
+        if differs:
+            self.on_reports()
+
+
+def _place_of(name: str) -> HostLauncher:
+    """Return where a launcher runs, as it says in its parameter."""
+    parameter = f"{name}/addresses"
+    try:
+        addresses = get_parameters([parameter]).get(parameter)
+    except CallError:
+        addresses = None
+    return HostLauncher(name, tuple(map(str, addresses)) if isinstance(addresses, list) else ())
+
+
+def _is_here(place: HostLauncher) -> bool:
+    uri = NodeApi.address(place.name)
+    return uri is None or is_this_host(rosgraph.network.parse_http_host_and_port(uri)[0])
+
+
+def _resolved(address: str) -> set[str]:
+    try:
+        return {str(entry[4][0]) for entry in socket.getaddrinfo(address, None)}
+    except OSError:
+        return set()

@@ -1,0 +1,226 @@
+"""The launchers of all hosts, which make changes together."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future, wait
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import rosgraph
+import rospy
+from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, ChangeNodesResponse, CheckNodes
+from rosgraph_launcher.description import NodeDescription
+from rosgraph_launcher.launching.report import FAILED
+from rosgraph_launcher.ros.node_messages import to_message
+from rospy.exceptions import TransportException, TransportInitError
+
+from rosgraph_manipulator.change.deployment import DeploymentError
+from rosgraph_manipulator.hosts.directory import no_launcher
+from rosgraph_manipulator.hosts.merging import stale
+from rosgraph_manipulator.hosts.splitting import Part, split
+from rosgraph_manipulator.ros.launcher_reports import REPEAT_PERIOD, LauncherReports
+
+_NOT_REACHED = (TransportInitError, rosgraph.MasterError)
+"""What rospy has caught when it raises a ServiceException and has sent no request: no registration, no connection."""
+
+
+@dataclass(frozen=True)
+class Changed:
+    """A change that all launchers have made.
+
+    Attributes:
+        number: what the reports together have as their number once all have reported it.
+        phases: durations of the slowest launcher's phases, s.
+    """
+
+    number: int
+    phases: Mapping[str, float]
+
+
+class Launchers(LauncherReports):
+    """Follows the launchers of all hosts, and asks them for changes."""
+
+    def check(self, node: NodeDescription) -> tuple[bool, str]:
+        """Ask a node's launcher whether the node is up, and who has taken its name."""
+        name = self._find(node.machine)
+        if not name:
+            return False, ""
+        try:
+            answer = self._wait_for(name, lambda: rospy.ServiceProxy(f"{name}/check", CheckNodes)([node.name]))
+        except (DeploymentError, rospy.ServiceException, rospy.ROSException, TransportException, OSError):
+            return False, ""
+        return answer.up[0], answer.conflicts[0]
+
+    # -- changes --------------------------------------------------------------------------------------------------
+
+    def change(
+        self,
+        function: str,
+        configuration: str,
+        nodes: Iterable[NodeDescription],
+        stop: Iterable[str],
+        start: Iterable[str],
+        found: Callable[[], None],
+    ) -> Changed:
+        """Have the launchers change the nodes of a function, side by side.
+
+        Args:
+            function: its name.
+            configuration: name of the configuration; empty: stop what only this function needs.
+            nodes: all nodes of the configuration.
+            stop: the nodes to stop.
+            start: the nodes to start.
+            found: is called when a launcher is there, before it is asked.
+
+        Raises:
+            DeploymentError: a launcher is not there, or refuses, or has died. Others may have made their part.
+        """
+        described = {node.name: node for node in nodes}
+        places = {name: self._place(node) for name, node in described.items()}
+        with self._lock:
+            parts = split(places, self._of(function), list(stop), list(start))
+            lost = {name for name, known in self._known.items() if known.lost}
+            asked = [part for part in parts if part.launcher not in lost]  # what a lost one runs ends when it is back
+            self._parts[function] = frozenset(part.launcher for part in asked)
+            numbers = {name: report.change for name, report in self._of(function).items()}
+        if not configuration and not asked:  # as ever: there must be a launcher, also to release nothing
+            asked = [Part(self._main, releases=True)]
+        phases: dict[str, float] = {}
+        for turn in (True, False):
+            taking_turn = [part for part in asked if part.comes_first is turn]
+            answers = self._ask_all(function, configuration, described, taking_turn, found)
+            for name, answer in answers.items():
+                numbers[name] = answer.change
+                for phase in answer.phases:
+                    phases[phase.name] = max(phases.get(phase.name, 0.0), phase.duration)
+        with self._lock:
+            self._parts[function] = frozenset(part.launcher for part in asked if configuration and not part.releases)
+        self.on_reports()
+        return Changed(sum(numbers.values()), phases)
+
+    def clear(self, function: str) -> list[str]:
+        """Stop what runs for a function where it should not; return the hosts on which something did."""
+        with self._lock:
+            if function not in self._parts:
+                return []  # nothing has been decided about it yet
+            reports = {name: report for name, report in self._of(function).items() if not self._known[name].lost}
+            names = stale(reports, self._parts[function])
+            hosts = [self._known[name].place.host for name in names]
+        self._release(function, names)
+        return hosts
+
+    def stop_rest(self, function: str) -> None:
+        """Stop what is left of a function that has failed on one host; its launchers stay as they are expected."""
+        with self._lock:
+            names = [
+                name
+                for name, report in self._of(function).items()
+                if report.configuration and report.nodes and report.state != FAILED and not self._known[name].lost
+            ]
+        self._release(function, names)
+
+    def _release(self, function: str, launchers: list[str]) -> None:
+        try:
+            self._ask_all(function, "", {}, [Part(name, releases=True) for name in launchers], lambda: None)
+        except DeploymentError as error:
+            rospy.logwarn("%s", error)
+
+    def _place(self, node: NodeDescription) -> str:
+        """Return the launcher of a node; wait for one."""
+        deadline = time.monotonic() + self._timeout
+        while not (name := self._find(node.machine)):
+            if time.monotonic() > deadline or rospy.is_shutdown():
+                with self._lock:
+                    places = [known.place for known in self._known.values()]
+                raise DeploymentError(no_launcher(node.name, node.machine, places))
+            time.sleep(REPEAT_PERIOD)
+        with self._lock:
+            if name in self._known and self._known[name].lost:
+                raise DeploymentError(f"node {node.name}: {self._line(self._known[name])}")
+        return name
+
+    def _ask_all(
+        self,
+        function: str,
+        configuration: str,
+        nodes: Mapping[str, NodeDescription],
+        parts: list[Part],
+        found: Callable[[], None],
+    ) -> dict[str, ChangeNodesResponse]:
+        """Ask launchers side by side, and wait for all answers."""
+        asked = {}
+        for part in parts:
+            request = ChangeNodesRequest(
+                function=function,
+                configuration="" if part.releases else configuration,
+                nodes=[to_message(nodes[name]) for name in part.nodes],
+                stop=list(part.stop),
+                start=list(part.start),
+            )
+            asked[part.launcher] = _begin(partial(self._ask, part.launcher, request, found))
+        answers, failures = {}, []
+        for name, future in asked.items():
+            try:
+                answers[name] = answer = self._result(name, future)
+                if not answer.ok:
+                    failures.append(answer.message if len(parts) == 1 else f"{self._host(name)}: {answer.message}")
+            except DeploymentError as error:
+                failures.append(str(error))
+            except (rospy.ServiceException, rospy.ROSException, TransportException, OSError) as error:
+                failures.append(f"{name.rpartition('/')[2]} has failed ({error}): check that it runs")
+        if failures:
+            raise DeploymentError("; ".join(failures))
+        return answers
+
+    def _ask(self, name: str, request: ChangeNodesRequest, found: Callable[[], None]) -> ChangeNodesResponse:
+        """Return a launcher's answer to a request, which is made as soon as the launcher is there.
+
+        A launcher that is being killed may accept the connection by which `wait_for_service` finds it and refuse the
+        next one, because the kernel closes its sockets one after the other. A request that reached no launcher is
+        repeated. One that did is not, because a part of it may be done.
+        """
+        service = rospy.ServiceProxy(f"{name}/change", ChangeNodes)
+        deadline = time.monotonic() + self._timeout
+        while True:
+            service.wait_for_service(max(deadline - time.monotonic(), REPEAT_PERIOD))
+            found()
+            try:
+                return service(request)
+            except rospy.ServiceException as error:
+                if not isinstance(error.__context__, _NOT_REACHED) or time.monotonic() > deadline:
+                    raise
+                time.sleep(REPEAT_PERIOD)
+
+    def _wait_for(self, name: str, work: Callable[[], Any]) -> Any:
+        """Do work that waits for a launcher, until its host is lost."""
+        return self._result(name, _begin(work))
+
+    def _result(self, name: str, future: Future[Any]) -> Any:
+        """Return what a launcher has answered.
+
+        Raises:
+            DeploymentError: its host was lost meanwhile.
+        """
+        while not wait([future], REPEAT_PERIOD).done:
+            with self._lock:
+                if name in self._known and self._known[name].lost:
+                    raise DeploymentError(self._line(self._known[name]))
+        return future.result()
+
+
+def _begin(work: Callable[[], Any]) -> Future[Any]:
+    """Do work in a thread that keeps nobody from ending, however long a connection hangs."""
+    future: Future[Any] = Future()
+
+    def do() -> None:
+        try:
+            future.set_result(work())
+        except Exception as error:
+            future.set_exception(error)
+
+    threading.Thread(target=do, name="ask a launcher", daemon=True).start()
+    return future

@@ -1,0 +1,177 @@
+#!/usr/bin/env python3
+"""A function over two hosts: its nodes, its launchers and the link between the hosts fail and come back."""
+
+import os
+import signal
+import subprocess
+import threading
+from contextlib import suppress
+
+import actionlib
+import psutil
+import rosgraph
+import rospy
+import rostest
+from helpers.waiting import DEADLINE_S, wait_for
+from manipulator_harness import HERE, PairTest, is_alive, pid_of
+from metacontrol_msgs.msg import MvpReconfigurationAction
+
+HOST, ADDRESS = os.environ["OTHER_HOST"], os.environ["OTHER_ADDRESS"]
+FAR_LAUNCHER = "rosgraph_launcher_arm"
+NEAR, FAR = "/near_node", "/far_node"
+
+
+def link(state):
+    subprocess.run(["/usr/sbin/ip", "-n", HOST, "link", "set", "eth0", state], check=True)
+
+
+def configuration(name, *args):
+    return {"function": "f_wait", "launch": str(HERE / f"{name}.launch"), "args": list(args)}
+
+
+class Respawned:
+    """The launcher of the other host, which is started again whenever it ends, as roslaunch does there."""
+
+    def __init__(self):
+        port = rosgraph.get_master_uri().rstrip("/").rpartition(":")[2]
+        self._environment = {
+            **os.environ,
+            "ROS_IP": ADDRESS,
+            "ROS_MASTER_URI": f"http://{os.environ['THIS_ADDRESS']}:{port}",
+        }
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self.process = None
+        self._thread.start()
+
+    def _run(self):
+        words = ["/usr/sbin/ip", "netns", "exec", HOST, "/usr/bin/rosrun", "rosgraph_launcher", "rosgraph_launcher"]
+        while not self._ending.is_set():
+            self.process = subprocess.Popen([*words, f"__name:={FAR_LAUNCHER}"], env=self._environment)
+            self.process.wait()
+            self._ending.wait(0.2)
+
+    def end(self):
+        self._ending.set()
+        while self._thread.is_alive():
+            with suppress(ProcessLookupError):
+                self.process.send_signal(signal.SIGINT)
+            self._thread.join(1.0)
+
+
+class HostsTest(PairTest):
+    configurations = {
+        "both": configuration("hosts", f"address:={ADDRESS}"),
+        "missing": configuration("hosts", f"address:={ADDRESS}", "far:=no_such_node.py"),
+        "dies": configuration("hosts", f"address:={ADDRESS}", "far:=wait_server.py", "far_args:=--die-after 0.3"),
+        "nowhere": configuration("hosts", "address:=192.0.2.1"),
+        "near": configuration("near"),
+    }
+    manipulator_parameters = {
+        "save_action": "",
+        "goal_msg_type": "",
+        "initial_configuration": "near",
+        "host_timeout": 4.0,
+        "launcher_timeout": 10.0,
+        "probation": 0.0,
+    }
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.far = Respawned()
+        cls.addClassCleanup(cls.far.end)
+
+    def setUp(self):
+        link("up")
+        wait_for(lambda: pid_of(f"/{FAR_LAUNCHER}"), "the launcher of the other host is there")
+        self.assertEqual(self.request("both"), 1, self.text)
+        self.wait_for_state("both")
+        self.near_pid, self.far_pid = pid_of(NEAR), pid_of(FAR)
+        self.said_before = len(self.manipulator.said())
+
+    def said(self):
+        return self.manipulator.said()[self.said_before :]
+
+    def test_nodes_run_on_their_hosts(self):
+        namespaces = {os.readlink(f"/proc/{pid}/ns/net") for pid in (self.near_pid, os.getpid())}
+        self.assertEqual(len(namespaces), 1)
+        self.assertNotIn(os.readlink(f"/proc/{self.far_pid}/ns/net"), namespaces)
+
+    def test_request_that_keeps_the_nodes_keeps_those_of_all_hosts(self):
+        self.assertEqual(self.request("both"), 1, self.text)
+        self.assertEqual((pid_of(NEAR), pid_of(FAR)), (self.near_pid, self.far_pid))
+
+    def test_node_that_dies_there_is_started_again_there(self):
+        os.kill(self.far_pid, signal.SIGKILL)
+        self.wait_for_state("both", "RECOVERING")
+        self.wait_for_state("both")
+        self.assertNotIn(pid_of(FAR), (None, self.far_pid))
+        self.assertEqual(pid_of(NEAR), self.near_pid)
+
+    def test_death_of_the_launcher_there_ends_its_nodes_and_they_are_deployed_again(self):
+        os.kill(pid_of(f"/{FAR_LAUNCHER}"), signal.SIGKILL)
+        wait_for(lambda: not is_alive(self.far_pid), "its node ends with it")
+        wait_for(lambda: pid_of(FAR), "the node is started again")
+        self.wait_for_state("both")
+
+    def test_death_of_the_manipulator_leaves_all_nodes(self):
+        self.manipulator.end(signal.SIGKILL)
+        self.states.clear()
+        type(self).start_manipulator()
+        self.wait_for_state("both")
+        type(self).client = actionlib.SimpleActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
+        self.assertTrue(self.client.wait_for_server(rospy.Duration(DEADLINE_S)))
+        self.assertEqual(self.request("both"), 1, self.text)
+        self.assertEqual((pid_of(NEAR), pid_of(FAR)), (self.near_pid, self.far_pid))
+
+    def test_failure_there_ends_the_nodes_here(self):
+        while not self.is_in("both", "FAILED"):
+            pid = wait_for(
+                lambda: self.is_in("both", "FAILED") or pid_of(FAR), "the node is started again, or given up"
+            )
+            if not self.is_in("both", "FAILED"):
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+                wait_for(lambda: not is_alive(pid), "the node has ended")  # noqa: B023
+        wait_for(lambda: not is_alive(self.near_pid), "what is left of the function ends")
+
+    def test_what_succeeded_here_is_taken_back_when_it_fails_there(self):
+        self.assertEqual(self.request("near"), 1, self.text)
+        self.assertIsNone(pid_of(FAR))
+        for name, words in (("missing", "no_such_node.py"), ("dies", FAR)):
+            self.assertEqual(self.request(name), 0, self.text)
+            self.assertIn(words, self.text)
+            self.assertIn("near was restored", self.text)
+            wait_for(lambda: pid_of(NEAR) and not pid_of(FAR), "what ran before runs")
+
+    def test_host_without_launcher_is_named_with_node_and_remedy(self):
+        self.assertEqual(self.request("nowhere"), 0)
+        self.assertIn(f"node {FAR} is for host 192.0.2.1, where no rosgraph_launcher runs", self.text)
+        self.assertIn("roslaunch rosgraph_launcher launcher.launch", self.text)
+        self.assertIn("both", self.text)
+
+    def test_lost_host_is_named_once_and_its_nodes_are_deployed_again_when_it_is_back(self):
+        link("down")
+        self.wait_for_state("both", "FAILED")
+        wait_for(lambda: not is_alive(self.near_pid), "what is left of the function ends")
+        line = f"host {ADDRESS} is lost"
+        self.assertIn(line, self.states[-1].message)
+        self.assertEqual(self.said().count(line), 1, self.said())
+        link("up")
+        self.wait_for_state("both")
+        self.assertTrue(pid_of(NEAR) and pid_of(FAR))
+
+    def test_other_configuration_works_without_the_lost_host(self):
+        link("down")
+        self.wait_for_state("both", "FAILED")
+        self.assertEqual(self.request("near"), 1, self.text)
+        self.wait_for_state("near")
+        link("up")
+        wait_for(lambda: not psutil.pid_exists(self.far_pid) or not is_alive(self.far_pid), "what is left there ends")
+        wait_for(lambda: pid_of(f"/{FAR_LAUNCHER}"), "the launcher of the other host is there")
+        self.assertTrue(self.is_in("near", "STABLE"))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "manipulator_hosts", HostsTest)
