@@ -100,6 +100,13 @@ body = st.lists(statement, max_size=6)
 futures = st.sampled_from(["", '"""A docstring."""\n', "from __future__ import annotations\n"])
 
 
+def is_waiting(process):
+    """Whether a prepared process sleeps where it waits to be begun, as far as the kernel tells."""
+    where = Path(f"/proc/{process.pid}/wchan").read_text()
+    asleep = psutil.Process(process.pid).status() == psutil.STATUS_SLEEPING
+    return asleep and (where == "0" or "pipe_read" in where)
+
+
 class Workspace:
     """A folder with a script, modules of its own, and a record of what they saw."""
 
@@ -135,7 +142,7 @@ class Workspace:
         world.write_text("before" if prepared else "after")
         if prepared:
             process = processes.prepare(command)
-            wait_for(lambda: psutil.Process(process.pid).status() == psutil.STATUS_SLEEPING, "it waits")
+            wait_for(lambda: is_waiting(process), "it waits")
             assert record.read_text() == ""  # no module of its own was executed
             world.write_text("after")
             process.begin()
@@ -320,7 +327,7 @@ def run_with_safe_modules(tmp_path, modules):
     script.write_text("#!/usr/bin/env python3\nimport own\nprint('begun')\n")
     script.chmod(0o755)
     process = processes.prepare(Command((str(script),), str(tmp_path), os.environ, str(log), safe_imports=("own",)))
-    wait_for(lambda: psutil.Process(process.pid).status() == psutil.STATUS_SLEEPING, "it waits")
+    wait_for(lambda: is_waiting(process), "it waits")
     before = log.read_text()
     process.begin()
     assert processes.wait_for_ends([process], DEADLINE_S)
@@ -342,7 +349,7 @@ def test_modules_of_move_base_are_imported_in_advance(tmp_path):
     script = Path(os.environ["MROS_ROOT"]) / "catkin_ws" / "devel" / "lib" / "move_base" / "move_base"
     command = Command((str(script),), str(tmp_path), os.environ, safe_imports=safe_imports("move_base"))
     process = processes.prepare(command)
-    wait_for(lambda: psutil.Process(process.pid).status() == psutil.STATUS_SLEEPING, "it waits")
+    wait_for(lambda: is_waiting(process), "it waits")
     setting = psutil.Process(process.pid).environ()[SETTING]
     process.close()
     assert ":1:move_base " in setting  # where a process has begun anew, without imports, it is :0:

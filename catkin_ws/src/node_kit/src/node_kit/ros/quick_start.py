@@ -25,7 +25,7 @@ def quick_start() -> Iterator[None]:
     module, set_before = rospy.impl.init, os.environ.get(LOG_CONFIGURATION)
     found = set_before or _log_configuration()
     usual = module.time
-    module.time = SimpleNamespace(sleep=lambda seconds: time.sleep(min(seconds, POLL_PERIOD)))
+    module.time = SimpleNamespace(**{**vars(time), "sleep": lambda seconds: time.sleep(min(seconds, POLL_PERIOD))})
     if found:
         os.environ[LOG_CONFIGURATION] = found
     try:
