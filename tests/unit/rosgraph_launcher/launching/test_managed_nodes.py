@@ -56,6 +56,14 @@ def test_node_that_neither_ran_nor_is_started_does_not_belong_to_the_configurati
     assert nodes.report("f").nodes == ("/a", "/b")
 
 
+def test_node_that_has_done_its_work_is_forgotten_with_its_configuration(nodes):
+    nodes.inspected("/b", set())
+    nodes.ended("/b", 0, 5.0)
+    assert (nodes.names, nodes.unfinished) == (("/a", "/b"), ("/a",))
+    change(nodes, "second", described("/a"), [])  # nobody asks to stop what has ended
+    assert nodes.names == ("/a",)
+
+
 def test_change_that_starts_unknown_nodes_or_relies_on_nodes_that_do_not_run_is_refused(nodes):
     assert nodes.refusal(described("/a", "/c"), ["/c"]) == ""
     assert nodes.refusal(described("/a"), ["/c"]) == "starts no node /c"

@@ -184,7 +184,7 @@ class Launcher:
         """Keep a warm process for each kind of Python node that runs, where that is wanted and no change is recent."""
         if self._options.standby and self._nodes.may_stand_by(time.monotonic()):
             self._processes.stand_by(
-                [self._commands.command(self._nodes.description(name)) for name in self._nodes.names]
+                [self._commands.command(self._nodes.description(name)) for name in self._nodes.unfinished]
             )
 
     def _inspect(self, now: float) -> None:

@@ -115,6 +115,11 @@ class ManagedNodes:
         """All nodes of all functions, also those that have done their work."""
         return tuple(self._nodes)
 
+    @property
+    def unfinished(self) -> tuple[str, ...]:
+        """The nodes that run or should run."""
+        return tuple(name for name, node in self._nodes.items() if not node.finished)
+
     def description(self, name: str) -> NodeDescription:
         """Return how a node is started."""
         return self._nodes[name].description
@@ -186,12 +191,12 @@ class ManagedNodes:
         """Note that a function has the nodes of a configuration.
 
         Those are the ones in `start`, and those that ran before and are kept. A node that the configuration lacks and
-        that is not in `stop` stays until a later change stops it.
+        that is not in `stop` stays until a later change stops it, unless it has done its work.
         """
         function = self._functions[name]
         if configuration != function.configuration:
             function.deaths.reset()
-        left = [node for node in function.nodes if node not in nodes and node not in stop]
+        left = [n for n in function.nodes if n not in nodes and n not in stop and not self._nodes[n].finished]
         kept = [node for node in nodes if node not in start and node in self._nodes]
         for node in start:
             self._nodes[node] = _Node(nodes[node])
