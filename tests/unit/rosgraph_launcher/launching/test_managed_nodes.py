@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rosgraph_launcher.description import NodeDescription
-from rosgraph_launcher.launching.managed_nodes import ManagedNodes, Verdict, standby_changes
+from rosgraph_launcher.launching.managed_nodes import ManagedNodes, Verdict
 from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE
 from rosgraph_launcher.launching.restarts import RestartPolicy
 
@@ -59,7 +59,7 @@ def test_node_that_neither_ran_nor_is_started_does_not_belong_to_the_configurati
 def test_node_that_has_done_its_work_is_forgotten_with_its_configuration(nodes):
     nodes.inspected("/b", set())
     nodes.ended("/b", 0, 5.0)
-    assert (nodes.names, nodes.unfinished) == (("/a", "/b"), ("/a",))
+    assert (nodes.names, nodes.needed) == (("/a", "/b"), ("/a",))
     change(nodes, "second", described("/a"), [])  # nobody asks to stop what has ended
     assert nodes.names == ("/a",)
 
@@ -113,6 +113,7 @@ def test_configuration_whose_nodes_die_too_often_is_given_up(nodes):
     for name in ending.stopped:
         nodes.stopped(name)
     assert (nodes.report("f").state, nodes.report("f").dead, nodes.next_restart()) == (FAILED, ("/a", "/b"), None)
+    assert nodes.needed == ()
 
 
 def test_deaths_of_one_configuration_do_not_count_for_another(nodes):
@@ -214,18 +215,6 @@ def test_warm_processes_wait_until_the_new_nodes_have_had_time_for_their_imports
     assert nodes.may_stand_by(0.6)
     nodes.begin_change("f", ["/b"], [])
     assert not nodes.may_stand_by(9.0)
-
-
-def test_warm_process_that_ended_is_replaced():
-    assert standby_changes({"a"}, {"a": False}) == (["a"], ["a"])
-
-
-@given(st.sets(st.sampled_from("abcd")), st.dictionaries(st.sampled_from("abcd"), st.booleans()))
-def test_one_warm_process_of_each_wanted_kind_remains(wanted, warm):
-    closed, started = standby_changes(wanted, warm)
-    left = [kind for kind in warm if kind not in closed] + started
-    assert sorted(left) == sorted(wanted)
-    assert all(warm[kind] for kind in set(warm) - set(closed))
 
 
 @pytest.fixture

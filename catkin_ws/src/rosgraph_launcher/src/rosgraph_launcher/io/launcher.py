@@ -24,6 +24,7 @@ from rosgraph_launcher.launching.options import LauncherOptions
 from rosgraph_launcher.launching.report import LauncherReport
 
 UNLOAD_TIMEOUT = 2.0  # s, for a nodelet's manager to answer; it takes about 0.1
+STANDBY_PERIOD = 1.0  # s, from one warm process to the next one, so that their imports take no more than one core
 
 
 class LauncherError(Exception):
@@ -52,6 +53,7 @@ class Launcher:
         self._nodes = ManagedNodes(options.policy)
         self._commands = NodeCommands(options.mark, options.run_id, log)
         self._processes = NodeProcesses(options, log)
+        self._next_standby = 0.0
         self._report()
 
     @property
@@ -159,8 +161,7 @@ class Launcher:
         self._processes.ask_to_end(leaving)
         self._end(leaving, forget=leaving)
         self._nodes.end_release(function, time.monotonic())
-        if not self._nodes.names:
-            self._processes.end_standby()
+        self._processes.stand_by(self._nodes.needed, may_start=False)
         self._report()
 
     # -- supervision ----------------------------------------------------------------------------------------------
@@ -181,11 +182,12 @@ class Launcher:
             self._report()
 
     def stand_by(self) -> None:
-        """Keep a warm process for each kind of Python node that runs, where that is wanted and no change is recent."""
-        if self._options.standby and self._nodes.may_stand_by(time.monotonic()):
-            self._processes.stand_by(
-                [self._commands.command(self._nodes.description(name)) for name in self._nodes.unfinished]
-            )
+        """Keep a warm process for each Python node that runs, where that is wanted; start none right after a change."""
+        now = time.monotonic()
+        if self._options.standby:
+            may_start = now >= self._next_standby and self._nodes.may_stand_by(now)
+            if self._processes.stand_by(self._nodes.needed, may_start):
+                self._next_standby = now + STANDBY_PERIOD
 
     def _inspect(self, now: float) -> None:
         for name in self._nodes.to_inspect(now):
@@ -204,6 +206,7 @@ class Launcher:
         if ending.verdict is Verdict.GIVE_UP:
             self._processes.ask_to_end(ending.stopped)
             self._end(ending.stopped, forget=ending.stopped)
+            self._processes.stand_by(self._nodes.needed, may_start=False)
         elif ending.stopped:
             self._end(ending.stopped, patience=False)
         self._report()

@@ -6,6 +6,7 @@ For one thread only: the main thread of the node rosgraph_launcher.
 from __future__ import annotations
 
 import signal
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -16,11 +17,11 @@ from rosgraph_launcher.io import processes
 from rosgraph_launcher.io.master import NodeApi, forget_node
 from rosgraph_launcher.io.ownership import look_up
 from rosgraph_launcher.io.processes import Command, Process, StartError
-from rosgraph_launcher.launching.managed_nodes import standby_changes
 from rosgraph_launcher.launching.options import LauncherOptions
 
 ASK_THREADS = 8  # nodes are asked to end side by side
 REASON = "replaced by another configuration"
+MOST_LOST_WARM = 3  # after so many warm processes of one kind that ended by themselves, no further one is started
 
 
 class NodeProcesses:
@@ -36,7 +37,9 @@ class NodeProcesses:
         self._options = options
         self._log = log
         self._running: dict[str, Process] = {}
+        self._commands: dict[str, Command] = {}  # by which each node was begun last
         self._warm: dict[tuple[Any, ...], Process] = {}
+        self._lost_warm: Counter[tuple[Any, ...]] = Counter()
         for pid in processes.kill_marked(options.mark):
             log(f"killed process {pid}, which an earlier launcher had left behind")
         self._reaper = processes.start_reaper(options.mark)
@@ -78,6 +81,7 @@ class NodeProcesses:
         if process is None:
             process = processes.start(command)
         self._running[name] = process
+        self._commands[name] = command
         return process.started
 
     def begin_again(self, name: str, command: Command) -> float:
@@ -135,20 +139,23 @@ class NodeProcesses:
 
     # -- standby --------------------------------------------------------------------------------------------------
 
-    def stand_by(self, commands: Iterable[Command]) -> None:
-        """Keep a warm process for each Python node among the commands, and none for another one.
+    def stand_by(self, names: Iterable[str], may_start: bool) -> bool:
+        """End the warm processes that serve none of these nodes, and start one for a Python node that lacks it.
 
-        Raises:
-            StartError: the system refuses.
+        Returns:
+            Whether one was started.
         """
+        for kind, process in list(self._warm.items()):
+            if process.status is not None:
+                self._lost_warm[kind] += 1
+                self._warm.pop(kind).close()
+        commands = (self._commands[name] for name in names if name in self._commands)
         wanted = {_kind(command): command for command in commands if command.is_python}
-        closed, missing = standby_changes(wanted, {kind: p.status is None for kind, p in self._warm.items()})
-        for kind in closed:
+        for kind in set(self._warm) - set(wanted):
             self._warm.pop(kind).close()
-        for kind in missing:
-            warm = processes.prepare(wanted[kind])
-            if warm is not None:
-                self._warm[kind] = warm
+        lacking = (k for k in wanted if k not in self._warm and self._lost_warm[k] < MOST_LOST_WARM)
+        kind = next(lacking, None) if may_start else None
+        return kind is not None and self._prepare_warm(kind, wanted[kind])
 
     def end_standby(self) -> None:
         """End all warm processes."""
@@ -161,6 +168,17 @@ class NodeProcesses:
         self._reaper.kill()
         self._reaper.wait()
         processes.kill_marked(self._options.mark)
+
+    def _prepare_warm(self, kind: tuple[Any, ...], command: Command) -> bool:
+        try:
+            warm = processes.prepare(command)
+        except StartError as error:
+            self._lost_warm[kind] += 1
+            self._log(f"no process stands by: {error}")
+            return False
+        if warm is not None:
+            self._warm[kind] = warm
+        return warm is not None
 
     def _take_warm(self, command: Command) -> Process | None:
         process = self._warm.pop(_kind(command), None)

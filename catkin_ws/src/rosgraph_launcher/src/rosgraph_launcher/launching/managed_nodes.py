@@ -6,16 +6,13 @@ A node runs once, however many functions share it. Times are arguments, in secon
 from __future__ import annotations
 
 import enum
-from collections.abc import Collection, Hashable, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.launching.nodelets import loaders
 from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 from rosgraph_launcher.launching.restarts import DeathCounter, Meaning, RestartPolicy, meaning_of_end
-
-Kind = TypeVar("Kind", bound=Hashable)
 
 OFFER_AGE = 1.0  # s after a node's start: by then it has advertised its topics and services
 STANDBY_DELAY = 0.5  # s after a change: the imports of a warm process must not slow the new nodes down
@@ -116,9 +113,9 @@ class ManagedNodes:
         return tuple(self._nodes)
 
     @property
-    def unfinished(self) -> tuple[str, ...]:
+    def needed(self) -> tuple[str, ...]:
         """The nodes that run or should run."""
-        return tuple(name for name, node in self._nodes.items() if not node.finished)
+        return tuple(name for name, node in self._nodes.items() if not node.finished and self._needing(name))
 
     def description(self, name: str) -> NodeDescription:
         """Return how a node is started."""
@@ -345,7 +342,7 @@ class ManagedNodes:
     # -- standby --------------------------------------------------------------------------------------------------
 
     def may_stand_by(self, now: float) -> bool:
-        """Tell whether warm processes may be started: not during a change, and not right after one."""
+        """Tell whether a warm process may be started: not during a change, and not right after one."""
         functions = self._functions.values()
         busy = any(f.state in (CHANGING, RECOVERING) or now - f.changed_at <= STANDBY_DELAY for f in functions)
         return any(f.state == STABLE for f in functions) and not busy
@@ -370,18 +367,3 @@ class ManagedNodes:
 
     def _drop_unowned(self) -> None:
         self._nodes = {name: node for name, node in self._nodes.items() if self._owners(name)}
-
-
-def standby_changes(wanted: Collection[Kind], warm: Mapping[Kind, bool]) -> tuple[list[Kind], list[Kind]]:
-    """Decide which warm processes to close and which to start, so that there is one of each wanted kind.
-
-    Args:
-        wanted: the kinds of the nodes that run.
-        warm: for each kind of which there is a warm process, whether that process still runs.
-
-    Returns:
-        The kinds of which to close the process, and the kinds of which to start one.
-    """
-    closed = [kind for kind, runs in warm.items() if kind not in wanted or not runs]
-    kept = set(warm) - set(closed)
-    return closed, [kind for kind in wanted if kind not in kept]

@@ -24,5 +24,5 @@ class LauncherOptions:
     run_id: str = ""
     shutdown_timeout: float = 2.0
     sigint_timeout: float = 2.0
-    standby: bool = False
+    standby: bool = True
     policy: RestartPolicy = field(default_factory=RestartPolicy)
