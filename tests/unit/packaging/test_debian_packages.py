@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import sys
 from pathlib import Path
 
@@ -81,6 +82,20 @@ def test_metapackages_hold_each_package_once(packaging):
     held = [name for name in (*meta.depends, *demo.depends) if name.startswith("mros-")]
     assert sorted(name.partition(" ")[0] for name in held) == sorted(map(packaging.debian_name, manifests))
     assert not [name for name in meta.depends if "move-base" in name or "sim" in name]
+
+
+@pytest.mark.parametrize(("begin", "packages"), [("./mros_*.deb ", None), ("", ["rosgraph_launcher"])])
+def test_documented_command_names_all_packages_that_apt_finds_nowhere_else(packaging, begin, packages):
+    manifests = {path.parent.name: packaging.read_manifest(path) for path in packaging.SOURCES.glob("*/package.xml")}
+    needed, left = {packaging.PYTHON_PACKAGE}, list(packages or packaging.META_CONTROLLER)
+    while left:
+        name = left.pop()
+        needed.add(packaging.debian_name(name))
+        left += [other for other in manifests[name].dependencies if other in manifests]
+    text = (SCRIPT.parent / "README.md").read_text()
+    command = text.split(f"apt-get install --no-install-recommends {begin}./mros-{{")[1].partition("\n\n")[0]
+    names = re.findall(r"[a-z0-9-]+(?=[,}])", command)
+    assert sorted(f"mros-{name}" for name in names) == sorted(needed)
 
 
 def test_executable_of_ours_names_the_installed_interpreter(packaging, tmp_path):
