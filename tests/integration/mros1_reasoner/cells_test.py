@@ -78,7 +78,7 @@ class CellsTest(unittest.TestCase):
         wait_for(lambda: [d for d in two.decisions if d.state == "EXECUTED"], "an executed decision of cell_2")
         self.assertNotEqual(node_pid("/cell_2/picker"), hung)
         self.look_again()
-        self.assertTrue(two.runs("picks_by_eye"))
+        wait_for(lambda: two.runs("picks_by_eye"), lambda: f"cell_2 picks by eye again, not {two.active[-1:]}")
         changes = {(d.trigger, d.from_configuration, d.to_configuration) for d in two.decisions}
         self.assertEqual(changes, {("component:picker", "picks_by_eye", "picks_by_eye")})
         self.assertEqual(len({d.id for d in two.decisions}), 1, [d.explanation for d in two.decisions])

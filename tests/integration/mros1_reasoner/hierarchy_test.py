@@ -4,6 +4,7 @@
 Its package is generated from its models, and all parts of the meta-controller run.
 """
 
+import contextlib
 import os
 import shutil
 import signal
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import rospy
 import rostest
-from helpers.waiting import DEADLINE_S, wait_for
+from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
 from metacontrol_msgs.msg import ActiveConfiguration, Decision
 from metacontrol_msgs.srv import AddObjective, RemoveObjective
 from reasoner_harness import node_pid
@@ -49,7 +50,7 @@ class HierarchyTest(unittest.TestCase):
 
     def wait_for_configurations(self, **configurations):
         expected = {function: (name, "STABLE") for function, name in {**BEST, **configurations}.items()}
-        wait_for(lambda: self.active == expected, f"exactly {expected} run; the last: {self.active}")
+        wait_for_equal(lambda: self.active, expected, "what runs")
 
     def executed(self):
         return [decision.to_configuration for decision in self.decisions if decision.state == "EXECUTED"]
@@ -64,10 +65,7 @@ class HierarchyTest(unittest.TestCase):
 
     def test_each_level_is_deployed_repaired_and_released(self):
         self.wait_for_configurations()
-        wait_for(
-            lambda: self.executed() == ["look_left", "grasp_fine", "screw"],
-            f"the deepest requirement comes first; executed in the end: {self.executed()}",
-        )
+        wait_for_equal(self.executed, ["look_left", "grasp_fine", "screw"], "the deepest requirement comes first")
 
         above = self.pids("f_assemble", "f_grasp")
         self.kill("/eye_left")  # the lowest level: its driver is gone
@@ -80,10 +78,7 @@ class HierarchyTest(unittest.TestCase):
         self.wait_for_configurations(f_look="look_right")
         self.assertEqual(self.pids("f_assemble", "f_look"), others)
 
-        while self.active["f_grasp"][0] == "grasp_fine":  # the middle: its node dies again and again
-            if self.active["f_grasp"] == ("grasp_fine", "STABLE") and (pid := self.answers("/grasper")):
-                os.kill(pid, signal.SIGKILL)
-                wait_for(lambda: self.answers("/grasper") != pid, "it is gone")
+        wait_for(self.is_given_up, lambda: f"the middle, whose node dies again and again, gives up: {self.active}")
         self.wait_for_configurations(f_look="look_right", f_grasp="grasp_rough")
         self.assertEqual(self.pids("f_assemble", "f_look"), others)
         self.assertEqual(rospy.get_param("/grasper/force"), 9)
@@ -95,12 +90,20 @@ class HierarchyTest(unittest.TestCase):
 
         answer = rospy.ServiceProxy("reasoner/remove_objective", RemoveObjective)("o_assemble")
         self.assertTrue(answer.ok, answer.message)
-        wait_for(lambda: self.active == {}, "everything is released")
+        wait_for_equal(lambda: self.active, {}, "what runs without an objective")
         for node in PARTS.values():
             self.assertIsNone(self.answers(node), node)
         answer = rospy.ServiceProxy("reasoner/add_objective", AddObjective)("o_look", "f_look", [])
         self.assertTrue(answer.ok, answer.message)
-        wait_for(lambda: self.active == {"f_look": ("look_right", "STABLE")}, "what the new objective needs runs")
+        wait_for_equal(lambda: self.active, {"f_look": ("look_right", "STABLE")}, "what the new objective needs")
+
+    def is_given_up(self):
+        """Kill the grasper where it runs; tell whether another configuration has taken its place."""
+        if self.active["f_grasp"] == ("grasp_fine", "STABLE") and (pid := self.answers("/grasper")):
+            with contextlib.suppress(ProcessLookupError):  # somebody else was faster
+                os.kill(pid, signal.SIGKILL)
+            wait_for(lambda: self.answers("/grasper") != pid, "it is gone")
+        return self.active["f_grasp"][0] != "grasp_fine"
 
     @staticmethod
     def answers(node):

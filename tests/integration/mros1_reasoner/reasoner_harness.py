@@ -9,6 +9,7 @@ import actionlib
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from helpers.connections import hears, reaches
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_bags import ownership
 from metacontrol_msgs.msg import (
@@ -32,9 +33,11 @@ PARAMETERS = {
     "violation_window": 0.5,
     "cool_down": 0.5,
     "backoff": 0.2,
-    "start_grace": 1.0,
+    "start_grace": DEADLINE_S,  # what runs is told in time, however slow the machine is
     "reasoning_rate": 0.5,
 }
+NOTHING_RUNS = {"start_grace": 0.5}
+"""For a reasoner that asks for a first configuration."""
 
 
 def node_api(node):
@@ -65,7 +68,7 @@ class Diagnostics:
 
     def reaches(self, node):
         """Tell whether a node is connected to it."""
-        return any(info[1] == node for info in self._publisher.impl.get_stats_info())
+        return reaches(self._publisher, node)
 
     def tell(self, *statuses, stamp=None):
         """Publish statuses in one array, and return its stamp."""
@@ -82,10 +85,14 @@ class Diagnostics:
 
 
 class Manipulator:
-    """Deploys in no time: announces, answers with the result that the test has set, None: not at all."""
+    """Deploys in no time: announces, and answers.
+
+    Attributes:
+        failures: results of the next requests; None: it does not answer. It carries out all others.
+    """
 
     def __init__(self, namespace="", serves=True):
-        self.result = 1
+        self.failures = []
         self.requests = []
         self.running = ""
         self._namespace = namespace
@@ -116,16 +123,17 @@ class Manipulator:
 
     def _execute(self, goal):
         name = goal.desired_configuration_name
+        result = self.failures.pop(0) if self.failures else 1
         self.requests.append(name)
-        if self.result is None:
+        if result is None:
             wait_for(self._server.is_preempt_requested, "a request to give up")
             self._server.set_preempted()
-        elif self.result == 1:
+        elif result == 1:
             self.announce(name, "RECONFIGURING")
             self.announce(name)
             self._server.set_succeeded(MvpReconfigurationResult(1))
         else:
-            self._server.set_aborted(MvpReconfigurationResult(self.result), "it did not come up")
+            self._server.set_aborted(MvpReconfigurationResult(result), "it did not come up")
 
 
 class Listener:
@@ -134,9 +142,16 @@ class Listener:
     def __init__(self, namespace=""):
         self.node = f"{namespace}/reasoner"
         self.decisions, self.log, self.lines, self.troubles = [], [], [], []
-        rospy.Subscriber(f"{namespace}/mros1_reasoner/decision", Decision, self.decisions.append, queue_size=50)
-        rospy.Subscriber("/rosout", Log, self._on_log, queue_size=500)
+        self._subscribers = [
+            rospy.Subscriber(f"{namespace}/mros1_reasoner/decision", Decision, self.decisions.append, queue_size=50),
+            rospy.Subscriber("/rosout", Log, self._on_log, queue_size=500),
+        ]
         rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=500)
+
+    @property
+    def is_connected(self):
+        """Whether it hears what the reasoner decides and logs from now on."""
+        return all(hears(subscriber, self.node) for subscriber in self._subscribers)
 
     def _on_log(self, message):
         if message.name == self.node:
@@ -150,13 +165,17 @@ class Listener:
     def decided(self, state, count=1):
         """Wait until so many decisions of a state were heard; return the last."""
         found = wait_for(
-            lambda: [d for d in self.decisions if d.state == state][count - 1 :], f"decision {count} of state {state}"
+            lambda: [d for d in self.decisions if d.state == state][count - 1 :],
+            lambda: f"decision {count} of state {state}; heard {[(d.state, d.explanation) for d in self.decisions]}",
         )
         return found[0]
 
     def logged(self, text, start=0):
         """Wait until a line of the log holds a text; return the line."""
-        return wait_for(lambda: [line for line in self.log[start:] if text in line], f"in the log: {text}")[0]
+        return wait_for(
+            lambda: [line for line in self.log[start:] if text in line],
+            lambda: f"in the log: {text}; the last lines: {self.log[start:][-10:]}",
+        )[0]
 
 
 class Reasoner:
@@ -187,6 +206,7 @@ class Reasoner:
             stdout=subprocess.DEVNULL,
         )
         self.listener.logged("Reasoner Initialization Ok", before)
+        wait_for(lambda: self.listener.is_connected, "the reasoner is heard")
         wait_for(lambda: self._diagnostics.reaches(self.node), "the reasoner hears diagnostics")
 
     def kill(self):

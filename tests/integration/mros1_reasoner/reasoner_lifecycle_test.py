@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
 from metacontrol_msgs.srv import Feasible
-from reasoner_harness import Diagnostics, Manipulator, Reasoner, status
+from reasoner_harness import NOTHING_RUNS, Diagnostics, Manipulator, Reasoner, status
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
@@ -28,7 +28,7 @@ class LifecycleTest(unittest.TestCase):
 
     def test_first_configuration_is_asked_for_where_none_runs(self):
         manipulator = Manipulator("/first")
-        with self.reasoner("/first") as reasoner:
+        with self.reasoner("/first", **NOTHING_RUNS) as reasoner:
             done = reasoner.listener.decided("EXECUTED")
             self.assertEqual(
                 (done.trigger, done.from_configuration, done.to_configuration), ("initial", "", "scan_slow")
@@ -37,7 +37,7 @@ class LifecycleTest(unittest.TestCase):
 
     def test_desired_configuration_is_the_first_one(self):
         manipulator = Manipulator("/desired")
-        with self.reasoner("/desired", desired_configuration="camera_slower") as reasoner:
+        with self.reasoner("/desired", desired_configuration="camera_slower", **NOTHING_RUNS) as reasoner:
             reasoner.listener.decided("EXECUTED")
             self.assertEqual(manipulator.requests, ["camera_slower"])
 
@@ -61,8 +61,9 @@ class LifecycleTest(unittest.TestCase):
             wait_for(lambda: [s.level for s in reasoner.listener.troubles][-1:] == ok, "the end of the trouble")
 
     def test_late_manipulator_keeps_what_it_runs(self):
-        with self.reasoner("/late") as reasoner:
+        with self.reasoner("/late", **NOTHING_RUNS) as reasoner:
             self.assertEqual(reasoner.listener.decided("FAILED").trigger, "initial")
+            reasoner.listener.decided("DECIDED", 2)  # the manipulator is looked for again
             manipulator = Manipulator("/late", serves=False)
             manipulator.announce("scan_slow")
             reasoner.listener.logged("f_move runs scan_slow")
@@ -153,7 +154,7 @@ class LifecycleTest(unittest.TestCase):
         manipulator = Manipulator("/aborted")
         manipulator.announce("scan_slow")
         drive = Manipulator("/aborted/drive")  # serves an action; which one, does not matter
-        drive.result = 0
+        drive.failures = [0]
         action = "drive/rosgraph_manipulator_action_server"
         with self.reasoner("/aborted", task_actions=f"{{o_moveA: {action}}}") as reasoner:
             reasoner.listener.logged("f_move runs scan_slow")

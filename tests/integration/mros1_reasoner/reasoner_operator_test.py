@@ -214,7 +214,7 @@ class OperatorTest(unittest.TestCase):
                     lambda level=level, text=text: any(
                         line.level == level and line.msg == text for line in reasoner.listener.lines
                     ),
-                    text,
+                    lambda text=text: f"{text}; logged {reasoner.listener.log}",
                 )
 
     def test_flood_of_bad_diagnostics_leaves_few_lines_and_the_loop_going(self):
@@ -240,11 +240,10 @@ class OperatorTest(unittest.TestCase):
                 self.diagnostics.component("laser", "FALSE")  # before it is recorded
                 reasoner.listener.decided("EXECUTED")
                 with Recorder(path, "/bag") as recorder:
-                    manipulator.result = 0
+                    manipulator.failures = [0]
                     self.diagnostics.component("laser", "TRUE")
                     self.diagnostics.component("camera", "FALSE")
                     reasoner.listener.decided("FAILED")
-                    manipulator.result = 1
                     last = reasoner.listener.decided("EXECUTED", 2)
                     wait_for(lambda: recorder.holds(last.id), "the end of the story in the bag")
                 shown = self.command("explain", "--topic", "/bag/mros1_reasoner/decision", "--wait", str(DEADLINE_S))

@@ -217,6 +217,8 @@ class ReasonerNode:
             self._log.tell(f"{name} runs no more")
         for function in running:
             taken = self._take(ActiveFact(function.function, function.configuration, function.state))
+            if taken and self._requests and function.state != messages.FunctionGrounding.FAILED:
+                self._requests.keep_what_runs(function.function)
             if taken and function.function not in self._taken_over:
                 self._taken_over.add(function.function)
                 say = f"{function.function} runs {function.configuration} ({function.state}): taken over as it is"

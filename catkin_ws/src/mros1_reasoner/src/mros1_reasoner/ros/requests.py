@@ -108,6 +108,12 @@ class Requests:
             self._release_after = time.monotonic() + _RELEASE_WAIT
             self._warn_of_absence(f"{', '.join(functions)} can't be released and may go on running")
 
+    def keep_what_runs(self, function: str) -> None:
+        """Give up a request for the first configuration of a function that could not be sent yet: something runs."""
+        request = self._request
+        if request and request.handle is None and request.wanted.is_first and request.wanted.function == function:
+            self._end(request, False, "a configuration runs already", blame=False)
+
     def look(self) -> None:
         """Send a request that could not be sent before; give up one that takes too long."""
         request = self._request
