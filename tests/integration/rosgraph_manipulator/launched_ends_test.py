@@ -11,7 +11,7 @@ from pathlib import Path
 import rosgraph
 import rostest
 from helpers.cases import case
-from helpers.waiting import DEADLINE_S, wait_for
+from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
 from manipulator_harness import HERE, PairTest, pid_of
 
 LAUNCH = str(HERE / "ends.launch")
@@ -33,8 +33,8 @@ def starts():
 
 
 def let_end():
-    """Let the node end, as often as it has begun."""
-    rosgraph.Master("/test").setParam("/launched_go", starts())
+    """Let the node end, as often as it has begun; it counts its starts after it is up."""
+    rosgraph.Master("/test").setParam("/launched_go", wait_for(starts, "the node has begun"))
 
 
 class LaunchedEndsTest(PairTest):
@@ -77,7 +77,7 @@ class LaunchedEndsTest(PairTest):
         for number in range(1, MORE_THAN_INTENSITY + 1):
             wait_for(lambda: starts() == number and pid_of("/short"), f"start {number}")  # noqa: B023
             let_end()
-        wait_for(lambda: starts() == MORE_THAN_INTENSITY + 1, "it has begun once more")
+        wait_for_equal(starts, MORE_THAN_INTENSITY + 1, "it has begun once more")
 
     def test_respawned_node_may_end_with_status_0_again_and_again(self):
         with self.roslaunch("respawned"):
@@ -94,10 +94,11 @@ class LaunchedEndsTest(PairTest):
                     process.wait(DEADLINE_S)
                 self.launch(name)
                 let_end()
-                wait_for(lambda: self.is_in(name, "FAILED"), "the configuration has failed")  # noqa: B023
+                self.wait_for_state(name, "FAILED")
                 wait_for(lambda: not pid_of("/long"), "the other node has ended")
-                self.assertIn(f"node /short ended with status {status}", self.launcher_states[-1].message)
-                self.assertIn(f"it is required: {name} is stopped", self.launcher_states[-1].message)
+                wait_for(lambda: self.launcher_state.state == "FAILED", lambda: f"FAILED: {self.launcher_state}")
+                self.assertIn(f"node /short ended with status {status}", self.launcher_state.message)
+                self.assertIn(f"it is required: {name} is stopped", self.launcher_state.message)
                 self.setUp()
 
     def test_node_that_fails_is_told_with_its_status(self):
@@ -107,7 +108,7 @@ class LaunchedEndsTest(PairTest):
             self.assertTrue(pid_of("/long"))
         self.launch("failing")
         let_end()
-        wait_for(lambda: starts() == 2, "the launcher has started it again, which roslaunch does not")
+        wait_for_equal(starts, 2, "the launcher has started it again, which roslaunch does not")
         self.assertIn("node /short ended with status 3", self.launcher.said())
         self.assertTrue(pid_of("/long"))
 
@@ -117,7 +118,7 @@ class LaunchedEndsTest(PairTest):
             wait_for(lambda: "finished cleanly" in self.read(), "roslaunch tells it")
         self.launch("finishing")
         let_end()
-        wait_for(lambda: self.launcher_states[-1].nodes == ["/long"], "the launcher tells it")
+        wait_for_equal(lambda: self.launcher_state.nodes, ["/long"], "the launcher tells it")
         self.assertTrue(self.is_in("finishing", "STABLE"))
         self.assertEqual(starts(), 1)
 

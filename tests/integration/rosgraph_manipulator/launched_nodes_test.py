@@ -172,8 +172,10 @@ def seen():
     return None
 
 
-SETTLE_S = 60
+SETTLE_S = 100
 """Wall s, within which all that nodes do at their start must have happened."""
+SAME_LOOKS = 10
+"""Looks in a row that find the same; then nodes have done what they do at their start."""
 
 
 def differs(found, expected):
@@ -182,6 +184,16 @@ def differs(found, expected):
     return any(found[part] != expected[part] for part in parts) or any(
         found["processes"][name] != process for name, process in expected["processes"].items()
     )
+
+
+def settled():
+    """What is seen of the nodes once it stays the same: a bond of a nodelet comes up later than its node."""
+    found, same = seen(), 0
+    while same < SAME_LOOKS:
+        again = wait_for(seen, "all nodes still run")
+        same = same + 1 if found and not differs(again, found) else 0
+        found = again
+    return found
 
 
 class LaunchedNodesTest(PairTest):
@@ -218,7 +230,8 @@ class LaunchedNodesTest(PairTest):
                 env={**os.environ, "PYTHONUNBUFFERED": "1"},
             )
             try:
-                found = wait_for(seen, "roslaunch has started all nodes")
+                wait_for(seen, "roslaunch has started all nodes")
+                found = settled()
             finally:
                 process.send_signal(signal.SIGINT)
                 process.wait(DEADLINE_S)

@@ -12,7 +12,7 @@ import rostest
 from actionlib_msgs.msg import GoalStatus
 from dynamic_reconfigure.msg import Config
 from helpers.cases import case
-from helpers.waiting import DEADLINE_S, wait_for
+from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
 from manipulator_harness import PairTest, is_alive, pid_of
 
 RANDOM_REQUESTS = int(os.environ.get("MROS_RANDOM_REQUESTS", "10"))  # the benchmark makes 200
@@ -29,22 +29,36 @@ class ChangesTest(PairTest):
     def test_many_random_requests_leave_nothing_behind_and_lose_no_goal(self):
         goal_id, _ = self.send_goal()
         generator = random.Random(200)
-        names = ["slow", "fast", "tuned_1", "tuned_2", "once", "exits", "dies", "malformed", "no_node", "unknown"]
-        expected = {"exits": 0, "dies": 0, "malformed": 0, "no_node": 0, "unknown": -1}
+        names = [
+            "slow",
+            "fast",
+            "tuned_1",
+            "tuned_2",
+            "once",
+            "exits",
+            "dies_at_once",
+            "malformed",
+            "no_node",
+            "unknown",
+        ]
+        expected = {"exits": 0, "dies_at_once": 0, "malformed": 0, "no_node": 0, "unknown": -1}
         usage = []
         for number in range(RANDOM_REQUESTS):
             name = generator.choice(names)
             with case(number, name=name):
                 self.assertEqual(self.request(name), expected.get(name, 1), self.text)
-            wait_for(lambda: self.states[-1].functions[0].state == "STABLE", "a configuration is stable")
+            wait_for(lambda: self.state.state == "STABLE", lambda: f"a configuration is stable: {self.state}")
             usage.append(self.usage())
         wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the goal is still at work")
-        running = {pid_of(node) for node in self.launcher_states[-1].nodes}
-        standby = len(self.launcher_states[-1].nodes)
-        wait_for(lambda: len(set(self.launched()) - running) <= standby, "nothing but the standby is left")
+        wait_for(self.has_only_standby, lambda: f"nothing but the standby is left: {self.launched()}")
         descriptors, memory = zip(*usage[len(usage) // 3 :], strict=True)
         self.assertLess(max(descriptors) - min(descriptors), 30, usage)
         self.assertLess(memory[-1] - memory[0], 20e6 + 0.05e6 * RANDOM_REQUESTS, usage)
+
+    def has_only_standby(self):
+        """Whether at most one process for each node that runs is left beside the nodes."""
+        nodes = self.launcher_state.nodes
+        return len(set(self.launched()) - {pid_of(node) for node in nodes}) <= len(nodes)
 
     def usage(self):
         pair = [psutil.Process(node.pid) for node in (self.launcher, self.manipulator)]
@@ -53,7 +67,7 @@ class ChangesTest(PairTest):
     def test_parameters_are_set_while_the_nodes_run(self):
         self.assertEqual(self.request("tuned_1"), 1)
         pids = pid_of("/tunable"), pid_of("/wait_server")
-        wait_for(lambda: self.updates() == 1.0, "the server is there")
+        wait_for_equal(self.updates, 1.0, "the server is there")
         self.assertEqual(self.request("tuned_2"), 1)
         wait_for(lambda: self.states[-1].tactic == "parameters", "the tactic is told")
         self.assertEqual((pid_of("/tunable"), pid_of("/wait_server")), pids)

@@ -22,7 +22,7 @@ def own_file(name):
 
 
 class FaultsTest(PairTest):
-    manipulator_parameters = {"ready_timeout": 15.0, "settle_time": 2.0}
+    manipulator_parameters = {"ready_timeout": 30.0, "settle_time": 2.0}
 
     @classmethod
     def setUpClass(cls):
@@ -85,7 +85,7 @@ class FaultsTest(PairTest):
         self.assertEqual(self.request("exits"), -2)
         self.wait_for_state("exits", "FAILED")
         wait_for(lambda: Twist() in self.commands, "the robot is commanded to stop")
-        self.assertEqual(self.launched(), [])
+        wait_for(self.has_ended, "nothing is left")
 
 
 if __name__ == "__main__":

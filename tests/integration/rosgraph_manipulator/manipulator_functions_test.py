@@ -10,7 +10,7 @@ import rospy
 import rostest
 from actionlib.msg import TestAction
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
-from helpers.waiting import DEADLINE_S, wait_for
+from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
 from manipulator_harness import HERE, PairTest, pid_of
 from metacontrol_msgs.msg import ChangeFunctionAction, ChangeFunctionGoal
 
@@ -28,7 +28,7 @@ class FunctionsTest(PairTest):
         "look_fast": configuration("f_look", "look", "rate:=4.0"),
         "pick_softly": configuration("f_pick", "pick", "force:=1"),
         "pick_hard": configuration("f_pick", "pick", "force:=9"),
-        "pick_dying": configuration("f_pick", "pick", "force:=1", "args:=--die-after 0.2"),
+        "pick_dying": configuration("f_pick", "pick", "force:=1", "args:=--die-after 0.01"),
         "pick_otherwise": configuration("f_pick", "pick", "force:=1", "raw:=other"),
         "sort_slowly": configuration("f_sort", "sort", "rate:=1.0"),
         "sort_fast": configuration("f_sort", "sort", "rate:=5.0"),
@@ -41,7 +41,8 @@ class FunctionsTest(PairTest):
         "settle_time": 0.5,
         "probation": 0.0,
     }
-    launcher_parameters = {"restart_intensity": 2}
+    # Nodes stay dead long enough for the manipulator to see it, and no death is forgotten.
+    launcher_parameters = {"restart_intensity": 2, "restart_delay": 1.0, "restart_period": 100.0}
 
     @classmethod
     def setUpClass(cls):
@@ -66,7 +67,7 @@ class FunctionsTest(PairTest):
 
     def wait_for_functions(self, **configurations):
         expected = {function: (name, "STABLE") for function, name in configurations.items()}
-        wait_for(lambda: self.deployed() == expected, f"exactly {configurations} are stable")
+        wait_for_equal(self.deployed, expected, "what runs")
 
     def change(self, function, name="", restart=()):
         self.changes.send_goal(ChangeFunctionGoal(function, name, list(restart)))
@@ -105,11 +106,15 @@ class FunctionsTest(PairTest):
 
     def test_death_of_a_shared_node_concerns_the_functions_that_share_it(self):
         seen = len(self.states)
+
+        def told():
+            return {f.function for message in self.states[seen:] for f in message.functions if f.state == "RECOVERING"}
+
         os.kill(self.pids[CAMERA], signal.SIGKILL)
-        wait_for(lambda: pid_of(CAMERA) not in (None, self.pids[CAMERA]), "the camera is back")
+        wait_for_equal(told, {"f_look", "f_pick"}, "who recovers")
         self.wait_for_functions(f_look="look_slowly", f_pick="pick_softly", f_sort="sort_slowly")
-        told = {f.function for message in self.states[seen:] for f in message.functions if f.state == "RECOVERING"}
-        self.assertEqual(told, {"f_look", "f_pick"})
+        self.assertNotIn(pid_of(CAMERA), (None, self.pids[CAMERA]))
+        self.assertEqual(told(), {"f_look", "f_pick"})
         self.assert_same(VIEWER, GRIPPER, SORTER)
 
     def test_function_whose_node_dies_too_often_fails_alone(self):
@@ -162,7 +167,7 @@ class FunctionsTest(PairTest):
         client.update_configuration({"controller_frequency": 7.5})
         wait_for(lambda: rospy.get_param(f"{VIEWER}/controller_frequency") == 7.5, "it has drifted")
         self.assertEqual(self.request("look_slowly"), 1, self.text)
-        self.assertEqual(client.get_configuration(timeout=DEADLINE_S)["controller_frequency"], 1.0)
+        wait_for_equal(lambda: client.get_configuration(timeout=DEADLINE_S)["controller_frequency"], 1.0, "the rate")
         self.assertEqual(rospy.get_param(f"{VIEWER}/controller_frequency"), 1.0)
         self.assert_same(VIEWER)
 
@@ -181,9 +186,13 @@ class FunctionsTest(PairTest):
         self.start_manipulator()
         self.wait_for_functions(f_look="look_slowly", f_pick="pick_softly", f_sort="sort_slowly")
         self.assert_same(CAMERA, VIEWER, GRIPPER, SORTER)
-        self.assertTrue(self.client.wait_for_server(rospy.Duration(DEADLINE_S)))
-        self.assertTrue(self.changes.wait_for_server(rospy.Duration(DEADLINE_S)))
-        wait_for(lambda: self.change("f_look").result == 1, "the new manipulator takes requests")
+        self.wait_until_it_serves()
+
+        def is_released():
+            self.changes.send_goal(ChangeFunctionGoal("f_look", "", []))
+            return self.changes.wait_for_result(rospy.Duration(3)) and self.changes.get_result().result == 1
+
+        wait_for(is_released, "the new manipulator takes requests")
         wait_for(lambda: not rospy.has_param(f"{VIEWER}/controller_frequency"), "its parameters are gone")
 
     def test_all_functions_survive_a_killed_launcher(self):

@@ -18,12 +18,16 @@ import rospy
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import Twist
+from helpers.connections import hears
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
+    FunctionGrounding,
+    LaunchedFunction,
     LaunchedFunctions,
     MvpReconfigurationAction,
     MvpReconfigurationGoal,
+    ReconfigurationResult,
 )
 from rosgraph_launcher.io.processes import MARK
 
@@ -60,7 +64,7 @@ CONFIGURATIONS = {
     "hangs": configuration(args="--hang"),
     "stubborn": configuration(args="--stubborn"),
     "dies": configuration(args="--die-after 0.3"),
-    "dies_later": configuration(args="--die-after 4.5"),
+    "dies_at_once": configuration(args="--die-after 0.01"),
     "malformed": {"function": "f_wait", "launch": str(HERE / "malformed.launch")},
     "undefined": {"function": "f_wait", "launch": str(HERE / "undefined.launch")},
     "no_package": {"function": "f_wait", "command": "roslaunch no_such_package x.launch"},
@@ -110,7 +114,7 @@ class PairTest(unittest.TestCase):
     def setUpClass(cls):
         rospy.init_node("manipulator_test", anonymous=True)
         cls.states, cls.launcher_states, cls.commands = [], [], []
-        cls.server_goals, cls.server = {}, None
+        cls.server_status = None, {}  # a server, as the header of its connection, and the states of its goals
         rospy.set_param(
             "rosgraph_manipulator",
             {
@@ -130,6 +134,7 @@ class PairTest(unittest.TestCase):
             rospy.Subscriber("cmd_vel", Twist, cls.commands.append),
             rospy.Subscriber("wait/status", GoalStatusArray, cls.on_status),
         ]
+        cls.heard_commands = cls.subscribers[2]
         cls.addClassCleanup(cls.end_pair)
         cls.launcher = cls.manipulator = None
         cls.start_launcher()
@@ -161,35 +166,75 @@ class PairTest(unittest.TestCase):
 
     @classmethod
     def on_status(cls, message):
-        cls.server = message._connection_header
-        cls.server_goals = {entry.goal_id.id: entry.status for entry in message.status_list}
+        goals = {entry.goal_id.id: entry.status for entry in message.status_list}
+        cls.server_status = message._connection_header, goals
+
+    @property
+    def server(self):
+        return self.server_status[0]
+
+    @property
+    def server_goals(self):
+        return self.server_status[1]
+
+    @property
+    def launcher_state(self):
+        """What the launcher has told last of the tests' only function."""
+        return self.launcher_states[-1] if self.launcher_states else LaunchedFunction()
+
+    @property
+    def state(self):
+        """What the manipulator has told last of its first function."""
+        functions = self.states[-1].functions if self.states else []
+        return functions[0] if functions else FunctionGrounding()
 
     def request(self, name):
+        """Ask for a configuration; return the result, once the manipulator has told of its end on its topic, too."""
+        before = len(self.states)
         self.client.send_goal(MvpReconfigurationGoal(name))
         self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)), f"no result for {name}")
-        return self.client.get_result().result
+        result, text = self.client.get_result().result, self.text
+        if result != ReconfigurationResult.UNKNOWN_CONFIGURATION:
+            wait_for(lambda: text in [state.message for state in self.states[before:]], f"it is told: {text}")
+        return result
 
     @property
     def text(self):
         return self.client.get_goal_status_text()
 
     def is_in(self, name, state):
-        return bool(self.states) and (
-            self.states[-1].functions[0].configuration == name and self.states[-1].functions[0].state == state
-        )
+        return (self.state.configuration, self.state.state) == (name, state)
 
     def wait_for_state(self, name, state="STABLE"):
-        wait_for(lambda: self.is_in(name, state), f"{name} is {state}")
+        wait_for(lambda: self.is_in(name, state), lambda: f"{name} is {state}; told last: {self.states[-1:]}")
 
     def forget_goals(self):
         """Cancel what the server has at work, and wait until it has nothing."""
+        now = rospy.Time.now()
 
         def is_idle():
-            return not {GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING} & set(self.server_goals.values())
+            if not {GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING} & set(self.server_goals.values()):
+                return True
+            # Again and again, since it may not have found a new server yet; it does not concern later goals.
+            self.waiting.cancel_goals_at_and_before_time(now)
+            return False
 
-        if not is_idle():
-            self.waiting.cancel_all_goals()
-            wait_for(is_idle, "the server has nothing to do")
+        wait_for(is_idle, lambda: f"the server has nothing to do; it has {self.server_goals}")
+
+    def wait_until_it_serves(self):
+        """Wait until the (new) manipulator answers requests: an unknown one is refused at once."""
+        wait_for(lambda: pid_of("/rosgraph_manipulator") == self.manipulator.pid, "the manipulator is there")
+
+        def answers():
+            self.client.send_goal(MvpReconfigurationGoal("no_such_configuration"))
+            return self.client.wait_for_result(rospy.Duration(1)) and self.client.get_result().result == -1
+
+        wait_for(answers, lambda: f"the manipulator answers: {self.manipulator.said()}")
+        wait_for(lambda: hears(self.heard_commands, "/rosgraph_manipulator"), "its commands are heard")
+
+    def has_ended(self):
+        """Whether the launcher has ended all that it has started."""
+        return not self.launched()
 
     def send_goal(self):
         """Send a goal that stays pending; return its id and handle."""
@@ -210,10 +255,12 @@ class PairTest(unittest.TestCase):
 
     def wait_for_goal(self, goal_id, old_server):
         """Wait until another server works at the goal."""
-        wait_for(
-            lambda: self.server is not old_server and self.server_goals.get(goal_id) == GoalStatus.ACTIVE,
-            "another server works at the goal",
-        )
+
+        def is_at_work():
+            server, goals = self.server_status
+            return server is not old_server and goals.get(goal_id) == GoalStatus.ACTIVE
+
+        wait_for(is_at_work, lambda: f"another server works at goal {goal_id}; goals: {self.server_goals}")
 
     @staticmethod
     def launched(master=None):

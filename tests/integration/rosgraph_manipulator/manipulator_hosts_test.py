@@ -7,14 +7,12 @@ import subprocess
 import threading
 from contextlib import suppress
 
-import actionlib
 import psutil
 import rosgraph
 import rospy
 import rostest
-from helpers.waiting import DEADLINE_S, wait_for
+from helpers.waiting import wait_for
 from manipulator_harness import HERE, PairTest, is_alive, pid_of
-from metacontrol_msgs.msg import MvpReconfigurationAction
 
 HOST, ADDRESS = os.environ["OTHER_HOST"], os.environ["OTHER_ADDRESS"]
 FAR_LAUNCHER = "rosgraph_launcher_arm"
@@ -63,7 +61,7 @@ class HostsTest(PairTest):
     configurations = {
         "both": configuration("hosts", f"address:={ADDRESS}"),
         "missing": configuration("hosts", f"address:={ADDRESS}", "far:=no_such_node.py"),
-        "dies": configuration("hosts", f"address:={ADDRESS}", "far:=wait_server.py", "far_args:=--die-after 0.3"),
+        "dies": configuration("hosts", f"address:={ADDRESS}", "far:=wait_server.py", "far_args:=--die-after 0.01"),
         "nowhere": configuration("hosts", "address:=192.0.2.1"),
         "near": configuration("near"),
     }
@@ -71,13 +69,15 @@ class HostsTest(PairTest):
         "save_action": "",
         "goal_msg_type": "",
         "initial_configuration": "near",
-        "host_timeout": 4.0,
-        "launcher_timeout": 10.0,
+        "host_timeout": 8.0,
+        "launcher_timeout": 20.0,
         "probation": 0.0,
     }
 
     @classmethod
     def setUpClass(cls):
+        # A node stays dead long enough for the manipulator to see it.
+        rospy.set_param(FAR_LAUNCHER, {"restart_delay": 1.0, "restart_period": 100.0})
         super().setUpClass()
         cls.far = Respawned()
         cls.addClassCleanup(cls.far.end)
@@ -120,8 +120,7 @@ class HostsTest(PairTest):
         self.states.clear()
         type(self).start_manipulator()
         self.wait_for_state("both")
-        type(self).client = actionlib.SimpleActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
-        self.assertTrue(self.client.wait_for_server(rospy.Duration(DEADLINE_S)))
+        self.wait_until_it_serves()
         self.assertEqual(self.request("both"), 1, self.text)
         self.assertEqual((pid_of(NEAR), pid_of(FAR)), (self.near_pid, self.far_pid))
 

@@ -12,6 +12,7 @@ import rostest
 from actionlib.action_client import GoalManager
 from actionlib_msgs.msg import GoalID, GoalStatus
 from helpers.cases import case
+from helpers.connections import reaches
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import CONFIGURATIONS, PairTest, pid_of
 from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
@@ -41,7 +42,7 @@ class RequestsTest(PairTest):
         wait_for(lambda: pid_of("/rosgraph_manipulator") == self.manipulator.pid, "the manipulator is there")
         # what was said before it heard us is lost, on either topic
         wait_for(self.is_heard, "it answers")
-        wait_for(lambda: self.requests.pub_cancel.get_num_connections() > 0, "it hears what is taken back")
+        wait_for(lambda: reaches(self.requests.pub_cancel, "/rosgraph_manipulator"), "it hears what is taken back")
 
     def is_heard(self):
         handle = self.ask("no_such_configuration")
@@ -64,7 +65,7 @@ class RequestsTest(PairTest):
         return handle.get_goal_status(), handle.get_result() and handle.get_result().result
 
     def test_configuration_without_its_topics_is_not_ready(self):
-        self.restart_with(ready_timeout=10.0)
+        self.restart_with(ready_timeout=15.0)
         self.addCleanup(self.restart_with, ready_timeout=30.0)
         self.assertEqual(self.request("mute"), 0)
         self.assertIn("not all of its topics are published", self.text)
@@ -103,18 +104,19 @@ class RequestsTest(PairTest):
 
     def test_request_is_refused_while_another_one_runs(self):
         self.restart_with(concurrency="refuse")
-        first = self.ask("fast")
-        wait_for(lambda: self.is_in("fast", "RECONFIGURING"), "the change has begun")
-        second = self.ask("slow")
+        first = self.ask("hangs")  # until it is taken back
+        self.wait_for_state("hangs", "RECONFIGURING")
+        second = self.ask("fast")
         self.assertEqual(self.finish(second)[0], GoalStatus.REJECTED)
-        self.assertEqual(self.finish(first), (GoalStatus.SUCCEEDED, 1))
-        self.wait_for_state("fast")
+        self.take_back(first)
+        self.assertEqual(self.finish(first), (GoalStatus.PREEMPTED, 0))
+        self.wait_for_state("slow")
 
     def test_request_replaces_the_one_that_runs(self):
         self.restart_with(concurrency="replace")
         goal_id, _ = self.send_goal()
         hanging = self.ask("hangs")
-        wait_for(lambda: self.launcher_states[-1].configuration == "hangs", "it is being started")
+        wait_for(lambda: self.launcher_state.configuration == "hangs", "it is being started")
         server = self.server
         better = self.ask("fast")
         self.assertEqual(self.finish(hanging), (GoalStatus.PREEMPTED, 0))
@@ -125,8 +127,8 @@ class RequestsTest(PairTest):
         self.restart_with(concurrency="wait")
         goal_id, _ = self.send_goal()
         generator = random.Random(6)
+        running = "slow"
         for number in range(5):
-            running = self.states[-1].functions[0].configuration
             wanted = "slow" if running == "fast" else "fast"
             handle = self.ask(wanted)
             time.sleep(generator.uniform(0.0, 1.2))
@@ -138,7 +140,8 @@ class RequestsTest(PairTest):
                     (status, result),
                     [(GoalStatus.RECALLED, 0), (GoalStatus.PREEMPTED, 0), (GoalStatus.SUCCEEDED, 1)],
                 )
-                self.wait_for_state(wanted if result == 1 else running)
+                running = wanted if result == 1 else running
+                self.wait_for_state(running)
                 wait_for(lambda: pid_of("/wait_server"), "a server runs")
         wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the goal is still at work")
 

@@ -16,21 +16,21 @@ import rostest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist
 from helpers.cases import case
+from helpers.ports import reserved_port
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import Node, PairTest, is_alive, later, pid_of
-from metacontrol_experiments.io.processes import free_port
 from metacontrol_msgs.msg import MvpReconfigurationGoal
 
 
 class SurvivalTest(PairTest):
     manipulator_parameters = {"probation": 0.0, "settle_time": 0.2}
-    launcher_parameters = {"restart_intensity": 1}
+    # Nodes stay dead long enough for the manipulator to see it, and no death is forgotten.
+    launcher_parameters = {"restart_intensity": 1, "restart_delay": 1.0, "restart_period": 100.0}
 
     def setUp(self):
         self.wait_until_it_serves()
         self.assertEqual(self.request("slow"), 1, self.manipulator.said())
         self.forget_goals()
-        wait_for(lambda: GoalStatus.ACTIVE not in self.server_goals.values(), "no goal is at work")
 
     def kill_server(self):
         pid = pid_of("/wait_server")
@@ -64,7 +64,7 @@ class SurvivalTest(PairTest):
         self.wait_for_state("fast", "FAILED")
         self.assertIn("too many", self.states[-1].message)
         wait_for(lambda: Twist() in self.commands, "the robot is commanded to stop")
-        self.assertEqual(self.launched(), [])
+        wait_for(self.has_ended, "nothing is left")
         self.assertEqual(self.request("fast"), 1)
 
     def test_killed_launcher_leaves_nothing_behind_and_brings_all_back(self):
@@ -90,15 +90,13 @@ class SurvivalTest(PairTest):
         self.wait_for_goal(goal_id, server)
 
     def test_goal_that_ends_while_there_is_no_manipulator_is_not_resurrected(self):
-        goal_id, handle = self.send_goal()
-        server = self.server
+        goal_id, _ = self.send_goal()
         self.manipulator.end(signal.SIGKILL)
-        handle.cancel()
-        wait_for(lambda: self.server_goals.get(goal_id) != GoalStatus.ACTIVE, "the goal is cancelled")
+        self.forget_goals()
         self.restart_manipulator()
         self.wait_until_it_serves()
         self.assertEqual(self.request("fast"), 1)
-        wait_for(lambda: self.server is not server, "the new server tells its goals")
+        self.send_goal()  # a former one would have come before it
         self.assertNotEqual(self.server_goals.get(goal_id), GoalStatus.ACTIVE)
 
     def test_manipulator_killed_in_the_middle_of_a_change_finishes_it(self):
@@ -126,7 +124,10 @@ class SurvivalTest(PairTest):
             self.states.clear()
             self.restart_manipulator()
         refusal = "hangs is not deployed again: the manipulator has died 2 times"
-        wait_for(lambda: self.states and refusal in self.states[-1].message, "the change is refused")
+        wait_for(
+            lambda: self.states and refusal in self.states[-1].message,
+            lambda: f"the change is refused; told last: {self.states[-1:]}",
+        )
         self.assertTrue(self.is_in("slow", "STABLE"), self.states[-1])
         self.wait_until_it_serves()
         self.assertEqual(self.request("fast"), 1)
@@ -146,19 +147,19 @@ class SurvivalTest(PairTest):
         goal_id, _ = self.send_goal()
         server = self.server
         self.client.send_goal(MvpReconfigurationGoal("fast"))
-        wait_for(lambda: self.launcher_states[-1].state == "CHANGING", "the change has begun")
+        wait_for(lambda: self.launcher_state.state == "CHANGING", "the change has begun")
         self.launcher.end(signal.SIGKILL)
         self.restart_launcher()
         self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
         self.assertIn(self.client.get_result().result, (0, 1))
         self.wait_for_goal(goal_id, server)
-        wait_for(lambda: self.states[-1].functions[0].state == "STABLE", "a configuration is stable")
+        wait_for(lambda: self.state.state == "STABLE", lambda: f"a configuration is stable: {self.state}")
 
     def test_launcher_that_dies_before_the_nodes_are_ready_is_noticed(self):
         self.client.send_goal(MvpReconfigurationGoal("hangs"))
         wait_for(
-            lambda: (self.launcher_states[-1].configuration, self.launcher_states[-1].state) == ("hangs", "STABLE"),
-            "the launcher has made the change",
+            lambda: (self.launcher_state.configuration, self.launcher_state.state) == ("hangs", "STABLE"),
+            lambda: f"the launcher has made the change: {self.launcher_state}",
         )
         self.launcher.end(signal.SIGKILL)
         self.restart_launcher()
@@ -185,8 +186,8 @@ class SurvivalTest(PairTest):
         self.assertEqual(self.client.get_result().result, 1, self.text)
 
     def test_lost_master_ends_the_pair_in_one_line_each_and_leaves_nothing(self):
-        port = free_port()
-        folder = tempfile.mkdtemp()
+        port = self.enterContext(reserved_port())
+        folder = self.enterContext(tempfile.TemporaryDirectory())
         environment = {"ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": folder}
         master = subprocess.Popen(
             [sys.executable, "-c", f"import rosmaster; rosmaster.rosmaster_main(['--core', '-p', '{port}'])"],
@@ -215,16 +216,6 @@ class SurvivalTest(PairTest):
         finally:
             master.kill()
             master.wait(DEADLINE_S)
-
-    def wait_until_it_serves(self):
-        """Wait until the (new) manipulator answers requests: an unknown one is refused at once."""
-        wait_for(lambda: pid_of("/rosgraph_manipulator") == self.manipulator.pid, "the manipulator is there")
-
-        def answers():
-            self.client.send_goal(MvpReconfigurationGoal("no_such_configuration"))
-            return self.client.wait_for_result(rospy.Duration(1)) and self.client.get_result().result == -1
-
-        wait_for(answers, "the manipulator answers")
 
 
 def accept_one(server):

@@ -11,19 +11,23 @@ import rostest
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from helpers.cases import case
+from helpers.connections import reaches
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import is_alive, pid_of
-from metacontrol_msgs.msg import ActiveConfiguration, MvpReconfigurationAction, MvpReconfigurationGoal
+from metacontrol_msgs.msg import (
+    ActiveConfiguration,
+    FunctionGrounding,
+    MvpReconfigurationAction,
+    MvpReconfigurationGoal,
+)
 
 
 class ManipulatorTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         rospy.init_node("manipulator_test")
-        cls.active = None
-        cls.server_goals = {}
-        cls.server_count = 0  # servers seen so far
-        cls.status_count = 0  # status messages of the present one
+        cls.active = FunctionGrounding()
+        cls.statuses = []  # a server, as the header of its connection, and the states of its goals
         rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, cls.on_active)
         rospy.Subscriber("wait/status", GoalStatusArray, cls.on_status)
         cls.client = actionlib.SimpleActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
@@ -35,10 +39,12 @@ class ManipulatorTest(unittest.TestCase):
 
     @classmethod
     def on_status(cls, message):
-        if message.header.seq <= cls.status_count:  # a new process counts from the start
-            cls.server_count += 1
-        cls.status_count = message.header.seq
-        cls.server_goals = {entry.goal_id.id: entry.status for entry in message.status_list}
+        goals = {entry.goal_id.id: entry.status for entry in message.status_list}
+        cls.statuses.append((message._connection_header, goals))
+
+    @property
+    def server_goals(self):
+        return self.statuses[-1][1] if self.statuses else {}
 
     def setUp(self):
         self.assertEqual(self.request("slow"), 1)
@@ -50,9 +56,13 @@ class ManipulatorTest(unittest.TestCase):
 
     def change_to(self, name):
         """Deploy a configuration, and wait until its server has told its goals three times."""
-        before = self.server_count
+        before = len(self.statuses)
+        old = self.statuses[-1][0]
         self.assertEqual(self.request(name), 1)
-        wait_for(lambda: self.server_count > before and self.status_count >= 3, "the new server tells its goals")
+        wait_for(
+            lambda: sum(server is not old for server, _ in self.statuses[before:]) >= 3,
+            "the new server tells its goals",
+        )
 
     def is_stable(self, name):
         return self.active.configuration == name and self.active.state == "STABLE"
@@ -60,7 +70,7 @@ class ManipulatorTest(unittest.TestCase):
     def test_request_replaces_the_nodes_and_says_so(self):
         before = pid_of("/wait_server")
         self.assertEqual(self.request("fast"), 1)
-        wait_for(lambda: self.is_stable("fast"), "fast is stable")
+        wait_for(lambda: self.is_stable("fast"), lambda: f"fast is stable, not {self.active}")
         self.assertEqual(self.active.function, "f_navigate")
         self.assertNotEqual(pid_of("/wait_server"), before)
         self.assertFalse(is_alive(before))
@@ -84,23 +94,30 @@ class ManipulatorTest(unittest.TestCase):
         for name in ("exits", "malformed"):
             with case(name):
                 self.assertEqual(self.request(name), 0)
-                wait_for(lambda: self.is_stable("slow"), "slow is restored")
+                wait_for(lambda: self.is_stable("slow"), lambda: f"slow is restored, not {self.active}")
                 self.assertIsNotNone(pid_of("/wait_server"))
 
     def test_pending_goal_reaches_the_new_server_with_its_id(self):
         client = actionlib.ActionClient("wait", TestAction)
-        self.assertTrue(client.wait_for_server(rospy.Duration(DEADLINE_S)))
+        wait_for(lambda: self.is_reached(client), "the server is reached")
         handle = client.send_goal(TestGoal(0))
         goal_id = handle.comm_state_machine.action_goal.goal_id.id
         wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the goal is active")
         self.change_to("fast")
         self.assertEqual(self.server_goals.get(goal_id), GoalStatus.ACTIVE)
+        wait_for(lambda: self.is_reached(client), "the new server is reached")
         client.cancel_all_goals()
         wait_for(lambda: self.server_goals.get(goal_id) != GoalStatus.ACTIVE, "the goal is cancelled")
+
+    @staticmethod
+    def is_reached(client):
+        """Whether the server that runs now gets what a client sends."""
+        return reaches(client.pub_goal, "/wait_server") and reaches(client.pub_cancel, "/wait_server")
 
     def test_finished_goal_is_not_resurrected(self):
         client = actionlib.SimpleActionClient("wait", TestAction)
         self.assertTrue(client.wait_for_server(rospy.Duration(DEADLINE_S)))
+        wait_for(lambda: self.is_reached(client.action_client), "the server is reached")
         client.send_goal_and_wait(TestGoal(7), rospy.Duration(DEADLINE_S))
         self.assertEqual(client.get_result().result, 7)
         self.change_to("fast")
@@ -111,7 +128,7 @@ class ManipulatorTest(unittest.TestCase):
         os.kill(pid_of("/rosgraph_launcher"), signal.SIGKILL)
         wait_for(lambda: not is_alive(before), "the launched node died with its launcher")
         wait_for(lambda: (pid_of("/wait_server") or before) != before, "the node was started again")
-        wait_for(lambda: self.is_stable("slow"), "slow is stable again")
+        wait_for(lambda: self.is_stable("slow"), lambda: f"slow is stable again, not {self.active}")
 
 
 if __name__ == "__main__":
