@@ -1,4 +1,7 @@
-"""Our nodes end in time whatever they are at: told to, without a master, with one that hangs or dies."""
+"""Our nodes end in time whatever they are at: told to, without a master, with one that hangs or dies.
+
+All nodes of a test start side by side at one master. Most of what a test costs is their start and their waiting.
+"""
 
 import contextlib
 import os
@@ -13,8 +16,9 @@ from pathlib import Path
 import psutil
 import pytest
 import yaml
+from helpers.cases import case
+from helpers.ports import reserved_port
 from helpers.waiting import DEADLINE_S, wait_for
-from metacontrol_experiments.io.processes import free_port
 
 HERE = Path(__file__).resolve().parent
 INTEGRATION = HERE.parent
@@ -42,7 +46,6 @@ PARAMETERS = {
     "/reasoner": {"model_file": str(MODEL)},
     "/simulator": {"initial_pose_x": -8.0, "initial_pose_y": -8.0},
 }
-every_node = pytest.mark.parametrize("node", NODES, ids=lambda node: node.rpartition("/")[2])
 
 
 def has_ended(child):
@@ -100,7 +103,7 @@ class World:
     """A master of the test's own, and nodes that join it."""
 
     def __init__(self, folder, stack):
-        self.port = free_port()
+        self.port = stack.enter_context(reserved_port())
         self.uri = f"http://localhost:{self.port}"
         self.master = xmlrpc.client.ServerProxy(self.uri)
         self._folder, self._stack = folder, stack
@@ -152,8 +155,26 @@ class World:
 
     def start_until_ready(self, node, **options):
         process = self.start(node, **options)
-        wait_for(lambda: NODES[node] in self.registrations(node), f"{node} is ready")
+        self.wait_until_ready(node)
         return process
+
+    def wait_until_ready(self, node):
+        wait_for(
+            lambda: NODES[node] in self.registrations(node),
+            lambda: f"{node} is ready; it has {self.registrations(node)} and says {self.said(node)}",
+        )
+
+    def start_all(self):
+        """Start all nodes side by side, and wait until they are ready; return their processes by their names."""
+        processes = {node: self.start(node) for node in NODES}
+        for node in NODES:
+            self.wait_until_ready(node)
+        return processes
+
+    def start_behind_gates(self, answers):
+        """Start all nodes side by side, each behind a gate that closes after so many answers of the master."""
+        gates = {node: Gate(self.port, answers) for node in NODES}
+        return {node: (self.start(node, gate.uri), gate) for node, gate in gates.items()}
 
     def said(self, node):
         return self._path(node).read_text()
@@ -177,67 +198,73 @@ def world(tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
-@every_node
-def test_signal_ends_it_and_it_unregisters(world, node, number):
+def test_signal_ends_them_and_they_unregister(world, number):
     world.start_master()
-    process = world.start_until_ready(node)
-    children = psutil.Process(process.pid).children()
-    process.send_signal(number)
-    assert "ROS master" not in world.expect_end(node, process)
-    assert not world.registrations(node)
-    wait_for(lambda: all(map(has_ended, children)), "the end of its processes")
+    for node, process in world.start_all().items():
+        with case(node):
+            children = psutil.Process(process.pid).children()
+            process.send_signal(number)
+            assert "ROS master" not in world.expect_end(node, process)
+            assert not world.registrations(node)
+            wait_for(lambda: all(map(has_ended, children)), "the end of its processes")  # noqa: B023
 
 
-@every_node
-def test_request_over_its_own_interface_ends_it(world, node):
+def test_request_over_its_own_interface_ends_them(world):
     world.start_master()
-    process = world.start_until_ready(node)
-    name = node.rpartition("/")[2]
-    address = world.ask("lookupNode", f"/{NAMES.get(name, name)}")
-    with contextlib.suppress(OSError), xmlrpc.client.ServerProxy(address) as api:
-        api.shutdown("/test", "a request")  # it may end before it has answered
-    world.expect_end(node, process)
-    assert not world.registrations(node)
+    for node, process in world.start_all().items():
+        with case(node):
+            name = node.rpartition("/")[2]
+            address = world.ask("lookupNode", f"/{NAMES.get(name, name)}")
+            with contextlib.suppress(OSError), xmlrpc.client.ServerProxy(address) as api:
+                api.shutdown("/test", "a request")  # it may end before it has answered
+            world.expect_end(node, process)
+            assert not world.registrations(node)
 
 
 @pytest.mark.parametrize("answers", [1, 4])
-@every_node
-def test_signal_ends_it_while_it_starts(world, node, answers):
+def test_signal_ends_them_while_they_start(world, answers):
     world.start_master()
-    gate = Gate(world.port, answers)
-    process = world.start(node, gate.uri)
-    assert gate.closed.wait(DEADLINE_S)
-    process.send_signal(signal.SIGTERM)
-    world.expect_end(node, process)
-
-
-@every_node
-def test_signal_ends_it_while_its_master_hangs(world, node):
-    master = world.start_master()
-    process = world.start_until_ready(node)
-    master.send_signal(signal.SIGSTOP)
-    process.send_signal(signal.SIGTERM)
-    world.expect_end(node, process)
-
-
-@every_node
-def test_signal_ends_it_while_it_waits_for_the_first_answer(world, node):
-    with socket.create_server(("localhost", 0)) as silent:
-        process = world.start(node, f"http://localhost:{silent.getsockname()[1]}")
-        connection, _ = silent.accept()
-        with connection:
-            process.send_signal(signal.SIGTERM)
+    started = world.start_behind_gates(answers)
+    for process, gate in started.values():
+        assert gate.closed.wait(DEADLINE_S)
+        process.send_signal(signal.SIGTERM)
+    for node, (process, _) in started.items():
+        with case(node):
             world.expect_end(node, process)
 
 
-@every_node
-def test_master_that_dies_is_told_in_one_line(world, node):
+def test_signal_ends_them_while_their_master_hangs(world):
     master = world.start_master()
-    process = world.start_until_ready(node)
-    children = psutil.Process(process.pid).children()
+    processes = world.start_all()
+    master.send_signal(signal.SIGSTOP)
+    for process in processes.values():
+        process.send_signal(signal.SIGTERM)
+    for node, process in processes.items():
+        with case(node):
+            world.expect_end(node, process)
+
+
+def test_signal_ends_them_while_they_wait_for_the_first_answer(world):
+    with contextlib.ExitStack() as stack:
+        silent = {node: stack.enter_context(socket.create_server(("localhost", 0))) for node in NODES}
+        processes = {node: world.start(node, f"http://localhost:{s.getsockname()[1]}") for node, s in silent.items()}
+        for node, process in processes.items():
+            stack.enter_context(silent[node].accept()[0])
+            process.send_signal(signal.SIGTERM)
+        for node, process in processes.items():
+            with case(node):
+                world.expect_end(node, process)
+
+
+def test_master_that_dies_is_told_in_one_line(world):
+    master = world.start_master()
+    processes = world.start_all()
+    children = {node: psutil.Process(process.pid).children() for node, process in processes.items()}
     master.kill()
-    assert world.expect_end(node, process).count(f"ROS master {world.uri} is gone") == 1
-    wait_for(lambda: all(map(has_ended, children)), "the end of its processes")
+    for node, process in processes.items():
+        with case(node):
+            assert world.expect_end(node, process).count(f"ROS master {world.uri} is gone") == 1
+            wait_for(lambda: all(map(has_ended, children[node])), "the end of its processes")  # noqa: B023
 
 
 def test_master_that_dies_ends_it_though_nobody_reads_what_it_says(world):
@@ -251,31 +278,34 @@ def test_master_that_dies_ends_it_though_nobody_reads_what_it_says(world):
 
 
 @pytest.mark.parametrize("answers", [1, 3, 8, 15])
-@every_node
-def test_master_that_dies_while_it_starts_is_told_in_one_line(world, node, answers):
+def test_master_that_dies_while_they_start_is_told_in_one_line(world, answers):
     world.start_master()
-    gate = Gate(world.port, answers)
-    process = world.start(node, gate.uri)
-    said = world.expect_end(node, process)
-    assert said.count(f"ROS master {gate.uri} is gone") == 1, said
+    for node, (process, gate) in world.start_behind_gates(answers).items():
+        with case(node):
+            said = world.expect_end(node, process)
+            assert said.count(f"ROS master {gate.uri} is gone") == 1, said
 
 
 def test_master_that_hangs_is_told_in_one_line_and_ends_them(world):
     master = world.start_master()
-    processes = {node: world.start_until_ready(node) for node in NODES}
+    processes = world.start_all()
     master.send_signal(signal.SIGSTOP)
     for node, process in processes.items():
-        said = world.expect_end(node, process)
-        assert said.count(f"ROS master {world.uri} does not answer") == 1, said
+        with case(node):
+            said = world.expect_end(node, process)
+            assert said.count(f"ROS master {world.uri} does not answer") == 1, said
 
 
-@every_node
-def test_without_a_master_it_says_so_in_one_line_and_ends_with_2(world, node):
-    process = world.start(node)
-    said = world.expect_end(node, process, status=2)
-    name = node.rpartition("/")[2]
-    line = f"{NAMES.get(name, name)}: no ROS master answers at {world.uri}: start roscore or set ROS_MASTER_URI\n"
-    assert [said for said in said.splitlines(True) if not said.startswith("pybullet build")] == [line]
+def test_without_a_master_they_say_so_in_one_line_and_end_with_2(world):
+    processes = {node: world.start(node) for node in NODES}
+    for node, process in processes.items():
+        with case(node):
+            said = world.expect_end(node, process, status=2)
+            name = node.rpartition("/")[2]
+            line = (
+                f"{NAMES.get(name, name)}: no ROS master answers at {world.uri}: start roscore or set ROS_MASTER_URI\n"
+            )
+            assert [said for said in said.splitlines(True) if not said.startswith("pybullet build")] == [line]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)
