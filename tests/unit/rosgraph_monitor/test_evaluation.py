@@ -111,6 +111,15 @@ def test_node_that_ends_cleanly_has_its_own_words_and_one_that_died_keeps_its():
     assert ("front_laser", "Missing node", Life.DEAD.value) in said(cleaned_up)
 
 
+def test_node_that_ends_while_the_master_is_slow_has_ended_once_the_master_says_so():
+    watched = monitor()
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.0)
+    gone = watched.evaluate(BOTH, ALIVE | lives(front_laser=Life.DEAD), DESIRED, 0.1, is_fresh=False)
+    assert ("front_laser", "Missing node", Life.DEAD.value) in said(gone)
+    ended = watched.evaluate(graph("/move_base"), ALIVE, DESIRED, 0.2)
+    assert ("front_laser", "Missing node", "ended: it has unregistered from the master") in said(ended)
+
+
 def test_what_changes_between_looks_is_found_though_the_graph_is_the_same():
     watched = monitor()
     for now, known in ((0.0, Life.ALIVE), (0.1, Life.DEAD), (0.2, Life.ALIVE)):

@@ -88,6 +88,7 @@ class GraphEvaluator:
         *,
         topics: Sequence[TopicVerdict] = (),
         others: Mapping[str, NodeCondition] | None = None,
+        is_fresh: bool = True,
     ) -> list[Status]:
         """Judge the graph.
 
@@ -98,6 +99,8 @@ class GraphEvaluator:
             now: wall seconds.
             topics: what is wrong with topics.
             others: conditions of components that are no nodes, by name of the component.
+            is_fresh: whether the snapshot is newer than what is known of the nodes. Else a node that seems dead may
+                have unregistered since, so that the next evaluation says that it has ended.
 
         Returns:
             The statuses of components, then the findings, or "running OK" where there are none.
@@ -114,7 +117,7 @@ class GraphEvaluator:
         statuses = component_statuses(components)
         if desired.problem:
             statuses.append(graph_problem(f"desired model: {desired.problem}"))
-        findings = self._findings(snapshot, life, desired, now)
+        findings = self._findings(snapshot, life, desired, now, is_fresh)
         problems = [*finding_statuses(findings), *verdict_statuses(topics)]
         statuses.extend(problems)
         if desired.system is not None and not problems and not desired.problem:
@@ -138,7 +141,7 @@ class GraphEvaluator:
         return frozenset(found)
 
     def _findings(
-        self, snapshot: GraphSnapshot, life: Mapping[str, Life], desired: Desired, now: float
+        self, snapshot: GraphSnapshot, life: Mapping[str, Life], desired: Desired, now: float, is_fresh: bool
     ) -> list[Finding]:
         self._told.alive_since = {
             (name, node.uri): self._told.alive_since.get((name, node.uri), now)
@@ -151,7 +154,7 @@ class GraphEvaluator:
         excused = desired.excused | self._tracker.waited_for
         findings = self._compared(snapshot, desired.system, dead, excused)
         settled = self._settled([f for f in findings if isinstance(f, PortFinding)], now)
-        return [self._worded(f) for f in findings if not isinstance(f, PortFinding) or f in settled]
+        return [self._worded(f, is_fresh) for f in findings if not isinstance(f, PortFinding) or f in settled]
 
     def _compared(
         self, snapshot: GraphSnapshot, system: RosSystem, dead: dict[str, tuple[str, str]], excused: frozenset[str]
@@ -180,14 +183,14 @@ class GraphEvaluator:
             if now - at >= self._patience.ports and young.isdisjoint(concerned(finding))
         }
 
-    def _worded(self, finding: Finding) -> Finding:
+    def _worded(self, finding: Finding, is_fresh: bool) -> Finding:
         """Return the finding with the reason: the node has ended, has died, or never came."""
         if not isinstance(finding, MissingNode):
             return finding
         state, reason = finding.state, finding.reason
         if (state, reason) == NOT_REGISTERED and self._tracker.has_run(finding.node):
             state, reason = self._told.gone.get(finding.node, _ENDED)
-        elif (state, reason) != NOT_REGISTERED:
+        elif (state, reason) != NOT_REGISTERED and is_fresh:
             self._told.gone[finding.node] = state, reason
         return MissingNode(finding.node, state, reason)
 

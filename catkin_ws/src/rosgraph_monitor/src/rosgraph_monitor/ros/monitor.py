@@ -163,7 +163,8 @@ class MonitorNode:
         return self._monitor.excused_topics(polled.snapshot, desired, self._topics.topics) if polled else frozenset()
 
     def _evaluate(self, polled: PolledGraph) -> list[Status]:
-        lives = polled.lives if self._polled.is_set() else self._connections.lives()
+        is_fresh = self._polled.is_set()
+        lives = polled.lives if is_fresh else self._connections.lives()
         own = polled.snapshot.nodes.get(rospy.get_name())
         if own:
             lives[own.name, own.uri] = Life.ALIVE
@@ -171,7 +172,13 @@ class MonitorNode:
         verdicts = self._topics.judge(self._excused_topics())
         self._topic_states = {verdict.spec.name: verdict.message for verdict in verdicts}
         statuses = self._monitor.evaluate(
-            polled.snapshot, lives, self._model.current, now, topics=verdicts, others=self._batteries.conditions
+            polled.snapshot,
+            lives,
+            self._model.current,
+            now,
+            topics=verdicts,
+            others=self._batteries.conditions,
+            is_fresh=is_fresh,
         )
         if now >= self._usage_due:
             self._usage_due = now + _USAGE_PERIOD
