@@ -94,7 +94,7 @@ def test_both_engines_tell_the_same_story_over_seeds(tmp_path):
 def test_interrupted_comparison_ends_its_mission(tmp_path):
     console, log = tmp_path / "ros_1" / "log" / "console.log", str(tmp_path / "ros_1" / "log")
     with subprocess.Popen(compare(tmp_path, "--seeds", "1"), stderr=subprocess.PIPE, text=True) as process:
-        assert wait_until(lambda: process.poll() is not None or console.exists(), 60.0)
+        assert wait_until(lambda: process.poll() is not None or console.exists(), LIMIT_S)
         process.send_signal(signal.SIGTERM)
         _, said = process.communicate(timeout=150.0)
     assert process.returncode == 130, said

@@ -14,8 +14,8 @@ from xmlrpc.client import Error as XmlRpcError
 from xmlrpc.client import ServerProxy
 
 import pytest
+from helpers.ports import reserved_port
 from helpers.waiting import wait_for
-from metacontrol_experiments.io.processes import free_port
 
 ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "catkin_ws" / "src" / "metacontrol_sim" / "models"
@@ -67,16 +67,18 @@ def workspace(tmp_path_factory) -> tuple[Path, dict[str, str]]:
 def master(workspace, tmp_path):
     """Run a master; return the environment of its nodes."""
     _, environment = workspace
-    port = free_port()
-    environment = {**environment, "ROS_MASTER_URI": f"http://localhost:{port}", "PYTHONUNBUFFERED": "1"}
-    with running("roscore", "-p", str(port), environment=environment, folder=tmp_path):
-        wait_for(
-            lambda: (
-                not subprocess.run(["rosnode", "list"], env=environment, capture_output=True, check=False).returncode
-            ),
-            "the master answers",
-        )
-        yield environment
+    with reserved_port() as port:
+        environment = {**environment, "ROS_MASTER_URI": f"http://localhost:{port}", "PYTHONUNBUFFERED": "1"}
+        with running("roscore", "-p", str(port), environment=environment, folder=tmp_path):
+            wait_for(
+                lambda: (
+                    not subprocess.run(
+                        ["rosnode", "list"], env=environment, capture_output=True, check=False
+                    ).returncode
+                ),
+                "the master answers",
+            )
+            yield environment
 
 
 def test_generator_makes_a_table_of_the_variants(workspace, tmp_path):
@@ -111,7 +113,9 @@ def test_observer_says_how_hot_a_motor_is(master, tmp_path):
         running(*heard, environment=master, folder=tmp_path) as log,
     ):
         level = re.compile(r'key: "motor_temperature"\s+value: "0\.5"')
-        wait_for(lambda: level.search(log.read_text()), "the level of 65 degrees")
+        wait_for(
+            lambda: level.search(log.read_text()), lambda: f"the level of 65 degrees, not {log.read_text()[-300:]}"
+        )
 
 
 def pid_of(node: str, master: dict[str, str]) -> int:

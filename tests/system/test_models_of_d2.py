@@ -5,18 +5,18 @@ from __future__ import annotations
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import rospkg
+from helpers.ports import reserved_port
 from node_kit.io.xml_rpc import CallError
 from ros_model.graph.snapshot import GraphSnapshot
 from ros_model.io.master import take_snapshot
@@ -36,12 +36,6 @@ SETTLED_S = 3.0
 PATIENCE_S = 10.0
 D2 = Path(rospkg.RosPack().get_path("metacontrol_sim"))
 KINDS = [kind for kind in PortKind if kind is not PortKind.SERVICE_CLIENT]  # a master knows no clients of services
-
-
-def free_port() -> int:
-    with closing(socket.socket()) as probe:
-        probe.bind(("localhost", 0))
-        return int(probe.getsockname()[1])
 
 
 def ends_of(uri: str) -> set[End]:
@@ -72,7 +66,11 @@ def wait_until_settled(uri: str, process: subprocess.Popen[bytes], log: Path) ->
 @contextmanager
 def running_d2(folder: Path) -> Iterator[str]:
     """Run D2, and give the address of its master."""
-    port = free_port()
+    with reserved_port() as port:
+        yield from running_at(port, folder)
+
+
+def running_at(port: int, folder: Path) -> Iterator[str]:
     uri = f"http://localhost:{port}"
     environment = {
         **os.environ,

@@ -28,6 +28,9 @@ class Heard:
         self._condition = threading.Condition()
         self._subscriber = rospy.Subscriber(topic, kind, self._on_message)
 
+    def is_connected(self):
+        return self._subscriber.get_num_connections() > 0
+
     def _on_message(self, message):
         with self._condition:
             self.messages.append(message)
@@ -69,6 +72,7 @@ class ContingenciesTest(unittest.TestCase):
         cls.rear = Heard("rear/scan", LaserScan)
         cls.light = Heard("simulator/light", Float32)
         rospy.wait_for_service("contingency/strike", DEADLINE_S)
+        assert becomes(cls.events.is_connected), "nobody tells events"
         cls.strike = rospy.ServiceProxy("contingency/strike", Contingency)
 
     def test_1_clutter_lies_there_from_the_start(self):
@@ -125,6 +129,7 @@ class ContingenciesTest(unittest.TestCase):
         self.assertEqual(struck.kind, MissionEvent.PERTURBATION)
         pid = int({pair.key: pair.value for pair in struck.values}["pid"])
         self.assertTrue(becomes(lambda: is_dead(pid)))
+        self.assertIsNotNone(self.light.wait(lambda _light: True))
         self.assertEqual([message.data for message in self.light.messages], [1.0])  # the robot has not moved
 
     def test_5_light_and_power_change_on_demand(self):

@@ -12,13 +12,8 @@ import unittest
 import xmlrpc.client
 
 import rostest
+from helpers.ports import reserved_port
 from helpers.waiting import wait_for
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def answers(master):
@@ -82,7 +77,7 @@ PATHS = ("desired_rossystem", "ros_models")
 
 class MonitorMasterTest(unittest.TestCase):
     def setUp(self):
-        port = free_port()
+        port = self.enterContext(reserved_port())
         self.uri = f"http://localhost:{port}"
         self.environment = {**os.environ, "ROS_MASTER_URI": self.uri}
         self.environment.pop("ROS_NAMESPACE", None)
@@ -134,7 +129,7 @@ class MonitorMasterTest(unittest.TestCase):
         self.start_master()
         proxy = self.start_proxy()
         monitor = self.start_monitor()
-        port = free_port()
+        port = self.enterContext(reserved_port())
         self.start("rosmaster", "--core", "-p", str(port))
         wait_for(lambda: answers(xmlrpc.client.ServerProxy(f"http://localhost:{port}")), "the master answers")
         proxy.master_port = port

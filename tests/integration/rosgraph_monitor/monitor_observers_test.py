@@ -7,6 +7,7 @@ import rospy
 import rostest
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
+from helpers.waiting import wait_for
 from metacontrol_msgs.srv import ListObservers, LoadObserver, UnloadObserver
 from monitor_common import Diagnostics
 from rosgraph_msgs.msg import Log
@@ -92,7 +93,8 @@ class MonitorObserversTest(unittest.TestCase):
 
     def test_aborted_goal_is_told_on_obj_error(self):
         heard = []
-        rospy.Subscriber("/obj_error", Bool, lambda msg: heard.append(msg.data))
+        error = rospy.Subscriber("/obj_error", Bool, lambda msg: heard.append(msg.data))
+        wait_for(error.get_num_connections, "the monitor is heard")
         status = rospy.Publisher("move_base/status", GoalStatusArray, queue_size=10)
         state = [GoalStatus.ACTIVE]
 
@@ -105,10 +107,7 @@ class MonitorObserversTest(unittest.TestCase):
         self.seen.wait("goal that fares well", lambda s: (s.name, s.message) == ("move_base", "no objective error"))
         state[0] = GoalStatus.ABORTED
         self.seen.wait("objective error", lambda s: (s.name, s.message) == ("move_base", "Objective error"))
-        end = rospy.get_time() + 30.0
-        while True not in heard and rospy.get_time() < end:
-            rospy.sleep(0.05)
-        self.assertIn(True, heard)
+        wait_for(lambda: True in heard, lambda: f"an error on obj_error, not only {heard}")
 
     def test_new_quality_attributes_need_nothing_but_an_observer(self):
         self.assertLessEqual(float(self.wait_qa("CpuLoadQualityObserver").values[0].value), 1.0)

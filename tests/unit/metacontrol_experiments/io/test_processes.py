@@ -5,12 +5,13 @@ import sys
 
 import psutil
 import pytest
+from helpers.waiting import DEADLINE_S
 from metacontrol_experiments.io.processes import ProcessTree, wait_until
 
 
 def test_processes_end_even_when_orphaned_and_stubborn(tmp_path):
     stubborn = (
-        "import signal,time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('up', flush=True); time.sleep(60)"
+        "import signal,time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('up', flush=True); time.sleep(1000)"
     )
     parent = (
         "import subprocess, sys; "
@@ -19,8 +20,8 @@ def test_processes_end_even_when_orphaned_and_stubborn(tmp_path):
     tree = ProcessTree({})
     log = tmp_path / "log"
     process = tree.start([sys.executable, "-c", parent], log)
-    assert wait_until(lambda: {"up", "left"} <= set(log.read_text().split()), 10.0)
-    process.wait(10.0)
+    assert wait_until(lambda: {"up", "left"} <= set(log.read_text().split()), DEADLINE_S)
+    process.wait(DEADLINE_S)
     (orphan,) = tree.alive()
     assert tree.owns(orphan.pid)
     tree.close(grace_s=0.5)
@@ -43,8 +44,8 @@ def test_stop_interrupts_and_waits(tmp_path, ours):
 
 def _stop_interrupts_and_waits(tmp_path):
     tree = ProcessTree({})
-    code = "import time\ntry:\n print('up', flush=True); time.sleep(60)\nexcept KeyboardInterrupt:\n print('bye')"
+    code = "import time\ntry:\n print('up', flush=True); time.sleep(1000)\nexcept KeyboardInterrupt:\n print('bye')"
     process = tree.start([sys.executable, "-c", code], tmp_path / "log")
-    assert wait_until(lambda: "up" in (tmp_path / "log").read_text(), 10.0)
-    assert tree.stop(process, 20.0)
+    assert wait_until(lambda: "up" in (tmp_path / "log").read_text(), DEADLINE_S)
+    assert tree.stop(process, DEADLINE_S)
     assert "bye" in (tmp_path / "log").read_text()

@@ -36,7 +36,7 @@ def test_killed_child_is_replaced_and_the_analysis_repeated(knowledge_base):
 
 
 def test_hanging_child_is_replaced_after_the_deadline(knowledge_base):
-    reasoner = PelletReasoner(deadline=2.0)
+    reasoner = PelletReasoner(deadline=6.0)
     try:
         reasoner.load(knowledge_base.ontology)
         first = reasoner.pid

@@ -97,8 +97,8 @@ def test_nobody_at_the_address():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         uri = f"http://127.0.0.1:{free.getsockname()[1]}"
-    with Client(uri, "/me") as client, pytest.raises(GoneError, match=f"^ROS master {uri} is gone"):
-        client.call("size")
+        with Client(uri, "/me") as client, pytest.raises(GoneError, match=f"^ROS master {uri} is gone"):
+            client.call("size")
 
 
 def test_host_that_has_no_address_is_not_taken_for_gone():

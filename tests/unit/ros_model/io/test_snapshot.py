@@ -147,8 +147,8 @@ def test_master_that_is_gone_is_named():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         uri = f"http://127.0.0.1:{free.getsockname()[1]}"
-    with pytest.raises(GoneError, match=uri):
-        take_snapshot(uri)
+        with pytest.raises(GoneError, match=uri):
+            take_snapshot(uri)
 
 
 def test_silent_master_times_out():

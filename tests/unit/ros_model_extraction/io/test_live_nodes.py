@@ -11,6 +11,7 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 import rosgraph.network
+from helpers.ports import reserved_port
 from ros_model.cli.rosmodel import main
 from ros_model.graph.snapshot import GraphSnapshot, NodeState, ServiceState
 from ros_model_extraction.io.live_nodes import ask_nodes
@@ -54,11 +55,6 @@ def tcp_server(answer):
             yield server.getsockname()[1]
         finally:
             server.shutdown(socket.SHUT_RDWR)
-
-
-def free_port() -> int:
-    with socket.create_server(("localhost", 0)) as probe:
-        return int(probe.getsockname()[1])
 
 
 def header(connection: socket.socket) -> None:
@@ -128,8 +124,9 @@ def test_node_that_hangs_is_not_waited_for():
 
 
 def test_node_at_whose_address_nobody_listens_is_dead():
-    uri = f"http://localhost:{free_port()}"
-    found = ask_nodes(graph(uri), uri, PATIENCE_S)
+    with reserved_port() as port:
+        uri = f"http://localhost:{port}"
+        found = ask_nodes(graph(uri), uri, PATIENCE_S)
     assert found.dead == {"/a"} and found.unknown == {}
 
 
