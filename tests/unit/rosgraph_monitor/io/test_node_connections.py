@@ -98,7 +98,7 @@ def test_live_node_is_alive_with_its_pid(watcher, handler):
             lambda: watcher.lives() == {("/n", uri): Life.ALIVE},
             known(watcher),
         )
-        assert watcher.pids() == {"/n": 4711}
+        assert watcher.pids() == {("/n", uri): 4711}
         end = time.monotonic() + 0.4
         while time.monotonic() < end:
             assert watcher.lives()[("/n", uri)] is Life.ALIVE

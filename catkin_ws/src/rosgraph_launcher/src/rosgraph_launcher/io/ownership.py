@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import socket
 from urllib.parse import urlsplit
 
 import psutil
@@ -12,6 +11,7 @@ import rosgraph
 
 from rosgraph_launcher.io.master import NodeApi
 from rosgraph_launcher.io.processes import MARK
+from rosgraph_launcher.io.this_host import resolved
 from rosgraph_launcher.launching.ownership import Answer, ProcessFacts
 
 
@@ -40,10 +40,7 @@ def launcher_mark(name: str) -> str:
 @functools.lru_cache(maxsize=256)
 def is_this_host(host: str) -> bool:
     """Tell whether a name or an address is one of this host."""
-    try:
-        addresses = {str(entry[4][0]) for entry in socket.getaddrinfo(host, None)}
-    except OSError:
-        return False
+    addresses = resolved(host)
     return any(one.startswith("127.") or one == "::1" for one in addresses) or bool(
         addresses & set(rosgraph.network.get_local_addresses())
     )

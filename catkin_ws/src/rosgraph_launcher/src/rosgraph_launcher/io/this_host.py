@@ -18,3 +18,11 @@ def addresses(given: str = "") -> list[str]:
     by_ros = [os.environ.get("ROS_HOSTNAME", ""), os.environ.get("ROS_IP", "")]
     found = [given, *by_ros, own, *rosgraph.network.get_local_addresses()]
     return [name for name in dict.fromkeys(found) if name and not name.startswith(("127.", "::1"))]
+
+
+def resolved(address: str) -> set[str]:
+    """Return the addresses that the name service has for a name or an address; it may take its time."""
+    try:
+        return {str(entry[4][0]) for entry in socket.getaddrinfo(address, None)}
+    except (OSError, UnicodeError):
+        return set()

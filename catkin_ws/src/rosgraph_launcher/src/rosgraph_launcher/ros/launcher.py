@@ -18,6 +18,9 @@ from metacontrol_msgs.srv import (
     CheckNodes,
     CheckNodesRequest,
     CheckNodesResponse,
+    ReadUsage,
+    ReadUsageRequest,
+    ReadUsageResponse,
 )
 from node_kit.io.inbox import ClosedError, Inbox
 from node_kit.parameters import ParameterError, ParameterTree
@@ -27,10 +30,11 @@ from rosgraph_launcher.io.launcher import Launcher, LauncherError
 from rosgraph_launcher.io.ownership import launcher_mark
 from rosgraph_launcher.io.processes import StartError, check_host
 from rosgraph_launcher.io.this_host import addresses
+from rosgraph_launcher.io.usage import read_sample
 from rosgraph_launcher.launching.options import LauncherOptions
 from rosgraph_launcher.launching.report import LauncherReport
 from rosgraph_launcher.launching.restarts import RestartPolicy
-from rosgraph_launcher.ros.node_messages import from_message, report_message
+from rosgraph_launcher.ros.node_messages import from_message, report_message, usage_messages
 
 TOPIC = "rosgraph_launcher/functions"
 """The launchers of all hosts share it, whatever their names are, so that all are found there."""
@@ -56,6 +60,7 @@ class LauncherNode:
         self._services = (
             rospy.Service("~change", ChangeNodes, self._on_change),
             rospy.Service("~check", CheckNodes, self._on_check),
+            rospy.Service("~usage", ReadUsage, self._on_usage),
         )
 
     def end(self, reason: str) -> None:
@@ -109,6 +114,10 @@ class LauncherNode:
         up = [self._launcher.is_up(name) for name in request.nodes]
         conflicts = ["" if is_up else self._launcher.conflict(name) for name, is_up in zip(request.nodes, up)]
         return CheckNodesResponse(up=up, conflicts=conflicts)
+
+    def _on_usage(self, request: ReadUsageRequest) -> ReadUsageResponse:
+        read = {pid: read_sample(pid, pid not in request.alone) for pid in request.pids}
+        return ReadUsageResponse(usage_messages({pid: sample for pid, sample in read.items() if sample}))
 
     def _change(self, request: ChangeNodesRequest) -> ChangeNodesResponse:
         try:

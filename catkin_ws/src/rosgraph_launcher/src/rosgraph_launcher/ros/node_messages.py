@@ -1,15 +1,17 @@
-"""Converts node descriptions and the launcher's reports from and to messages."""
+"""Converts node descriptions, reports and what processes use from and to messages."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from typing import Any
 
-from metacontrol_msgs.msg import LaunchedFunction
+from metacontrol_msgs.msg import LaunchedFunction, ProcessUsage
 from metacontrol_msgs.msg import NodeDescription as Message
 
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.launching.report import LauncherReport
+from rosgraph_launcher.usage import Sample, Use
 
 _OPTIONAL = ("cwd", "launch_prefix")  # None in the description is empty in the message
 _PLAIN = tuple(
@@ -56,4 +58,23 @@ def report_message(report: LauncherReport) -> LaunchedFunction:
 def report_from(message: LaunchedFunction) -> LauncherReport:
     """Return the report that a message holds."""
     content = {field.name: getattr(message, field.name) for field in fields(LauncherReport)}
-    return LauncherReport(**content | {"nodes": tuple(message.nodes), "dead": tuple(message.dead)})
+    return LauncherReport(**{**content, "nodes": tuple(message.nodes), "dead": tuple(message.dead)})
+
+
+def usage_messages(samples: Mapping[int, Sample]) -> list[ProcessUsage]:
+    """Return the messages of what processes use, by their ids."""
+    return [
+        ProcessUsage(root, pid, created, sample.at, use.cpu, use.memory)
+        for root, sample in samples.items()
+        for (pid, created), use in sample.uses.items()
+    ]
+
+
+def samples_from(messages: Iterable[ProcessUsage]) -> dict[int, Sample]:
+    """Return what processes use, by the ids that were asked for."""
+    samples: dict[int, Sample] = {}
+    for message in messages:
+        earlier = samples[message.root].uses if message.root in samples else {}
+        use = Use(message.cpu, message.memory)
+        samples[message.root] = Sample(message.at, {**earlier, (message.pid, message.created): use})
+    return samples

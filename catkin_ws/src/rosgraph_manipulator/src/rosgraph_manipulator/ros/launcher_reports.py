@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -13,18 +12,20 @@ import rospy
 from metacontrol_msgs.msg import LaunchedFunctions
 from node_kit.io.xml_rpc import CallError
 from rosgraph_launcher.description import NodeDescription
+from rosgraph_launcher.hosts import HostLauncher, launcher_at
 from rosgraph_launcher.io.master import NodeApi
 from rosgraph_launcher.io.ownership import is_this_host, launcher_mark
+from rosgraph_launcher.io.this_host import resolved
 from rosgraph_launcher.launching.report import LauncherReport
 from rosgraph_launcher.ros.node_messages import report_from
 
-from rosgraph_manipulator.hosts.directory import HostLauncher, launcher_at
 from rosgraph_manipulator.hosts.merging import merged
 from rosgraph_manipulator.io.master import get_parameters, publishers
 
 TOPIC = "rosgraph_launcher/functions"
 REPEAT_PERIOD = 0.01  # s, wall
 WATCH_PERIOD = 0.5  # s, wall, between two questions whether a host is there
+ASKING = "ask a launcher"  # name of the threads that do
 
 
 @dataclass
@@ -110,7 +111,7 @@ class LauncherReports:
             return next((name for name in sorted(self._parts.get(function, ())) if name not in connected), "")
 
     def adopt(self, function: str, nodes: Iterable[NodeDescription]) -> None:
-        """Note that what runs for a function has been started by an earlier manipulator."""
+        """Note which nodes should run for a function although no change has started them."""
         places = {self._find(node.machine) or f"the launcher of {node.machine}" for node in nodes}
         with self._lock:
             self._parts[function] = frozenset(places)
@@ -133,7 +134,7 @@ class LauncherReports:
             return self._main
         with self._lock:
             places = [known.place for known in self._known.values()]
-        found = launcher_at(machine, places) or launcher_at(machine, places, _resolved(machine))
+        found = launcher_at(machine, places) or launcher_at(machine, places, resolved(machine))
         return found.name if found else ""
 
     # -- the hosts ------------------------------------------------------------------------------------------------
@@ -215,10 +216,3 @@ def _place_of(name: str) -> HostLauncher:
 def _is_here(place: HostLauncher) -> bool:
     uri = NodeApi.address(place.name)
     return uri is None or is_this_host(rosgraph.network.parse_http_host_and_port(uri)[0])
-
-
-def _resolved(address: str) -> set[str]:
-    try:
-        return {str(entry[4][0]) for entry in socket.getaddrinfo(address, None)}
-    except OSError:
-        return set()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, wait
@@ -13,16 +12,17 @@ from typing import Any
 import rosgraph
 import rospy
 from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, ChangeNodesResponse, CheckNodes
+from node_kit.io.background import in_background
 from rosgraph_launcher.description import NodeDescription
+from rosgraph_launcher.hosts import no_launcher
 from rosgraph_launcher.launching.report import FAILED
 from rosgraph_launcher.ros.node_messages import to_message
 from rospy.exceptions import TransportException, TransportInitError
 
 from rosgraph_manipulator.change.deployment import DeploymentError
-from rosgraph_manipulator.hosts.directory import no_launcher
 from rosgraph_manipulator.hosts.merging import stale
 from rosgraph_manipulator.hosts.splitting import Part, split
-from rosgraph_manipulator.ros.launcher_reports import REPEAT_PERIOD, LauncherReports
+from rosgraph_manipulator.ros.launcher_reports import ASKING, REPEAT_PERIOD, LauncherReports
 
 _NOT_REACHED = (TransportInitError, rosgraph.MasterError)
 """What rospy has caught when it raises a ServiceException and has sent no request: no registration, no connection."""
@@ -161,7 +161,7 @@ class Launchers(LauncherReports):
                 stop=list(part.stop),
                 start=list(part.start),
             )
-            asked[part.launcher] = _begin(partial(self._ask, part.launcher, request, found))
+            asked[part.launcher] = in_background(partial(self._ask, part.launcher, request, found), ASKING)
         answers, failures = {}, []
         for name, future in asked.items():
             try:
@@ -197,7 +197,7 @@ class Launchers(LauncherReports):
 
     def _wait_for(self, name: str, work: Callable[[], Any]) -> Any:
         """Do work that waits for a launcher, until its host is lost."""
-        return self._result(name, _begin(work))
+        return self._result(name, in_background(work, ASKING))
 
     def _result(self, name: str, future: Future[Any]) -> Any:
         """Return what a launcher has answered.
@@ -210,17 +210,3 @@ class Launchers(LauncherReports):
                 if name in self._known and self._known[name].lost:
                     raise DeploymentError(self._line(self._known[name]))
         return future.result()
-
-
-def _begin(work: Callable[[], Any]) -> Future[Any]:
-    """Do work in a thread that keeps nobody from ending, however long a connection hangs."""
-    future: Future[Any] = Future()
-
-    def do() -> None:
-        try:
-            future.set_result(work())
-        except Exception as error:
-            future.set_exception(error)
-
-    threading.Thread(target=do, name="ask a launcher", daemon=True).start()
-    return future

@@ -102,10 +102,10 @@ class NodeConnections:
         with self._lock:
             return {key: life for key, (life, _) in self._known.items()}
 
-    def pids(self) -> dict[str, int]:
-        """Return the process id, on its own host, of each live node, by name."""
+    def pids(self) -> dict[Key, int]:
+        """Return the process id, on its own host, of each live node."""
         with self._lock:
-            return {key[0]: pid for key, (life, pid) in self._known.items() if pid is not None and life is Life.ALIVE}
+            return {key: pid for key, (life, pid) in self._known.items() if pid is not None and life is Life.ALIVE}
 
     # All below runs in the watching thread.
 

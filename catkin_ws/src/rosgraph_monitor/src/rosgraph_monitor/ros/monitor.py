@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import resource
 import threading
 import time
@@ -25,20 +24,20 @@ from ros_model.io.models import read_system
 
 from rosgraph_monitor.evaluation import GraphEvaluator
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding
-from rosgraph_monitor.graph.names import resolved
 from rosgraph_monitor.health.liveness import Life
 from rosgraph_monitor.health.topics import merged, model_topics
 from rosgraph_monitor.io.graph_poller import GraphPoller, PolledGraph
 from rosgraph_monitor.io.node_connections import NodeConnections
-from rosgraph_monitor.io.usage import UsageMeter
 from rosgraph_monitor.ros import parameters as parameters_node
 from rosgraph_monitor.ros.diagnostics import DiagnosticsTopic
 from rosgraph_monitor.ros.observers import ObserverHost
 from rosgraph_monitor.ros.topics import BatteryListener, TopicListener
+from rosgraph_monitor.ros.usage import UsageWatch
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from ros_model.graph.snapshot import GraphSnapshot
     from ros_model.language.metamodel import RosSystem
 
     from rosgraph_monitor.diagnostics.status import Status
@@ -53,9 +52,8 @@ _LONGEST_REST = 0.2
 _FRESH = 0.15
 """Wall seconds to wait, after a node died, for a poll that says whether it has unregistered."""
 _TOPIC_PERIOD = 0.05
-_USAGE_PERIOD = 1.0
-_LAUNCHER = "rosgraph_launcher"
-_METACONTROL_NODES = [NAME, "reasoner", "rosgraph_manipulator", _LAUNCHER]
+_OBSERVERS_PERIOD = 1.0
+_METACONTROL_NODES = [NAME, "reasoner", "rosgraph_manipulator", "rosgraph_launcher"]
 
 
 class MonitorNode:
@@ -96,9 +94,7 @@ class MonitorNode:
         )
         base = parameters_node.text("desired_rossystem")
         self._model = DesiredModel(read_system(resolve(base)) if base else None, self._read_variant)
-        self._metacontrol = parameters_node.names("metacontrol_nodes", _METACONTROL_NODES)
-        self._meter = UsageMeter(alone=frozenset({_LAUNCHER}))
-        self._usage_due = 0.0
+        self._observers_due = 0.0
         self._running_observers = 0
         self._evaluation = 0.0
         observers = dict.fromkeys((*parameters_node.names("observers", []), *load))
@@ -114,6 +110,12 @@ class MonitorNode:
         self._topic_states: dict[str, str] = {}
         self._follow_topics()
         self._batteries = BatteryListener(components.batteries, self._events.set)
+        self._usage = UsageWatch(
+            parameters_node.names("metacontrol_nodes", _METACONTROL_NODES),
+            self._snapshot,
+            self._connections.pids,
+            self._publish,
+        )
         self._subscriber = rospy.Subscriber(
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, self._follow, queue_size=5
         )
@@ -180,9 +182,8 @@ class MonitorNode:
             others=self._batteries.conditions,
             is_fresh=is_fresh,
         )
-        if now >= self._usage_due:
-            self._usage_due = now + _USAGE_PERIOD
-            statuses.extend(self._meter.measure(self._metacontrol_pids(polled), now))
+        if now >= self._observers_due:
+            self._observers_due = now + _OBSERVERS_PERIOD
             self._running_observers = self._observers.supervise()
             self._updater.force_update()  # `update` would ask the master for its period, and wait for the answer
         return statuses
@@ -202,16 +203,9 @@ class MonitorNode:
         status.add("observers", str(self._running_observers))
         return status
 
-    def _metacontrol_pids(self, polled: PolledGraph) -> dict[str, int]:
-        """Return the process ids of the meta-controller's nodes that run on this host."""
-        pids = self._connections.pids() | {rospy.get_name(): os.getpid()}
-        nodes = polled.snapshot.nodes
-        local = {}
-        for name in self._metacontrol:
-            graph_name = resolved(name, self._namespace)
-            if graph_name in pids and graph_name in nodes and _is_local(nodes[graph_name].uri):
-                local[name] = pids[graph_name]
-        return local
+    def _snapshot(self) -> GraphSnapshot | None:
+        polled = self._poller.latest
+        return polled.snapshot if polled else None
 
     def _publish(self, statuses: list[Status]) -> None:
         if statuses:
@@ -272,8 +266,3 @@ def _message(status: Status) -> DiagnosticStatus:
         hardware_id=status.hardware_id,
         values=[KeyValue(key, value) for key, value in status.values],
     )
-
-
-def _is_local(uri: str) -> bool:
-    host, _ = rosgraph.network.parse_http_host_and_port(uri)
-    return bool(rosgraph.network.is_local_address(host))

@@ -1,6 +1,6 @@
 """Which launcher starts the nodes of a host."""
 
-from rosgraph_manipulator.hosts.directory import HostLauncher, launcher_at, no_launcher
+from rosgraph_launcher.hosts import HostLauncher, launcher_at, no_launcher
 
 BASE = HostLauncher("/rosgraph_launcher", ("base", "ubuntu", "192.0.2.1"))
 ARM = HostLauncher("/rosgraph_launcher_arm", ("Arm-PC", "ubuntu", "192.0.2.7", "10.0.0.7"))
