@@ -3,58 +3,25 @@
 
 import os
 import signal
-import subprocess
-import threading
+import tempfile
 from contextlib import suppress
+from pathlib import Path
 
+import actionlib
 import psutil
-import rosgraph
 import rospy
 import rostest
-from helpers.waiting import wait_for
+from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import HERE, PairTest, is_alive, pid_of
+from manipulator_hosts_harness import ADDRESS, FAR_LAUNCHER, Respawned, link
+from metacontrol_msgs.msg import MvpReconfigurationAction
 
-HOST, ADDRESS = os.environ["OTHER_HOST"], os.environ["OTHER_ADDRESS"]
-FAR_LAUNCHER = "rosgraph_launcher_arm"
 NEAR, FAR = "/near_node", "/far_node"
-
-
-def link(state):
-    subprocess.run(["/usr/sbin/ip", "-n", HOST, "link", "set", "eth0", state], check=True)
+LIFE = Path(tempfile.mkdtemp()) / "life"
 
 
 def configuration(name, *args):
     return {"function": "f_wait", "launch": str(HERE / f"{name}.launch"), "args": list(args)}
-
-
-class Respawned:
-    """The launcher of the other host, which is started again whenever it ends, as roslaunch does there."""
-
-    def __init__(self):
-        port = rosgraph.get_master_uri().rstrip("/").rpartition(":")[2]
-        self._environment = {
-            **os.environ,
-            "ROS_IP": ADDRESS,
-            "ROS_MASTER_URI": f"http://{os.environ['THIS_ADDRESS']}:{port}",
-        }
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._run)
-        self.process = None
-        self._thread.start()
-
-    def _run(self):
-        words = ["/usr/sbin/ip", "netns", "exec", HOST, "/usr/bin/rosrun", "rosgraph_launcher", "rosgraph_launcher"]
-        while not self._ending.is_set():
-            self.process = subprocess.Popen([*words, f"__name:={FAR_LAUNCHER}"], env=self._environment)
-            self.process.wait()
-            self._ending.wait(0.2)
-
-    def end(self):
-        self._ending.set()
-        while self._thread.is_alive():
-            with suppress(ProcessLookupError):
-                self.process.send_signal(signal.SIGINT)
-            self._thread.join(1.0)
 
 
 class HostsTest(PairTest):
@@ -64,6 +31,7 @@ class HostsTest(PairTest):
         "dies": configuration("hosts", f"address:={ADDRESS}", "far:=wait_server.py", "far_args:=--die-after 0.01"),
         "nowhere": configuration("hosts", "address:=192.0.2.1"),
         "near": configuration("near"),
+        "held": configuration("hosts", f"address:={ADDRESS}", "far:=lived.py", f"far_args:={LIFE} 0"),
     }
     manipulator_parameters = {
         "save_action": "",
@@ -89,6 +57,11 @@ class HostsTest(PairTest):
         self.wait_for_state("both")
         self.near_pid, self.far_pid = pid_of(NEAR), pid_of(FAR)
         self.said_before = len(self.manipulator.said())
+
+    def connect(self):
+        """Find the action of a new manipulator."""
+        type(self).client = actionlib.SimpleActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
+        self.assertTrue(self.client.wait_for_server(rospy.Duration(DEADLINE_S)))
 
     def said(self):
         return self.manipulator.said()[self.said_before :]
@@ -120,6 +93,7 @@ class HostsTest(PairTest):
         self.states.clear()
         type(self).start_manipulator()
         self.wait_for_state("both")
+        self.connect()
         self.wait_until_it_serves()
         self.assertEqual(self.request("both"), 1, self.text)
         self.assertEqual((pid_of(NEAR), pid_of(FAR)), (self.near_pid, self.far_pid))
@@ -159,6 +133,24 @@ class HostsTest(PairTest):
         self.assertEqual(self.said().count(line), 1, self.said())
         link("up")
         self.wait_for_state("both")
+        self.assertTrue(pid_of(NEAR) and pid_of(FAR))
+
+    def test_host_that_is_lost_again_during_the_deployment_after_its_return_is_waited_for_once_more(self):
+        self.assertEqual(self.request("held"), 1, self.text)
+        hold = Path(f"{LIFE}.hold")
+        hold.touch()
+        self.addCleanup(hold.unlink, missing_ok=True)
+        link("down")
+        self.wait_for_state("held", "FAILED")
+        lives = LIFE.read_text().count("begins")
+        link("up")
+        wait_for(lambda: LIFE.read_text().count("begins") > lives, "its node has begun, and is held")
+        link("down")
+        self.wait_for_state("held", "FAILED")
+        self.assertIn(f"host {ADDRESS} is lost", self.states[-1].message)
+        hold.unlink()
+        link("up")
+        self.wait_for_state("held")
         self.assertTrue(pid_of(NEAR) and pid_of(FAR))
 
     def test_other_configuration_works_without_the_lost_host(self):

@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import pytest
 from helpers.other_host import other_host, run_rostest
 
-FILE = Path(__file__).parent / "hosts" / "hosts.test"
+FOLDER = Path(__file__).parent / "hosts"
 
 
-def test_functions_over_two_hosts(tmp_path):
+@pytest.mark.parametrize("name", ["hosts", "changes"])
+def test_functions_over_two_hosts(name, tmp_path):
     with other_host() as host:
-        run_rostest(FILE, host, tmp_path, ROS_IP=host.here)
+        run_rostest(FOLDER / f"{name}.test", host, tmp_path, ROS_IP=host.here)

@@ -115,6 +115,16 @@ def test_what_a_lost_host_has_stopped_is_deployed_again_when_it_is_back():
     assert deployments.waiting == A
 
 
+def test_what_is_lost_again_during_its_deployment_waits_once_more():
+    deployments = deployed(A)
+    deployments.failed(waits=True)
+    deployments.finished(Outcome(Result.GENERAL_ERROR, None, "host arm is lost"), 2.0)
+    assert deployments.react(report(None, STABLE), 3.0) is Reaction.NONE
+    deployments.wait_for(A)
+    assert deployments.react(report(None, FAILED), 3.0) is Reaction.NONE
+    assert deployments.react(report(None, STABLE), 4.0) is Reaction.RETURN
+
+
 @pytest.mark.parametrize(
     "meanwhile",
     [

@@ -45,6 +45,20 @@ def test_node_that_moves_to_another_host_ends_first():
     assert (here.stop, here.start, here.comes_first) == ((), ("/a",), False)
 
 
+def test_nodes_that_change_places_end_before_either_of_them_starts():
+    reports = {"/here": report("/a", "/c"), "/far": report("/b")}
+    places = {"/a": "/far", "/b": "/here", "/c": "/here"}
+    parts = split(places, reports, ["/a", "/b"], ["/a", "/b"])
+    assert [part for part in parts if part.comes_first] == [
+        Part("/far", (), ("/b",), releases=True, comes_first=True),
+        Part("/here", ("/c",), ("/a",), comes_first=True),
+    ]
+    assert [part for part in parts if not part.comes_first] == [
+        Part("/far", ("/a",), start=("/a",)),
+        Part("/here", ("/b", "/c"), start=("/b",)),
+    ]
+
+
 def test_launcher_that_never_had_the_function_is_not_asked():
     parts = split({"/a": "/here"}, {"/far": report(configuration="")}, [], ["/a"])
     assert [part.launcher for part in parts] == ["/here"]
@@ -62,3 +76,7 @@ def test_parts_together_are_the_change(places, running):
     assert sorted(node for part in parts for node in part.stop) == sorted(stop)
     assert {node: part.launcher for part in parts for node in part.nodes} == places
     assert all(part.releases is (not part.nodes) for part in parts)
+    for node, place in running.items():
+        ends = next(number for number, part in enumerate(parts) if node in part.stop)
+        begins = next((number for number, part in enumerate(parts) if node in part.start), ends)
+        assert places.get(node, place) == place or (parts[ends].comes_first and not parts[begins].comes_first)

@@ -113,6 +113,10 @@ class DeployedConfigurations:
         self._running = self._last_good = None
         self._recovering = False
 
+    def wait_for(self, configuration: Configuration) -> None:
+        """Note that nothing runs, because a host was lost, and that a configuration is deployed when it is back."""
+        self._waiting = configuration
+
     def released(self) -> None:
         """Note that the function is needed no longer: nothing is restored."""
         self._running = self._last_good = self._previous = self._waiting = None

@@ -34,7 +34,8 @@ def split(
 ) -> list[Part]:
     """Return what each launcher is asked for, in the order of their names.
 
-    A launcher that has anything of the function is asked, too, so that all have the same configuration after it.
+    A launcher that has anything of the function is asked, too, so that all have the same configuration after it. One
+    that starts nodes and loses some to other hosts is asked twice, so that these have ended before they start there.
 
     Args:
         places: for each node of the wanted configuration the launcher that is to run it.
@@ -51,5 +52,10 @@ def split(
         stops = tuple(dict.fromkeys((*(node for node in stop if node in running), *moving)))
         left = [node for node in running if node not in stops and node not in own]
         starts = tuple(node for node in start if node in own)
-        parts.append(Part(launcher, own, stops, starts, not own and not left, bool(moving) and not starts))
+        if moving and starts:
+            kept = tuple(node for node in own if node not in starts)
+            parts.append(Part(launcher, kept, stops, releases=not kept and not left, comes_first=True))
+            parts.append(Part(launcher, own, (), starts))
+        else:
+            parts.append(Part(launcher, own, stops, starts, not own and not left, bool(moving)))
     return parts

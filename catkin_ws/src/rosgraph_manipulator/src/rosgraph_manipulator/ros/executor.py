@@ -95,7 +95,7 @@ class RosExecutor:
         return self._progress.report(function)
 
     def adopt(self, configuration: Configuration) -> None:
-        """Note that a configuration runs that an earlier manipulator has deployed."""
+        """Note that a configuration runs, or should, although the last change was not to it."""
         with contextlib.suppress(DeploymentError):  # what the launchers tell is all that is known of it
             nodes = self.system.launch_file(configuration).system.nodes.values()
             self._launchers.adopt(configuration.function, nodes)
@@ -112,6 +112,11 @@ class RosExecutor:
     def lost_hosts(self, function: str) -> list[str]:
         """Return the lost hosts that have a part of what should run for a function."""
         return self._launchers.lost_hosts(function)
+
+    @property
+    def losses(self) -> int:
+        """How often a host was lost."""
+        return self._launchers.losses
 
     # -- steps ----------------------------------------------------------------------------------------------------
 

@@ -62,6 +62,7 @@ class LauncherReports:
             host_timeout: how long the launcher of another host may be silent, before that host counts as lost, s, wall.
         """
         self.on_reports: Callable[[], object] = lambda: None  # called whenever something differs, in any thread
+        self.losses = 0  # how often a host was lost
         self._timeout, self._host_timeout = timeout, host_timeout
         self._main = rospy.resolve_name("rosgraph_launcher")
         self._lock = threading.RLock()
@@ -115,6 +116,7 @@ class LauncherReports:
         places = {self._find(node.machine) or f"the launcher of {node.machine}" for node in nodes}
         with self._lock:
             self._parts[function] = frozenset(places)
+        self.on_reports()
 
     # -- where nodes are ------------------------------------------------------------------------------------------
 
@@ -195,6 +197,7 @@ class LauncherReports:
                 self._heard(known)
             elif time.monotonic() - known.answered > self._host_timeout:
                 known.lost = True
+                self.losses += not was_lost
             differs = known.lost is not was_lost
             concerns = any(known.place.name in parts for parts in self._parts.values())
         if differs and known.lost and not concerns:  # the failure of a function tells it, too

@@ -266,8 +266,7 @@ class Manipulator:
         running, previous = deployments.running, deployments.previous
         reaction = deployments.react(report, time.monotonic())
         if reaction is Reaction.RETURN and deployments.waiting:
-            rospy.logwarn("%s: deploying it again, because its hosts are back", deployments.waiting.name)
-            self._deploy(deployments.waiting)
+            self._deploy_after_loss(deployments.waiting)
         if report is None or running is None:
             return
         if reaction is Reaction.DEPLOY_AGAIN:
@@ -287,6 +286,15 @@ class Manipulator:
             self._begin_recovery(running, report.message)
         elif reaction is Reaction.END_RECOVERY:
             self._end_recovery(running)
+
+    def _deploy_after_loss(self, waiting: Configuration) -> None:
+        """Deploy a configuration again whose hosts are back; if one is lost during that, wait for it once more."""
+        rospy.logwarn("%s: deploying it again, because its hosts are back", waiting.name)
+        losses = self._executor.losses
+        self._deploy(waiting)
+        if self._deployments[waiting.function].running is None and self._executor.losses != losses:
+            self._executor.adopt(waiting)
+            self._deployments[waiting.function].wait_for(waiting)
 
     def _begin_recovery(self, running: Configuration, reason: str) -> None:
         self._deployments[running.function].begin_recovery()
