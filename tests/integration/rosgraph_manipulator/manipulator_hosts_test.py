@@ -153,6 +153,25 @@ class HostsTest(PairTest):
         self.wait_for_state("held")
         self.assertTrue(pid_of(NEAR) and pid_of(FAR))
 
+    def test_lost_host_does_not_delay_the_start_of_the_manipulator(self):
+        self.assertEqual(self.request("near"), 1, self.text)
+        self.manipulator.end()
+        link("down")
+        longer = 10 * DEADLINE_S  # than this test waits
+        rospy.set_param("rosgraph_manipulator/host_timeout", longer)
+        rospy.set_param("rosgraph_manipulator/launcher_timeout", longer)
+        self.states.clear()
+        try:
+            type(self).start_manipulator()
+            self.wait_for_state("near")
+        finally:
+            self.manipulator.end()
+            link("up")
+            for name in ("host_timeout", "launcher_timeout"):
+                rospy.set_param(f"rosgraph_manipulator/{name}", self.manipulator_parameters[name])
+            type(self).start_manipulator()
+            self.connect()
+
     def test_other_configuration_works_without_the_lost_host(self):
         link("down")
         self.wait_for_state("both", "FAILED")

@@ -5,11 +5,15 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterable
+from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
 
 import rosgraph
 import rospy
 from metacontrol_msgs.msg import LaunchedFunctions
+from node_kit.io.background import in_background
 from node_kit.io.xml_rpc import CallError
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.hosts import HostLauncher, launcher_at
@@ -74,17 +78,24 @@ class LauncherReports:
     # -- what they tell -------------------------------------------------------------------------------------------
 
     def find(self) -> bool:
-        """Wait for all launchers that are registered, and at most the time to look; tell whether one was heard."""
+        """Wait for all launchers that are registered and answer, at most the time to look; tell whether one was heard.
+
+        All are asked side by side, because one that has died stays registered, and its host may let a call wait.
+        """
         begun = time.monotonic()
+        asked: dict[str, Future[Any]] = {}
         while not rospy.is_shutdown():
             try:
-                awaited = publishers(rospy.resolve_name(TOPIC))
+                registered = publishers(rospy.resolve_name(TOPIC))
             except CallError:
-                awaited = set()
+                registered = set()
+            for name in registered - asked.keys():
+                asked[name] = in_background(partial(NodeApi.answer, name), ASKING)
+            silent = {name for name, answer in asked.items() if answer.done() and answer.result() is None}
             with self._lock:
                 heard = set(self._known)
             waited = time.monotonic() - begun
-            if heard and (awaited <= heard or waited > min(self._host_timeout, self._timeout)):
+            if heard and (registered <= heard | silent or waited > min(self._host_timeout, self._timeout)):
                 return True
             if waited > self._timeout:
                 return False
