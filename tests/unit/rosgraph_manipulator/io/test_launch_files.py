@@ -46,6 +46,21 @@ def test_node_of_another_machine_names_its_address(tmp_path):
     )
 
 
+def test_name_of_a_machine_may_be_known_to_its_launcher_alone(tmp_path):
+    body = f'<machine name="far" address="arm-pc.invalid"/>{NODE} machine="far"/>'
+    assert read_launch_file(write(tmp_path, body)).system.nodes["/n"].machine == "arm-pc.invalid"
+
+
+def test_user_of_a_machine_makes_it_no_other_host(tmp_path):
+    body = f'<machine name="own" address="localhost" user="somebody_else"/>{NODE} machine="own"/>'
+    assert read_launch_file(write(tmp_path, body)).system.nodes["/n"].machine == ""
+
+
+def test_machine_that_is_not_declared_is_named_with_node_and_remedy(tmp_path):
+    with pytest.raises(LaunchFileError, match=r"node n is for machine 'arm', which is not declared: add <machine"):
+        read_launch_file(write(tmp_path, f'{NODE} machine="arm"/>'))
+
+
 def test_two_readings_of_anonymous_names_are_the_same(tmp_path):
     path = write(tmp_path, '<node name="$(anon n)" pkg="move_base" type="move_base"/>')
     assert list(read_launch_file(path).system.nodes) == list(read_launch_file(path).system.nodes)

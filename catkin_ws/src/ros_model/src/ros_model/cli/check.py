@@ -10,6 +10,7 @@ import click
 from node_kit.io.input_files import real_path
 
 from ros_model.checks.families import check_family, families
+from ros_model.checks.launched import check_launch_file
 from ros_model.checks.packages import check_packages
 from ros_model.checks.systems import check_system
 from ros_model.cli import BAD_INPUT
@@ -27,10 +28,12 @@ from ros_model.project.settings import FILE_NAME
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
+    from ros_model.checks.launched import LaunchFile
     from ros_model.language.metamodel import RosSystem
     from ros_model.project.project import Project
 
 
+_LAUNCH = ".launch"
 _UNREADABLE = ("syntax", "unreadable")  # rules that a file breaks which can't be read
 
 
@@ -53,10 +56,11 @@ _UNREADABLE = ("syntax", "unreadable")  # rules that a file breaks which can't b
 )
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path())
 def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
-    """Check .rossystem and .ros files, folders of them, or projects by their metacontrol.yaml or folder.
+    """Check .rossystem and .ros files, folders of them, projects by their metacontrol.yaml or folder, or .launch files.
 
     References are followed to the .ros models that are checked, stand beside the files, belong to their project, or are
     found with --path. Message types of installed ROS packages are known. A variant is checked with its project's base.
+    Of a launch file, the machines and the executables are checked, with the defaults of its arguments.
 
     Exit status: 0 all is well or only warnings were given, 1 something is wrong in a model, 2 a file can't be read.
     """
@@ -84,12 +88,16 @@ class _Check:
         self._wholes: dict[Path, RosSystem] = {}  # what a system that is a variant is part of
         self._packages: dict[Path, PackageSet] = {}
         self._beside: dict[Path, PackageSet] = {}
+        self._launch_files: dict[Path, LaunchFile] = {}
         for folder in folders:
             self._know(files_in(Path(folder), PACKAGES))
 
     def add(self, path: Path) -> None:
         """Add a file, a project or a folder of files."""
         try:
+            if path.suffix == _LAUNCH:
+                self._add_launch_file(path)
+                return
             if path.name == FILE_NAME or os.path.isfile(path / FILE_NAME):
                 self._add_project(path)
                 return
@@ -113,6 +121,8 @@ class _Check:
             found += check_packages(packages, library)
         for path, system in self._systems.items():
             found += check_system(system, self._wholes.get(path), library, installed)
+        for launch in self._launch_files.values():
+            found += check_launch_file(launch, installed)
         for family in families(self._systems.values()):
             found += check_family(family)
         for project in self._projects.values():
@@ -124,6 +134,11 @@ class _Check:
         self._projects[project.folder] = project
         for file in files_in(project.folder, PACKAGES):
             self._add_file(file)
+
+    def _add_launch_file(self, path: Path) -> None:
+        from ros_model.io.launch_files import read_launch_file  # imported when asked for: roslaunch takes its time
+
+        self._launch_files[path] = read_launch_file(path)
 
     def _add_file(self, path: Path) -> None:
         self._asked.add(real_path(path))

@@ -12,6 +12,7 @@ from typing import Any
 import rospkg
 from node_kit.yaml_text import YamlError, parse_yaml
 from ros_model.errors import ModelError
+from ros_model.io.launch_files import load as load_by_roslaunch
 from ros_model.language.metamodel import PortKind, Reference
 
 from ros_model_extraction import ros_defaults as plumbing
@@ -86,25 +87,11 @@ def load(path: Path, arguments: Sequence[str]) -> tuple[list[LaunchedNode], dict
     Raises:
         ModelError: roslaunch refuses the file.
     """
-    import roslaunch.config
-    import roslaunch.core
-    import roslaunch.xmlloader
-
     read_xml(path, "a launch file")
     for argument in arguments:
         if ":=" not in argument:
             raise ModelError(f"argument {argument!r} is not NAME:=VALUE")
-    try:
-        config = roslaunch.config.ROSLaunchConfig()  # without what a roscore has: that runs two programs
-        loader = roslaunch.xmlloader.XmlLoader()
-        loader.ignore_unset_args = False
-        loader.load(str(path), config, argv=list(arguments), verbose=False)
-    except (roslaunch.core.RLException, roslaunch.xmlloader.XmlParseException, rospkg.ResourceNotFound) as error:
-        raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(error).split())}") from error
-    except Exception as error:  # whatever `$(eval ...)`, an encoding or the file's size makes of it
-        raise ModelError(f"{path}: roslaunch can't read it: {type(error).__name__}: {error}") from error
-    if config.config_errors:
-        raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(config.config_errors[0]).split())}")
+    config = load_by_roslaunch(path, arguments)
     nodes = [_launched(node) for node in config.nodes]
     return nodes, {name: parameter.value for name, parameter in config.params.items()}
 

@@ -160,9 +160,14 @@ class _Builder(expatbuilder.ExpatBuilderNS):
 
 
 def _checked(path: str | Path, config: Any) -> LaunchFile:
-    config.assign_machines()
     if config.config_errors:
         raise LaunchFileError(f"{path}: {' '.join(str(config.config_errors[0]).split())}")
+    for node in config.nodes:
+        name = node.machine_name or ""
+        if name not in config.machines:
+            remedy = f'add <machine name="{name}" address="HOST"/>, or correct the name'
+            raise LaunchFileError(f"{path}: node {node.name} is for machine '{name}', which is not declared: {remedy}")
+        node.machine = config.machines[name]
     if not config.nodes:
         raise LaunchFileError(f"{path}: starts no node")
     nodes = {}
@@ -180,9 +185,20 @@ def _checked(path: str | Path, config: Any) -> LaunchFile:
     )
 
 
+def _is_here(machine: Any) -> bool:
+    """Tell whether a machine is this host, as roslaunch does, whatever its user is.
+
+    A name that the name service does not know may be one that a launcher was given.
+    """
+    try:
+        return bool(roslaunch.core.is_machine_local(roslaunch.core.Machine(machine.name, machine.address)))
+    except (roslaunch.core.RLException, UnicodeError):
+        return False
+
+
 def _ignored(machine: Any) -> str:
     """Return what has no effect in the machine of a node, in one line; empty where all has."""
-    if roslaunch.core.is_machine_local(machine):
+    if _is_here(machine):
         return ""
     given = (("env-loader", machine.env_loader), ("user", machine.user), ("password", machine.password))
     names = [name for name, value in given if value]
@@ -206,6 +222,6 @@ def _description(name: str, node: Any, parameters: dict[str, Any]) -> NodeDescri
         respawn_delay=float(node.respawn_delay or 0.0),
         required=bool(node.required),
         launch_prefix=node.launch_prefix or None,
-        machine="" if roslaunch.core.is_machine_local(node.machine) else str(node.machine.address),
+        machine="" if _is_here(node.machine) else str(node.machine.address),
         parameters=parameters,
     )

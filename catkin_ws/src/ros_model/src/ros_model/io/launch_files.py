@@ -1,0 +1,61 @@
+"""Reads launch files through roslaunch."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import rospkg
+
+from ros_model.checks.launched import LaunchedNode, LaunchFile
+from ros_model.errors import ModelError
+from ros_model.io.files import read_text
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+
+def read_launch_file(path: Path) -> LaunchFile:
+    """Return what a launch file starts; its arguments have their defaults.
+
+    Raises:
+        ModelError: it can't be read, or roslaunch refuses it; says what roslaunch says.
+    """
+    text = read_text(path)
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ModelError(f"{path}: a launch file has no DOCTYPE and no entities: remove them")
+    config = load(path)
+    nodes = [
+        LaunchedNode(f"{node.namespace}{node.name}", node.package, node.type, node.machine_name or "")
+        for node in config.nodes
+    ]
+    machines = {name: str(machine.address) for name, machine in config.machines.items() if name}
+    return LaunchFile(str(path), tuple(nodes), machines)
+
+
+def load(path: Path, arguments: Sequence[str] = ()) -> Any:
+    """Return the configuration that roslaunch makes of a launch file, without what a roscore has.
+
+    Args:
+        path: the launch file.
+        arguments: `name:=value`, as for roslaunch.
+
+    Raises:
+        ModelError: roslaunch refuses the file; says what it says.
+    """
+    import roslaunch.config
+    import roslaunch.core
+    import roslaunch.xmlloader
+
+    try:
+        config = roslaunch.config.ROSLaunchConfig()  # without what a roscore has: that runs two programs
+        loader = roslaunch.xmlloader.XmlLoader()
+        loader.ignore_unset_args = False
+        loader.load(str(path), config, argv=list(arguments), verbose=False)
+    except (roslaunch.core.RLException, roslaunch.xmlloader.XmlParseException, rospkg.ResourceNotFound) as error:
+        raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(error).split())}") from error
+    except Exception as error:  # whatever `$(eval ...)`, an encoding or the file's size makes of it
+        raise ModelError(f"{path}: roslaunch can't read it: {type(error).__name__}: {error}") from error
+    if config.config_errors:
+        raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(config.config_errors[0]).split())}")
+    return config
