@@ -7,14 +7,12 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-import actionlib
 import psutil
 import rospy
 import rostest
 from helpers.waiting import DEADLINE_S, wait_for
 from manipulator_harness import HERE, PairTest, is_alive, pid_of
 from manipulator_hosts_harness import ADDRESS, FAR_LAUNCHER, Respawned, link
-from metacontrol_msgs.msg import MvpReconfigurationAction
 
 NEAR, FAR = "/near_node", "/far_node"
 LIFE = Path(tempfile.mkdtemp()) / "life"
@@ -58,11 +56,6 @@ class HostsTest(PairTest):
         self.near_pid, self.far_pid = pid_of(NEAR), pid_of(FAR)
         self.said_before = len(self.manipulator.said())
 
-    def connect(self):
-        """Find the action of a new manipulator."""
-        type(self).client = actionlib.SimpleActionClient("rosgraph_manipulator_action_server", MvpReconfigurationAction)
-        self.assertTrue(self.client.wait_for_server(rospy.Duration(DEADLINE_S)))
-
     def said(self):
         return self.manipulator.said()[self.said_before :]
 
@@ -93,7 +86,6 @@ class HostsTest(PairTest):
         self.states.clear()
         type(self).start_manipulator()
         self.wait_for_state("both")
-        self.connect()
         self.wait_until_it_serves()
         self.assertEqual(self.request("both"), 1, self.text)
         self.assertEqual((pid_of(NEAR), pid_of(FAR)), (self.near_pid, self.far_pid))
