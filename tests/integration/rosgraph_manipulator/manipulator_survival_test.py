@@ -24,8 +24,8 @@ from metacontrol_msgs.msg import MvpReconfigurationGoal
 
 class SurvivalTest(PairTest):
     manipulator_parameters = {"probation": 0.0, "settle_time": 0.2}
-    # Nodes stay dead long enough for the manipulator to see it, and no death is forgotten.
-    launcher_parameters = {"restart_intensity": 1, "restart_delay": 1.0, "restart_period": 100.0}
+    # No death is forgotten.
+    launcher_parameters = {"restart_intensity": 1, "restart_period": 100.0}
 
     def setUp(self):
         self.wait_until_it_serves()

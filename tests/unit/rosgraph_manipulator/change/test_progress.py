@@ -112,7 +112,6 @@ def test_node_that_has_done_its_work_needs_not_answer(progress):
 
 def test_recovery_waits_for_the_nodes_and_for_a_server_that_died(progress):
     progress.take(reports(RECOVERING, change=4, dead=("/a",), message="/a died"))
-    assert progress.server_died("f", {"/a"})
     progress.take(reports(STABLE, change=4))
     progress.recover("f", NEW, 20.0, new_server=True)
     assert progress.awaited(False) == Awaited(("/a", "/b"), frozenset({"plan"}), server=True)
@@ -121,9 +120,22 @@ def test_recovery_waits_for_the_nodes_and_for_a_server_that_died(progress):
     assert progress.failure() == "/b died"
 
 
-def test_server_that_lives_need_not_be_waited_for(progress):
+def test_deaths_that_are_over_by_now_are_told_once(progress):
+    progress.take(reports(RECOVERING, change=4, dead=("/a",), message="/a died"))
+    progress.take(reports(RECOVERING, change=4, dead=("/b",), message="/b died"))
+    progress.take(reports(STABLE, change=4))
+    assert progress.take_deaths("f") == report(RECOVERING, change=4, dead=("/a", "/b"), message="/b died")
+    assert progress.take_deaths("f") is None
+    assert progress.take_deaths("g") is None
+
+
+@pytest.mark.parametrize("later", [report(RECOVERING, dead=("/a",)), report(STABLE, change=2), report(FAILED)])
+def test_deaths_that_the_last_report_tells_or_an_earlier_change_had_are_not_told(progress, later):
     progress.take(reports(RECOVERING, dead=("/a",)))
-    assert not progress.server_died("f", {"/b"})
+    progress.take([later])
+    assert progress.take_deaths("f") is None
+    progress.take(reports(STABLE))
+    assert progress.take_deaths("f") is None
 
 
 def test_dead_nodes_do_not_run(progress):

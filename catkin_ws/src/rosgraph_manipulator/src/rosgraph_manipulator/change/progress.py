@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from rosgraph_launcher.description import NodeDescription, SystemDescription
-from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, LauncherReport
+from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 
 from rosgraph_manipulator.configuration.configurations import Configuration
 
@@ -35,6 +35,7 @@ class ChangeProgress:
 
     def __init__(self) -> None:
         self._reports: dict[str, LauncherReport] | None = None
+        self._unseen: dict[str, LauncherReport] = {}  # by function: of nodes that have died since `take_deaths`
         self._function = ""
         self._wanted: Configuration | None = None
         self._begun = 0.0
@@ -87,6 +88,10 @@ class ChangeProgress:
         That is when all nodes that drove the robot have ended, and before the first new one begins.
         """
         self._reports = {report.function: report for report in reports}
+        for function, report in self._reports.items():
+            if report.state == RECOVERING:
+                before = self._unseen.get(function, LauncherReport()).dead
+                self._unseen[function] = replace(report, dead=tuple(dict.fromkeys((*before, *report.dead))))
         report = self._reports.get(self._function, LauncherReport(self._function))
         if report.state in (RECOVERING, FAILED):
             self._death = (report.change, report.message)
@@ -95,6 +100,15 @@ class ChangeProgress:
             return False
         self._stops_robot = False
         return True
+
+    def take_deaths(self, function: str) -> LauncherReport | None:
+        """Return a report of nodes that have died and run again since the last call; None: there are none.
+
+        A node may be dead for a shorter time than the last reaction took.
+        """
+        unseen, report = self._unseen.pop(function, None), self.report(function)
+        is_over = unseen and report and report.state == STABLE and report.change == unseen.change
+        return unseen if is_over else None
 
     def is_reported(self, change: int) -> bool:
         """Tell whether the launcher has reported the end of a change of the function that changes."""
@@ -172,11 +186,6 @@ class ChangeProgress:
         return self._reports is not None and node not in self.launched_for(self._function)
 
     # -- recovery -------------------------------------------------------------------------------------------------
-
-    def server_died(self, function: str, servers: Collection[str]) -> bool:
-        """Note who served the kept action when nodes of a function died; return whether one of them was a server."""
-        report = self.report(function)
-        return bool(report and set(servers) & set(report.dead))
 
     def recover(self, function: str, configuration: Configuration | None, now: float, new_server: bool) -> None:
         """Begin to wait for nodes of a function that the launcher has started again.

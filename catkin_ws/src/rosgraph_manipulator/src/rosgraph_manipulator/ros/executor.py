@@ -224,14 +224,18 @@ class RosExecutor:
 
     # -- recovery -------------------------------------------------------------------------------------------------
 
-    def begin_recovery(self, function: str) -> None:
-        """Note that nodes of a function have died, and that the launcher will start them again.
+    def take_deaths(self, function: str) -> LauncherReport | None:
+        """Return a report of nodes that have died and run again since the last call; None: there are none."""
+        return self._progress.take_deaths(function)
+
+    def begin_recovery(self, report: LauncherReport) -> None:
+        """Note that nodes of a function have died, and that the launcher will start them again, or has done so.
 
         Their parameters are put back first, because somebody may have set others, such as the launch file of a robot
         that was started again.
         """
-        report = self._progress.report(function)
-        wanted = self.system.parameters_of(function, report.dead if report else ())
+        function = report.function
+        wanted = self.system.parameters_of(function, report.dead)
         try:
             live = get_parameters(wanted)
             lost = {name: v for name, v in wanted.items() if name not in live or not same_value(live[name], v)}
@@ -248,9 +252,10 @@ class RosExecutor:
         except CallError as error:
             rospy.logwarn("%s", error)
             servers = set()
-        self._servers_died[function] = self._progress.server_died(function, servers)
+        self._servers_died[function] = bool(servers & set(report.dead))
         if self._servers_died[function]:
-            goal.server_stops()
+            now = self._progress.report(function)
+            goal.server_stops(is_back=now is not None and not servers & set(now.dead))
 
     def end_recovery(self, function: str) -> None:
         """Wait until the nodes of a function that the launcher has started again are ready.

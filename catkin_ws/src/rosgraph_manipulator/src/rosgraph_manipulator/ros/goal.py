@@ -67,10 +67,15 @@ class PendingGoal:
         """Full name of the server's status topic."""
         return str(rospy.resolve_name(f"{self._action}/status"))
 
-    def server_stops(self) -> None:
-        """Note that the server will be stopped now, or has died."""
+    def server_stops(self, is_back: bool = False) -> None:
+        """Note that the server will be stopped now, or has died.
+
+        Args:
+            is_back: whether it was started again, so that the last status may be that of the new one.
+        """
         with self._lock:
             self._keeper.server_changes(True)
+            self._server = None if is_back else self._server
             self._old_server = self._server
             self._store(again=True)
 

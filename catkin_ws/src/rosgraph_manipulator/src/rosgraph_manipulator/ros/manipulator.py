@@ -259,10 +259,13 @@ class Manipulator:
         """React to the launchers' last reports."""
         for function in self._deployments:
             self._executor.clear(function)
-            self._follow_function(function)
+            deaths = self._executor.take_deaths(function)
+            if deaths is not None:
+                self._follow_function(function, deaths)
+            self._follow_function(function, self._executor.report(function))
 
-    def _follow_function(self, function: str) -> None:
-        deployments, report = self._deployments[function], self._executor.report(function)
+    def _follow_function(self, function: str, report: LauncherReport | None) -> None:
+        deployments = self._deployments[function]
         running, previous = deployments.running, deployments.previous
         reaction = deployments.react(report, time.monotonic())
         if reaction is Reaction.RETURN and deployments.waiting:
@@ -283,7 +286,7 @@ class Manipulator:
             deployments.failed()
             self._deploy(previous)
         elif reaction is Reaction.BEGIN_RECOVERY:
-            self._begin_recovery(running, report.message)
+            self._begin_recovery(running, report)
         elif reaction is Reaction.END_RECOVERY:
             self._end_recovery(running)
 
@@ -296,11 +299,11 @@ class Manipulator:
             self._executor.adopt(waiting)
             self._deployments[waiting.function].wait_for(waiting)
 
-    def _begin_recovery(self, running: Configuration, reason: str) -> None:
+    def _begin_recovery(self, running: Configuration, report: LauncherReport) -> None:
         self._deployments[running.function].begin_recovery()
-        self._executor.begin_recovery(running.function)
-        self._announcer.announce(running, FunctionGrounding.RECOVERING, Outcome(Result.OK, running, reason))
-        self._announcer.diagnose(False, reason, running.name)
+        self._executor.begin_recovery(report)
+        self._announcer.announce(running, FunctionGrounding.RECOVERING, Outcome(Result.OK, running, report.message))
+        self._announcer.diagnose(False, report.message, running.name)
 
     def _end_recovery(self, running: Configuration) -> None:
         try:
