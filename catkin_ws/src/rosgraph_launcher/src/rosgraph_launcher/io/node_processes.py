@@ -153,9 +153,8 @@ class NodeProcesses:
         wanted = {_kind(command): command for command in commands if command.is_python}
         for kind in set(self._warm) - set(wanted):
             self._warm.pop(kind).close()
-        lacking = (k for k in wanted if k not in self._warm and self._lost_warm[k] < MOST_LOST_WARM)
-        kind = next(lacking, None) if may_start else None
-        return kind is not None and self._prepare_warm(kind, wanted[kind])
+        lacking = [k for k in wanted if k not in self._warm and self._lost_warm[k] < MOST_LOST_WARM]
+        return may_start and bool(lacking) and self._prepare_warm(lacking[0], wanted[lacking[0]])
 
     def end_standby(self) -> None:
         """End all warm processes."""
