@@ -162,7 +162,7 @@ class HostsTest(PairTest):
             for name in ("host_timeout", "launcher_timeout"):
                 rospy.set_param(f"rosgraph_manipulator/{name}", self.manipulator_parameters[name])
             type(self).start_manipulator()
-            self.connect()
+            self.wait_until_it_serves()
 
     def test_other_configuration_works_without_the_lost_host(self):
         link("down")
