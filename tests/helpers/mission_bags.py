@@ -85,8 +85,13 @@ class BagBuilder:
         message.info.origin.position.x, message.info.origin.position.y = -2.0, -3.0
         self.add(stamp, "/map", message)
 
-    def write(self, path: Path) -> Path:
-        with Writer(path) as writer:
+    def write(self, path: Path, compression: str = "none", chunk_bytes: int = 1 << 20) -> Path:
+        """Write a bag, compressed by bz2 or lz4 or not, in chunks of about this size."""
+        writer = Writer(path)
+        if compression != "none":
+            writer.set_compression(Writer.CompressionFormat[compression.upper()])
+        writer.chunk_threshold = chunk_bytes
+        with writer:
             connections = {}
             for stamp, topic, message in sorted(self.messages, key=lambda entry: entry[0]):
                 if topic not in connections:

@@ -9,7 +9,7 @@ SOURCES = Path(__file__).parents[2] / "catkin_ws" / "src"
 REACHING_OUT = {"io", "ros", "cli", "pellet"}
 """Rooms that may touch files, in any package."""
 ALSO = {
-    "metacontrol_bags/bag.py": "reads a bag",
+    "metacontrol_bags/bag_file.py": "reads a bag",
     "node_kit/plugins.py": "reads the package.xml of all packages",
     "ros_model/generators": "generators write files, and ask what is there already",
     "ros_model/language/parser.py": "reads the grammars of its own package",

@@ -20,5 +20,6 @@ setup(
     packages=find_packages("src"),
     package_dir={"": "src"},
     python_requires=">=3.11",
-    install_requires=["matplotlib", "numpy", "rosbags", "scipy"],
+    install_requires=["click", "lz4", "matplotlib", "numpy", "rich", "rosbags", "scipy"],
+    entry_points={"console_scripts": ["metacontrol-bag=metacontrol_bags.cli.main:main"]},
 )

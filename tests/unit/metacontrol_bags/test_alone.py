@@ -11,6 +11,8 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from metacontrol_bags.bag import read_record
+from metacontrol_bags.metrics import summarise
 from packaging.requirements import Requirement
 
 PACKAGE = Path(__file__).parents[3] / "catkin_ws" / "src" / "metacontrol_bags"
@@ -72,8 +74,9 @@ def libraries(tmp_path):
 
 def test_every_module_imports_without_ros_and_our_other_packages(libraries):
     imported = run(sys.executable, "-I", "-c", ALONE + IMPORT_ALL, PACKAGE / "src", libraries).split()
-    modules = {f"metacontrol_bags.{path.stem}" for path in (PACKAGE / "src/metacontrol_bags").glob("[!_]*.py")}
-    assert set(imported) == modules
+    files = [path.relative_to(PACKAGE / "src") for path in (PACKAGE / "src").rglob("*.py")]
+    modules = {".".join(path.with_suffix("").parts).removesuffix(".__init__") for path in files}
+    assert {*imported, "metacontrol_bags"} == modules
 
 
 def test_pip_installs_it_alone_and_it_reads_a_bag(mission_bag, libraries, tmp_path):
@@ -93,6 +96,43 @@ def test_pip_installs_it_alone_and_it_reads_a_bag(mission_bag, libraries, tmp_pa
     assert where.startswith(str(home))
     assert reached
     assert states == ["DECIDED", "EXECUTED"]
+
+
+@pytest.fixture(scope="module")
+def command(tmp_path_factory):
+    """Install the package with its libraries into an empty environment; return its command, to run without ROS."""
+    folder = tmp_path_factory.mktemp("empty")
+    shutil.copytree(PACKAGE, folder / "metacontrol_bags")
+    kept = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("PYTHONPATH", "CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH", "VIRTUAL_ENV") and "ROS" not in name
+    }
+    kept["PATH"] = "/usr/bin:/bin"
+    run("/usr/bin/python3", "-m", "venv", folder / "environment", env=kept)
+    python = folder / "environment/bin/python"
+    pinned = ("--constraint", REQUIREMENTS)  # the versions that are tested
+    run(python, "-m", "pip", "install", "--disable-pip-version-check", *pinned, folder / "metacontrol_bags", env=kept)
+    seen = run(python, "-c", f"import importlib.util as u; print([n for n in {FOREIGN!r} if u.find_spec(n)])", env=kept)
+    assert seen == "[]\n"
+
+    def call(*arguments):
+        return run(folder / "environment/bin/metacontrol-bag", *arguments, env=kept, cwd=folder)
+
+    return call
+
+
+def test_every_command_works_in_an_environment_with_nothing_else(command, mission_bag, tmp_path):
+    bag = mission_bag.write(tmp_path / "mission.bag", "lz4")
+    assert json.loads(command("info", "--json", bag))[0]["messages"] == len(mission_bag.messages)
+    (told,) = json.loads(command("metrics", "--json", bag))
+    assert told["summary"] == summarise(read_record(bag))
+    assert "component:front_laser" in command("metrics", bag)
+    assert json.loads(command("decisions", "--json", bag))[0]["decisions"][0]["state"] == "EXECUTED"
+    assert "f2_v2_r2 -> f2_v1_r3_k" in command("decisions", bag)
+    assert "| goal reached | yes | yes |" in command("compare", "--markdown", bag, bag)
+    assert command("plot", bag) == f"{tmp_path / 'mission.png'}\n"
+    assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_libraries_that_it_needs_are_those_that_set_up_installs():

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 from bag_helpers import Types
 from metacontrol_bags import messages
-from mros1_reasoner.cli.decision_tables import render
+from metacontrol_bags.decision_tables import render
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.planning.log_line import line

@@ -1,37 +1,40 @@
 """Read a mission's bag, without ROS, into a `MissionRecord`.
 
-Message types come from the bag itself: every connection of a bag carries the definition of its messages.
+Message types come from the bag itself: every connection of a bag carries the definition of its messages. Only the
+topics that the record needs are decoded.
 """
 
 from __future__ import annotations
 
 import math
-import os
+import struct
+from collections import Counter
+from dataclasses import dataclass
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rosbags.rosbag1 import Reader, ReaderError
+from rosbags.serde import SerdeError
 from rosbags.typesys import TypesysError
 
 from metacontrol_bags import messages
+from metacontrol_bags.bag_file import BagError, BagFile
 from metacontrol_bags.record import (
     ComponentReport,
     CostReport,
-    GoalReport,
     MissionRecord,
     OccupancyMap,
     QualityReport,
 )
-from metacontrol_bags.typestore import typestore
+from metacontrol_bags.typestore import types_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection, Iterable, Iterator
     from pathlib import Path
 
-    from rosbags.interfaces import Connection
+    from rosbags.interfaces import Connection as RosbagsConnection
 
-    from metacontrol_bags.decision import Decision
-    from metacontrol_bags.record import ConfigurationReport, Event
+    from metacontrol_bags.bag_file import Connection
 
 TOPICS = (
     "/amcl_pose",
@@ -71,119 +74,167 @@ _CUBE = 1
 """Type of a visualization_msgs/Marker that shows clutter; people are cylinders."""
 
 
-class BagError(ValueError):
-    """A bag cannot be used; one line that names it and says what to do."""
+_ERRORS = (SerdeError, ValueError, AttributeError, AssertionError, LookupError, TypeError, OverflowError, struct.error)
+"""What messages raise that do not fit their definition, or are of another type than their topic has in a mission."""
+
+
+@dataclass(frozen=True)
+class Salvaged:
+    """What could be read of a bag.
+
+    Attributes:
+        record: of the mission.
+        topics: all topics of the bag.
+        problems: what is lost, each in words; empty where nothing is.
+    """
+
+    record: MissionRecord
+    topics: frozenset[str]
+    problems: tuple[str, ...]
 
 
 def read_record(path: Path) -> MissionRecord:
-    """Return the record of a mission from its bag.
+    """Return the record of a mission from its bag, which must be whole.
 
     Raises:
         BagError: the file is missing, no bag, not closed, or holds messages that do not fit their definition.
     """
-    if not os.path.isfile(path):  # False also for what can be no path
-        raise BagError(f"{path}: no such bag")
+    found = salvage(path)
+    if found.problems:
+        raise BagError(f"{path}: not a readable mission bag ({found.problems[0]})")
+    if not found.topics:
+        raise BagError(f"{path}: holds no messages")
+    return found.record
+
+
+def salvage(path: Path, topics: Collection[str] = ()) -> Salvaged:
+    """Return what can be read of a mission from its bag, however damaged it is.
+
+    Args:
+        path: of the bag.
+        topics: the only ones to read; all that the record needs where empty.
+
+    Raises:
+        BagError: the file is missing, unreadable, empty or no bag.
+    """
     builder = _Builder()
+    wanted = set(topics or builder.handlers)
+    decoders: dict[tuple[str, str], Callable[[bytes], Any] | str] = {}
+    lost: Counter[str] = Counter()
+    with BagFile(path) as bag:
+        for connection, stamp, data in bag.messages(lambda connection: connection.topic in wanted):
+            kind = connection.type, connection.definition
+            if kind not in decoders:
+                decoders[kind] = _decoder(*kind)
+            decode = decoders[kind]
+            try:
+                if isinstance(decode, str):
+                    raise LookupError(decode)
+                builder.take(connection, stamp, decode(data))
+            except _ERRORS:
+                reason = decode if isinstance(decode, str) else f"do not fit as {connection.type}"
+                lost[f"messages on {connection.topic} {reason}"] += 1
+        problems = [*bag.problems, *(f"{count} {what}" for what, count in lost.items())]
+        held = frozenset(bag.connections[number].topic for number, count in bag.counts.items() if count)
+        record = builder.build((bag.first or 0) * 1e-9, (bag.last or 0) * 1e-9)
+    return Salvaged(record, held, tuple(problems))
+
+
+def _decoder(name: str, definition: str) -> Callable[[bytes], Any] | str:
+    """Return a function that decodes messages of a type, or why there is none."""
     try:
-        with Reader(path) as reader:
-            wanted = [connection for connection in reader.connections if connection.topic in builder.handlers]
-            store = typestore(wanted)
-            for connection, nanoseconds, data in reader.messages(connections=wanted):
-                message = store.deserialize_ros1(data, connection.msgtype)
-                builder.publisher = publisher_of(connection)
-                builder.handlers[connection.topic](nanoseconds * 1e-9, message)
-            if not reader.message_count:
-                raise BagError(f"{path}: holds no messages")
-            first, last = reader.start_time * 1e-9, reader.end_time * 1e-9
-    except (ReaderError, TypesysError, AttributeError, IndexError, UnicodeDecodeError) as error:
-        hint = "; it was not closed: run `rosbag reindex`" if path.suffix == ".active" else ""
-        raise BagError(f"{path}: not a readable mission bag ({error}){hint}") from error
-    return builder.build(first, last)
+        store, known = types_of(name, definition)
+    except LookupError:
+        return f"are of the type {name}, which the bag does not define"
+    except TypesysError:
+        return f"are of the type {name}, whose definition makes no sense"
+    return lambda data: store.deserialize_ros1(data, known)
 
 
-def publisher_of(connection: Connection) -> str:
+def publisher_of(connection: RosbagsConnection) -> str:
     """Return the name of the node that published the messages of a connection; empty where the bag does not tell."""
     return str(getattr(connection.ext, "callerid", None) or "")
 
 
 class _Builder:
-    """Collects what the messages say; one handler per topic, called with the time of recording in s and the message.
-
-    Attributes:
-        publisher: of the message that is handled now.
-    """
+    """Collects what the messages say; one handler for each topic, with the time of recording in s and the message."""
 
     def __init__(self) -> None:
-        self.publisher = ""
-        self._events: list[Event] = []
-        self._poses: list[tuple[float, float, float]] = []
-        self._samples: dict[str, list[tuple[float, float]]] = {"safety": [], "energy": [], "contacts": []}
-        self._diagnostics: list[messages.DiagnosticReport] = []
-        self._configurations: list[ConfigurationReport] = []
-        self._decisions: list[Decision] = []
-        self._goals: list[GoalReport] = []
-        self._results: list[GoalReport] = []
-        self._commands: list[float] = []
-        self._obstacles: dict[tuple[str, float, float], None] = {}
-        self._map: OccupancyMap | None = None
-        self.handlers: dict[str, Callable[[float, Any], None]] = {
-            "/mission/event": lambda t, m: self._events.append(messages.event(m, t)),
-            "/diagnostics": lambda t, m: self._diagnostics.extend(messages.diagnostics(m, t, publisher=self.publisher)),
-            "/mros1_reasoner/decision": lambda t, m: self._decisions.append(messages.decision(m, t)),
-            "/move_base/goal": lambda t, m: self._goals.append(messages.goal(m, t)),
-            "/move_base/result": lambda t, m: self._results.append(messages.result(m, t)),
-            "/rosgraph_manipulator/active_configuration": lambda t, m: self._configurations.extend(
-                messages.configurations(m, t)
-            ),
-            "/ground_truth/state": self._add_pose,
-            "/ground_truth/safety": lambda t, m: self._add_sample("safety", t, m),
-            "/ground_truth/energy": lambda t, m: self._add_sample("energy", t, m),
-            "/ground_truth/contacts": lambda t, m: self._add_sample("contacts", t, m),
-            "/cmd_vel": lambda t, _: self._commands.append(t),
-            "/ground_truth/obstacles": self._add_obstacles,
-            "/map": self._take_map,
+        self._found: dict[str, list[tuple[int, Any]]] = {}
+        self.handlers: dict[str, Callable[[float, Any, str], Iterable[Any]]] = {
+            "/mission/event": lambda t, m, _: [messages.event(m, t)],
+            "/diagnostics": lambda t, m, publisher: messages.diagnostics(m, t, publisher=publisher),
+            "/mros1_reasoner/decision": lambda t, m, _: [messages.decision(m, t)],
+            "/move_base/goal": lambda t, m, _: [messages.goal(m, t)],
+            "/move_base/result": lambda t, m, _: [messages.result(m, t)],
+            "/rosgraph_manipulator/active_configuration": lambda t, m, _: messages.configurations(m, t),
+            "/ground_truth/state": _pose,
+            "/ground_truth/safety": _sample,
+            "/ground_truth/energy": _sample,
+            "/ground_truth/contacts": _sample,
+            "/cmd_vel": lambda t, _m, _p: [t],
+            "/ground_truth/obstacles": _obstacles,
+            "/map": _map,
         }
+
+    def take(self, connection: Connection, nanoseconds: int, message: Any) -> None:
+        """Keep what a message says."""
+        topic = connection.topic
+        said = self.handlers[topic](nanoseconds * 1e-9, message, connection.publisher)
+        self._found.setdefault(topic, []).extend((nanoseconds, item) for item in said)
 
     def build(self, first: float, last: float) -> MissionRecord:
         """Return the record; `first` and `last` are the stamps in s of the bag's first and last message."""
+        reports = self._of("/diagnostics")
+        maps = self._of("/map")
+        places = dict.fromkeys(self._of("/ground_truth/obstacles"))
         return MissionRecord(
-            events=tuple(self._events),
-            poses=np.array(self._poses, dtype=np.float64).reshape(-1, 3),
-            true_quality={name: tuple(self._samples[name]) for name in ("safety", "energy")},
-            contacts=tuple(self._samples["contacts"]),
-            components=tuple(report for report in self._diagnostics if isinstance(report, ComponentReport)),
-            observed=tuple(report for report in self._diagnostics if isinstance(report, QualityReport)),
-            costs=tuple(report for report in self._diagnostics if isinstance(report, CostReport)),
-            configurations=tuple(self._configurations),
-            decisions=tuple(self._decisions),
-            goals=tuple(self._goals),
-            results=tuple(self._results),
-            commands=tuple(self._commands),
-            obstacles=tuple((x, y) for _, x, y in self._obstacles),
-            map=self._map,
+            events=self._of("/mission/event"),
+            poses=np.array(self._of("/ground_truth/state"), dtype=np.float64).reshape(-1, 3),
+            true_quality={name: self._of(f"/ground_truth/{name}") for name in ("safety", "energy")},
+            contacts=self._of("/ground_truth/contacts"),
+            components=tuple(report for report in reports if isinstance(report, ComponentReport)),
+            observed=tuple(report for report in reports if isinstance(report, QualityReport)),
+            costs=tuple(report for report in reports if isinstance(report, CostReport)),
+            configurations=self._of("/rosgraph_manipulator/active_configuration"),
+            decisions=self._of("/mros1_reasoner/decision"),
+            goals=self._of("/move_base/goal"),
+            results=self._of("/move_base/result"),
+            commands=self._of("/cmd_vel"),
+            obstacles=tuple((x, y) for _, x, y in places),
+            map=maps[-1] if maps else None,
             first_stamp=first,
             last_stamp=last,
         )
 
-    def _add_pose(self, received: float, message: Any) -> None:
-        position = message.pose.pose.position
-        if math.isfinite(position.x) and math.isfinite(position.y):
-            self._poses.append((messages.header_stamp(message.header, received), position.x, position.y))
+    def _of(self, topic: str) -> tuple[Any, ...]:
+        """Return what was said on a topic, in the order of recording."""
+        return tuple(item for _, item in sorted(self._found.pop(topic, ()), key=itemgetter(0)))
 
-    def _add_sample(self, name: str, received: float, message: Any) -> None:
-        if math.isfinite(message.data):
-            self._samples[name].append((received, float(message.data)))
 
-    def _add_obstacles(self, _received: float, message: Any) -> None:
-        for marker in message.markers:
-            place = marker.pose.position
-            if marker.action == 0 and marker.type == _CUBE and math.isfinite(place.x) and math.isfinite(place.y):
-                self._obstacles[marker.ns, round(place.x, 1), round(place.y, 1)] = None
+def _pose(received: float, message: Any, _publisher: str) -> list[tuple[float, float, float]]:
+    position = message.pose.pose.position
+    if not (math.isfinite(position.x) and math.isfinite(position.y)):
+        return []
+    return [(messages.header_stamp(message.header, received), position.x, position.y)]
 
-    def _take_map(self, _received: float, message: Any) -> None:
-        info = message.info
-        grid = np.asarray(message.data, dtype=np.int8)
-        if grid.size and grid.size == info.width * info.height:
-            cells = grid.reshape(info.height, info.width) >= _OCCUPIED
-            origin = info.origin.position
-            self._map = OccupancyMap(float(info.resolution), origin.x, origin.y, cells)
+
+def _sample(received: float, message: Any, _publisher: str) -> list[tuple[float, float]]:
+    return [(received, float(message.data))] if math.isfinite(message.data) else []
+
+
+def _obstacles(_received: float, message: Any, _publisher: str) -> Iterator[tuple[str, float, float]]:
+    for marker in message.markers:
+        place = marker.pose.position
+        if marker.action == 0 and marker.type == _CUBE and math.isfinite(place.x) and math.isfinite(place.y):
+            yield marker.ns, round(place.x, 1), round(place.y, 1)
+
+
+def _map(_received: float, message: Any, _publisher: str) -> list[OccupancyMap]:
+    info = message.info
+    grid = np.asarray(message.data, dtype=np.int8)
+    if not grid.size or grid.size != info.width * info.height:
+        return []
+    cells = grid.reshape(info.height, info.width) >= _OCCUPIED
+    origin = info.origin.position
+    return [OccupancyMap(float(info.resolution), origin.x, origin.y, cells)]

@@ -113,3 +113,8 @@ class Decision:
     analyse_wall_s: float = 0.0
     plan_wall_s: float = 0.0
     execute_wall_s: float = 0.0
+
+
+def milliseconds(duration: float) -> str:
+    """Return a duration, given in s, as text in ms."""
+    return f"{duration * 1000:.1f} ms"

@@ -33,7 +33,7 @@ _MARGIN_M = 0.6
 
 
 def draw(record: MissionRecord, path: Path) -> None:
-    """Draw a mission into a PNG file of 1600 x 2000 pixels.
+    """Draw a mission into a file: SVG if it is called so, else PNG of 1600 x 2000 pixels.
 
     Raises:
         MetricsError: an event of the record has impossible content.
@@ -48,7 +48,7 @@ def draw(record: MissionRecord, path: Path) -> None:
         _draw_quality(axis, record, summary, name)
     axes[1].tick_params(labelbottom=False)
     axes[2].set_xlabel("simulated time since the start of the mission (s)")
-    figure.savefig(path, dpi=_DPI, format="png")
+    figure.savefig(path, dpi=_DPI, format="svg" if path.suffix == ".svg" else "png")
 
 
 def configuration_spans(record: MissionRecord) -> list[tuple[float, float, str]]:

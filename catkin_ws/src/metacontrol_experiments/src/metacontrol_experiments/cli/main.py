@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import click
+from metacontrol_bags.cli.main import bag
 
 from metacontrol_experiments.cli.calibrate import calibrate
 from metacontrol_experiments.cli.compare import compare
@@ -18,7 +19,7 @@ def metacontrol() -> None:
     """Missions of a robot that adapts, and what their bags tell."""
 
 
-for _command in (run, summary, figure, calibrate, variants, compare, delays):
+for _command in (run, summary, figure, calibrate, variants, compare, delays, bag):
     metacontrol.add_command(_command)
 
 

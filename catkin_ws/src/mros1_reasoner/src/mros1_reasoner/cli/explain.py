@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from metacontrol_bags.decision_tables import render
 
-from mros1_reasoner.cli.decision_tables import render
 from mros1_reasoner.cli.output import ERRORS, NAMESPACE, console, refuse
 from mros1_reasoner.io.reasoner_bag import read_decisions
 

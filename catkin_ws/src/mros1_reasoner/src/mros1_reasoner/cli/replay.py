@@ -11,13 +11,13 @@ from typing import Any
 
 import click
 from metacontrol_bags.decision import Decision
+from metacontrol_bags.decision_tables import render
 from metacontrol_msgs.msg import FunctionGrounding
 from node_kit.parameters import ParameterError
 from node_kit.yaml_text import YamlError, parse_yaml
 from rich.console import Console
 from rich.table import Table
 
-from mros1_reasoner.cli.decision_tables import render
 from mros1_reasoner.cli.output import ERRORS, NAMESPACE, console, refuse
 from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.io.reasoner_bag import read_recording

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from metacontrol_bags.decision import ADVISED, PROPOSED, Decision
+from metacontrol_bags.decision import ADVISED, PROPOSED, Decision, milliseconds
 
 _IN_LINE = 4  # candidates that a line names
 _STATES = {
@@ -38,8 +38,3 @@ def _ranking(decision: Decision) -> str:
         texts.append(f"{rank} {candidate.name} ({candidate.utility:g}{f': {reason}' if reason else ''})")
     more = len(decision.candidates) - _IN_LINE
     return ", ".join(texts) + (f", and {more} more" if more > 0 else "")
-
-
-def milliseconds(duration: float) -> str:
-    """Return a duration, given in s, as text in ms."""
-    return f"{duration * 1000:.1f} ms"

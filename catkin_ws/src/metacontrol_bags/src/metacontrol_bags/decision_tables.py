@@ -5,13 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from metacontrol_bags.decision import ADVISED, EXECUTED, FAILED, PROPOSED, Candidate, Cause, Decision
 from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from mros1_reasoner.planning.log_line import milliseconds
+from metacontrol_bags.decision import (
+    ADVISED,
+    EXECUTED,
+    FAILED,
+    PROPOSED,
+    Candidate,
+    Cause,
+    Decision,
+    milliseconds,
+)
 
 _STYLES = {EXECUTED: "green", FAILED: "red", PROPOSED: "yellow", ADVISED: "yellow"}
 

@@ -1,0 +1,59 @@
+"""What a bag does not tell of a mission, in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from metacontrol_bags.words import MissionEvent
+
+if TYPE_CHECKING:
+    from metacontrol_bags.bag import Salvaged
+    from metacontrol_bags.record import MissionRecord
+
+_TELLS = {
+    "/mission/event": "settings, start and end",
+    "/ground_truth/state": "the way",
+    "/ground_truth/safety": "safety",
+    "/ground_truth/energy": "energy",
+    "/ground_truth/contacts": "collisions",
+    "/diagnostics": "what was observed",
+    "/move_base/goal": "goals",
+    "/rosgraph_manipulator/active_configuration": "configurations",
+}
+_NAMED = 4
+"""Topics of a bag of something else that a line names."""
+
+
+def is_mission(record: MissionRecord) -> bool:
+    """Return whether a record holds anything of a mission."""
+    told = (record.events, record.decisions, record.configurations, record.goals, record.observed, record.components)
+    return any((*told, record.contacts, *record.true_quality.values(), len(record.poses)))
+
+
+def gaps(found: Salvaged) -> tuple[str, ...]:
+    """Return what is lost or was not recorded, each in words."""
+    absent = [f"{topic} ({what})" for topic, what in _TELLS.items() if topic not in found.topics]
+    told = list(found.problems)
+    if absent:
+        told.append(
+            f"it has no {', no '.join(absent)}: what follows from these is unknown, `metacontrol run` records all"
+        )
+    elif found.record.event(MissionEvent.MISSION_START) is None:
+        told.append("the start of the mission is not in it: the first message is taken for it")
+    elif found.record.event(MissionEvent.MISSION_END) is None:
+        told.append("the end of the mission is not in it: the last message is taken for it")
+    return tuple(told)
+
+
+def nothing_of_a_mission(found: Salvaged) -> str:
+    """Return what to say of a bag that holds nothing of a mission."""
+    if not found.topics:
+        lost = f" ({'; '.join(found.problems)})" if found.problems else ""
+        return f"holds no messages{lost}: record again"
+    topics = sorted(found.topics)
+    more = f" and {len(topics) - _NAMED} more" if len(topics) > _NAMED else ""
+    lost = f" ({'; '.join(found.problems)})" if found.problems else ""
+    return (
+        f"holds nothing of a mission, only {', '.join(topics[:_NAMED])}{more}{lost}: "
+        "record the topics that the README of metacontrol_bags lists"
+    )

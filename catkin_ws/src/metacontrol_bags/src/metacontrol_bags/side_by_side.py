@@ -1,0 +1,91 @@
+"""Summaries of missions side by side: a column for each mission, a row for each figure."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+UNKNOWN = "-"
+
+
+def table(summaries: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
+    """Return the rows of a table, the first one with the names of the missions.
+
+    Args:
+        summaries: as `metrics.summarise` makes them, by the name of the column.
+    """
+    columns = [_column(summary) for summary in summaries.values()]
+    labels = dict.fromkeys(label for column in columns for label in column)
+    return [["", *summaries], *([label, *(column.get(label, UNKNOWN) for column in columns)] for label in labels)]
+
+
+def markdown(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows as a Markdown table."""
+    cells = [[text.replace("|", "\\|") for text in row] for row in rows]
+    lines = [f"| {' | '.join(row)} |" for row in cells]
+    return "\n".join([lines[0], f"|---|{'---:|' * (len(rows[0]) - 1)}", *lines[1:]])
+
+
+def short_names(paths: Sequence[Path]) -> list[str]:
+    """Return the shortest ends of paths by which they differ; equal paths get a number."""
+    parts = [path.parts or (str(path),) for path in paths]
+    depth = 1
+    while depth < max(map(len, parts), default=0) and len({part[-depth:] for part in parts}) < len(set(parts)):
+        depth += 1
+    names = [str(Path(*part[-depth:])) for part in parts]
+    return [
+        f"{name} ({names[: number + 1].count(name)})" if names.count(name) > 1 else name
+        for number, name in enumerate(names)
+    ]
+
+
+def _column(summary: Mapping[str, Any]) -> dict[str, str]:
+    goals, control = summary["goals"], summary["control"]
+    changes = summary["reconfigurations"]
+    durations = [change["execute_s"] for change in changes if change["execute_s"] is not None]
+    configurations = dict.fromkeys(filter(None, (summary["initial_configuration"], summary["final_configuration"])))
+    rows = {
+        "mission": f"{summary['mission']}, route {summary['route']}, seed {summary['seed']}, {summary['engine']}",
+        "meta-controller": _yes(summary["metacontrol"]),
+        "contingency": _contingency(summary["contingency"]),
+        "goal reached": _yes(summary["goal_reached"]) if goals["sent"] else UNKNOWN,
+        "success (paper's four conditions)": _yes(summary["success"]),
+        "outcome": summary["reason"],
+        "duration": _number(summary["duration_s"], "s"),
+        "way driven": _number(summary["path_length_m"], "m"),
+        "collisions": UNKNOWN if summary["collisions"] is None else str(summary["collisions"]),
+        "configuration": " -> ".join(configurations) or UNKNOWN,
+    }
+    rows |= {f"time above the {name} threshold": _share(v) for name, v in summary["time_above_threshold"].items()}
+    rows |= {f"mean {name}": _number(level) for name, level in summary["mean_qa"].items()}
+    for name, observed in summary["observed_qa"].items():
+        rows[f"time above the {name} threshold, as observed"] = _share(observed["time_above_threshold"])
+        rows[f"{name} could not be observed"] = _number(observed["stale_s"], "s")
+    return rows | {
+        "reconfigurations": str(len(changes)),
+        "reconfigurations that failed": str(len(summary["reconfigurations_failed"])),
+        "mean duration of a reconfiguration": _number(statistics.fmean(durations) if durations else None, "s"),
+        "control periods missed": _share(control["periods_missed"]),
+        "simulated / wall time": _number(summary["real_time_factor"]),
+    }
+
+
+def _contingency(told: Mapping[str, Any]) -> str:
+    parts = [f"clutter {told['clutter']}"] if told["clutter"] else []
+    parts += [f"power x {told['power']:g}"] if told["power"] != 1.0 else []
+    parts += [told["component"]] if told["component"] else []
+    return ", ".join(parts) or "none"
+
+
+def _yes(value: bool) -> str:
+    return "yes" if value else "no"
+
+
+def _number(value: float | None, unit: str = "") -> str:
+    return UNKNOWN if value is None else f"{value:.2f} {unit}".strip()
+
+
+def _share(value: float | None) -> str:
+    return UNKNOWN if value is None else f"{value:.2%}"
