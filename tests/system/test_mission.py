@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import psutil
 import pytest
+import rosbag
 from metacontrol_bags.bag import read_record
 
 if TYPE_CHECKING:
@@ -87,6 +88,19 @@ def test_summary_follows_from_the_bag_alone(adapted):
     again = metacontrol("summary", str(output / "mission.bag"))
     assert json.loads(again.stdout) == json.loads((output / "summary.json").read_text())
     assert (output / "mission.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
+def test_metrics_of_the_bag_are_those_of_the_run_also_compressed(adapted, tmp_path, compression):
+    _, output = adapted
+    path = tmp_path / "mission.bag"
+    with rosbag.Bag(str(output / "mission.bag")) as recorded, rosbag.Bag(str(path), "w", compression) as written:
+        for topic, message, stamp, header in recorded.read_messages(raw=True, return_connection_header=True):
+            written.write(topic, message, stamp, raw=True, connection_header=header)
+    result = metacontrol("bag", "metrics", "--json", str(path))
+    assert (result.returncode, result.stderr) == (0, "")
+    (told,) = json.loads(result.stdout)
+    assert told["summary"] == json.loads((output / "summary.json").read_text())
 
 
 def test_baseline_stops_for_want_of_a_sensor(baseline):
