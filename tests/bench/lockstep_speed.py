@@ -28,7 +28,7 @@ def run() -> list[dict[str, Any]]:
     speeds = []
     with tempfile.TemporaryDirectory(prefix="bench_") as folder:
         for _ in range(_RUNS):
-            lockstep = set_up(Settings(route, Path(folder), metacontrol=False))
+            lockstep = set_up(Settings(route, Path(folder), manager="none"))
             began = time.perf_counter()
             state = lockstep.run().state
             simulated = (state.ended_s or 0.0) - state.started_s + SETTLE_S

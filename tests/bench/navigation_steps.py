@@ -46,7 +46,7 @@ def run() -> list[dict[str, Any]]:
         for name, owner, method, _ in _MEASURED:
             timed = _timed(getattr(owner, method), times[name])
             patches.enter_context(mock.patch.object(owner, method, timed))
-        set_up(Settings(route, Path(folder), metacontrol=False, timeout_s=_SECONDS)).run()
+        set_up(Settings(route, Path(folder), manager="none", timeout_s=_SECONDS)).run()
     times["global_plan"] = times["global_plan"][:_FIRST_PLANS]
     return [
         entry(name, statistics.median(times[name]), "ms", len(times[name]), LIMIT, limit)

@@ -1,5 +1,6 @@
 """The mission that `metacontrol run` makes of its options."""
 
+import pytest
 from click.testing import CliRunner
 from metacontrol_experiments.cli import run as cli
 from metacontrol_experiments.cli.main import metacontrol
@@ -48,3 +49,22 @@ def test_world_and_routes_of_the_users_own(monkeypatch, tmp_path):
     assert settings.route.name == "home"
     assert f"world:={tmp_path / 'hall.yaml'}" in settings.launch_command(4000)
     assert not any(argument.startswith("world:=") for argument in settings_of(monkeypatch).launch_command(4000))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--manager", "magic"), "no manager 'magic'; there are mros, none, random, respawn, rules"),
+        (("--manager", "rules"), "--manager rules: on ROS there are only mros and none so far; use --engine lockstep"),
+        (("--manager", "rules", "--no-metacontrol"), "--no-metacontrol is --manager none"),
+    ],
+)
+def test_managers_that_cannot_be_had_are_refused_with_one_line(arguments, said):
+    result = CliRunner().invoke(metacontrol, ["run", "--output", "out", *arguments])
+    assert result.exit_code == 2 and said in result.output and result.output.count("\n") == 1
+
+
+def test_baseline_is_the_manager_none(monkeypatch):
+    assert settings_of(monkeypatch, "--no-metacontrol").manager == "none"
+    assert settings_of(monkeypatch, "--manager", "none").manager == "none"
+    assert settings_of(monkeypatch).manager == "mros"

@@ -26,7 +26,7 @@ FAR = Route("far", Pose(-8.0, -8.0, 0.78), Pose(5.4, 6.0, 0.0))
 
 
 def settings(tmp_path, *texts, **changes):
-    usual = {"metacontrol": False, "contingencies": tuple(map(parse_contingency, texts)), "timeout_s": 60.0}
+    usual = {"manager": "none", "contingencies": tuple(map(parse_contingency, texts)), "timeout_s": 60.0}
     return Settings(**({"route": WAY, "output": tmp_path} | usual | changes))
 
 
@@ -97,7 +97,7 @@ def test_baseline_stands_still_when_its_laser_dies(tmp_path):
 
 
 def test_meta_controller_goes_on_with_the_camera_and_repeats_byte_for_byte(tmp_path):
-    asked = settings(tmp_path, "kill:front_laser@time:2", metacontrol=True)
+    asked = settings(tmp_path, "kill:front_laser@time:2", manager="mros")
     one = set_up(asked).run()
     assert one.state.outcome is Outcome.REACHED
     summary = summarise(one.record)
@@ -109,7 +109,7 @@ def test_meta_controller_goes_on_with_the_camera_and_repeats_byte_for_byte(tmp_p
 
 def test_energy_over_its_limit_is_answered_without_a_stop(tmp_path):
     changes = {"route": FAR, "initial_configuration": "f3_v3_r1", "timeout_s": 12.0}
-    asked = settings(tmp_path, "power:2.5@time:1", metacontrol=True, **changes)
+    asked = settings(tmp_path, "power:2.5@time:1", manager="mros", **changes)
     record = set_up(asked).run().record
     change = next(entry for entry in summarise(record)["reconfigurations"] if entry["trigger"] == "qa:energy")
     assert change["execute_s"] < 1.0
@@ -166,3 +166,28 @@ def test_command_leaves_log_summary_and_figure(tmp_path):
     assert refused.exit_code == 2 and "in lockstep there are only" in refused.output
     refused = CliRunner().invoke(cli.metacontrol, [*arguments, *files, "--rviz"])
     assert refused.exit_code == 2 and "has no window" in refused.output
+
+
+@pytest.mark.parametrize(
+    ("strike", "goes_on"),
+    [("kill:front_laser@time:2", True), ("unplug:front_laser@time:2", False), ("freeze:front_laser@time:2", False)],
+)
+def test_respawn_helps_where_a_driver_has_died_and_its_device_is_there(tmp_path, strike, goes_on):
+    outcome = set_up(settings(tmp_path, strike, manager="respawn", timeout_s=20.0)).run()
+    assert (outcome.state.outcome is Outcome.REACHED) is goes_on
+    assert outcome.record.decisions == ()
+    assert ("front_laser started again" in outcome.log) is goes_on
+
+
+def test_rules_go_on_with_the_camera(tmp_path):
+    outcome = set_up(settings(tmp_path, "unplug:front_laser@time:2", manager="rules")).run()
+    assert outcome.state.outcome is Outcome.REACHED
+    summary = summarise(outcome.record)
+    assert summary["final_configuration"] == "f2_v1_r3_k" and "manager=rules" in outcome.log
+
+
+def test_random_choice_repeats_byte_for_byte_for_a_seed(tmp_path):
+    changes = {"initial_configuration": "f3_v3_r1", "timeout_s": 12.0, "manager": "random"}
+    logs = [set_up(settings(tmp_path, "power:2.5@time:1", **changes)).run() for _ in range(2)]
+    assert summarise(logs[0].record)["reconfigurations"][0]["trigger"] == "qa:energy"
+    assert logs[0].log == logs[1].log

@@ -10,7 +10,9 @@ from metacontrol_experiments.lockstep.metacontroller import Cores, Metacontrolle
 from metacontrol_experiments.lockstep.observation import Observers
 from metacontrol_experiments.lockstep.reconfiguration import navigation_parameters, plan_change, restarts
 from metacontrol_experiments.lockstep.system import LockstepError, System, private_parameters
+from metacontrol_experiments.managers.manager import Manager
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
+from mros1_reasoner.loop.entries import ActiveFact, ComponentFact
 from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.messages.state import stamp
 from pybullet_simulator.physics.simulation import Settings as SimulationSettings
@@ -160,36 +162,40 @@ def test_sensor_of_the_model_feeds_observers():
     assert heard.latest("carrier/range", 1.0).data == 2.5
 
 
-class Loop:
+class Noting(Manager):
     """Notes what it is told."""
 
+    observes = True
+
     def __init__(self):
-        self.active, self.components = [], []
+        self.facts = []
 
-    def observe_component(self, now, component, status, stamp):
-        self.components.append((component, status))
+    def take(self, now, fact):
+        self.facts.append(fact)
 
-    def step(self, now, heartbeat):
-        return []
 
-    def observe_active(self, now, function, configuration, state):
-        self.active.append((function, configuration, state))
+def cores(manager, *components):
+    return Cores(manager, Observers([], {}), DiagnosticsReader([], components), 2.0, {})
 
 
 def test_function_is_that_of_the_configuration(system):
-    loop = Loop()
-    cores = Cores(Observers([], {}), None, loop, None, 2.0, {})
-    Metacontroller(system, cores, None, "slow", seed=1)
-    assert loop.active == [("f_carry", "slow", "STABLE")]
+    manager = Noting()
+    Metacontroller(system, cores(manager), None, "slow", seed=1)
+    assert manager.facts == [ActiveFact("f_carry", "slow", "STABLE")]
 
 
 def test_system_without_model_of_the_variant_is_refused(system):
     def missing(name):
         raise ModelError(f"no {name}.rossystem")
 
-    cores = Cores(Observers([], {}), None, Loop(), None, 2.0, {})
     with pytest.raises(LockstepError, match=r"no slow\.rossystem"):
-        Metacontroller(replace(system, variant=missing), cores, None, "slow", seed=1)
+        Metacontroller(replace(system, variant=missing), cores(Noting()), None, "slow", seed=1)
+
+
+def test_manager_that_observes_nothing_is_told_nothing(system):
+    metacontroller = Metacontroller(system, cores(Manager(), "gripper"), None, "slow", seed=1)
+    metacontroller.component_changed(1.0, "gripper", works=False)
+    assert metacontroller.step(1.1, 1, stamp(1_100_000_000)) == [] and metacontroller.components == []
 
 
 class NoDelays:
@@ -200,11 +206,10 @@ class NoDelays:
 
 
 def test_component_that_the_reasoner_does_not_model_is_seen_but_left_out(system):
-    loop = Loop()
-    cores = Cores(Observers([], {}), DiagnosticsReader([], ["gripper"]), loop, None, 2.0, {})
-    metacontroller = Metacontroller(system, cores, NoDelays(), "slow", seed=1)
+    manager = Noting()
+    metacontroller = Metacontroller(system, cores(manager, "gripper"), NoDelays(), "slow", seed=1)
     for component in ("gripper", "wheel"):
         metacontroller.component_changed(1.0, component, works=False)
-    assert metacontroller.step(1.1, 1, stamp(1_100_000_000)) is None
+    assert metacontroller.step(1.1, 1, stamp(1_100_000_000)) == []
     assert [report.component for report in metacontroller.components] == ["gripper", "wheel"]
-    assert loop.components == [("gripper", "FALSE")]
+    assert manager.facts[1:] == [ComponentFact("gripper", "FALSE")]

@@ -34,6 +34,7 @@ from metacontrol_experiments.io.input_files import (
     simulation_package,
 )
 from metacontrol_experiments.io.processes import RunError
+from metacontrol_experiments.managers.manager import MROS, NONE, ManagerError, find_manager
 from metacontrol_experiments.mission.mission import MissionError, Outcome
 from metacontrol_experiments.mission.routes import RouteError
 from metacontrol_experiments.mission.settings import BAG_NAME, FIGURE_NAME, LOG_NAME, SUMMARY_NAME, Settings
@@ -45,6 +46,16 @@ if TYPE_CHECKING:
 
     from metacontrol_experiments.mission.mission import State
 
+_BAD_INPUT = (
+    BagError,
+    ComponentError,
+    ContingencyError,
+    ManagerError,
+    MetricsError,
+    PackageError,
+    RouteError,
+    RunError,
+)
 _FAILED = 1
 """Exit status of a mission that did not reach its goal."""
 
@@ -67,7 +78,13 @@ class _Number(click.FloatRange):
     show_default=True,
     help="lockstep: in one process without ROS, as fast as it can, the same bytes for a seed.",
 )
-@click.option("--no-metacontrol", is_flag=True, help="The baseline: everything but the reasoner.")
+@click.option(
+    "--manager",
+    default=MROS,
+    show_default=True,
+    help="What adapts: mros, none, random, rules, respawn, or one that a package exports.",
+)
+@click.option("--no-metacontrol", is_flag=True, help="The baseline, everything but the reasoner: --manager none.")
 @click.option(
     "--seed", type=click.IntRange(0), default=1, show_default=True, help="Of everything random in the simulation."
 )
@@ -96,8 +113,9 @@ class _Number(click.FloatRange):
     "contingencies",
     multiple=True,
     metavar="KIND:WHAT[@WHEN]",
-    help="What goes wrong, any number of times: kill:, stop:, freeze:, thaw:, repeat: or jump:COMPONENT, power:FACTOR, "
-    "clutter:NUMBER, light:0..1; at share:0..1 of the way, time:SECONDS or place:X,Y. Clutter is there from the start.",
+    help="What goes wrong, any number of times: kill:, stop:, unplug:, freeze:, thaw:, repeat: or jump:COMPONENT, "
+    "power:FACTOR, clutter:NUMBER, light:0..1; at share:0..1 of the way, time:SECONDS or place:X,Y. Clutter is there "
+    "from the start.",
 )
 @click.option("--timeline", type=click.Path(path_type=Path), help="YAML file of contingencies.")
 @click.option(
@@ -127,12 +145,13 @@ class _Number(click.FloatRange):
 @click.option("--gui", is_flag=True, help="Show the simulator's window.")
 @click.option("--rviz", is_flag=True, help="Show RViz.")
 @click.option("--quiet", is_flag=True, help="Say nothing but errors.")
-def run(quiet: bool, output: Path, engine: str, **options: Any) -> None:
+def run(quiet: bool, output: Path, **options: Any) -> None:
     """Run a mission and leave its bag, summary and figure in a folder.
 
     Exit status: 0 the goal was reached, 1 it was not, 2 bad input or a system that did not start, 130 interrupted.
     """
-    with refusing(RunError, PackageError, RouteError, ContingencyError, ComponentError, BagError, MetricsError):
+    engine = options["engine"]
+    with refusing(*_BAD_INPUT):
         settings = _settings(output, options)
         for name in (SUMMARY_NAME, FIGURE_NAME):  # those of an earlier run
             (output / name).unlink(missing_ok=True)
@@ -161,6 +180,7 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
         RunError: it has no such configuration, or there is no such world.
         RouteError: there is no such route.
         ContingencyError, ComponentError: what is to go wrong makes no sense.
+        ManagerError: there is no such manager.
     """
     simulation = simulation_package()
     name = options["initial_configuration"]
@@ -175,7 +195,7 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
     return Settings(
         route=read_route(options["routes"] or simulation / "worlds" / "routes.yaml", options["route"]),
         output=output,
-        metacontrol=not options["no_metacontrol"],
+        manager=_manager(options["manager"], options["engine"], baseline=options["no_metacontrol"]),
         seed=options["seed"],
         initial_configuration=name,
         contingencies=_contingencies(options, components),
@@ -189,6 +209,21 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
         port=options["port"],
         commit=current_commit(),
     )
+
+
+def _manager(asked: str, engine: str, *, baseline: bool) -> str:
+    """Return the manager that is asked for.
+
+    Raises:
+        ManagerError: no package exports one of that name.
+        RunError: the engine has no such manager, or two are asked for.
+    """
+    if baseline and asked not in (MROS, NONE):
+        raise RunError(f"--no-metacontrol is --manager none, and --manager is {asked}: leave one of them out")
+    find_manager(asked)
+    if engine == "ros" and asked not in (MROS, NONE):
+        raise RunError(f"--manager {asked}: on ROS there are only {MROS} and {NONE} so far; use --engine lockstep")
+    return NONE if baseline else asked
 
 
 def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionRecord]:

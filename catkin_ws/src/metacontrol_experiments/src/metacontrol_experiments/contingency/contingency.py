@@ -19,6 +19,7 @@ class Kind(Enum):
 
     KILL = "kill"
     STOP = "stop"
+    UNPLUG = "unplug"
     FREEZE = "freeze"
     THAW = "thaw"
     REPEAT = "repeat"
@@ -35,7 +36,12 @@ class Kind(Enum):
     @property
     def breaks_component(self) -> bool:
         """Whether the component's node does not run afterwards."""
-        return self in (Kind.KILL, Kind.STOP, Kind.FREEZE)
+        return self.ends_process or self is Kind.FREEZE
+
+    @property
+    def ends_process(self) -> bool:
+        """Whether the process of the component's node ends; where it is unplugged, it ends again at each start."""
+        return self in (Kind.KILL, Kind.STOP, Kind.UNPLUG)
 
     @property
     def spoils_data(self) -> bool:
@@ -43,7 +49,7 @@ class Kind(Enum):
         return self in (Kind.REPEAT, Kind.JUMP)
 
 
-_OF_COMPONENTS = (Kind.KILL, Kind.STOP, Kind.FREEZE, Kind.THAW, Kind.REPEAT, Kind.JUMP)
+_OF_COMPONENTS = (Kind.KILL, Kind.STOP, Kind.UNPLUG, Kind.FREEZE, Kind.THAW, Kind.REPEAT, Kind.JUMP)
 
 
 @dataclass(frozen=True)

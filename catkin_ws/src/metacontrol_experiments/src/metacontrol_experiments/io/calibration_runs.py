@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from metacontrol_experiments.campaign.calibration import CalibrationError, Job, Run, run_of
 from metacontrol_experiments.io.input_files import read_route
+from metacontrol_experiments.managers.manager import NONE
 from metacontrol_experiments.mission.mission import MissionError
 from metacontrol_experiments.mission.settings import Settings
 
@@ -59,7 +60,7 @@ def _drive(job: Job, routes: Path, commit: str) -> Run:
     asked = Settings(
         route=read_route(routes, job.route),
         output=Path(),  # nothing is written
-        metacontrol=False,
+        manager=NONE,
         seed=job.seed,
         initial_configuration=job.variant,
         commit=commit,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +11,6 @@ from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
-from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.pellet.process import make_reasoner
 from node_kit.parameters import ParameterError
 from node_kit.plugins import PluginError
 from pybullet_simulator.io.world_file import read_world
@@ -37,6 +36,8 @@ from metacontrol_experiments.lockstep.metacontroller import Cores, Metacontrolle
 from metacontrol_experiments.lockstep.observation import Observers
 from metacontrol_experiments.lockstep.reconfiguration import plan_change, restarts
 from metacontrol_experiments.lockstep.system import LockstepError, System, private_parameters
+from metacontrol_experiments.managers.d2_rules import RuleError
+from metacontrol_experiments.managers.manager import Manager, ManagerError, Situation, find_manager
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -57,11 +58,13 @@ _UNUSABLE = (
     DelayError,
     KnowledgeBaseError,
     LaunchFileError,
+    ManagerError,
     ModelError,
     PackageError,
     ParameterError,
     PluginError,
     ReasonerError,
+    RuleError,
     SimulationError,
     WorldError,
 )
@@ -78,12 +81,10 @@ def set_up(settings: Settings) -> Lockstep:
             system = describe_system(settings.launch_package, settings.launch_file, settings.launch_arguments)
             robot = _robot(settings, system.base)
             failing.callback(robot.simulation.close)
-            metacontroller = None
-            if settings.metacontrol:
-                cores = _cores(system.launched, robot.drivers)
-                failing.callback(cores.reasoner.close)
-                delays = read_delays()
-                metacontroller = Metacontroller(system, cores, delays, settings.initial_configuration, settings.seed)
+            cores = _cores(settings, system.launched, robot.drivers)
+            failing.callback(cores.manager.close)
+            delays = read_delays()
+            metacontroller = Metacontroller(system, cores, delays, settings.initial_configuration, settings.seed)
             lockstep = Lockstep(settings, robot, system, metacontroller)
         except _UNUSABLE as error:
             raise LockstepError(str(error)) from error
@@ -155,22 +156,29 @@ def _robot(settings: Settings, base: RosSystem) -> Robot:
     return Robot(simulation, rasterise(world), Drivers(simulation, base, settings.seed))
 
 
-def _cores(launched: SystemDescription, drivers: Drivers) -> Cores:
-    """Return the deciding parts of the meta-controller's nodes, with the parameters of these nodes."""
-    observers = Observers(_observers(private_parameters(launched, *_MONITOR)), drivers.topics)
-    tactics = load_tactics()
-    parameters = Parameters(private_parameters(launched, *_REASONER))
-    knowledge = parameters.knowledge_base()
-    objectives, behaviour = parameters.objectives(knowledge), parameters.settings(knowledge)
-    reader = DiagnosticsReader(knowledge.qualities, knowledge.components, parameters.nodes)
-    reasoner = make_reasoner()
-    try:
-        reasoner.load(knowledge.ontology)
-        loop = Mape(knowledge, reasoner, objectives, behaviour, wall=lambda: 0.0, name="lockstep")
-    except BaseException:
-        reasoner.close()
-        raise
-    return Cores(observers, reader, loop, reasoner, parameters.period, tactics)
+def _cores(settings: Settings, launched: SystemDescription, drivers: Drivers) -> Cores:
+    """Return the manager, and the deciding parts of the nodes beside it, with the parameters of these nodes."""
+    plugin = find_manager(settings.manager)
+    make = plugin.load()
+    situation = Situation(settings.initial_configuration, settings.seed)
+    observers, parameters = Observers([], {}), Parameters({})
+    reader, tactics = DiagnosticsReader([], []), {}
+    if settings.metacontrol:
+        values = private_parameters(launched, *_REASONER)
+        parameters = Parameters(values)
+        knowledge = parameters.knowledge_base()
+        objectives = parameters.objectives(knowledge)
+        situation = replace(situation, knowledge=knowledge, objectives=objectives, parameters=values)
+        observers = Observers(_observers(private_parameters(launched, *_MONITOR)), drivers.topics)
+        reader = DiagnosticsReader(knowledge.qualities, knowledge.components, parameters.nodes)
+        tactics = load_tactics()
+    with plugin.guard(*_UNUSABLE):
+        manager = make(situation)
+    if not isinstance(manager, Manager):
+        raise plugin.error(f"returned {manager!r}", "return a metacontrol_experiments Manager")
+    if not manager.observes:
+        observers = Observers([], {})
+    return Cores(manager, observers, reader, parameters.period, tactics)
 
 
 def _observers(monitor: dict[str, Any]) -> list[Observer]:

@@ -70,6 +70,12 @@ class Drivers:
             if self._silent.get(component) is Kind.FREEZE:
                 del self._silent[component]
 
+    def start(self, component: str) -> bool:
+        """Start a driver again that has ended; tell whether it runs. Without its device it ends at once."""
+        if self._silent.get(component) in (Kind.KILL, Kind.STOP):
+            del self._silent[component]
+        return component not in self._silent
+
     def message(self, topic: str, stamp: Any) -> Any | None:
         """Return a driver's message, a ROS one so that navigation takes it as on ROS; None where it is silent."""
         component, measure = self._sources[topic]

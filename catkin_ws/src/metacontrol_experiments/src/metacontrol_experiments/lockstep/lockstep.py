@@ -25,6 +25,7 @@ from metacontrol_experiments.lockstep.navigation import Navigation
 from metacontrol_experiments.lockstep.reconfiguration import navigation_parameters
 from metacontrol_experiments.lockstep.recorder import Recorder
 from metacontrol_experiments.lockstep.system import LockstepError
+from metacontrol_experiments.managers.manager import Restart
 from metacontrol_experiments.mission import mission
 from metacontrol_experiments.mission.mission import Inject
 
@@ -81,14 +82,14 @@ class Robot:
 class Lockstep:
     """One mission, stepped."""
 
-    def __init__(self, settings: Settings, robot: Robot, system: System, metacontroller: Metacontroller | None) -> None:
+    def __init__(self, settings: Settings, robot: Robot, system: System, metacontroller: Metacontroller) -> None:
         """Start navigation.
 
         Args:
             settings: the mission.
             robot: at the start of the route.
             system: what runs beside the robot.
-            metacontroller: None for the baseline.
+            metacontroller: what observes, and what adapts.
 
         Raises:
             LockstepError: a contingency cannot happen in lockstep, or the initial configuration cannot run.
@@ -130,16 +131,14 @@ class Lockstep:
             self._end()
         finally:
             self.close()
-        if self._metacontroller is not None:
-            self._recorder.take_from(self._metacontroller)
+        self._recorder.take_from(self._metacontroller)
         record = self._recorder.record(self._drawn_map(), self._injector.obstacles)
         return Outcome(self._mission, record, "\n".join(self._recorder.lines) + "\n")
 
     def close(self) -> None:
-        """End simulation and reasoner."""
+        """End simulation and manager."""
         self._simulation.close()
-        if self._metacontroller is not None:
-            self._metacontroller.close()
+        self._metacontroller.close()
 
     @property
     def _mission(self) -> State:
@@ -199,28 +198,34 @@ class Lockstep:
 
     def _sense(self, now: float) -> None:
         """Make the drivers that have listeners measure, and pass on their messages."""
-        heard = self._navigation.topics
-        if self._metacontroller is not None:
-            heard |= self._metacontroller.wanted_topics
+        heard = self._navigation.topics | self._metacontroller.wanted_topics
         for topic in self._drivers.topics:
             message = self._drivers.message(topic, _stamp(now)) if topic in heard else None
             if message is None:
                 continue
-            if self._metacontroller is not None:
-                self._metacontroller.receive(topic, message, now)
+            self._metacontroller.receive(topic, message, now)
             self._navigation.receive(topic, message, now)
 
     def _manage(self, now: float) -> None:
-        """Step the meta-controller, and deploy its decision."""
-        if self._metacontroller is None:
-            return
+        """Step the meta-controller, and do what it decides."""
         time = _stamp(now)
         self._metacontroller.listen(self._simulation, self._steps, now, time)
         if self._state is None:
             return
-        change = self._metacontroller.step(now, self._steps, time)
-        if change is not None:
-            self._deploy(change, now)
+        for change in self._metacontroller.step(now, self._steps, time):
+            if isinstance(change, Restart):
+                self._start_driver(change.component, now)
+            else:
+                self._deploy(change, now)
+
+    def _start_driver(self, component: str, now: float) -> None:
+        """Start a dead driver again; it ends at once where its device is gone."""
+        runs = self._drivers.start(component)
+        self._recorder.lines.append(f"{now:.2f} {component} {'started again' if runs else 'has no device'}")
+        if runs:
+            self._metacontroller.component_changed(now, component, works=True)
+        else:
+            self._metacontroller.ended(now, component)
 
     def _deploy(self, change: Change, now: float) -> None:
         """Let a change happen to navigation."""
@@ -279,8 +284,10 @@ class Lockstep:
         """
         values = self._injector.inject(contingency)
         kind = contingency.kind
-        if self._metacontroller is not None and kind.hits_component and not kind.spoils_data:
+        if kind.hits_component and not kind.spoils_data:
             self._metacontroller.component_changed(self._simulation.time, contingency.target, kind is Kind.THAW)
+        if kind.ends_process:
+            self._metacontroller.ended(self._simulation.time, contingency.target)
         return values
 
     def _drawn_map(self) -> OccupancyMap:

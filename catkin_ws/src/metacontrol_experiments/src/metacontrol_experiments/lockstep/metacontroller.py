@@ -1,4 +1,4 @@
-"""The meta-controller in lockstep: observers, the reasoner's loop and the manipulator's plans.
+"""What runs beside the robot in lockstep: observers, a manager and the manipulator's plans.
 
 Detection and execution take times drawn at random, as on ROS, where messages, processes and the master take their time.
 """
@@ -15,26 +15,26 @@ from metacontrol_bags.messages import diagnostics
 from metacontrol_bags.record import ComponentReport, QualityReport
 from metacontrol_msgs.msg import DiagnosticWords, FunctionGrounding
 from mros1_reasoner.knowledge.reasoner import ReasonerError
-from mros1_reasoner.loop.entries import ComponentFact, LevelFact, StaleFact
+from mros1_reasoner.loop.entries import ActiveFact
 from pybullet_simulator.physics.simulation import STEP
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding
 
 from metacontrol_experiments.lockstep.reconfiguration import plan_change, restarts
 from metacontrol_experiments.lockstep.system import LockstepError
+from metacontrol_experiments.managers.manager import Restart
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import genpy
-    from mros1_reasoner.knowledge.reasoner import Reasoner
     from mros1_reasoner.loop.diagnostics import DiagnosticsReader
-    from mros1_reasoner.loop.mape import Mape
     from pybullet_simulator.physics.simulation import Simulation
     from rosgraph_manipulator.change.tactics import Plan, Tactic
 
     from metacontrol_experiments.lockstep.delays import Delays
     from metacontrol_experiments.lockstep.observation import Observers
     from metacontrol_experiments.lockstep.system import System
+    from metacontrol_experiments.managers.manager import Manager
 
 REASON_STEPS = 10
 """Steps between two looks of the reasoner: 10 Hz, the fastest observer's rate."""
@@ -42,21 +42,19 @@ REASON_STEPS = 10
 
 @dataclass(frozen=True)
 class Cores:
-    """The parts of the meta-controller's nodes that decide.
+    """The parts that decide, of the nodes beside the robot.
 
     Attributes:
+        manager: what adapts; where it observes nothing, the other parts are not used.
         observers: of the monitor.
         reader: of what observers say.
-        loop: of the reasoner.
-        reasoner: what analyses for the loop.
         period: of reasoning while only levels change, s.
         tactics: of the manipulator, by name.
     """
 
+    manager: Manager
     observers: Observers
     reader: DiagnosticsReader
-    loop: Mape
-    reasoner: Reasoner
     period: float
     tactics: Mapping[str, Tactic]
 
@@ -86,7 +84,7 @@ class _Pending:
 
 
 class Metacontroller:
-    """Observes and decides; carries out its decisions after a while.
+    """Observes, lets the manager decide, and carries out its decisions after a while.
 
     Attributes:
         configuration: name of the one in force.
@@ -117,7 +115,8 @@ class Metacontroller:
         self._heartbeat_steps = max(1, round(cores.period / STEP))
         self._due: list[tuple[float, str, str]] = []  # time, component, status
         self._pending: _Pending | None = None
-        self._take_active(0.0)
+        if cores.manager.observes:
+            self._take_active(0.0)
 
     @property
     def wanted_topics(self) -> set[str]:
@@ -125,8 +124,8 @@ class Metacontroller:
         return self._cores.observers.wanted_topics
 
     def close(self) -> None:
-        """End the reasoner's process."""
-        self._cores.reasoner.close()
+        """End the manager."""
+        self._cores.manager.close()
 
     def receive(self, topic: str, message: Any, now: float) -> None:
         """Take a sensor's message."""
@@ -136,12 +135,18 @@ class Metacontroller:
         """Take what the robot publishes in this step; `stamp` is the same time as `now`."""
         self._cores.observers.listen(simulation, step, now, stamp)
 
+    def ended(self, now: float, component: str) -> None:
+        """Note that the process of a component's driver has ended."""
+        self._cores.manager.ended(now, component)
+
     def component_changed(self, now: float, component: str, works: bool) -> None:
         """Note that a component's node died or came back; the monitor detects it after a while."""
+        if not self._cores.manager.observes:
+            return
         status = DiagnosticWords.COMPONENT_RECOVERED if works else DiagnosticWords.COMPONENT_FALSE
         self._due.append((now + self._delays.draw("detect", self._rng), component, status))
 
-    def step(self, now: float, step: int, stamp: genpy.Time) -> Change | None:
+    def step(self, now: float, step: int, stamp: genpy.Time) -> list[Change | Restart]:
         """Observe, reason, and carry out.
 
         Args:
@@ -150,7 +155,7 @@ class Metacontroller:
             stamp: the same time for messages.
 
         Returns:
-            The change that has just begun or ended, else None.
+            The changes that have just begun or ended, and drivers to start again.
 
         Raises:
             LockstepError: an observer or the analysis failed, or what was decided cannot be deployed.
@@ -164,8 +169,8 @@ class Metacontroller:
         if self._pending is not None:
             return self._carry_out(now)
         if found or step % REASON_STEPS == 0:
-            self._reason(now, heartbeat=step % self._heartbeat_steps == 0)
-        return None
+            return self._reason(now, heartbeat=step % self._heartbeat_steps == 0)
+        return []
 
     def _take_statuses(self, statuses: list[DiagnosticStatus], now: float, stamp: genpy.Time) -> None:
         """Take in what the monitor or an observer says, as the reasoner's node does."""
@@ -175,24 +180,21 @@ class Metacontroller:
         self.observed += [report for report in reports if isinstance(report, QualityReport)]
         self.components += [report for report in reports if isinstance(report, ComponentReport)]
         for fact in self._cores.reader.read(statuses).facts:
-            if isinstance(fact, LevelFact):
-                self._cores.loop.observe_level(now, fact.quality, fact.level, fact.grounding, stamp=now)
-            elif isinstance(fact, StaleFact):
-                self._cores.loop.observe_stale(fact.quality)
-            elif isinstance(fact, ComponentFact):
-                self._cores.loop.observe_component(now, fact.component, fact.status, stamp=now)
+            self._cores.manager.take(now, fact)
 
-    def _reason(self, now: float, *, heartbeat: bool) -> None:
-        """Let the reasoner analyse the present facts.
+    def _reason(self, now: float, *, heartbeat: bool) -> list[Change | Restart]:
+        """Let the manager decide, and return the drivers to start again.
 
         Raises:
             LockstepError: the analysis failed, or what was decided cannot be deployed.
         """
         try:
-            decisions = self._cores.loop.step(now, heartbeat=heartbeat)
+            decisions = self._cores.manager.step(now, heartbeat=heartbeat)
         except ReasonerError as error:
             raise LockstepError(str(error)) from error
         for decision in decisions:
+            if isinstance(decision, Restart):
+                continue
             if decision.state == DECIDED:
                 decided = now + self._delays.draw("decide", self._rng)
                 plan = plan_change(self._system, self.configuration, decision.to_configuration, self._cores.tactics)
@@ -200,28 +202,30 @@ class Metacontroller:
                 self._pending = _Pending(decision, plan, decided, done)
             else:
                 self.decisions.append(replace(decision, stamp=now))
+        return [decision for decision in decisions if isinstance(decision, Restart)]
 
-    def _carry_out(self, now: float) -> Change | None:
+    def _carry_out(self, now: float) -> list[Change | Restart]:
         """Begin decisions that are due, and report those that are done."""
         pending = self._pending
         if pending is None:
-            return None
+            return []
         if not pending.begun and now >= pending.decided:
             pending.begun = True
             self.decisions.append(replace(pending.decision, stamp=now))
-            return pending.change(FunctionGrounding.RECONFIGURING)
+            return [pending.change(FunctionGrounding.RECONFIGURING)]
         if now < pending.done:
-            return None
+            return []
         self._pending = None
         self.configuration = pending.decision.to_configuration
         self._take_active(now)
-        self.decisions.append(replace(self._cores.loop.report(now, pending.decision.id, True), stamp=now))
-        return pending.change(FunctionGrounding.STABLE)
+        self.decisions.append(replace(self._cores.manager.executed(now, pending.decision.id), stamp=now))
+        return [pending.change(FunctionGrounding.STABLE)]
 
     def _take_active(self, now: float) -> None:
-        """Let reasoner and observers know which configuration is active."""
+        """Let manager and observers know which configuration is active."""
         grounding = Grounding(self._system.function(self.configuration), self.configuration, FunctionGrounding.STABLE)
-        self._cores.loop.observe_active(now, grounding.function, grounding.configuration, grounding.state)
+        active = ActiveFact(grounding.function, grounding.configuration, grounding.state)
+        self._cores.manager.take(now, active)
         desired = self._desired.follow([grounding])
         if desired.problem:
             raise LockstepError(desired.problem)

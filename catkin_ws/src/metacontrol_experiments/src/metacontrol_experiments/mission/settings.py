@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S
 
 from metacontrol_experiments.contingency.contingency import Contingency, Kind, with_seed
+from metacontrol_experiments.managers.manager import MROS, NONE
 from metacontrol_experiments.mission.mission import Plan
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ class Settings:
     Attributes:
         route: where it starts and goes.
         output: folder for bag, summary, figure and logs.
-        metacontrol: with the reasoner; without it is the baseline.
+        manager: name of what adapts.
         seed: of everything random in the simulation.
         initial_configuration: name of the variant deployed first.
         contingencies: what goes wrong, and when.
@@ -43,7 +44,7 @@ class Settings:
 
     route: Route
     output: Path
-    metacontrol: bool = True
+    manager: str = MROS
     seed: int = 1
     initial_configuration: str = "f2_v2_r2"
     contingencies: tuple[Contingency, ...] = ()
@@ -59,6 +60,11 @@ class Settings:
 
     launch_package: ClassVar[str] = "metacontrol_sim"
     """Has the launch files of the whole system."""
+
+    @property
+    def metacontrol(self) -> bool:
+        """Whether anything adapts; the baseline is without it."""
+        return self.manager != NONE
 
     @property
     def plan(self) -> Plan:
@@ -104,11 +110,13 @@ class Settings:
         goal = self.route.goal
         broken = [entry for entry in self.contingencies if entry.kind.breaks_component]
         power = [entry.value for entry in self.contingencies if entry.kind is Kind.POWER]
+        other = {} if self.manager in (NONE, MROS) else {"manager": self.manager}
         return {
             "mission": "D2",
             "route": self.route.name,
             "goal": f"{goal.x:g} {goal.y:g} {goal.yaw:g}",
             "metacontrol": _boolean(self.metacontrol),
+            **other,
             "seed": str(self.seed),
             "initial_configuration": self.initial_configuration,
             "world": str(self.world) if self.world else "factory",

@@ -37,6 +37,7 @@ SERVICE = "contingency/strike"
 _SIGNALS = {
     Kind.KILL: signal.SIGKILL,
     Kind.STOP: signal.SIGINT,
+    Kind.UNPLUG: signal.SIGKILL,  # nothing on ROS starts a driver again
     Kind.FREEZE: signal.SIGSTOP,
     Kind.THAW: signal.SIGCONT,
     Kind.REPEAT: SIGNALS[Fault.REPEAT],

@@ -1,0 +1,65 @@
+"""Makes the managers of this package: plug-ins of its package.xml. What they decide is in the room `managers`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mros1_reasoner.io.parameters import Parameters
+from mros1_reasoner.loop.mape import Mape
+from mros1_reasoner.pellet.process import make_reasoner
+from node_kit.io.input_files import InputFileError, read_text
+from ros_model.project.tables import parse_table
+
+from metacontrol_experiments.io.input_files import simulation_package
+from metacontrol_experiments.managers.d2_rules import RuleError, by_rules, variants_of
+from metacontrol_experiments.managers.manager import Manager
+from metacontrol_experiments.managers.mros import MrosManager
+from metacontrol_experiments.managers.reactive import ReactiveManager, at_random
+from metacontrol_experiments.managers.respawn import RespawnManager
+
+if TYPE_CHECKING:
+    from metacontrol_experiments.managers.manager import Situation
+
+
+def none(_situation: Situation) -> Manager:
+    """Return the baseline: nothing adapts."""
+    return Manager()
+
+
+def mros(situation: Situation) -> Manager:
+    """Return the meta-controller, with a reasoner's process of its own."""
+    if situation.knowledge is None:
+        raise ValueError("manager mros needs a knowledge base")
+    behaviour = Parameters(situation.parameters).settings(situation.knowledge)
+    reasoner = make_reasoner()
+    try:
+        reasoner.load(situation.knowledge.ontology)
+        loop = Mape(situation.knowledge, reasoner, situation.objectives, behaviour, wall=lambda: 0.0, name="lockstep")
+    except BaseException:
+        reasoner.close()
+        raise
+    return MrosManager(loop, reasoner)
+
+
+def respawn(_situation: Situation) -> Manager:
+    """Return roslaunch's respawn of dead drivers."""
+    return RespawnManager()
+
+
+def random(situation: Situation) -> Manager:
+    """Return the choice of any variant that can run."""
+    return ReactiveManager("random", situation, at_random(situation.seed))
+
+
+def rules(situation: Situation) -> Manager:
+    """Return the rules for D2.
+
+    Raises:
+        RuleError: the table of variants cannot be used.
+    """
+    path = simulation_package() / "models" / "variants.csv"
+    try:
+        table = parse_table(read_text(path), path)
+    except InputFileError as error:
+        raise RuleError(str(error)) from error
+    return ReactiveManager("rules", situation, by_rules(variants_of({r.name: r.cells for r in table.rows}, str(path))))

@@ -1,0 +1,102 @@
+"""The interface of managers: facts come in, decisions come out.
+
+A package offers a manager in its package.xml:
+`<export><metacontrol_experiments manager="NAME" function="MODULE:FUNCTION"/></export>`.
+The function takes a `Situation` and returns a `Manager`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from metacontrol_bags.decision import Decision
+from node_kit.plugins import Plugin, find
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+    from mros1_reasoner.knowledge.model import Objective
+    from mros1_reasoner.loop.entries import Fact
+
+PACKAGE = "metacontrol_experiments"
+NONE, MROS = "none", "mros"
+"""The baseline, and the meta-controller."""
+
+
+class ManagerError(ValueError):
+    """There is no such manager; the message lists those that there are."""
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What a manager is made for.
+
+    Attributes:
+        configuration: deployed at the start.
+        seed: of the mission; a manager that draws numbers draws the same ones for it.
+        knowledge: the models; None for a manager that observes nothing.
+        objectives: what is needed, with the limits of the mission.
+        parameters: of the reasoner's node.
+    """
+
+    configuration: str
+    seed: int
+    knowledge: KnowledgeBase | None = None
+    objectives: tuple[Objective, ...] = ()
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Restart:
+    """Start the driver of a component again."""
+
+    component: str
+
+
+class Manager:
+    """Decides nothing: the baseline. Others override what they need. Times are s of ROS time.
+
+    Attributes:
+        observes: whether the monitor and its observers run for it; only then it gets facts and a knowledge base.
+    """
+
+    observes: ClassVar[bool] = False
+
+    def take(self, now: float, fact: Fact) -> None:
+        """Take in what the monitor, an observer or the manipulator says."""
+
+    def ended(self, now: float, component: str) -> None:
+        """Take in that the process of a component's driver has ended, which its parent process knows at once."""
+
+    def step(self, now: float, *, heartbeat: bool) -> Sequence[Decision | Restart]:  # noqa: ARG002
+        """Return what to do now.
+
+        Args:
+            now: present time.
+            heartbeat: whether the reasoner's period is over; it looks at new levels only then.
+        """
+        return ()
+
+    def executed(self, now: float, decision: str) -> Decision:
+        """Take in that the decision of this id was carried out, and return it as it is now."""
+        raise NotImplementedError(f"{type(self).__name__} decides nothing, so {decision} is not its own ({now:.2f} s)")
+
+    def close(self) -> None:
+        """End what was started for it."""
+
+
+def find_manager(name: str) -> Plugin:
+    """Return the plug-in that makes a manager; the function that it loads takes a Situation.
+
+    Raises:
+        ManagerError: no package exports one of that name.
+    """
+    known = find(PACKAGE, "manager")
+    if name not in known:
+        raise ManagerError(
+            f"no manager {name!r}; there are {', '.join(sorted(known)) or 'none'}; a package exports one as "
+            f'<{PACKAGE} manager="NAME" function="MODULE:FUNCTION"/>'
+        )
+    return known[name]
