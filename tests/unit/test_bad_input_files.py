@@ -222,6 +222,7 @@ OTHERS = [
     (metacontrol, "run --engine lockstep --quiet --timeline BAD --route nowhere --output out", ".yaml"),
     (metacontrol, "calibrate --runs BAD --seeds 1 --variant nothing", ".csv"),
     (metacontrol, "variants --runs BAD", ".csv"),
+    (metacontrol, "campaign BAD --output out", ".yaml"),
     (explain, "BAD", ".bag"),
     (replay, "BAD", ".bag"),
 ]

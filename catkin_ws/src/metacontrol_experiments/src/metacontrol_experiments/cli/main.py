@@ -6,6 +6,7 @@ import click
 from metacontrol_bags.cli.main import bag
 
 from metacontrol_experiments.cli.calibrate import calibrate
+from metacontrol_experiments.cli.campaign import campaign
 from metacontrol_experiments.cli.compare import compare
 from metacontrol_experiments.cli.delays import delays
 from metacontrol_experiments.cli.figure import figure
@@ -19,7 +20,7 @@ def metacontrol() -> None:
     """Missions of a robot that adapts, and what their bags tell."""
 
 
-for _command in (run, summary, figure, calibrate, variants, compare, delays, bag):
+for _command in (run, summary, figure, calibrate, variants, compare, delays, campaign, bag):
     metacontrol.add_command(_command)
 
 

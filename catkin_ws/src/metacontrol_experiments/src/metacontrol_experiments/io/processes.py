@@ -7,6 +7,7 @@ its own, and a node whose parent died belongs to nobody, but both still carry th
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import shutil
 import signal
@@ -143,3 +144,21 @@ def signals_as_interrupts() -> Iterator[None]:
     finally:
         for number, handler in former.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Keep other runs out of a folder.
+
+    Raises:
+        RunError: one is at work in it.
+    """
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise RunError(f"--output: another run is at work in {folder}: choose another folder") from error
+        yield
+    finally:
+        os.close(lock)

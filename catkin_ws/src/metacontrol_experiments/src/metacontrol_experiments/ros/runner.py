@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
 import signal
@@ -13,7 +12,14 @@ from metacontrol_bags.bag import TOPICS
 from roslib.packages import find_node
 from rospkg import ResourceNotFound
 
-from metacontrol_experiments.io.processes import ProcessTree, RunError, free_port, is_free, signals_as_interrupts
+from metacontrol_experiments.io.processes import (
+    ProcessTree,
+    RunError,
+    alone_in,
+    free_port,
+    is_free,
+    signals_as_interrupts,
+)
 from metacontrol_experiments.mission.settings import BAG_NAME
 
 if TYPE_CHECKING:
@@ -48,7 +54,7 @@ def run_mission(settings: Settings, display: Display) -> State:
     bag = settings.output / BAG_NAME
     for folder in (settings.output, log):
         folder.mkdir(parents=True, exist_ok=True)
-    with _alone_in(settings.output):
+    with alone_in(settings.output):
         return _run_alone(settings, display, log, bag)
 
 
@@ -104,24 +110,6 @@ def _run(settings: Settings, display: Display, tree: ProcessTree, port: int, bag
     if not bag.exists():
         raise RunError(f"the recorder left no {bag}; see {settings.output / 'log' / 'recorder.log'}")
     return state
-
-
-@contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
-    """Keep other runs out of a folder.
-
-    Raises:
-        RunError: one is at work in it.
-    """
-    lock = os.open(folder, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise RunError(f"--output: another run is at work in {folder}: choose another folder") from error
-        yield
-    finally:
-        os.close(lock)
 
 
 def _record_command(bag: Path) -> list[str]:

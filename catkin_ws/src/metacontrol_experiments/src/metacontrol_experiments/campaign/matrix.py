@@ -1,0 +1,252 @@
+"""A campaign: which missions a file asks for. Every manager meets the same world, clutter, noise and contingencies."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from metacontrol_bags.metrics import TIMEOUT_S
+from ros_model.project.schema_check import violations
+
+from metacontrol_experiments.contingency.contingency import Contingency, Kind
+from metacontrol_experiments.contingency.parsing import ContingencyError, make, parse_contingency
+from metacontrol_experiments.managers.manager import MROS, NONE
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping
+
+DEADLINE_S = 600.0
+"""Wall s for a run, by default: a mission in lockstep takes some seconds."""
+FIRST_SEED = 2**20
+"""Seeds of campaigns are not below, those of calibration are: no variant is measured on what it is tried on."""
+
+_SEEDS = 2**30
+_TEXTS = {"type": "array", "minItems": 1, "items": {"type": "string", "title": "text"}, "title": "a list of names"}
+_NUMBER = {"type": "number", "title": "a number"}
+_NUMBERS = {"type": "array", "minItems": 1, "items": _NUMBER, "title": "a list of numbers"}
+_STRIKES = {
+    "type": "array",
+    "items": {"type": "string", "title": "a text KIND:WHAT@WHEN"},
+    "title": "a list of contingencies KIND:WHAT@WHEN",
+}
+_NAME = {"pattern": r"^\w+$", "title": "a name of letters, digits and _"}
+_PART = {
+    "type": "object",
+    "title": "a mapping with the lists of a matrix",
+    "required": ["routes", "initial_configurations", "managers"],
+    "additionalProperties": False,
+    "properties": {
+        "routes": _TEXTS,
+        "initial_configurations": _TEXTS,
+        "clutter": _NUMBERS,
+        "power": _NUMBERS,
+        "failures": {
+            "type": "object",
+            "minProperties": 1,
+            "propertyNames": _NAME,
+            "additionalProperties": _STRIKES,
+            "title": "a mapping of names to lists of contingencies",
+        },
+        "managers": {
+            "type": "object",
+            "minProperties": 1,
+            "additionalProperties": {"type": "number", "title": "the number of repeats"},
+            "title": "a mapping of managers to the number of repeats",
+        },
+    },
+}
+_SCHEMA = {
+    "type": "object",
+    "title": "a mapping with the key parts",
+    "required": ["parts"],
+    "additionalProperties": False,
+    "properties": {
+        "engine": {"type": "string", "enum": ["lockstep", "ros"], "title": "lockstep or ros"},
+        "seed": {"type": "number", "title": "a whole number"},
+        "timeout": {"type": "number", "exclusiveMinimum": 0, "title": "simulated s, more than 0"},
+        "deadline": {"type": "number", "exclusiveMinimum": 0, "title": "wall s for a run, more than 0"},
+        "logs": {"type": "boolean", "title": "true or false"},
+        "parts": {
+            "type": "object",
+            "minProperties": 1,
+            "propertyNames": _NAME,
+            "additionalProperties": _PART,
+            "title": "a mapping of names to matrices",
+        },
+    },
+}
+
+
+class CampaignError(ValueError):
+    """A campaign makes no sense, or its folder is not its own; the message names file, place and remedy."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One mission of a campaign.
+
+    Attributes:
+        part: of the campaign.
+        route: name.
+        initial_configuration: the variant deployed first.
+        clutter: number of unknown obstacles.
+        power: factor of the power load.
+        failure: name of what goes wrong beside these.
+        contingencies: all that goes wrong, as users write it.
+        manager: what adapts.
+        repeat: 1, 2, ...
+        seed: of everything random; the same for all managers.
+        engine: lockstep or ros.
+        timeout: simulated s after which the mission has failed.
+    """
+
+    part: str
+    route: str
+    initial_configuration: str
+    clutter: int
+    power: float
+    failure: str
+    contingencies: tuple[str, ...]
+    manager: str
+    repeat: int
+    seed: int
+    engine: str = "lockstep"
+    timeout: float = TIMEOUT_S
+
+    @property
+    def name(self) -> str:
+        """Its name, and its folder below that of the campaign's runs."""
+        world = f"{self.route}-{self.initial_configuration}-clutter{self.clutter}-power{self.power:g}-{self.failure}"
+        return f"{self.part}/{world}/{self.manager}-{self.repeat}"
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What a file asks for.
+
+    Attributes:
+        runs: repeat by repeat, so that the first part is of use, too.
+        deadline: wall s for a run.
+        logs: whether each run leaves its log.
+    """
+
+    runs: tuple[Run, ...]
+    deadline: float = DEADLINE_S
+    logs: bool = False
+
+
+@dataclass(frozen=True)
+class Known:
+    """Names that a campaign may use."""
+
+    routes: Collection[str]
+    configurations: Collection[str]
+    managers: Collection[str]
+    components: Collection[str]
+
+
+def parse_campaign(content: Any, known: Known, where: str) -> Campaign:
+    """Return the campaign of a YAML file's content.
+
+    Args:
+        content: as the YAML reader returns it.
+        known: names that may be used.
+        where: the file, for messages.
+
+    Raises:
+        CampaignError: it is none; the message names the place.
+    """
+    for violation in violations(content, _SCHEMA):
+        raise CampaignError(f"{where}: {violation}")
+    seed = _whole(content.get("seed", 0), 0, f"{where}: seed")
+    engine, timeout = content.get("engine", "lockstep"), float(content.get("timeout", TIMEOUT_S))
+    runs = [
+        run
+        for name, part in content["parts"].items()
+        for run in _runs(name, part, known, f"{where}: parts.{name}", (seed, engine, timeout))
+    ]
+    runs.sort(key=lambda run: run.repeat)  # stable
+    return Campaign(tuple(runs), float(content.get("deadline", DEADLINE_S)), bool(content.get("logs", False)))
+
+
+def contingencies_of(run: Run) -> tuple[Contingency, ...]:
+    """Return what goes wrong in a run."""
+    return tuple(parse_contingency(text) for text in run.contingencies)
+
+
+def seed_of(base: int, *world: object) -> int:
+    """Return the seed of a cell and repeat, the same on every machine."""
+    told = "/".join(map(str, (base, *world)))
+    return FIRST_SEED + int.from_bytes(hashlib.sha256(told.encode()).digest()[:8]) % _SEEDS
+
+
+def _runs(name: str, part: Mapping[str, Any], known: Known, where: str, given: tuple[int, str, float]) -> Iterator[Run]:
+    """Yield the runs of a part."""
+    base, engine, timeout = given
+    _check_names(part["routes"], known.routes, f"{where}.routes", "route")
+    _check_names(part["initial_configurations"], known.configurations, f"{where}.initial_configurations", "variant")
+    _check_names(part["managers"], known.managers, f"{where}.managers", "manager")
+    lacking = [manager for manager in part["managers"] if engine == "ros" and manager not in (MROS, NONE)]
+    if lacking:
+        there = f"on ROS there are only {MROS} and {NONE} so far"
+        raise CampaignError(f"{where}.managers: {lacking[0]}: {there}; use engine lockstep, or leave it out")
+    clutter = [_whole(number, 0, f"{where}.clutter") for number in part.get("clutter", [0])]
+    power = [float(number) for number in part.get("power", [1.0])]
+    _check_once(clutter, f"{where}.clutter")
+    _check_once(power, f"{where}.power")
+    repeats = {manager: _whole(n, 1, f"{where}.managers.{manager}") for manager, n in part["managers"].items()}
+    failures = part.get("failures", {"none": []})
+    for failure, texts in failures.items():
+        _check_contingencies(texts, known.components, f"{where}.failures.{failure}")
+    for repeat in range(1, max(repeats.values()) + 1):
+        for cell in itertools.product(part["routes"], part["initial_configurations"], clutter, power, failures):
+            contingencies = (*_disturbances(cell[2], cell[3], where), *failures[cell[4]])
+            seed = seed_of(base, *cell[:3], f"{cell[3]:g}", cell[4], repeat)
+            for manager, count in repeats.items():
+                if repeat <= count:
+                    yield Run(name, *cell, contingencies, manager, repeat, seed, engine, timeout)
+
+
+def _disturbances(clutter: int, power: float, where: str) -> tuple[str, ...]:
+    """Return clutter and power as contingencies; power strikes on the way (paper)."""
+    found = []
+    try:
+        if clutter:
+            found.append(make(Kind.CLUTTER.value, clutter, None, f"{where}.clutter"))
+        if power != 1.0:
+            found.append(make(Kind.POWER.value, power, None, f"{where}.power"))
+    except ContingencyError as error:
+        raise CampaignError(str(error)) from error
+    return tuple(map(str, found))
+
+
+def _check_contingencies(texts: list[str], components: Collection[str], where: str) -> None:
+    for text in texts:
+        try:
+            contingency = parse_contingency(text)
+        except ContingencyError as error:
+            raise CampaignError(f"{where}: {error}") from error
+        if contingency.kind.hits_component and contingency.target not in components:
+            known = ", ".join(components)
+            raise CampaignError(f"{where}: {text}: no component {contingency.target!r}; there are {known}")
+
+
+def _check_names(names: Collection[str], known: Collection[str], where: str, what: str) -> None:
+    _check_once(names, where)
+    for name in names:
+        if name not in known:
+            raise CampaignError(f"{where}: no {what} {name!r}; there are {', '.join(known) or 'none'}")
+
+
+def _check_once(values: Collection[Any], where: str) -> None:
+    twice = [value for value in values if list(values).count(value) > 1]
+    if twice:
+        raise CampaignError(f"{where}: {twice[0]!r} stands there more than once: leave one")
+
+
+def _whole(number: float, least: int, where: str) -> int:
+    if number != int(number) or number < least:
+        raise CampaignError(f"{where}: is {number:g}; give a whole number, {least} or more")
+    return int(number)

@@ -1,0 +1,130 @@
+"""The command `metacontrol campaign`."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from node_kit.io.input_files import InputFileError, read_text, read_yaml
+from node_kit.plugins import find
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
+from rich.text import Text
+
+from metacontrol_experiments.campaign.matrix import CampaignError, Known, parse_campaign
+from metacontrol_experiments.campaign.progress import Status, remaining
+from metacontrol_experiments.io.campaign_folder import RUNS, read_results, write_result, write_table
+from metacontrol_experiments.io.code_version import current_commit
+from metacontrol_experiments.io.display import CONSOLE, refusing, tell
+from metacontrol_experiments.io.input_files import PackageError, read_components, route_names, simulation_package
+from metacontrol_experiments.io.processes import RunError, alone_in
+from metacontrol_experiments.managers.manager import PACKAGE
+from metacontrol_experiments.mission.routes import RouteError
+
+if TYPE_CHECKING:
+    from rich.progress import Task
+
+    from metacontrol_experiments.campaign.matrix import Campaign, Run
+    from metacontrol_experiments.campaign.progress import Result
+
+_FAILED = 1
+"""Exit status of a campaign with runs that crashed or hung."""
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "--output",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder of the runs and their table.  [default: results/campaign/ and the name of FILE]",
+)
+@click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Worker processes on this machine.")
+@click.option("--scheduler", metavar="ADDRESS", help="Drive by the workers of this scheduler of Dask instead.")
+def campaign(file: Path, output: Path | None, jobs: int, scheduler: str | None) -> None:
+    """Drive the missions that a FILE asks for, and leave a table of their results.
+
+    What is there already is not driven again: after an interruption, the same command goes on.
+
+    Exit status: 0 all missions were driven, 1 some crashed or hung twice, 2 bad input, 130 interrupted.
+    """
+    with refusing(CampaignError, PackageError, RouteError, RunError):
+        asked = _read(file)
+        folder = output or Path("results/campaign") / file.stem
+        folder.mkdir(parents=True, exist_ok=True)
+        with alone_in(folder):
+            results = read_results(folder, asked.runs)
+            missing = remaining(asked.runs, results, str(folder / RUNS))
+            try:
+                _drive(asked, missing, results, folder, jobs, scheduler)
+            finally:
+                about = {"campaign": read_text(file), "commit": current_commit()}
+                table = write_table(folder, asked.runs, results, about) if results else None
+        _tell(asked, results, len(missing), table, folder)
+    raise click.exceptions.Exit(0 if all(result.status is Status.DONE for result in results.values()) else _FAILED)
+
+
+def _read(file: Path) -> Campaign:
+    """Return the campaign of a file.
+
+    Raises:
+        CampaignError: it cannot be read, or makes no sense.
+    """
+    package = simulation_package()
+    known = Known(
+        routes=route_names(package / "worlds" / "routes.yaml"),
+        configurations=sorted(path.stem for path in (package / "launch" / "variants").glob("*.launch")),
+        managers=sorted(find(PACKAGE, "manager")),
+        components=list(read_components(package / "models" / "metacontrol.yaml")),
+    )
+    try:
+        return parse_campaign(read_yaml(file), known, str(file))
+    except InputFileError as error:
+        raise CampaignError(str(error)) from error
+
+
+def _drive(
+    asked: Campaign, missing: list[Run], results: dict[str, Result], folder: Path, jobs: int, scheduler: str | None
+) -> None:
+    """Drive what is missing, and add its results."""
+    if not missing:
+        return
+    from metacontrol_experiments.io.campaign_cluster import drive_all  # Dask takes a while to import
+
+    with _progress() as bar:
+        task = bar.add_task("starting", total=len(missing), began=time.monotonic())
+        for result, log in drive_all(asked, missing, jobs=jobs, scheduler=scheduler):
+            write_result(folder, result, log)
+            results[result.run.name] = result
+            ended = result.summary["outcome"] if result.summary else result.status.value
+            bar.update(task, advance=1, description=f"{result.run.name}: {ended}")
+
+
+class _RateColumn(ProgressColumn):
+    """Missions per hour since the start."""
+
+    def render(self, task: Task) -> Text:
+        passed = time.monotonic() - task.fields["began"]
+        return Text(f"{task.completed / passed * 3600:.0f}/h" if task.completed else "-/h")
+
+
+def _progress() -> Progress:
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        _RateColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+        TextColumn("{task.description}"),
+    )
+    return Progress(*columns, console=CONSOLE, speed_estimate_period=600.0)
+
+
+def _tell(asked: Campaign, results: dict[str, Result], driven: int, table: Path | None, folder: Path) -> None:
+    bad = [result for result in results.values() if result.status is not Status.DONE]
+    tell(f"{driven} missions driven, {len(results)} of {len(asked.runs)} in {table}")
+    for result in bad[:10]:
+        tell(f"  {result.run.name} {result.status.value}: {result.attempts[-1].problem}", "red")
+    if bad:
+        tell(f"{len(bad)} missions failed; delete their folders in {folder / RUNS} to drive them again", "yellow")
+    if len({result.provenance.get("commit") for result in results.values()}) > 1:
+        tell(f"{folder} holds missions of different commits: name another folder to measure one", "yellow")

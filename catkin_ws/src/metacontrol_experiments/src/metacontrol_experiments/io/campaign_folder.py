@@ -1,0 +1,83 @@
+"""The folder of a campaign: a folder for each run with its result, and the table of all of them.
+
+A run is over when its `result.json` is there: it is written last, under another name, and renamed.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+from node_kit.io.input_files import InputFileError, read_text
+
+from metacontrol_experiments.campaign.matrix import CampaignError
+from metacontrol_experiments.campaign.progress import Result, from_json, row, to_json
+from metacontrol_experiments.mission.settings import LOG_NAME
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+
+    from metacontrol_experiments.campaign.matrix import Run
+
+RESULT, TABLE, RUNS = "result.json", "results.parquet", "runs"
+
+
+def read_results(folder: Path, runs: Iterable[Run]) -> dict[str, Result]:
+    """Return the results that are there, by the run's name.
+
+    Raises:
+        CampaignError: one of them cannot be read.
+    """
+    found = {}
+    for run in runs:
+        path = folder / RUNS / run.name / RESULT
+        if path.exists():
+            try:
+                found[run.name] = from_json(read_text(path), str(path))
+            except InputFileError as error:
+                raise CampaignError(str(error)) from error
+    return found
+
+
+def write_result(folder: Path, result: Result, log: str | None = None) -> None:
+    """Write what became of a run, with the logs of attempts that failed, and the mission's own log if given."""
+    home = folder / RUNS / result.run.name
+    home.mkdir(parents=True, exist_ok=True)
+    for number, attempt in enumerate(result.attempts, start=1):
+        if attempt.log:
+            _replace(home / f"attempt-{number}.log", attempt.log.encode())
+    if log is not None:
+        _replace(home / LOG_NAME, log.encode())
+    _replace(home / RESULT, to_json(result).encode())
+
+
+def write_table(folder: Path, runs: Iterable[Run], results: Mapping[str, Result], about: Mapping[str, str]) -> Path:
+    """Write the table of results in the order of the runs, and return its path.
+
+    Args:
+        folder: of the campaign.
+        runs: of the campaign.
+        results: those that are there, by the run's name.
+        about: the campaign, kept in the table's metadata.
+    """
+    import pyarrow  # takes a while to import
+    from pyarrow import parquet
+
+    path = folder / TABLE
+    rows = [row(results[run.name]) for run in runs if run.name in results]
+    table = pyarrow.Table.from_pylist(rows).replace_schema_metadata(dict(about))
+    beside = path.with_name(path.name + ".part")
+    parquet.write_table(table, beside, compression="zstd")
+    beside.replace(path)
+    return path
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file so that it is there whole, or not at all."""
+    beside = path.with_name(f"{path.name}.part")
+    with beside.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    beside.replace(path)

@@ -1,0 +1,84 @@
+"""Drives a run of a campaign on ROS: by `metacontrol run`, with a master of its own on a free port."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from metacontrol_experiments.campaign.progress import Attempt, Status
+from metacontrol_experiments.mission.settings import SUMMARY_NAME
+
+if TYPE_CHECKING:
+    from metacontrol_experiments.campaign.matrix import Run
+
+_OWN = ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
+"""It ends what it started when it is interrupted, and is interrupted when this process dies."""
+_GRACE_S = 60.0
+_LONGEST_LOG = 200_000
+_CONSOLE = Path("log", "console.log")
+
+
+def drive_on_ros(run: Run, deadline: float) -> tuple[Attempt, dict[str, Any]]:
+    """Drive a run; return how that went, and its summary with the log of the console.
+
+    Args:
+        run: what is asked for.
+        deadline: wall s for it.
+    """
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="campaign-") as folder:
+        output, said = Path(folder, "mission"), Path(folder, "said.log")
+        with said.open("wb") as log:
+            process = subprocess.Popen(
+                [*_OWN, *_command(run, output)], stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+            )
+        in_time = _ends(process, deadline)
+        if not in_time:
+            process.send_signal(signal.SIGINT)
+            if not _ends(process, _GRACE_S):
+                process.kill()
+                process.wait()
+        wall_s = round(time.monotonic() - began, 3)
+        summary, console = output / SUMMARY_NAME, _end_of(output / _CONSOLE)
+        if in_time and process.returncode in (0, 1) and summary.exists():
+            return Attempt(Status.DONE, wall_s), {"summary": json.loads(summary.read_bytes()), "log": console}
+        told = _end_of(said)
+        if not in_time:
+            return Attempt(Status.HUNG, wall_s, f"no end within {deadline:g} s of wall time", told + console), {}
+        last = (told.strip().splitlines() or ["it said nothing"])[-1]
+        problem = f"metacontrol run ended with status {process.returncode}: {last}"
+        return Attempt(Status.CRASHED, wall_s, problem, told + console), {}
+
+
+def _command(run: Run, output: Path) -> list[str]:
+    asked = {
+        "--manager": run.manager,
+        "--route": run.route,
+        "--initial-configuration": run.initial_configuration,
+        "--seed": run.seed,
+        "--timeout": run.timeout,
+        "--failure": "none",
+        "--output": output,
+    }
+    options = [*asked.items(), *(("--contingency", text) for text in run.contingencies)]
+    words = [str(word) for option in options for word in option]
+    return [sys.executable, "-m", "metacontrol_experiments.cli.main", "run", "--engine", "ros", "--quiet", *words]
+
+
+def _ends(process: subprocess.Popen[bytes], deadline: float) -> bool:
+    """Tell whether a process ends in time."""
+    try:
+        process.wait(deadline)
+    except subprocess.TimeoutExpired:
+        return False
+    return True
+
+
+def _end_of(path: Path) -> str:
+    return path.read_bytes()[-_LONGEST_LOG:].decode(errors="replace") if path.exists() else ""

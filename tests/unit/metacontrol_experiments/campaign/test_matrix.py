@@ -1,0 +1,129 @@
+"""Which missions a campaign has, and what is said of a file that makes no sense."""
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+import yaml
+from metacontrol_experiments.campaign.matrix import (
+    FIRST_SEED,
+    CampaignError,
+    Known,
+    contingencies_of,
+    parse_campaign,
+    seed_of,
+)
+
+FILES = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_experiments/campaigns"
+VARIANTS = [f"f{f}_v{v}_r{r}" for f in (1, 2, 3) for v in (1, 2, 3) for r in (1, 2, 3)]
+MANAGERS = ["none", "mros", "random", "rules", "respawn"]
+KNOWN = Known(["r1", "r2", "r3", "r4", "r5", "r6"], VARIANTS, MANAGERS, ["front_laser", "camera"])
+SMALL = {
+    "seed": 3,
+    "parts": {
+        "small": {
+            "routes": ["r1", "r2"],
+            "initial_configurations": ["f1_v1_r1"],
+            "clutter": [0, 7],
+            "power": [1.0, 1.6],
+            "failures": {"none": [], "killed": ["kill:front_laser@share:0.4"]},
+            "managers": {"none": 2, "rules": 1},
+        }
+    },
+}
+
+
+def campaign(**changes):
+    return parse_campaign({**SMALL, **changes}, KNOWN, "small.yaml")
+
+
+def read(name):
+    return parse_campaign(yaml.safe_load((FILES / name).read_text()), KNOWN, name)
+
+
+def changed(key, value):
+    """The small campaign with another value in its part; None takes the key out."""
+    part = {**SMALL["parts"]["small"], key: value}
+    return {**SMALL, "parts": {"small": {name: v for name, v in part.items() if v is not None}}}
+
+
+def test_every_cell_is_driven_by_every_manager_as_often_as_asked():
+    runs = campaign().runs
+    assert Counter(run.manager for run in runs) == {"none": 2 * 16, "rules": 16}
+    assert len({run.name for run in runs}) == len(runs)
+    assert [run.repeat for run in runs] == sorted(run.repeat for run in runs)
+
+
+def test_managers_meet_the_same_seed_and_contingencies_and_no_two_cells_do():
+    worlds = {}
+    for run in campaign().runs:
+        cell = (run.route, run.initial_configuration, run.clutter, run.power, run.failure, run.repeat)
+        worlds.setdefault(cell, set()).add((run.seed, run.contingencies))
+    assert all(len(met) == 1 for met in worlds.values())
+    assert len({seed for ((seed, _),) in worlds.values()}) == len(worlds) == 32
+
+
+def test_another_manager_or_order_changes_no_seed():
+    seeds = {run.name: run.seed for run in campaign().runs}
+    other = parse_campaign(changed("managers", {"mros": 3, "rules": 1, "none": 2}), KNOWN, "")
+    again = {run.name: run.seed for run in other.runs}
+    assert {name: again[name] for name in seeds} == seeds
+
+
+def test_seeds_are_the_same_everywhere_and_not_those_of_calibration():
+    assert seed_of(0, "r1", 1) == 792328737
+    assert min(seed_of(0, n) for n in range(1000)) >= FIRST_SEED > 1000
+    assert {run.seed for run in campaign(seed=4).runs}.isdisjoint(run.seed for run in campaign().runs)
+
+
+def test_what_goes_wrong_is_clutter_power_and_the_failure():
+    run = next(run for run in campaign().runs if (run.clutter, run.power, run.failure) == (7, 1.6, "killed"))
+    assert run.contingencies == ("clutter:7@time:0", "power:1.6@share:0.6", "kill:front_laser@share:0.4")
+    assert [str(entry) for entry in contingencies_of(run)] == list(run.contingencies)
+    assert next(run for run in campaign().runs if run.failure == "none").contingencies == ()
+
+
+def test_paper_has_the_matrix_of_the_paper():
+    runs = read("paper.yaml").runs
+    matrix = [run for run in runs if run.part == "disturbances"]
+    cells = {(run.route, run.initial_configuration, run.clutter, run.power) for run in matrix}
+    assert len(cells) == 864
+    per_manager = Counter(run.manager for run in matrix)
+    assert per_manager["none"] + per_manager["mros"] >= 6727
+    assert {per_manager[manager] for manager in ("random", "rules", "respawn")} == {864}
+    assert {run.failure for run in runs} == {"none", "killed", "unplugged"}
+
+
+@pytest.mark.parametrize(("name", "count"), [("smoke.yaml", 40), ("ci.yaml", 8)])
+def test_other_campaigns_of_the_project(name, count):
+    assert len(read(name).runs) == count
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "small.yaml: the file: is missing, must be a mapping with the key parts"),
+        ({"parts": {}}, "parts: is '{}', must be a mapping of names to matrices"),
+        ({**SMALL, "engines": "ros"}, "engines: unknown key, allowed here: engine, seed"),
+        ({**SMALL, "engine": "gazebo"}, "engine: is 'gazebo', must be lockstep or ros"),
+        ({**SMALL, "engine": "ros"}, "managers: rules: on ROS there are only mros and none so far; use engine"),
+        ({**SMALL, "seed": 1.5}, "seed: is 1.5; give a whole number, 0 or more"),
+        ({**SMALL, "deadline": 0}, "deadline: is '0', must be wall s for a run, more than 0"),
+        ({"parts": {"a/b": SMALL["parts"]["small"]}}, "'a/b' must be a name of letters, digits and _"),
+        (changed("routes", None), "parts.small.routes: is missing, must be a list of names"),
+        (changed("routes", "r1"), "parts.small.routes: is 'r1', must be a list of names"),
+        (changed("routes", ["r9"]), "parts.small.routes: no route 'r9'; there are r1, r2"),
+        (changed("routes", ["r1", "r1"]), "parts.small.routes: 'r1' stands there more than once"),
+        (changed("initial_configurations", ["f9"]), "initial_configurations: no variant 'f9'; there are f1_v1_r1"),
+        (changed("managers", {"magic": 1}), "managers: no manager 'magic'; there are none, mros"),
+        (changed("managers", {"none": 0}), "managers.none: is 0; give a whole number, 1 or more"),
+        (changed("clutter", [101]), "parts.small.clutter: clutter: is 101; give a whole number from 0 to 100"),
+        (changed("power", [-1]), "parts.small.power: power: is -1; give a number 0 or more"),
+        (changed("failures", {"x": ["kill:arm"]}), "failures.x: kill:arm: no component 'arm'; there are front_laser"),
+        (changed("failures", {"x": ["kill"]}), "failures.x: 'kill': expected KIND:WHAT"),
+    ],
+)
+def test_bad_file_is_refused_with_the_place(content, said):
+    with pytest.raises(CampaignError) as refused:
+        parse_campaign(content, KNOWN, "small.yaml")
+    assert str(refused.value).startswith("small.yaml: ") and said in str(refused.value)

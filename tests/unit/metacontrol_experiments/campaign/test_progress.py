@@ -1,0 +1,64 @@
+"""What is still to do in a campaign, and what its table says."""
+
+from dataclasses import replace
+
+import pytest
+from metacontrol_experiments.campaign.matrix import CampaignError, Run
+from metacontrol_experiments.campaign.progress import (
+    Attempt,
+    Result,
+    Status,
+    from_json,
+    is_final,
+    remaining,
+    row,
+    to_json,
+)
+
+RUN = Run("p", "r1", "f2_v2_r2", 7, 1.4, "killed", ("kill:front_laser@share:0.6",), "rules", 1, seed=5)
+DONE, CRASHED = Attempt(Status.DONE, 2.5), Attempt(Status.CRASHED, 1.0, "it broke", "Traceback")
+HUNG = Attempt(Status.HUNG, 9.0, "no end", "Thread")
+SUMMARY = {"outcome": "reached", "success": True, "time_above_threshold": {"safety": 0.01}, "reconfigurations": [{}]}
+
+
+def test_run_is_tried_once_more_unless_it_is_done():
+    assert not is_final([]) and not is_final([CRASHED]) and not is_final([HUNG])
+    assert is_final([DONE]) and is_final([CRASHED, DONE]) and is_final([HUNG, CRASHED])
+
+
+def test_what_has_a_result_is_not_driven_again_however_it_ended():
+    runs = [replace(RUN, repeat=number) for number in (1, 2, 3)]
+    results = {runs[0].name: Result(runs[0], (DONE,)), runs[2].name: Result(runs[2], (CRASHED, HUNG))}
+    assert remaining(runs, results, "out") == [runs[1]]
+
+
+def test_folder_of_another_campaign_is_refused():
+    held = {RUN.name: Result(replace(RUN, seed=6, timeout=5.0), (DONE,))}
+    with pytest.raises(CampaignError, match=r"out/p/.*rules-1: holds another mission \(seed, timeout\): name another"):
+        remaining([RUN], held, "out")
+
+
+def test_result_survives_its_file_but_for_the_logs():
+    result = Result(RUN, (CRASHED, DONE), SUMMARY, {"host": "a"})
+    read = from_json(to_json(result), "result.json")
+    assert read == replace(result, attempts=(replace(CRASHED, log=""), DONE))
+    assert "Traceback" not in to_json(result)
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[]", "[" * 9999, to_json(Result(RUN, (DONE,)))[:-9], '{"run": {}}'])
+def test_file_that_is_no_result_is_refused(text):
+    with pytest.raises(CampaignError, match=r"^x\.json: is no result of a run .*delete it"):
+        from_json(text, "x.json")
+
+
+def test_row_has_run_figures_and_provenance():
+    told = row(Result(RUN, (CRASHED, DONE), SUMMARY, {"host": "a", "commit": "c"}))
+    assert (told["manager"], told["seed"], told["status"], told["attempts"]) == ("rules", 5, "done", 2)
+    assert (told["outcome"], told["above_safety"], told["above_energy"]) == ("reached", 0.01, None)
+    assert (told["reconfigurations"], told["wall_s"], told["host"]) == (1, 3.5, "a")
+
+
+def test_run_that_failed_has_a_row_with_the_same_columns():
+    failed, done = row(Result(RUN, (CRASHED, HUNG))), row(Result(RUN, (DONE,), SUMMARY))
+    assert failed.keys() == done.keys()
+    assert (failed["status"], failed["problem"], failed["outcome"], failed["summary"]) == ("hung", "no end", None, None)
