@@ -96,6 +96,17 @@ def test_campaign_that_is_killed_goes_on_without_driving_a_run_again(ended, tmp_
     assert third.wait(150) == 0 and results(tmp_path) == after
 
 
+def test_campaign_that_is_interrupted_leaves_a_table_and_no_process(ended, tmp_path):
+    command = campaign(ended, tmp_path, "--jobs", "2")
+    wait_for(lambda: results(tmp_path), "the first result")
+    started = psutil.Process(command.pid).children(recursive=True)
+    command.send_signal(signal.SIGTERM)
+    assert command.wait(150) == 130
+    table = parquet.read_table(tmp_path / "out" / "results.parquet").to_pylist()
+    assert len(table) == len(results(tmp_path)) >= 1
+    wait_for(lambda: not [process for process in started if process.is_running()], "the end of all processes")
+
+
 def test_runs_on_ros_side_by_side_have_masters_of_their_own(ended, tmp_path):
     text = CAMPAIGN.replace("timeout: 2", "timeout: 2\nengine: ros").replace("{none: 2, respawn: 2}", "{none: 1}")
     command = campaign(ended, tmp_path, "--jobs", "2", text=text)

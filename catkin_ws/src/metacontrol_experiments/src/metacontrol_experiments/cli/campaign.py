@@ -18,7 +18,7 @@ from metacontrol_experiments.io.campaign_folder import RUNS, read_results, write
 from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.display import CONSOLE, refusing, tell
 from metacontrol_experiments.io.input_files import PackageError, read_components, route_names, simulation_package
-from metacontrol_experiments.io.processes import RunError, alone_in
+from metacontrol_experiments.io.processes import RunError, alone_in, signals_as_interrupts
 from metacontrol_experiments.managers.manager import PACKAGE
 from metacontrol_experiments.mission.routes import RouteError
 
@@ -52,7 +52,7 @@ def campaign(file: Path, output: Path | None, jobs: int, scheduler: str | None) 
         asked = _read(file)
         folder = output or Path("results/campaign") / file.stem
         folder.mkdir(parents=True, exist_ok=True)
-        with alone_in(folder):
+        with alone_in(folder), signals_as_interrupts():
             results = read_results(folder, asked.runs)
             missing = remaining(asked.runs, results, str(folder / RUNS))
             try:
