@@ -116,16 +116,21 @@ def test_cut_bag_gives_what_is_before_the_cut(series, tmp_path, compression, sha
 
 
 @pytest.mark.parametrize("compression", COMPRESSIONS)
-def test_damage_costs_no_more_than_its_chunk(series, tmp_path, compression):
+@pytest.mark.parametrize("is_indexed", [True, False])
+def test_damage_costs_no_more_than_its_chunk(series, tmp_path, compression, is_indexed):
     path = series.write(tmp_path / "damaged.bag", compression, CHUNK)
-    content = bytearray(path.read_bytes())
     middle = index_of(path) // 2
-    content[middle : middle + 30] = b"\xff" * 30
+    with Reader(path) as reader:
+        place = min(chunk.datapos for chunk in reader.chunks.values() if chunk.datapos > middle)
+    if not is_indexed:
+        path = without_index(path, tmp_path / "unindexed.bag")
+    content = bytearray(path.read_bytes())
+    content[place + 20 : place + 50] = b"\xff" * 30
     path.write_bytes(content)
     bag, found = numbers(path)
     assert 300 < len(found) <= 400
     assert found[-1][1] == 399
-    assert bag.problems and all("copy it again" in problem for problem in bag.problems)
+    assert sum(f"chunk at byte {place} is damaged" in problem for problem in bag.problems) == 1
 
 
 def test_damaged_index_does_not_matter(series, tmp_path):
