@@ -38,6 +38,7 @@ from ros_model.io.models import read_packages, read_system
 from ros_model.io.project import load_project, read_table
 from ros_model_extraction.io.launch_files import read_launch_file
 from ros_model_extraction.packages.catkin_package import find_packages, read_package
+from rosbags.rosbag1 import Writer
 from rosgraph_manipulator.configuration.configurations import ConfigurationError
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.launch_files import LaunchFileError, read_model
@@ -217,6 +218,11 @@ def test_rosmodel_ends_with_a_status(bad, tmp_path: Path, monkeypatch, capsys, l
 OTHERS = [
     (metacontrol, "summary BAD", ".bag"),
     (metacontrol, "figure BAD", ".bag"),
+    (metacontrol, "bag info BAD", ".bag"),
+    (metacontrol, "bag metrics BAD", ".bag"),
+    (metacontrol, "bag decisions BAD", ".bag"),
+    (metacontrol, "bag compare BAD BAD", ".bag"),
+    (metacontrol, "bag plot BAD", ".bag"),
     (metacontrol, "run --engine lockstep --quiet --world BAD --output out", ".yaml"),
     (metacontrol, "run --engine lockstep --quiet --routes BAD --output out", ".yaml"),
     (metacontrol, "run --engine lockstep --quiet --timeline BAD --route nowhere --output out", ".yaml"),
@@ -237,3 +243,17 @@ def test_command_ends_with_a_status(bad, tmp_path: Path, monkeypatch, number: in
     result = CliRunner().invoke(command, [word.replace("BAD", path) for word in line.split()])
     assert isinstance(result.exception, SystemExit | None), result.exception
     assert result.exit_code in (0, 1, 2)
+
+
+def test_message_that_does_not_fit_its_definition_is_refused_in_one_line(tmp_path: Path):
+    path = tmp_path / "odd.bag"
+    with Writer(path) as writer:
+        definition = "string id\nstring state"
+        connection = writer.add_connection(
+            "/mros1_reasoner/decision", "metacontrol_msgs/msg/Decision", msgdef=definition, md5sum="0" * 32
+        )
+        writer.write(connection, 1, b"\x09\x00")
+    for read, error in ((read_decisions, RecordingError), (read_recording, RecordingError), (read_record, BagError)):
+        with pytest.raises(error, match=r"odd\.bag.*fit") as raised:
+            read(path)
+        assert len(str(raised.value).splitlines()) == 1

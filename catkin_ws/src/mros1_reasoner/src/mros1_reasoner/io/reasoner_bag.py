@@ -16,6 +16,7 @@ from node_kit.io.input_files import is_file
 from node_kit.yaml_text import YamlError, parse_yaml
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Reader, ReaderError
+from rosbags.serde import SerdeError
 from rosbags.typesys import TypesysError
 
 from mros1_reasoner.loop.entries import ActiveFact
@@ -127,6 +128,6 @@ def _messages(path: Path, reader: Reader, topics: Collection[str]) -> Iterator[t
     for connection, nanoseconds, data in reader.messages(connections=connections):
         try:
             message = store.deserialize_ros1(data, connection.msgtype)
-        except (ValueError, struct.error, AssertionError) as error:
+        except (SerdeError, ValueError, struct.error, AssertionError) as error:
             raise RecordingError(f"{path}: a message on {connection.topic} does not fit its definition") from error
         yield connection, nanoseconds * 1e-9, message
