@@ -7,15 +7,25 @@ is decompressed while it is read. So no more than one message is in memory, howe
 
 from __future__ import annotations
 
-import bz2
-import io
 import os
 import struct
 from bisect import bisect_right
 from collections import Counter
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
-import lz4.frame
+from metacontrol_bags.bag_records import (
+    DAMAGE,
+    UINT32,
+    UINT64,
+    DamageError,
+    decompressed,
+    fields_of,
+    read_data,
+    read_header,
+    read_uint32,
+    skip,
+    time_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,23 +36,9 @@ _MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _CHUNK, _CHUNK_INFO, _CONNECTION = 2, 5, 6, 7
 """Kinds of records."""
 
-_HEADER_LIMIT, _DATA_LIMIT = 1 << 20, 1 << 30
-"""Bytes: what claims to be longer is no header, no message."""
-
-_BLOCK = 1 << 16
-_UINT32, _UINT64, _TIME = struct.Struct("<L"), struct.Struct("<Q"), struct.Struct("<LL")
-
 
 class BagError(ValueError):
     """A bag cannot be used; one line that names it and says what to do."""
-
-
-class _DamageError(Exception):
-    """The bytes at this place are no record, or end within one."""
-
-
-_DAMAGE = (_DamageError, OSError, EOFError, RuntimeError, ValueError, KeyError, IndexError, struct.error)
-"""Also what decompression raises."""
 
 
 class Connection(NamedTuple):
@@ -142,9 +138,9 @@ class BagFile:
                     continue
                 yield from self._record(reading)
                 if self._file.tell() > self.size:
-                    raise _DamageError
+                    raise DamageError
                 place = self._file.tell()
-            except _DAMAGE:
+            except DAMAGE:
                 left = positions[bisect_right(positions, place) :]
                 self._tell_damage(place, left[0] if left else None)
                 place = left[0] if left else self.size
@@ -153,7 +149,7 @@ class BagFile:
 
     def _record(self, reading: _Reading) -> Iterator[tuple[Connection, int, bytes]]:
         """Read one record of the file, a chunk with all that is in it, and stop behind it."""
-        header = _header(self._file)
+        header = read_header(self._file)
         if header[b"op"][0] == _CHUNK:
             yield from self._chunk(header, reading)
         else:
@@ -161,21 +157,21 @@ class BagFile:
 
     def _chunk(self, header: dict[bytes, bytes], reading: _Reading) -> Iterator[tuple[Connection, int, bytes]]:
         compression = header[b"compression"].decode()
-        stored = _uint32(self._file)
+        stored = read_uint32(self._file)
         begin = self._file.tell()
         is_whole = 0 < stored <= self.size - begin  # the recorder fills in the size when it ends the chunk
         self.compressions[compression] += 1
         try:
             if compression != "none":
-                stream = _decompressed(self._file, compression, stored if is_whole else self.size - begin)
+                stream = decompressed(self._file, compression, stored if is_whole else self.size - begin)
                 while stream.peek(1):
-                    yield from reading.take(_header(stream), stream)
+                    yield from reading.take(read_header(stream), stream)
             elif is_whole:  # else its records follow as if there were no chunk
                 while self._file.tell() < begin + stored:
-                    yield from reading.take(_header(self._file), self._file)
+                    yield from reading.take(read_header(self._file), self._file)
                 if self._file.tell() != begin + stored:
-                    raise _DamageError
-        except _DAMAGE:
+                    raise DamageError
+        except DAMAGE:
             if not is_whole:
                 raise
             self.problems.append(f"the chunk at byte {begin} is damaged, and messages in it are lost: copy it again")
@@ -184,8 +180,8 @@ class BagFile:
 
     def _after_chunk(self) -> int:
         """Return where the chunk at this place ends."""
-        self.compressions[_header(self._file)[b"compression"].decode()] += 1
-        stored = _uint32(self._file)
+        self.compressions[read_header(self._file)[b"compression"].decode()] += 1
+        stored = read_uint32(self._file)
         return self._file.tell() + stored
 
     def _read_start(self) -> int:
@@ -200,23 +196,23 @@ class BagFile:
         if self._file.read(len(_MAGIC)) != _MAGIC:
             raise BagError(f"{path}: not a bag of ROS 1: it does not begin with {_MAGIC.decode().strip()!r}")
         try:
-            header = _header(self._file)
-            _skip(self._file, _uint32(self._file))
-            index = _UINT64.unpack(header[b"index_pos"])[0]
-        except _DAMAGE:
+            header = read_header(self._file)
+            skip(self._file, read_uint32(self._file))
+            index = UINT64.unpack(header[b"index_pos"])[0]
+        except DAMAGE:
             raise BagError(f"{path}: its first bytes are damaged: copy it again") from None
         if header.get(b"encryptor"):
             raise BagError(f"{path}: is encrypted: decrypt it with `rosbag decrypt`")
         begin = self._file.tell()
         if not index:
             self.problems.append("it was not closed, so its end may be missing: `rosbag reindex` gives it an index")
-        elif index >= self.size and _UINT32.unpack(header[b"chunk_count"])[0]:
+        elif index >= self.size and UINT32.unpack(header[b"chunk_count"])[0]:
             self.problems.append(f"it is cut off: at least {index - self.size} bytes are missing: copy it again")
         else:
             try:
-                self._read_index(index, _UINT32.unpack(header[b"chunk_count"])[0])
+                self._read_index(index, UINT32.unpack(header[b"chunk_count"])[0])
                 self.is_closed = True
-            except _DAMAGE:
+            except DAMAGE:
                 self.connections, self._contents = {}, {}
                 self.counts.clear()
                 self.first = self.last = None
@@ -226,25 +222,25 @@ class BagFile:
     def _read_index(self, place: int, chunks: int) -> None:
         self._file.seek(place)
         while self._file.tell() < self.size:
-            header = _header(self._file)
+            header = read_header(self._file)
             if header[b"op"][0] == _CONNECTION:
-                self.add(header, _data(self._file))
+                self.add(header, read_data(self._file))
             elif header[b"op"][0] == _CHUNK_INFO:
-                counts = dict(struct.iter_unpack("<LL", _data(self._file)))
-                self._contents[_UINT64.unpack(header[b"chunk_pos"])[0]] = frozenset(counts)
+                counts = dict(struct.iter_unpack("<LL", read_data(self._file)))
+                self._contents[UINT64.unpack(header[b"chunk_pos"])[0]] = frozenset(counts)
                 self.counts.update(counts)
                 if counts:
-                    self.saw(_time(header[b"start_time"]))
-                    self.saw(_time(header[b"end_time"]))
+                    self.saw(time_of(header[b"start_time"]))
+                    self.saw(time_of(header[b"end_time"]))
             else:
-                raise _DamageError
+                raise DamageError
         if len(self._contents) != chunks or not self.counts.keys() <= self.connections.keys():
-            raise _DamageError
+            raise DamageError
 
     def add(self, header: dict[bytes, bytes], data: bytes) -> Connection:
         """Keep a connection."""
-        told = _fields(data)
-        number = _UINT32.unpack(header[b"conn"])[0]
+        told = fields_of(data)
+        number = UINT32.unpack(header[b"conn"])[0]
         texts = (
             header[b"topic"],
             *(told.get(name, b"") for name in (b"type", b"message_definition", b"md5sum", b"callerid")),
@@ -283,16 +279,16 @@ class _Reading:
         """Read what follows a record's header; yield it if it is a wanted message."""
         bag, kind = self._bag, header[b"op"][0]
         if kind == _CONNECTION:
-            connection = bag.add(header, _data(stream))
+            connection = bag.add(header, read_data(stream))
             if self._wanted(connection):
                 self._chosen.add(connection.id)
         elif kind == _MESSAGE:
-            number, stamp = _UINT32.unpack(header[b"conn"])[0], _time(header[b"time"])
+            number, stamp = UINT32.unpack(header[b"conn"])[0], time_of(header[b"time"])
             data = None
             if number in self._chosen:
-                data = _data(stream)
+                data = read_data(stream)
             else:
-                _skip(stream, _uint32(stream))
+                skip(stream, read_uint32(stream))
             if number not in bag.connections:
                 self.strangers += 1
                 return
@@ -302,80 +298,4 @@ class _Reading:
             if data is not None:
                 yield bag.connections[number], stamp, data
         else:
-            _skip(stream, _uint32(stream))
-
-
-class _Part(io.RawIOBase):
-    """The next bytes of a file, as a file of their own."""
-
-    def __init__(self, file: BinaryIO, size: int) -> None:
-        self._file, self._left = file, size
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]
-        data = self._file.read(min(len(buffer), self._left))
-        buffer[: len(data)] = data
-        self._left -= len(data)
-        return len(data)
-
-
-def _decompressed(file: BinaryIO, compression: str, size: int) -> io.BufferedReader:
-    """Return what the next bytes of a file are when decompressed, as a stream."""
-    part = io.BufferedReader(_Part(file, size), _BLOCK)
-    if compression == "bz2":
-        return io.BufferedReader(bz2.BZ2File(part), _BLOCK)
-    if compression == "lz4":
-        return io.BufferedReader(lz4.frame.open(part), _BLOCK)
-    raise _DamageError
-
-
-def _header(stream: BinaryIO) -> dict[bytes, bytes]:
-    size = _uint32(stream)
-    if size > _HEADER_LIMIT:
-        raise _DamageError
-    return _fields(_exactly(stream, size))
-
-
-def _fields(data: bytes) -> dict[bytes, bytes]:
-    fields, place, size = {}, 0, len(data)
-    while place < size:
-        length = _UINT32.unpack_from(data, place)[0]
-        name, sign, value = data[place + 4 : place + 4 + length].partition(b"=")
-        if not sign:
-            raise _DamageError
-        fields[name] = value
-        place += 4 + length
-    return fields
-
-
-def _data(stream: BinaryIO) -> bytes:
-    size = _uint32(stream)
-    if size > _DATA_LIMIT:
-        raise _DamageError
-    return _exactly(stream, size)
-
-
-def _skip(stream: BinaryIO, size: int) -> None:
-    if isinstance(stream, io.BufferedReader) and isinstance(stream.raw, io.FileIO):
-        stream.seek(size, os.SEEK_CUR)
-        return
-    while size:
-        size -= len(_exactly(stream, min(size, _BLOCK)))
-
-
-def _uint32(stream: BinaryIO) -> int:
-    return int(_UINT32.unpack(_exactly(stream, 4))[0])
-
-
-def _exactly(stream: BinaryIO, size: int) -> bytes:
-    data = stream.read(size)
-    if len(data) != size:
-        raise _DamageError
-    return data
-
-
-def _time(data: bytes) -> int:
-    seconds, nanoseconds = _TIME.unpack(data)
-    return int(seconds * 1_000_000_000 + nanoseconds)
+            skip(stream, read_uint32(stream))
