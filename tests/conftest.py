@@ -4,11 +4,17 @@ import os
 import sys
 from pathlib import Path
 
+from hypothesis import HealthCheck, settings
+
 HERE = str(Path(__file__).parent)
 
 # For `helpers`, here and in the nodes that tests start.
 sys.path.insert(0, HERE)
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (HERE, os.environ.get("PYTHONPATH"))))
+
+# No test fails because the machine is slow.
+settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any machine")
 
 _ORDER = ("system", "integration", "unit")
 """Whole missions begin first, one after the other on the first worker: several at once would be too much for 2 cores.
