@@ -48,6 +48,14 @@ def campaign(ended, tmp_path, *options, text=CAMPAIGN):
     return start(ended, "metacontrol_experiments.cli.main", *arguments, cwd=tmp_path)
 
 
+def runs(process):
+    """Tell whether a process has not ended, waited for or not."""
+    try:
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
 def results(tmp_path):
     return {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("runs/**/result.json")}
 
@@ -77,7 +85,7 @@ def test_runs_of_a_worker_that_is_killed_are_driven_by_another_one(ended, tmp_pa
     wait_for(lambda: command.poll() is not None, "the end of the campaign")
     assert command.returncode == 0
     check_complete(tmp_path)
-    wait_for(lambda: not [child for child in children if child.is_running()], "the end of what the dead worker started")
+    wait_for(lambda: not [child for child in children if runs(child)], "the end of what the dead worker started")
 
 
 def test_campaign_that_is_killed_goes_on_without_driving_a_run_again(ended, tmp_path):
@@ -104,7 +112,7 @@ def test_campaign_that_is_interrupted_leaves_a_table_and_no_process(ended, tmp_p
     assert command.wait(150) == 130
     table = parquet.read_table(tmp_path / "out" / "results.parquet").to_pylist()
     assert len(table) == len(results(tmp_path)) >= 1
-    wait_for(lambda: not [process for process in started if process.is_running()], "the end of all processes")
+    wait_for(lambda: not [process for process in started if runs(process)], "the end of all processes")
 
 
 def test_runs_on_ros_side_by_side_have_masters_of_their_own(ended, tmp_path):

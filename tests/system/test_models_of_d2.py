@@ -46,16 +46,15 @@ def ends_of(uri: str) -> set[End]:
 
 
 def wait_until_settled(uri: str, process: subprocess.Popen[bytes], log: Path) -> None:
-    """Wait until all of D2's components and the action server of navigation are there, and nothing is added."""
+    """Wait until components, the server of navigation and an action's client are there, and nothing is added."""
     wanted = {f"/{c.graph_name}" for c in read_system(D2 / "models" / "d2.rossystem").components} | {"/reasoner"}
     deadline, before, since = time.monotonic() + START_S, set[End](), time.monotonic()
     while time.monotonic() < deadline and process.poll() is None:
         now = ends_of(uri)
         if now != before:
             before, since = now, time.monotonic()
-        is_up = wanted <= {end.node for end in now} and (PortKind.ACTION_SERVER, "/move_base") in {
-            (end.kind, end.name) for end in now
-        }
+        has_server = (PortKind.ACTION_SERVER, "/move_base") in {(end.kind, end.name) for end in now}
+        is_up = has_server and wanted <= {end.node for end in now} and set(KINDS) <= {end.kind for end in now}
         if is_up and time.monotonic() - since > SETTLED_S:
             return
         time.sleep(0.2)

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Nodes, launcher, manipulator and master die in the middle of everything; the mission comes back, nothing is left."""
 
+import base64
 import os
 import signal
 import socket
@@ -45,6 +46,15 @@ class SurvivalTest(PairTest):
         self.manipulator.wait()
         self.start_manipulator()
 
+    def wait_until_kept(self, goal_id):
+        """Wait until the manipulator has stored a goal for the next manipulator."""
+
+        def is_stored():
+            stored = rospy.get_param("wait/resume_goal", {}).get("data", "")
+            return goal_id.encode() in base64.b64decode(stored)
+
+        wait_for(is_stored, f"goal {goal_id} is stored")
+
     def test_node_that_dies_is_started_again_and_works_at_the_goal(self):
         goal_id, _ = self.send_goal()
         server, told = self.server, len(self.states)
@@ -79,6 +89,7 @@ class SurvivalTest(PairTest):
 
     def test_killed_manipulator_comes_back_without_touching_what_runs(self):
         goal_id, _ = self.send_goal()
+        self.wait_until_kept(goal_id)
         before, server = pid_of("/wait_server"), self.server
         self.manipulator.end(signal.SIGKILL)
         self.restart_manipulator()
@@ -104,6 +115,7 @@ class SurvivalTest(PairTest):
             with case(delay):
                 self.assertEqual(self.request("slow"), 1)
                 goal_id, _ = self.send_goal()
+                self.wait_until_kept(goal_id)
                 server, before = self.server, pid_of("/wait_server")
                 self.client.send_goal(MvpReconfigurationGoal("fast"))
                 wait_for(lambda: self.is_in("fast", "RECONFIGURING"), "the change has begun")
@@ -134,6 +146,7 @@ class SurvivalTest(PairTest):
 
     def test_killed_pair_brings_the_mission_back(self):
         goal_id, _ = self.send_goal()
+        self.wait_until_kept(goal_id)
         server = self.server
         for node in (self.manipulator, self.launcher):
             node.end(signal.SIGKILL)
