@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 MOST_ATTEMPTS = 2
 """A run that crashed or hung is tried once more."""
+LONGEST_LOG = 200_000
+"""Bytes of an attempt's log that are kept, the last ones."""
 
 
 class Status(Enum):

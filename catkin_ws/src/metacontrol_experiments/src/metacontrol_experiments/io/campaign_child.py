@@ -22,7 +22,7 @@ def main() -> None:
     faulthandler.enable()  # a process that is ended for hanging tells where it hung
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # libraries print on stdout
-    lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+    lines: queue.Queue[str] = queue.Queue()
     threading.Thread(target=_read, args=(lines,), daemon=True).start()
     while True:
         asked = json.loads(lines.get())
@@ -36,7 +36,7 @@ def main() -> None:
         answers.flush()
 
 
-def _read(lines: queue.SimpleQueue[str]) -> None:
+def _read(lines: queue.Queue[str]) -> None:
     for line in sys.stdin:
         lines.put(line)
     os._exit(0)

@@ -18,15 +18,13 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from metacontrol_experiments.campaign.progress import Attempt, Result, Status, is_final
+from metacontrol_experiments.campaign.progress import LONGEST_LOG, Attempt, Result, Status, is_final
 from metacontrol_experiments.io.campaign_on_ros import drive_on_ros
 from metacontrol_experiments.io.code_version import current_commit
 
 if TYPE_CHECKING:
     from metacontrol_experiments.campaign.matrix import Run
 
-LONGEST_LOG = 200_000
-"""Bytes of an attempt's log that are kept, the last ones."""
 _GRACE_S = 3.0
 _PACKAGES = ("distributed", "jpype1", "numpy", "opencv-python-headless", "owlready2", "pybullet", "scipy")
 

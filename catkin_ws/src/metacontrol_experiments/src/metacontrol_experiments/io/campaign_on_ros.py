@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from metacontrol_experiments.campaign.progress import Attempt, Status
+from metacontrol_experiments.campaign.progress import LONGEST_LOG, Attempt, Status
 from metacontrol_experiments.mission.settings import SUMMARY_NAME
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 _OWN = ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
 """It ends what it started when it is interrupted, and is interrupted when this process dies."""
 _GRACE_S = 60.0
-_LONGEST_LOG = 200_000
 _CONSOLE = Path("log", "console.log")
 
 
@@ -81,4 +80,4 @@ def _ends(process: subprocess.Popen[bytes], deadline: float) -> bool:
 
 
 def _end_of(path: Path) -> str:
-    return path.read_bytes()[-_LONGEST_LOG:].decode(errors="replace") if path.exists() else ""
+    return path.read_bytes()[-LONGEST_LOG:].decode(errors="replace") if path.exists() else ""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def read_launch_file(path: Path) -> LaunchFile:
-    """Return what a launch file starts; its arguments have their defaults.
+    """Return what a launch file starts; its arguments have their defaults. Programs in its `command=` are run.
 
     Raises:
         ModelError: it can't be read, or roslaunch refuses it; says what roslaunch says.
