@@ -52,6 +52,12 @@ def test_rays_follow_the_robot_and_never_hit_it(simulate):
     assert rear[180] == pytest.approx(4.0 - 2.0 - simulation.robot.front_laser.mount.x, abs=1e-3)
 
 
+def test_rays_pass_through_robot_and_floor(simulate):
+    physics = simulate().physics
+    assert physics.sweep(Pose(-2.0, 0.0), 0.18, np.zeros(1), 10.0) == pytest.approx([4.0 - -2.0], abs=1e-3)
+    assert np.isinf(physics.sweep(Pose(-2.0, 0.0), -0.2, np.zeros(1), 10.0))
+
+
 def test_depth_image_sees_wall_and_floor(simulate):
     simulation = simulate()
     depth = simulation.depth_image()

@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 GRAVITY = 9.81
 """m/s2."""
 
-_WORLD_GROUP, _ROBOT_GROUP, _FLOOR_GROUP, _MAP_GROUP = 1, 2, 4, 8
-_SEEN = _WORLD_GROUP | _MAP_GROUP  # by rays
-_EVERYTHING = _SEEN | _ROBOT_GROUP | _FLOOR_GROUP
+_RAY_GROUP, _ROBOT_GROUP, _FLOOR_GROUP, _MAP_GROUP, _WORLD_GROUP = 1, 2, 4, 8, 16
+"""Two bodies meet if the mask of each has the other's group. Bullet gives rays the group 1. The masks of robot and floor
+lack it: a mask in the call that casts rays would only drop hits that Bullet has computed already."""
+_EVERYTHING = _RAY_GROUP | _ROBOT_GROUP | _FLOOR_GROUP | _MAP_GROUP | _WORLD_GROUP
 _BOXES_PER_MESH = 4000  # PyBullet takes no more than 131,072 vertices at once
 _COLOURS = {
     "wall": (0.75, 0.75, 0.72, 1.0),
@@ -121,7 +122,7 @@ class Physics:
         ends[:, 1] = start.y + length * np.sin(angles)
         ends[:, 2] = height
         origins = np.broadcast_to((start.x, start.y, height), ends.shape)
-        hits = pybullet.rayTestBatch(origins, ends, collisionFilterMask=_SEEN, physicsClientId=self.client)
+        hits = pybullet.rayTestBatch(origins, ends, physicsClientId=self.client)
         shares = np.array([hit[2] for hit in hits])
         return np.where(shares < 1.0, shares * length, math.inf)
 
@@ -224,7 +225,7 @@ class Physics:
             body = self._add(pybullet.GEOM_MESH, shape, visual, _COLOURS["wall"], Pose(0.0, 0.0, 0.0), 0.0)
             # Neither with the floor nor with each other: PyBullet would test their triangles in every step.
             pybullet.setCollisionFilterGroupMask(
-                body, -1, _MAP_GROUP, _WORLD_GROUP | _ROBOT_GROUP, physicsClientId=self.client
+                body, -1, _MAP_GROUP, _RAY_GROUP | _WORLD_GROUP | _ROBOT_GROUP, physicsClientId=self.client
             )
             bodies.append(body)
         return tuple(bodies)
@@ -241,7 +242,9 @@ class Physics:
         names = [pybullet.getJointInfo(body, link, physicsClientId=client)[1].decode() for link in links]
         self._joints = tuple(names.index(name) for name in JOINTS)
         for link in links:
-            pybullet.setCollisionFilterGroupMask(body, link, _ROBOT_GROUP, _SEEN, physicsClientId=client)
+            pybullet.setCollisionFilterGroupMask(
+                body, link, _ROBOT_GROUP, _WORLD_GROUP | _MAP_GROUP, physicsClientId=client
+            )
             pybullet.changeDynamics(
                 body, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, physicsClientId=client
             )
