@@ -271,6 +271,20 @@ def test_local_costmap_shows_the_map_through_the_drift_of_odometry(local):
     assert at(snapshot, x, y) == LETHAL
 
 
+@pytest.mark.parametrize("place", [ORIGIN, Pose(1.0, 0.0, 0.0)])
+def test_local_costmap_shows_a_map_that_comes_later(local, place):
+    def map_with(column):
+        occupancy = np.zeros((200, 200), dtype=np.int8)
+        occupancy[100, column] = 100
+        return static_map(occupancy, origin=(-5.0, -5.0, 0.0))
+
+    local.set_map(map_with(140))
+    assert at(local.update(ORIGIN, []), 2.02, 0.02) == LETHAL
+    local.set_map(map_with(160))
+    snapshot = local.update(place, [])
+    assert (at(snapshot, 2.02, 0.02), at(snapshot, 3.02, 0.02)) == (FREE, LETHAL)
+
+
 @pytest.mark.parametrize(
     ("width", "resolution", "origin"),
     [

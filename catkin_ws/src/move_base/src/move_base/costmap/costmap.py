@@ -12,7 +12,7 @@ from robot_formulas.geometry import ORIGIN, Pose, inscribed_radius
 
 from move_base.costmap.grid import FREE, LETHAL, UNKNOWN, Geometry
 from move_base.costmap.inflation import Inflation
-from move_base.costmap.static_map import bounding_geometry, resample
+from move_base.costmap.static_map import bounding_geometry, costs_of, resample
 from move_base.parameters.parameters import OBSTACLE_KINDS
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ class Costmap:
         self.parameters = parameters
         self.geometry = self._initial_geometry()
         self._maps: dict[str, StaticMap] = {}  # by topic
+        self._map_costs: dict[str, tuple[StaticMap, NDArray[np.uint8]]] = {}  # by layer, on the map's own grid
         self._static_costs: dict[str, NDArray[np.uint8]] = {}  # by layer
         self._static_placed: dict[str, tuple[Geometry, Pose]] = {}
         self._obstacles = self._no_obstacles()
@@ -69,6 +70,7 @@ class Costmap:
     def reconfigure(self, parameters: CostmapParameters) -> None:
         """Take other parameters; frames and layers can't change. Obstacles stay, unless the grid is another one."""
         old, self.parameters = self.parameters, parameters
+        self._map_costs.clear()
         if _grid(old) != _grid(parameters) and not self._has_size_of_map():
             self.geometry = self._initial_geometry()
             self._obstacles = self._no_obstacles()
@@ -303,7 +305,11 @@ class Costmap:
             static = self._maps.get(layer.map_topic)
             if static is None or (layer.name in self._static_costs and self._static_placed[layer.name] == placement):
                 continue
-            self._static_costs[layer.name] = resample(static, layer, self.geometry, map_pose)
+            known, costs = self._map_costs.get(layer.name, (None, None))
+            if costs is None or known is not static:
+                costs = costs_of(static, layer)
+                self._map_costs[layer.name] = static, costs
+            self._static_costs[layer.name] = resample(costs, static, layer, self.geometry, map_pose)
             self._static_placed[layer.name] = placement
 
 

@@ -104,10 +104,30 @@ def bounding_geometry(static: StaticMap) -> Geometry:
     return Geometry(g.resolution, int(columns), int(rows), float(low[0]), float(low[1]))
 
 
-def resample(static: StaticMap, layer: Layer, target: Geometry, map_pose: Pose) -> NDArray[np.uint8]:
-    """Return the static map's costs on another grid; what the map does not cover is unknown (if tracked) or FREE."""
+def costs_of(static: StaticMap, layer: Layer) -> NDArray[np.uint8]:
+    """Return the costs of a map's cells; occupancy counts as 0..255, as in costmap_2d, so an unknown cell is 255."""
+    values = np.arange(256)
+    table = np.where(values >= layer.lethal_cost_threshold, LETHAL, FREE)
+    if not layer.trinary_costmap:
+        scaled = values / max(layer.lethal_cost_threshold, 1) * LETHAL
+        table = np.where(values >= layer.lethal_cost_threshold, LETHAL, scaled)
+    table[layer.unknown_cost_value % 256] = UNKNOWN if layer.track_unknown_space else FREE
+    return np.asarray(table.astype(np.uint8)[static.occupancy.view(np.uint8)])
+
+
+def resample(
+    costs: NDArray[np.uint8], static: StaticMap, layer: Layer, target: Geometry, map_pose: Pose
+) -> NDArray[np.uint8]:
+    """Return a static map's costs on another grid; what the map does not cover is unknown (if tracked) or FREE.
+
+    Args:
+        costs: of the map's cells, see `costs_of`.
+        static: the map.
+        layer: that has it.
+        target: the other grid.
+        map_pose: pose of the map's frame in that of the grid.
+    """
     outside = UNKNOWN if layer.track_unknown_space else FREE
-    costs = _costs(static.occupancy, layer)
     source = static.geometry
     identity = map_pose == ORIGIN and static.yaw == 0.0
     if identity and source == target:
@@ -136,14 +156,3 @@ def resample(static: StaticMap, layer: Layer, target: Geometry, map_pose: Pose) 
         ),
         dtype=np.uint8,
     )
-
-
-def _costs(occupancy: NDArray[np.int8], layer: Layer) -> NDArray[np.uint8]:
-    """Return the costs of occupancy values; they count as 0..255, as in costmap_2d, so an unknown cell is 255."""
-    values = np.arange(256)
-    table = np.where(values >= layer.lethal_cost_threshold, LETHAL, FREE)
-    if not layer.trinary_costmap:
-        scaled = values / max(layer.lethal_cost_threshold, 1) * LETHAL
-        table = np.where(values >= layer.lethal_cost_threshold, LETHAL, scaled)
-    table[layer.unknown_cost_value % 256] = UNKNOWN if layer.track_unknown_space else FREE
-    return np.asarray(table.astype(np.uint8)[occupancy.view(np.uint8)])
