@@ -19,7 +19,7 @@ from move_base.costmap.grid import INSCRIBED
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from move_base.costmap.costmap import Snapshot
+    from move_base.costmap.snapshot import Snapshot
     from move_base.parameters.parameters import MoveBaseParameters
 
 MIN_STEPS, MAX_STEPS = 4, 20

@@ -11,7 +11,7 @@ from robot_formulas.geometry import Pose, Velocity, inscribed_radius
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from move_base.costmap.costmap import Snapshot
+    from move_base.costmap.snapshot import Snapshot
 
 EDGE_SPACING = 0.1
 """Distance between the points that stand for the footprint's edge, m."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import cv2
@@ -12,6 +12,7 @@ from robot_formulas.geometry import ORIGIN, Pose, inscribed_radius
 
 from move_base.costmap.grid import FREE, LETHAL, UNKNOWN, Geometry
 from move_base.costmap.inflation import Inflation
+from move_base.costmap.snapshot import Snapshot
 from move_base.costmap.static_map import bounding_geometry, costs_of, resample
 from move_base.parameters.parameters import OBSTACLE_KINDS
 
@@ -32,26 +33,6 @@ CLOUD_BIN = math.radians(1.0)
 
 SUBPIXEL_BITS = 4
 """Fixed-point digits of cv2's polygon corners: 1/16 cell."""
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """A costmap at one moment; its arrays are never written to again.
-
-    Attributes:
-        geometry: where the grid lies.
-        costs: 0..255 (H, W).
-        clearance: distance from each cell's centre to the nearest obstacle cell's centre (H, W), m, never beyond
-            `clearance_limit`.
-        clearance_limit: larger distances are not told apart, m.
-        inscribed_radius: of the padded footprint, m.
-    """
-
-    geometry: Geometry
-    costs: NDArray[np.uint8]
-    clearance: NDArray[np.float32]
-    clearance_limit: float
-    inscribed_radius: float
 
 
 class Costmap:

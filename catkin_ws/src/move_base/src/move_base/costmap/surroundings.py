@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Protocol
 
 from robot_formulas.geometry import ORIGIN, Pose
 
-from move_base.costmap.costmap import Costmap, Snapshot
+from move_base.costmap.costmap import Costmap
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from move_base.costmap.sensors import Observation
+    from move_base.costmap.snapshot import Snapshot
     from move_base.costmap.static_map import MapPart, StaticMap
     from move_base.parameters.parameters import CostmapParameters, MoveBaseParameters, ObservationSource
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from move_base.costmap.costmap import Snapshot
     from move_base.costmap.sensors import Observation
+    from move_base.costmap.snapshot import Snapshot
     from move_base.costmap.static_map import MapPart, StaticMap
     from move_base.costmap.surroundings import Transformer
     from move_base.parameters.parameters import MoveBaseParameters, ObservationSource

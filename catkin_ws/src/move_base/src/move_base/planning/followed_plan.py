@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from robot_formulas.geometry import Pose
 
-    from move_base.costmap.costmap import Snapshot
+    from move_base.costmap.snapshot import Snapshot
 
 LOOKAHEAD = 3.0
 """Length of the plan that the controller is given, m: twice what 0.75 m/s covers in a sim_time of 2 s."""

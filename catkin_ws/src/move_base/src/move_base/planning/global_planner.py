@@ -19,8 +19,8 @@ from move_base.costmap.grid import INSCRIBED, LETHAL, UNKNOWN
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from move_base.costmap.costmap import Snapshot
     from move_base.costmap.grid import Geometry
+    from move_base.costmap.snapshot import Snapshot
 
 COST_FACTOR = 0.8 / 50.0
 """Weight per unit of cost over a free cell's weight of 1: NavFn's COST_FACTOR over its COST_NEUTRAL."""

@@ -19,7 +19,7 @@ from move_base.ros.messages import occupancy_grid, occupancy_update, path_of, po
 if TYPE_CHECKING:
     import genpy
 
-    from move_base.costmap.costmap import Snapshot
+    from move_base.costmap.snapshot import Snapshot
     from move_base.navigation.result import Result
     from move_base.parameters.parameters import CostmapParameters, MoveBaseParameters
     from move_base.ros.frames import TfTransformer

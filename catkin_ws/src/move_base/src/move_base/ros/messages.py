@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from robot_formulas.geometry import Pose, Velocity
 
-    from move_base.costmap.costmap import Snapshot
+    from move_base.costmap.snapshot import Snapshot
 
 FARTHEST = 1e6
 """Coordinates beyond this (m) are a mistake: it is farther than anything drives."""
