@@ -63,6 +63,16 @@ def test_wide_way_is_taken_rather_than_a_gap_without_room(floor):
     assert points[:, 1].max() < 6.0
 
 
+def test_gap_with_half_of_the_padding_is_the_last_resort(floor):
+    wall = [(5.0, 5.4, 0.0, 5.0), (5.0, 5.4, 6.0, 9.5)]  # a gap of 1.0 m around y = 5.5; the padded robot is 1.0 m wide
+    assert plan(floor(*wall), (2.0, 5.5), (9.0, 5.5)).points[:, 1].max() > 9.5
+    closed = (5.0, 5.4, 9.5, 12.0)
+    assert plan(floor(*wall, closed), (2.0, 5.5), (9.0, 5.5)).points[:, 1].max() < 6.0
+    narrower = [(5.0, 5.4, 0.0, 5.0), (5.0, 5.4, 5.8, 12.0)]
+    with pytest.raises(PlanningError, match="no way"):
+        plan(floor(*narrower), (2.0, 5.5), (9.0, 5.5))
+
+
 def test_known_way_is_taken_unless_the_unknown_one_is_far_shorter(floor):
     strip = (5.0, 6.0, 0.05, 9.0)
     points = plan(floor(unknown=[strip]), (3.0, 7.0), (8.0, 7.0)).points

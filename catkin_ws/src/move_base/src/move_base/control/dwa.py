@@ -6,7 +6,7 @@ none of these is free, because the sensors look ahead.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,6 +47,9 @@ ALIGN_ANGLE = 1.05
 
 NARROW_ALIGN_ANGLE = 0.35
 """The same for a robot that hardly moves in front of a narrow passage, which it can't enter aslant, rad."""
+
+ALIGNED_ANGLE = 0.05
+"""Within this angle of the path's direction turning on the spot helps no further, rad."""
 
 NARROW_AHEAD = 1.0
 """How far ahead a passage counts as in front, m: the robot's length."""
@@ -100,13 +103,18 @@ class DwaController:
         p = self.parameters
         self._oscillation.follow(robot, p.oscillation_reset_dist)
         horizon = min(p.sim_time, max(MIN_HORIZON, 2.0 * to_goal / p.max_vel_x))
-        scene = _Scene(path, snapshot, self._shape_for(robot, snapshot))
+        shapes = self._shapes_for(robot, snapshot)
+        scene = _Scene(path, snapshot, shapes[0])
         best = self._back_off(robot, scene)
-        error = abs(wrap(_direction_of(path) - robot.yaw))
-        if best is None and error > self._align_angle(velocity, scene):
-            best = self._best(self._turn_samples(velocity), robot, horizon, scene)
-        if best is None:
-            best = self._best(self._arc_samples(velocity), robot, horizon, scene)
+        error = wrap(_direction_of(path) - robot.yaw)
+        if best is None and abs(error) > self._align_angle(velocity, scene):
+            best = self.turn(robot, error, snapshot)
+        arcs = self._arc_samples(velocity) if best is None else np.empty((0, 3))
+        for shape in shapes:  # a narrow passage is entered with less margin rather than not at all
+            if best is None:
+                best = self._best(arcs, robot, horizon, replace(scene, shape=shape))
+        if best is None and abs(error) > ALIGNED_ANGLE:
+            best = self.turn(robot, error, snapshot)
         if best is None:
             best = self._best(self._sideways_samples(velocity), robot, MIN_HORIZON, scene)
         if best is None:
@@ -126,7 +134,7 @@ class DwaController:
         speed = min(p.max_vel_theta, max(p.min_in_place_vel_theta, abs(angle) / 0.5))
         command = np.array([[0.0, 0.0, np.copysign(speed, angle)]])
         rollout = roll_out(command, robot, min(abs(angle) / speed, 1.0), MAX_STEPS)
-        if not self._shape_for(robot, snapshot).is_free(rollout, snapshot)[0]:
+        if not any(shape.is_free(rollout, snapshot)[0] for shape in self._shapes_for(robot, snapshot)):
             return None
         self._last = Velocity(0.0, 0.0, float(command[0, 2]))
         return rollout.trajectory(0, 0.0)
@@ -153,10 +161,11 @@ class DwaController:
         narrow = clearance < scene.shape.circumscribed + scene.shape.margin
         return NARROW_ALIGN_ANGLE if narrow else ALIGN_ANGLE
 
-    def _shape_for(self, robot: Pose, snapshot: Snapshot) -> Footprint:
-        """Return the footprint with its margin; the margin is smaller where an obstacle is already within it."""
+    def _shapes_for(self, robot: Pose, snapshot: Snapshot) -> list[Footprint]:
+        """Return the footprint with its margins, largest first, but those in which an obstacle is already."""
         here = Rollout(np.zeros((1, 3)), *(np.array([[value]]) for value in (robot.x, robot.y, robot.yaw)))
-        return next((shape for shape in self._shapes if shape.is_free(here, snapshot)[0]), self._shapes[-1])
+        free = (index for index, shape in enumerate(self._shapes) if shape.is_free(here, snapshot)[0])
+        return self._shapes[next(free, len(self._shapes) - 1) :]
 
     def _arc_samples(self, velocity: Velocity) -> NDArray[np.float64]:
         p = self.parameters
@@ -168,18 +177,7 @@ class DwaController:
         low, high = np.clip([velocity.yaw - turn_reach, velocity.yaw + turn_reach], p.min_vel_theta, p.max_vel_theta)
         turns = np.linspace(low, high, p.vtheta_samples)
         turns = np.unique(np.append(turns, [np.clip(0.0, turns[0], turns[-1])]))
-        arcs = np.stack(np.meshgrid(forward, [0.0], turns, indexing="ij"), axis=-1).reshape(-1, 3)
-        return np.vstack([arcs, self._turn_samples(velocity)])
-
-    def _turn_samples(self, velocity: Velocity) -> NDArray[np.float64]:
-        p = self.parameters
-        turn_reach = p.acc_lim_theta * self._period
-        rates = np.linspace(p.min_in_place_vel_theta, p.max_vel_theta, max(2, p.vtheta_samples // 2))
-        rates = np.concatenate([-rates, rates])
-        near = rates[np.abs(rates - velocity.yaw) <= max(turn_reach, p.min_in_place_vel_theta * 1.01)]
-        samples = np.zeros((len(near), 3))
-        samples[:, 2] = near
-        return self._oscillation.allowed(samples)
+        return np.stack(np.meshgrid(forward, [0.0], turns, indexing="ij"), axis=-1).reshape(-1, 3)
 
     def _sideways_samples(self, velocity: Velocity) -> NDArray[np.float64]:
         p = self.parameters

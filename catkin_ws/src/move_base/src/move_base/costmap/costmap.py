@@ -276,8 +276,10 @@ class Costmap:
                 costs = _larger(costs, static) if layer.use_maximum else static.copy()
             elif layer.name in self._obstacles:
                 costs[self._obstacles[layer.name] == LETHAL] = LETHAL
-        costs, clearance = self._inflation.apply(costs)
-        return Snapshot(self.geometry, costs, clearance, self._inflation.limit, self.inscribed_radius)
+        inflated, clearance = self._inflation.apply(costs)
+        pinch_radius = 0.5 * (inscribed_radius(self._footprint) + self.inscribed_radius)
+        radii = self.inscribed_radius, self.circumscribed_radius, pinch_radius
+        return Snapshot(self.geometry, inflated, costs, clearance, self._inflation.limit, *radii)
 
     def _place_static(self, map_pose: Pose) -> None:
         """Resample the static maps into the grid, where grid or map moved since the last time."""

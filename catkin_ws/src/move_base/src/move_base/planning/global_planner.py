@@ -7,7 +7,7 @@ only choose the way around the obstacles: dynamic programming over straight shor
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -31,11 +31,14 @@ UNKNOWN_WEIGHT = 253.0 / 50.0
 ESCAPE_WEIGHT, PUSH_WEIGHT = 30.0, 300.0
 """Weights of inscribed and of obstacle cells around a start that lies among them; high, for a short way out."""
 
-TIGHT_BAND = 0.1
-"""Cells with less clearance than this (m) beyond the inscribed radius leave the controller no room for corrections."""
+TIGHT_FACTOR = 3.0
+"""Factor of the weight of cells where the robot cannot turn: those with less clearance than its circumscribed radius. So a plan
+keeps off corners and enters a gap straight, and takes the gap where the way round is longer than three times its
+length."""
 
-TIGHT_WEIGHT = 2.0
-"""Extra weight of those cells: a gap is passed where the way round is longer than three times its length."""
+PINCH_WEIGHT = 10.0
+"""Weight of cells where the robot fits with half of its padding only. NavFn refuses them, and so loses every passage that
+is hardly wider than the padded robot as soon as a noisy return narrows it by a cell."""
 
 STRAIGHT_BIAS = 0.02
 """Extra weight per metre from the line between start and goal: breaks the ties of pyastar2d's metric."""
@@ -100,8 +103,8 @@ def make_plan(
     if not g.contains(goal.x, goal.y):
         raise PlanningError(f"the goal ({goal.x:.2f}, {goal.y:.2f}) is outside the map")
     start_cell, goal_cell = g.cell(start.x, start.y), g.cell(goal.x, goal.y)
-    weights = _weigh(snapshot, snapshot.costs, snapshot.clearance, allow_unknown)
-    goal_is_free = bool(np.isfinite(weights[goal_cell]))
+    weights = _weigh(snapshot, (slice(None), slice(None)), allow_unknown)
+    goal_is_free = bool(np.isfinite(weights[goal_cell])) and snapshot.costs[goal_cell] != INSCRIBED
     if not np.isfinite(weights[start_cell]):
         _open_start(weights, snapshot, start_cell, escape_radius)
     end_cell = goal_cell if goal_is_free else _nearest_end(snapshot, weights, start_cell, goal, tolerance)
@@ -130,7 +133,7 @@ def path_cost(points: NDArray[np.float64], snapshot: Snapshot, *, allow_unknown:
         return float("inf")
     if columns.max() >= snapshot.geometry.width:
         return float("inf")
-    weights = _weigh(snapshot, snapshot.costs[rows, columns], snapshot.clearance[rows, columns], allow_unknown)
+    weights = _weigh(snapshot, (rows, columns), allow_unknown)
     lengths = np.hypot(*np.diff(points, axis=0).T)
     return float((lengths * weights[1:]).sum())
 
@@ -144,15 +147,14 @@ def resample(points: NDArray[np.float64], spacing: float) -> NDArray[np.float64]
     return np.stack([np.interp(wanted, along, points[:, axis]) for axis in (0, 1)], axis=1)
 
 
-def _weigh(
-    snapshot: Snapshot, costs: NDArray[np.uint8], clearance: NDArray[np.float32], allow_unknown: bool
-) -> NDArray[np.float32]:
-    """Return the weights of cells by their costs and clearances: 1 for a free cell, infinite for a blocked one."""
+def _weigh(snapshot: Snapshot, cells: tuple[Any, Any], allow_unknown: bool) -> NDArray[np.float32]:
+    """Return the weights of cells (indices of rows and columns): 1 for a free cell, infinite for a blocked one."""
     table = (1.0 + COST_FACTOR * np.arange(256)).astype(np.float32)
     table[INSCRIBED : LETHAL + 1] = np.inf
     table[UNKNOWN] = UNKNOWN_WEIGHT if allow_unknown else np.inf
-    weights = table[costs]
-    weights[clearance < np.float32(snapshot.inscribed_radius + TIGHT_BAND)] += np.float32(TIGHT_WEIGHT)
+    weights = table[snapshot.costs[cells]]
+    weights[snapshot.clearance[cells] < np.float32(snapshot.circumscribed_radius)] *= np.float32(TIGHT_FACTOR)
+    weights[snapshot.pinched[cells]] = PINCH_WEIGHT
     return weights
 
 
