@@ -99,14 +99,19 @@ def test_map_marks_boxes_floor_and_outside(tmp_path):
     assert (grid.cells == OCCUPIED).sum() == pytest.approx(1.0 * 0.5 / 0.05**2, rel=0.15)
 
 
-def test_factory_aisles_let_the_robot_pass():
+def test_factory_has_four_narrow_aisles_and_else_wide_ways():
     world = read_world(WORLDS / "factory.yaml")
     narrow = {
-        (one.name, other.name): distance
+        (one.name, other.name): round(distance, 3)
         for one, other in itertools.combinations(world.boxes, 2)
-        if 0.03 < (distance := gap(one, other)) < 2.2
+        if 0.03 < (distance := gap(one, other)) < 1.2
     }
-    assert narrow == {}
+    assert narrow == {(f"row_{index}", f"row_{index + 1}"): 1.1 for index in range(1, 5)}
+
+
+def test_every_route_crosses_the_row_of_racks():
+    routes = yaml.safe_load((WORLDS / "routes.yaml").read_text())["routes"]
+    assert all(route["start"][1] * route["goal"][1] < 0.0 for route in routes.values())
 
 
 def test_routes_start_and_end_clear_of_obstacles():

@@ -32,13 +32,13 @@ ESCAPE_WEIGHT, PUSH_WEIGHT = 30.0, 300.0
 """Weights of inscribed and of obstacle cells around a start that lies among them; high, for a short way out."""
 
 TIGHT_FACTOR = 3.0
-"""Factor of the weight of cells where the robot cannot turn: those with less clearance than its circumscribed radius. So a plan
-keeps off corners and enters a gap straight, and takes the gap where the way round is longer than three times its
+"""Factor of the weight of cells where the robot cannot turn: those with less clearance than its circumscribed radius. So
+a plan keeps off corners and enters a gap straight, and takes the gap where the way round is longer than three times its
 length."""
 
 PINCH_WEIGHT = 10.0
-"""Weight of cells where the robot fits with half of its padding only. NavFn refuses them, and so loses every passage that
-is hardly wider than the padded robot as soon as a noisy return narrows it by a cell."""
+"""Weight of cells where the robot fits with half of its padding only. NavFn refuses them, and so loses every passage
+that is hardly wider than the padded robot as soon as a noisy return narrows it by a cell."""
 
 STRAIGHT_BIAS = 0.02
 """Extra weight per metre from the line between start and goal: breaks the ties of pyastar2d's metric."""

@@ -18,7 +18,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from pybullet_simulator.physics.physics import GRAVITY
-from pybullet_simulator.robot.motion_sensors import VIBRATION
+from pybullet_simulator.robot.motion_sensors import vibration_variance
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -72,7 +72,10 @@ class ImuWriter:
         self._message.angular_velocity_covariance = _diagonal(max(errors.gyro**2, _SMALL), 3)
         # The vibration at 0.5 m/s, a usual speed.
         sideways = max(errors.imu**2, _SMALL)
-        self._message.linear_acceleration_covariance = [(0.5 * VIBRATION) ** 2, *_diagonal(sideways, 3)[1:]]
+        self._message.linear_acceleration_covariance = [
+            vibration_variance(0.5, MOTION_STEPS * STEP),
+            *_diagonal(sideways, 3)[1:],
+        ]
         self._message.linear_acceleration.z = GRAVITY
 
     def write(self, now: genpy.Time, simulation: Simulation) -> Imu:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 from robot_formulas.geometry import ORIGIN, Pose, wrap
 
 from pybullet_simulator.robot.random_errors import Normals, Wander
@@ -13,13 +14,14 @@ from pybullet_simulator.robot.random_errors import Normals, Wander
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-VIBRATION = 12.0
-"""Standard deviation of the IMU's forward acceleration in m/s2 per m/s of speed, at 50 Hz.
+VIBRATION = 2.0
+"""Standard deviation of the IMU's forward acceleration between jolts, in m/s2 per m/s of speed, at 50 Hz."""
 
-Derived from the published energies of the thirty variants of D2: solved for the acceleration peak per second, they give
-25 to 28 m/s2 per m/s at the variants' top speeds, about 27 once slower stretches of a mission are allowed for. The
-expected maximum of the 50 normal samples of a second is 2.25 standard deviations: 27 / 2.25 = 12.
-"""
+JOLT_SPACING = 9.4
+"""m between two jolts on average: joints and damaged places of the floor that a wheel runs over."""
+
+JOLT = 26.5
+"""Scale of the Rayleigh distribution of a jolt's acceleration, in m/s2 per m/s of speed."""
 
 SLIP_SIDEWAYS = 3.0
 """Mecanum wheels slip about three times as much sideways as ahead: their rollers carry the load (estimate)."""
@@ -113,14 +115,27 @@ class Odometry:
         self.filtered = self.filtered @ Pose(x, y, moved.yaw + gyro_error * duration)
 
 
+def vibration_variance(speed: float, duration: float) -> float:
+    """Return the variance of the shaken forward acceleration, (m/s2)^2, at a speed (m/s) and time between samples (s)."""
+    jolts = 2.0 * speed * duration / JOLT_SPACING  # samples with a jolt, or with the rebound after it
+    return (VIBRATION * speed) ** 2 + jolts * 2.0 * (JOLT * speed) ** 2
+
+
 class Imu:
-    """Accelerations in base_link, shaken by the wheels on a hard floor."""
+    """Accelerations in base_link, shaken by the wheels on a hard floor.
+
+    The bulk of the vibration is normal. Jolts come as a Poisson process along the way, each forwards in one sample and
+    back in the next. The constants are fitted to published energies (docs/yardstick.md).
+    """
 
     def __init__(self, noise: float, seed: int) -> None:
         """Start at rest; `noise` is Errors.imu."""
         self._noise = noise
         self._shaking = Normals(seed, 1)
         self._resting = Normals(seed, 6)
+        self._floor = np.random.default_rng([seed, 10])
+        self._next_jolt = float(self._floor.exponential(JOLT_SPACING))  # m from here
+        self._rebound = 0.0
 
     def measure(self, change: Sequence[float], speed: float, duration: float) -> tuple[float, float]:
         """Return the acceleration (ahead, left) in m/s2 over the last sample.
@@ -130,9 +145,19 @@ class Imu:
             speed: of the base, m/s.
             duration: since the last sample, s.
         """
-        shaking = VIBRATION * speed * self._shaking.next()
+        shaking = VIBRATION * speed * self._shaking.next() + self._jolt(speed, duration)
         ahead, left = (value / duration + self._noise * self._resting.next() for value in change)
         return ahead + shaking, left
+
+    def _jolt(self, speed: float, duration: float) -> float:
+        """Return what the floor's joints add to the forward acceleration of this sample, m/s2."""
+        jolt, self._rebound = self._rebound, 0.0
+        self._next_jolt -= speed * duration
+        if self._next_jolt <= 0.0:
+            self._next_jolt += float(self._floor.exponential(JOLT_SPACING))
+            size = JOLT * speed * float(self._floor.rayleigh())
+            jolt, self._rebound = jolt + size, -size
+        return jolt
 
 
 class Localisation:
