@@ -102,7 +102,7 @@ def test_other_campaigns_of_the_project(name, count):
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (None, "small.yaml: the file: is missing, must be a mapping with the key parts"),
+        (None, "small.yaml: the file: is empty, must be a mapping with the key parts"),
         ({"parts": {}}, "parts: is '{}', must be a mapping of names to matrices"),
         ({**SMALL, "engines": "ros"}, "engines: unknown key, allowed here: engine, seed"),
         ({**SMALL, "engine": "gazebo"}, "engine: is 'gazebo', must be lockstep or ros"),

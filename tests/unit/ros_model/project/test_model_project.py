@@ -124,7 +124,10 @@ def test_without_a_table_variants_are_files(load, settings, tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"package": None}, "package: is missing, must be a name"),
+        ({"package": None}, "package: is empty, must be a name"),
+        ({"manipulator": None}, "manipulator: is empty, must be a mapping: fill it, or take it out"),
+        ({"functions": {"f_move": {"designs": None}}}, "functions.f_move.designs: is empty, must be 'all' or a list"),
+        ({"components": {"laser": None}}, "components.laser: is empty, must be a mapping with either node or topic"),
         ({"colour": 1}, "colour: unknown key, allowed here: package, base"),
         ({"functions": []}, "functions: is '[]', must be a mapping"),
         ({"utility": "speed"}, "utility: 'speed' is none of quality_attributes: safety"),
@@ -165,7 +168,7 @@ def test_wrong_setting_is_refused_in_one_line(load, settings, change, message):
     [
         ("{", r"metacontrol\.yaml:2:1: "),
         ("a: b: c", r"metacontrol\.yaml:1:5: "),
-        ("", "the file: is missing, must be a mapping with package"),
+        ("", "the file: is empty, must be a mapping with package"),
         ("!!python/object/apply:os.system [id]", "could not determine a constructor"),
         ("[" * 10_000, "metacontrol.yaml"),
     ],

@@ -91,17 +91,19 @@ def _check_object(
     properties, others = schema.get("properties", {}), schema.get("additionalProperties", {})
     for name in schema.get("required", ()):
         if name not in value:
-            yield _fault(None, _resolved(properties[name], root), (*keys, name))
+            yield Violation((*keys, name), f"is missing, must be {_resolved(properties[name], root)['title']}")
     for name, item in value.items():
         if not isinstance(name, str):
             yield Violation(keys, f"the key {name!r} must be text: put it in quotes")
         elif name in properties:
-            yield from _check(item, properties[name], root, (*keys, name))
+            optional = item is None and name not in schema.get("required", ())
+            for fault in _check(item, properties[name], root, (*keys, name)):
+                yield Violation(fault.keys, f"{fault.message}: fill it, or take it out") if optional else fault
         elif others is False:
             yield Violation((*keys, name), f"unknown key, allowed here: {', '.join(properties)}")
         else:
             names = _resolved(schema.get("propertyNames", {}), root)
-            if not _keeps_bounds(name, names):
+            if names and not _keeps_bounds(name, names):
                 yield Violation((*keys, name), f"the key {name!r} must be {names['title']}")
             yield from _check(item, others, root, (*keys, name))
 
@@ -140,7 +142,7 @@ def _keeps_bounds(value: Any, schema: Mapping[str, Any]) -> bool:
 
 
 def _fault(value: object, schema: Mapping[str, Any], keys: Keys) -> Violation:
-    found = "is missing" if value is None else f"is {_shortened(value)}"
+    found = "is empty" if value is None else f"is {_shortened(value)}"
     return Violation(keys, f"{found}, must be {schema['title']}")
 
 
