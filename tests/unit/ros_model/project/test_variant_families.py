@@ -239,6 +239,30 @@ def test_columns_that_do_not_fit_the_base_are_refused(systems, section, message)
     assert message in str(caught.value)
 
 
+def test_every_column_and_every_cell_that_is_wrong_is_told(systems):
+    section = {**SECTION, "ignore": [], "components": {}, "expected": {"danger": "safety"}}
+    with pytest.raises(ModelError) as caught:
+        systems("v,fast,3,sonar,served,maybe,0.1,x", section=section)
+    assert [error.message.partition(": ")[0] for error in caught.value.all] == [
+        "nothing says what column 'guarded' sets",
+        "nothing says what column 'risk' sets",
+        "nothing says what column 'note' sets",
+        "the mapped column 'danger' is missing",
+    ]
+    with pytest.raises(ModelError) as caught:
+        systems("v,fast,3,sonar,served,maybe,low,x")
+    assert [error.message.split()[1] for error in caught.value.all] == [
+        "'risk'",
+        "'guarded'",
+        "'sensor'",
+        "'speed_mps'",
+    ]
+    section = {**SECTION, "parameters": {"speed_mps": [{"name": "speed", "component": "leg"}]}, "component": "arm"}
+    with pytest.raises(ModelError) as caught:
+        systems("v,1,3,raw,served,true,0.1,x", section=section)
+    assert [error.message.split()[0] for error in caught.value.all] == ["'arm'", "'leg'"]
+
+
 def test_connection_of_a_component_that_the_variant_lacks_is_refused(systems):
     section = {**SECTION, "components": {"guarded": ["filter"]}}
     with pytest.raises(ModelError, match="2:1: connects 'filter', which this variant lacks"):
@@ -249,6 +273,7 @@ def test_connection_of_a_component_that_the_variant_lacks_is_refused(systems):
     ("text", "suffix", "message"),
     [
         ("name,a,a\nv,1,2\n", ".csv", "1:1: column 'a' is empty or stands twice"),
+        ("name,a,b,a,b\nv,1,2,3,4\n", ".csv", "1:1: column 'a' is empty or stands twice"),
         ('name,a\nv,"1\n', ".csv", "unexpected end of data"),
         ("name\nv\n", ".txt", "is neither .csv nor .yaml"),
         ("3", ".yaml", "1:1: must be a list of rows"),

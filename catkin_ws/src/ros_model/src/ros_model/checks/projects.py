@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
-from ros_model.project.corrections import correction_groups
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -19,8 +18,8 @@ def wrong_names(project: Project) -> Iterator[ModelError]:
     """Yield variants of one name, and designs and components that are not there."""
     source = project.source
     known = [variant.name for variant in project.variants]
-    if twice := sorted({name for name in known if known.count(name) > 1}):
-        yield source.error(f"two variants bear the name {twice[0]!r}: rename one", "variants")
+    for name in sorted({name for name in known if known.count(name) > 1}):
+        yield source.error(f"two variants bear the name {name!r}: rename one", "variants")
     for name, function in project.settings["functions"].items():
         for number, design in enumerate(function["designs"] if function["designs"] != "all" else ()):
             if design not in known:
@@ -40,14 +39,6 @@ def wrong_names(project: Project) -> Iterator[ModelError]:
                     f"{component!r} is a component neither of the base nor of components: add it to one",
                     *("requires", parameter, value),
                 )
-
-
-def wrong_corrections(project: Project) -> Iterator[ModelError]:
-    """Yield what `correction` names although neither the base nor a variant has it."""
-    try:
-        correction_groups(project)
-    except ModelError as error:
-        yield error
 
 
 def wrong_levels(project: Project) -> Iterator[ModelError]:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 from node_kit.io.input_files import real_path
 
-from ros_model.checks.projects import levels_of_nothing, two_meanings, wrong_corrections, wrong_levels, wrong_names
+from ros_model.checks.projects import levels_of_nothing, two_meanings, wrong_levels, wrong_names
 from ros_model.errors import Gathered, ModelError, first_of
 from ros_model.io.files import read_text
 from ros_model.io.models import files_in, read_library, read_system
 from ros_model.language.any_language import PACKAGES
 from ros_model.project.columns import parse_columns
+from ros_model.project.corrections import wrong_corrections
 from ros_model.project.project import Project
 from ros_model.project.settings import FILE_NAME, parse_settings
 from ros_model.project.tables import FORMATS, parse_table

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from ros_model.errors import ModelError
+from ros_model.errors import Gathered, ModelError
+from ros_model.language.library import hint
 from ros_model.language.metamodel import ENDS, PortPath, Position
 
 if TYPE_CHECKING:
-    from ros_model.language.metamodel import Component, PortKind, RosSystem
+    from ros_model.language.metamodel import PortKind, RosSystem
     from ros_model.project.tables import Table
 
 Where = Callable[..., Position | None]
@@ -141,10 +142,11 @@ def with_implied(columns: Columns, table: Table, base: RosSystem) -> Columns:
     """Return the columns, with those that need no mapping: `COMPONENT.PARAMETER` and `qa_NAME`.
 
     Raises:
-        ModelError: a column is neither mapped nor of this form, or a mapped column is missing.
+        ModelError: columns are neither mapped nor of this form, or mapped columns are missing; says which.
     """
     parameters, expected = dict(columns.parameters), dict(columns.expected)
     first_line = Position(str(table.path), 1, 1)
+    wrong = Gathered()
     for column in table.columns:
         component, dot, parameter = column.partition(".")
         if column in columns.names:
@@ -154,11 +156,12 @@ def with_implied(columns: Columns, table: Table, base: RosSystem) -> Columns:
         elif column.startswith(_EXPECTED):
             expected[column] = column.removeprefix(_EXPECTED)
         else:
-            raise ModelError(
-                f"nothing says what column {column!r} sets: map it, or name it COMPONENT.PARAMETER", first_line
-            )
-    if absent := sorted(columns.names - columns.ignored - set(table.columns)):
-        raise ModelError(f"the mapped column {absent[0]!r} is missing: add it, or remove its mapping", first_line)
+            told = f"nothing says what column {column!r} sets: map it, or name it COMPONENT.PARAMETER"
+            wrong.add([ModelError(told, first_line)])
+    for column in sorted(columns.names - columns.ignored - set(table.columns)):
+        told = f"the mapped column {column!r} is missing: add it, or remove its mapping"
+        wrong.add([ModelError(told, first_line)])
+    wrong.tell()
     return replace(columns, parameters=parameters, expected=expected)
 
 
@@ -166,41 +169,50 @@ def check_columns(columns: Columns, base: RosSystem) -> None:
     """Check that the base has all that the columns name.
 
     Raises:
-        ModelError: a component is not there or names no node, or a connection does not begin at a publisher or server.
+        ModelError: components are not there or name no node, or connections do not begin at a publisher or server;
+            says which.
     """
+    wrong = Gathered()
+    wrong.add(_wrong_names(columns, base))
+    wrong.tell()
 
-    def named(name: str, *keys: str | int) -> Component:
+
+def _wrong_names(columns: Columns, base: RosSystem) -> Iterator[ModelError]:
+    def unnamed(name: str, *keys: str | int) -> Iterator[ModelError]:
         component = base.component(name)
         if component is None or component.executable is None:
-            raise ModelError(
-                f"{name!r} is no component with a FromRosNode in {base.position.file}", columns.where(*keys)
-            )
-        return component
+            told = f"{name!r} is no component with a FromRosNode in {base.position.file}"
+            yield ModelError(told, columns.where(*keys))
 
     if columns.component:
-        named(columns.component, "component")
+        yield from unnamed(columns.component, "component")
     seen: dict[tuple[str, str], str] = {}
     for column, settings in columns.parameters.items():
         for number, setting in enumerate(settings):
-            named(setting.component, "parameters", column, number)
+            yield from unnamed(setting.component, "parameters", column, number)
             other = seen.setdefault((setting.component, setting.name), column)
             if other != column:
-                raise ModelError(
+                yield ModelError(
                     f"columns {other!r} and {column!r} both set {setting.name} of {setting.component}: take one out",
                     columns.where("parameters", column, number),
                 )
     for column, names in columns.presence.items():
         for number, name in enumerate(names):
-            named(name, "components", column, number)
+            yield from unnamed(name, "components", column, number)
     for column, choices in columns.wires.items():
         for value, wires in choices.items():
             for number, wire in enumerate(wires):
                 keys = ("connections", column, value, number)
-                named(wire.component, *keys)
+                yield from unnamed(wire.component, *keys)
                 if outlet(base, wire.source) is None:
-                    raise ModelError(
-                        f"{wire.source} is no publisher or server in {base.position.file}", columns.where(*keys)
-                    )
+                    told = f"{wire.source} is no publisher or server in {base.position.file}"
+                    yield ModelError(told + _other_outlet(base, wire.source), columns.where(*keys))
+
+
+def _other_outlet(base: RosSystem, source: PortPath) -> str:
+    """Return the hint which port may be meant."""
+    ends = (f"{c.name}.{port.name}" for c in base.components for port in c.ports if port.kind in TARGET_OF)
+    return hint(str(source), ends)
 
 
 def outlet(system: RosSystem, source: PortPath) -> PortKind | None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from ros_model.language.metamodel import compose
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from ros_model.errors import ModelError
     from ros_model.language.metamodel import RosSystem
     from ros_model.project.project import Project
@@ -17,22 +19,24 @@ def correction_groups(project: Project) -> dict[str, dict[str, str]]:
 
     A correction that was learnt of one variant holds for those with the same text. A quality attribute without such an
     entry is left out: what is learnt of it holds for all variants.
-
-    Raises:
-        ModelError: an entry names nothing that the base or a variant has.
     """
     found: dict[str, dict[str, str]] = {}
     for quality, entry in project.settings["quality_attributes"].items():
         names = entry.get("correction", {}).get("same", ())
-        for number, name in enumerate(names):
-            if not _is_known(project, name):
-                raise _unknown(project, name, "quality_attributes", quality, "correction", "same", number)
         if names:
             found[quality] = {
                 variant.name: ", ".join(_likeness(project, variant, name) for name in names)
                 for variant in project.variants
             }
     return found
+
+
+def wrong_corrections(project: Project) -> Iterator[ModelError]:
+    """Yield what `correction` names although neither the base nor a variant has it."""
+    for quality, entry in project.settings["quality_attributes"].items():
+        for number, name in enumerate(entry.get("correction", {}).get("same", ())):
+            if not _is_known(project, name):
+                yield _unknown(project, name, "quality_attributes", quality, "correction", "same", number)
 
 
 def _is_known(project: Project, name: str) -> bool:

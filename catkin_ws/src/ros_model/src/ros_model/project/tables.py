@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ros_model.errors import Gathered, ModelError
+from ros_model.errors import Gathered, ModelError, first_of
 from ros_model.file_names import safe_file_name
 from ros_model.language.metamodel import Position, Value
 from ros_model.project.yaml_file import parse_yaml
@@ -100,8 +100,10 @@ def _csv_rows(text: str, path: Path, wrong: Gathered) -> list[Row]:
         columns = [column.strip() for column in next(reader, [])]
         if NAME not in columns:
             raise _fault(f"no column {NAME!r}: the first line must name the columns", Position(str(path), 1, 1))
-        if twice := [column for column in columns if columns.count(column) > 1 or not column]:
-            raise _fault(f"column {twice[0]!r} is empty or stands twice", Position(str(path), 1, 1))
+        if twice := dict.fromkeys(column for column in columns if columns.count(column) > 1 or not column):
+            raise first_of(
+                _fault(f"column {column!r} is empty or stands twice", Position(str(path), 1, 1)) for column in twice
+            )
         for cells in reader:
             where = Position(str(path), reader.line_num, 1)
             if not cells:

@@ -66,9 +66,7 @@ def make_systems(
         row = replace(given, cells=cells)
         expected: list[SystemParameter] = []
         with wrong.step():
-            expected += _expected(row, columns.expected)
-        with wrong.step():
-            expected += _levels(row, levels)
+            expected += _expected(row, columns.expected, levels)
         with wrong.step():
             whole = _whole(base, columns, row, expected)
             found.append((whole, replace(_part(whole, columns.varied), parameters=tuple(expected))))
@@ -78,11 +76,29 @@ def make_systems(
 
 def _whole(base: RosSystem, columns: Columns, row: Row, expected: list[SystemParameter]) -> RosSystem:
     """Return the whole system that a row makes of the base."""
+    wrong = Gathered()
+    wrong.add(_wrong_cells(columns, row))
+    wrong.tell()
     rewired = _rewired(without(base, _absent(row, columns)), columns, row)
     components = tuple(_with_parameters(component, columns, row) for component in rewired.components)
     own = {parameter.name for parameter in expected}
     inherited = tuple(parameter for parameter in base.parameters if parameter.name not in own)
     return RosSystem(row.name, components, rewired.connections, (*inherited, *expected), position=row.position)
+
+
+def _wrong_cells(columns: Columns, row: Row) -> Iterator[ModelError]:
+    """Yield cells of a row that say nothing that their columns know."""
+    for column in columns.presence:
+        if not isinstance(row.cells[column], bool):
+            yield ModelError(f"column {column!r} is {row.cells[column]!r}, must be true or false", row.position)
+    for column, choices in columns.wires.items():
+        if (value := _key(row.cells[column])) not in choices:
+            yield ModelError(f"column {column!r} is {value!r}, must be {' or '.join(choices)}", row.position)
+    for column, settings in columns.parameters.items():
+        cell, factors = row.cells[column], [setting.factor for setting in settings if setting.factor is not None]
+        if factors and cell is not None and (isinstance(cell, bool) or not isinstance(cell, (int, float))):
+            told = f"column {column!r} is {cell!r}, must be a number: it is scaled by {factors[0]}"
+            yield ModelError(told, row.position)
 
 
 def without(system: RosSystem, names: Collection[str]) -> RosSystem:
@@ -114,22 +130,12 @@ def _part(whole: RosSystem, names: Collection[str]) -> RosSystem:
 
 
 def _absent(row: Row, columns: Columns) -> frozenset[str]:
-    absent: set[str] = set()
-    for column, names in columns.presence.items():
-        if not isinstance(row.cells[column], bool):
-            raise ModelError(f"column {column!r} is {row.cells[column]!r}, must be true or false", row.position)
-        absent.update(names if not row.cells[column] else ())
-    return frozenset(absent)
+    return frozenset(name for column, names in columns.presence.items() if not row.cells[column] for name in names)
 
 
 def _rewired(system: RosSystem, columns: Columns, row: Row) -> RosSystem:
     """Return the system with the connections that the row chooses in place of all that it may choose from."""
-    chosen: list[Wire] = []
-    for column, choices in columns.wires.items():
-        value = _key(row.cells[column])
-        if value not in choices:
-            raise ModelError(f"column {column!r} is {value!r}, must be {' or '.join(choices)}", row.position)
-        chosen += choices[value]
+    chosen = [wire for column, choices in columns.wires.items() for wire in choices[_key(row.cells[column])]]
     names = _connection_names(system)
     bare, system = _unwired(system, tuple(columns.all_wires()))
     for wire in chosen:
@@ -206,7 +212,7 @@ def _with_parameters(component: Component, columns: Columns, row: Row) -> Compon
         RosParameter(
             setting.name,
             Reference(node.package, node.artifact, node.node, setting.name),
-            _fitting(component, setting, _scaled(cell, setting.factor, column, row.position)),
+            _fitting(component, setting, _scaled(cell, setting.factor)),
             position=row.position,
         )
         for column, settings in columns.parameters.items()
@@ -218,12 +224,10 @@ def _with_parameters(component: Component, columns: Columns, row: Row) -> Compon
     return replace(component, parameters=(*kept, *found))
 
 
-def _scaled(cell: Value, factor: float | None, column: str, where: Position) -> Value:
+def _scaled(cell: Value, factor: float | None) -> Value:
     """Return a cell, times the factor, if there is one, as a double; exactly, as people reckon (0.3 * 12 is 3.6)."""
     if factor is None:
         return cell
-    if isinstance(cell, bool) or not isinstance(cell, (int, float)):
-        raise ModelError(f"column {column!r} is {cell!r}, must be a number: it is scaled by {factor}", where)
     return float(Decimal(str(cell)) * Decimal(str(factor)))
 
 
@@ -237,14 +241,26 @@ def _double(value: Value | None) -> Value | None:
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
-def _expected(row: Row, columns: Mapping[str, str]) -> Iterator[SystemParameter]:
-    for column, quality in columns.items():
-        yield _level(quality, row.cells[column], f"column {column!r}", row.position)
+def _expected(row: Row, columns: Mapping[str, str], levels: Table | None) -> list[SystemParameter]:
+    """Return the expected levels of a row, from its own columns and from the table of levels."""
+    cells = [(quality, row.cells[column], f"column {column!r}", row.position) for column, quality in columns.items()]
+    wrong = Gathered()
+    with wrong.step():
+        cells += _levels(row, levels)
+    found = []
+    for quality, cell, what, where in cells:
+        if isinstance(cell, bool) or not isinstance(cell, (int, float)):
+            wrong.add([ModelError(f"{what} is {cell!r}, must be a number", where)])
+        else:
+            found.append(SystemParameter(f"qa_{quality}", ParameterType("Double"), float(cell), position=where))
+    wrong.tell()
+    return found
 
 
-def _levels(row: Row, levels: Table | None) -> Iterator[SystemParameter]:
+def _levels(row: Row, levels: Table | None) -> list[tuple[str, Value | None, str, Position]]:
+    """Return quality attribute, cell, name for messages and position of each level of a row."""
     if levels is None:
-        return
+        return []
     found = levels.row(row.name)
     if found is None:
         raise ModelError(
@@ -252,15 +268,9 @@ def _levels(row: Row, levels: Table | None) -> Iterator[SystemParameter]:
             Position(str(levels.path), 1, 1),
         )
     cells = {column: cell for column, cell in found.cells.items() if not _ABOUT.fullmatch(column)}
-    if any(cell is not None for cell in cells.values()):
-        for column, cell in cells.items():
-            yield _level(column, cell, f"{row.name}: {column}", found.position)
-
-
-def _level(quality: str, cell: Value | None, what: str, where: Position) -> SystemParameter:
-    if isinstance(cell, bool) or not isinstance(cell, (int, float)):
-        raise ModelError(f"{what} is {cell!r}, must be a number", where)
-    return SystemParameter(f"qa_{quality}", ParameterType("Double"), float(cell), position=where)
+    if all(cell is None for cell in cells.values()):
+        return []
+    return [(column, cell, f"{row.name}: {column}", found.position) for column, cell in cells.items()]
 
 
 def _key(cell: Value | None) -> str:
