@@ -137,8 +137,8 @@ def test_wrong_arguments_are_refused(run, models, arguments, message):
     ("old", "new", "message"),
     [
         ("'p.nav.nav'", "'../../bin.sh.x'", "base.rossystem:7:51: reference '../../bin.sh.x' is not"),
-        ("'p.nav.nav'", "'p.$(env HOME).nav'", "base.rossystem:7:9: '$(env HOME)' can't name a package or executable"),
-        ("'p.nav.nav'", "'p.bin/sh.nav'", "base.rossystem:7:9: 'bin/sh' can't name a package or executable"),
+        ("'p.nav.nav'", "'p.$(env HOME).nav'", "base.rossystem:7:51: '$(env HOME)' can't name a package or executable"),
+        ("'p.nav.nav'", "'p.bin/sh.nav'", "base.rossystem:7:51: 'bin/sh' can't name a package or executable"),
         ("name nav", "name 'nav\" args=\"x'", "base.rossystem:7:9: 'nav\" args=\"x' is no name of ROS"),
         ("name nav", "name '$(arg x)'", "is no name of ROS"),
         ("name nav", "name nav NameSpace '../up'", "is no name of ROS"),
@@ -150,6 +150,57 @@ def test_model_that_reaches_outside_or_injects_is_refused_at_its_place(run, mode
     assert status == 2
     assert message in err.splitlines()[0]
     assert not (tmp_path / "out").exists()
+
+
+NAV = """PackageSet { CatkinPackage p { Artifact nav { Node { name nav
+    Parameters { Parameter { name speed type Double } } } }, Artifact robot { Node { name robot
+    Publishers { Publisher { name odom message 'nav_msgs.Odometry' } } } }, Artifact guard { Node { name guard
+    Subscribers { Subscriber { name odom message 'nav_msgs.Odometry' } } } } } }"""
+OBSERVER = {"name": "Tilt", "quality_attribute": "q", "topics": {"imu": "sensor_msgs/Imuu"}, "rate": 1, "range": [0, 1]}
+
+
+@pytest.mark.parametrize(
+    ("packages", "settings", "message"),
+    [
+        (NAV.replace("name speed", "name sped"), {}, "'p.nav.nav' declares no parameter 'speed'"),
+        (NAV.replace("type Double", "type Double default fast"), {}, "'fast' of 'speed' is no Double"),
+        (NAV.replace("Subscriber { name odom", "Subscriber { name pose"), {}, "no subscriber 'odom': it declares pose"),
+        (NAV, {"functions": {"f": {"designs": ["a"]}}}, "functions: none has b among its designs: add it to one"),
+        (NAV, {"observers": [OBSERVER]}, "observers[0].topics.imu: package 'sensor_msgs' declares no message 'Imuu'"),
+    ],
+)
+def test_what_check_refuses_is_refused_before_anything_is_written(run, models, tmp_path, packages, settings, message):
+    folder = models({"a": {"speed": 1.0}, "b": {"speed": 0.5}}, **settings)
+    (folder / "p.ros").write_text(packages)
+    status, out, _ = run("check", folder)
+    assert (status, message in out) == (1, True)
+    status, out, err = run("generate", "all", folder, "-o", tmp_path)
+    assert (status, out, message in err) == (2, "", True)
+    assert [path.name for path in tmp_path.iterdir()] == ["models"]
+
+
+def test_model_that_is_generated_anew_does_not_stand_in_the_way_of_its_correction(run, models, tmp_path):
+    good = {**OBSERVER, "topics": {"imu": "sensor_msgs/Imu"}}
+    assert run("generate", "all", models({"a": {"speed": 1}}, observers=[good]), "-o", tmp_path)[0] == 0
+    observers = tmp_path / "models" / "observers.ros"
+    observers.write_text(observers.read_text().replace("sensor_msgs.Imu'", "sensor_msgs.Imuu'"))
+    assert run("check", tmp_path / "models")[0] == 0
+    assert run("check", observers)[0] == 1
+    assert run("generate", "all", tmp_path / "models", "-o", tmp_path)[0] == 0
+    assert "sensor_msgs.Imu'" in observers.read_text()
+
+
+def test_lone_system_that_check_refuses_gets_no_launch_file(run, models, tmp_path):
+    folder = models({"a": {"speed": 1}}, base_text=BASE.replace("'guard.odom'", "'guard.odo'"))
+    status, _, err = run("generate", "launch", folder / "base.rossystem", "-o", tmp_path)
+    assert (status, "'guard' has no port 'odo'" in err, (tmp_path / "launch").exists()) == (2, True, False)
+
+
+def test_lone_variant_of_a_project_gets_a_launch_file(run, models, tmp_path):
+    folder = models({"a": {"speed": 1}}, variants={**SETTINGS["variants"], "components": {"g": ["guard"]}})
+    (folder / "v.yaml").write_text("a: {speed: 1, g: true}\n")
+    assert run("generate", "all", folder, "-o", tmp_path)[0] == 0
+    assert run("generate", "launch", folder / "variants" / "a.rossystem", "-o", tmp_path)[0] == 0
 
 
 @pytest.mark.parametrize(

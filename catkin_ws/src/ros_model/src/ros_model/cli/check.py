@@ -13,10 +13,12 @@ from ros_model.checks.families import check_family, families
 from ros_model.checks.launched import check_launch_file
 from ros_model.checks.packages import check_packages
 from ros_model.checks.systems import check_system
+from ros_model.checks.whole_projects import check_project
 from ros_model.cli import BAD_INPUT
 from ros_model.cli.reports import FORMATS
 from ros_model.errors import ModelError
 from ros_model.findings import ERROR, WARNING, Finding
+from ros_model.generators import MARK
 from ros_model.io.installed import InstalledPackages
 from ros_model.io.models import files_in, models_at, read_all, read_packages
 from ros_model.language.any_language import PACKAGES
@@ -26,7 +28,7 @@ from ros_model.language.packages import PackageSet
 from ros_model.project.settings import FILE_NAME
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
 
     from ros_model.checks.launched import LaunchFile
     from ros_model.language.metamodel import RosSystem
@@ -65,7 +67,7 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
 
     Exit status: 0 all is well or only warnings were given, 1 something is wrong in a model, 2 a file can't be read.
     """
-    checked = _Check(folders)
+    checked = Check(folders)
     for file in files:
         checked.add(Path(file))
     findings = checked.findings()
@@ -76,10 +78,10 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
     return int(any(finding.severity == ERROR for finding in findings))
 
 
-class _Check:
+class Check:
     """Gathers what there is to check, then checks it by all that is known."""
 
-    def __init__(self, folders: Iterable[str]) -> None:
+    def __init__(self, folders: Iterable[str] = ()) -> None:
         self._refused: list[Finding] = []
         self._unknown: dict[Path, Finding] = {}  # what could not be read, though nobody asked to check it
         self._asked: set[Path] = set()
@@ -89,6 +91,7 @@ class _Check:
         self._wholes: dict[Path, RosSystem] = {}  # what a system that is a variant is part of
         self._packages: dict[Path, PackageSet] = {}
         self._beside: dict[Path, PackageSet] = {}
+        self._generated: set[Path] = set()
         self._launch_files: dict[Path, LaunchFile] = {}
         for folder in folders:
             self._know(files_in(Path(folder), PACKAGES))
@@ -100,7 +103,7 @@ class _Check:
                 self._add_launch_file(path)
                 return
             if path.name == FILE_NAME or os.path.isfile(path / FILE_NAME):
-                self._add_project(path)
+                self.add_project(self._load(path if os.path.isdir(path) else path.parent))
                 return
             found = models_at(path)
         except ModelError as error:
@@ -111,15 +114,31 @@ class _Check:
         if not os.path.isdir(path):
             self._know(sorted(path.parent.glob(f"*{PACKAGES}")))
 
+    def add_project(self, project: Project) -> None:
+        """Add a project that is loaded, with its `.ros` models."""
+        self._projects[project.folder] = project
+        for file in files_in(project.source.path.parent, PACKAGES):
+            self._add_file(file)
+            if file in self._packages and self._packages[file].header.startswith(MARK):
+                self._generated.add(file)
+
+    @property
+    def projects(self) -> tuple[Project, ...]:
+        """The projects that were added and could be loaded."""
+        return tuple(self._projects.values())
+
     def findings(self) -> list[Finding]:
         """Return all that is wrong, file by file."""
-        known = {**self._beside, **self._packages}.values()
+        models = {**self._beside, **self._packages}
+        # Models of observers that are generated do not show that the modeller has models of the robot's nodes.
+        known = models.values() if models.keys() - self._generated else ()
         installed = InstalledPackages()
         library = Library((package for packages in known for package in packages.packages), installed)
         found = [*self._refused]
         found += [finding for path, finding in self._unknown.items() if path not in self._asked]
-        for packages in self._packages.values():
-            found += check_packages(packages, library)
+        for path, packages in self._packages.items():
+            if path not in self._generated:  # what is wrong there is wrong in metacontrol.yaml
+                found += check_packages(packages, library)
         for path, system in self._systems.items():
             found += check_system(system, self._wholes.get(path), library, installed)
         for launch in self._launch_files.values():
@@ -127,14 +146,8 @@ class _Check:
         for family in families(self._systems.values()):
             found += check_family(family)
         for project in self._projects.values():
-            found += _of_project(project, library)
+            found += check_project(project, library)
         return [*dict.fromkeys(found)]
-
-    def _add_project(self, path: Path) -> None:
-        project = self._load(path if os.path.isdir(path) else path.parent)
-        self._projects[project.folder] = project
-        for file in files_in(project.folder, PACKAGES):
-            self._add_file(file)
 
     def _add_launch_file(self, path: Path) -> None:
         from ros_model.io.launch_files import read_launch_file  # imported when asked for: roslaunch takes its time
@@ -194,13 +207,3 @@ def _warning(path: Path, error: ModelError) -> Finding:
     count = f"{len(error.all)} error{'s' * (len(error.all) != 1)}"
     message = f"{path} can't be read: {count}; its packages are unknown: check it by itself"
     return Finding(message, None, "unreadable", WARNING)
-
-
-def _of_project(project: Project, library: Library) -> Iterator[Finding]:
-    yield from check_system(project.whole_base, library=library, installed=library.installed)
-    for variant in project.variants:
-        # Where nothing is known of packages, the base has told so.
-        whole = compose(project.base, variant)
-        yield from check_system(variant, whole, library or None, library.installed)
-    for function in project.settings["functions"]:  # designs of one function are compared, and only with each other
-        yield from check_family(project.designs(function))

@@ -1,0 +1,52 @@
+"""The check of a whole project: its base, each variant with the base, the designs of each function, its observers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ros_model.checks.families import check_family
+from ros_model.checks.systems import check_system
+from ros_model.findings import Finding
+from ros_model.language.metamodel import compose
+from ros_model.language.packages import SpecKind
+from ros_model.project.schema_check import dotted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ros_model.language.library import Library
+    from ros_model.project.project import Project
+
+
+def check_project(project: Project, library: Library) -> Iterator[Finding]:
+    """Yield what is wrong with a project that could be loaded.
+
+    Args:
+        project: the project.
+        library: what is known of packages, those beside the project included.
+    """
+    yield from check_system(project.whole_base, library=library, installed=library.installed)
+    for variant in project.variants:
+        # Where nothing is known of packages, the base has told so.
+        whole = compose(project.base, variant)
+        yield from check_system(variant, whole, library or None, library.installed)
+    solving = {design.name for function in project.settings["functions"] for design in project.designs(function)}
+    for variant in project.variants:
+        if variant.name not in solving:
+            text = f"functions: none has {variant.name} among its designs: add it to one"
+            yield Finding(text, project.source.at("functions"), "settings")
+    for function in project.settings["functions"]:  # designs of one function are compared, and only with each other
+        yield from check_family(project.designs(function))
+    yield from unknown_observed_types(project, library)
+
+
+def unknown_observed_types(project: Project, library: Library) -> Iterator[Finding]:
+    """Yield the message types of observers that nobody declares."""
+    for number, entry in enumerate(project.settings["observers"]):
+        for key in ("topics", "outputs") if isinstance(entry, dict) else ():
+            for topic, kind in entry.get(key, {}).items():
+                unknown = library.missing_type(SpecKind.TOPIC, kind)
+                if unknown:
+                    keys = ("observers", number, key, topic)
+                    text = f"{dotted(keys)}: {unknown.message}"
+                    yield Finding(text, project.source.at(*keys), "unknown-type", unknown.severity)
