@@ -165,15 +165,16 @@ class Check:
             self._packages[path] = model
             return
         self._systems[path] = model
-        project = self._project_around(real_path(path))
+        project = self._project_around(path)
         if project is not None:
-            self._know(files_in(project.folder, PACKAGES))
-            if real_path(path) != project.folder / project.settings["base"]:
+            self._know(files_in(project.source.path.parent, PACKAGES))
+            if real_path(path) != real_path(project.source.inside("base")):
                 self._wholes[path] = compose(project.base, model)
 
     def _project_around(self, path: Path) -> Project | None:
         """Return the project that a model belongs to, by the folder that it is in or the one above."""
-        for folder in path.parents[:2]:
+        here = path.parent
+        for folder in (here, here / ".." if here.name in {"", ".."} else here.parent):
             if os.path.isfile(folder / FILE_NAME):
                 try:
                     return self._load(folder)
@@ -184,9 +185,10 @@ class Check:
     def _load(self, folder: Path) -> Project:
         from ros_model.io.project import load_project
 
-        if folder not in self._loaded:
-            self._loaded[folder] = load_project(folder)
-        return self._loaded[folder]
+        key = real_path(folder)
+        if key not in self._loaded:
+            self._loaded[key] = load_project(folder)
+        return self._loaded[key]
 
     def _know(self, paths: Iterable[Path]) -> None:
         """Read packages that references may lead to."""

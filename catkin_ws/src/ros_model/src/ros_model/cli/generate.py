@@ -125,8 +125,8 @@ def _placed(project: Project, output: Path, as_packages: bool) -> tuple[Project,
     folder, root = real_path(project.folder), real_path(package)
     if folder.is_relative_to(root) and folder != root / "models":
         raise ModelError(
-            f"{project.folder}: generated files look for the models in {package / 'models'}: move them there, "
-            "or give the folder around models/ with -o"
+            f"{project.source.path.parent}: generated files look for the models in {package / 'models'}: "
+            "move them there, or give the folder around models/ with -o"
         )
     return replace(project, packages_folder=output if as_packages else None), package
 

@@ -69,7 +69,7 @@ def load_project(folder: str | Path) -> Project:
         source=source,
         whole_base=whole_base,
         by_table=frozenset(by_table),
-        read_library=partial(_read_library, real_path(source.path.parent)),
+        read_library=partial(_read_library, source.path.parent),
     )
     wrong.add(wrong_names(project))
     wrong.add(wrong_levels(project))
@@ -164,7 +164,7 @@ def _from_files(source: Settings, keys: Keys) -> list[RosSystem]:
     if "files" in family:
         paths = [source.inside(*keys, "files", number) for number in range(len(family["files"]))]
     else:
-        paths = sorted((real_path(source.path.parent) / "variants").glob("*.rossystem"))
+        paths = sorted((source.path.parent / "variants").glob("*.rossystem"))
     if not paths:
         raise source.error("names no table, and variants/ holds no .rossystem file: add one", *keys)
     variants = [read_system(path) for path in paths]

@@ -46,7 +46,7 @@ class Settings:
         return ModelError(f"{dotted(keys) or 'the file'}: {message}", self.at(*keys), rule="settings")
 
     def inside(self, *keys: str | int) -> Path:
-        """Return the file that a value names, relative to this one.
+        """Return the file that a value names, relative to this one, as this one was given: messages show both alike.
 
         Raises:
             ModelError: it leaves the folder.
@@ -61,7 +61,7 @@ class Settings:
             raise self.error(f"{name!r} is no name of a file", *keys) from None
         if not found.is_relative_to(folder):
             raise self.error(f"{name} leaves the folder of the models: move the file into it", *keys)
-        return found
+        return self.path.parent / name
 
     def within(self, keys: Keys) -> Callable[..., Position]:
         """Return what gives the position of a value within a section, from the keys inside that."""
