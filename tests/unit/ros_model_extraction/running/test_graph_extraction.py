@@ -9,11 +9,12 @@ import pytest
 from ros_model.checks.systems import check_system
 from ros_model.generators.launch import launch_file
 from ros_model.graph.snapshot import GraphSnapshot, build_snapshot
+from ros_model.language.graph_names import resolve
 from ros_model.language.metamodel import ConnectionKind, PortKind, RosSystem
 from ros_model.language.system_reader import parse_system
 from ros_model.language.system_writer import write_system
 from ros_model_extraction.io.live_nodes import executable_of
-from ros_model_extraction.names import as_seen_from, resolve
+from ros_model_extraction.names import as_seen_from
 from ros_model_extraction.running.details import Details, Origin
 from ros_model_extraction.running.graph import NO_PACKAGE, Models, models_of
 from ros_model_extraction.values import UnwritableValueError, leaves, typed

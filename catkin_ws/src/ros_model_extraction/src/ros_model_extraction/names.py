@@ -16,15 +16,6 @@ def as_seen_from(node: str, name: str) -> str:
     return name.removeprefix(inside) if name.startswith(inside) and name != inside else name
 
 
-def resolve(name: str, node: str) -> str:
-    """Return the full name of what the node with that full name calls `name`: relative, private (`~`) or global."""
-    if name.startswith("/"):
-        return name.rstrip("/") or "/"
-    if name.startswith("~"):
-        return f"{node}/{name[1:].strip('/')}".rstrip("/")
-    return f"{split_name(node)[0]}/{name.rstrip('/')}"
-
-
 def node_name(text: str) -> str:
     """Return the name of a node of a model for a name in the graph or a file's: `talker.py` -> `talker`."""
     return text.removesuffix(".py").replace(".", "_") or "_"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ros_model.checks.references import wrong_port
+from ros_model.checks.references import declarations
 from ros_model.findings import Finding
 from ros_model.language.library import Library, Unknown, hint
 from ros_model.language.metamodel import ENDS
@@ -14,12 +14,10 @@ if TYPE_CHECKING:
 
     from ros_model.language.metamodel import (
         Connection,
-        Port,
         PortKind,
         PortPath,
         RosSystem,
     )
-    from ros_model.language.packages import Node
 
 
 def wrong_ends(connection: Connection, whole: RosSystem) -> Iterator[Finding]:
@@ -54,32 +52,29 @@ def _end(end: PortPath, kind: PortKind, whole: RosSystem) -> tuple[str, str] | N
 
 
 def wrong_types(connection: Connection, whole: RosSystem, library: Library) -> Iterator[Finding]:
-    """Yield ends that their nodes do not declare, and ends whose type differs from that of the first typed end."""
+    """Yield ends whose type differs from that of the first typed end."""
     first: tuple[PortPath, str] | None = None
     for ends, kind in zip((connection.sources, connection.targets), ENDS[connection.kind], strict=True):
         for end in ends:
-            port = _port(end, kind, whole)
-            node = library.node(port.reference) if port and port.reference else None
-            if port is None or port.reference is None or node is None or isinstance(node, Unknown):
-                continue
-            text = f"connection '{connection.name}': '{end}'"
-            place = end.position if end.position.line else connection.position
-            if problem := wrong_port(kind, port.reference, node):
-                yield Finding(f"{text}: {problem[0]}", place, problem[1])
-            found = _type(kind, port.reference.name, node)
+            found = _type(end, kind, whole, library)
             if found and first is None:
                 first = end, found
             elif found and first and found.removesuffix("Action") != first[1].removesuffix("Action"):
-                yield Finding(f"{text} is {found}, but '{first[0]}' is {first[1]}", place, "type-mismatch")
+                text = f"connection '{connection.name}': '{end}' is {found}, but '{first[0]}' is {first[1]}"
+                place = end.position if end.position.line else connection.position
+                yield Finding(text, place, "type-mismatch")
 
 
-def _port(end: PortPath, kind: PortKind, whole: RosSystem) -> Port | None:
+def _type(end: PortPath, kind: PortKind, whole: RosSystem, library: Library) -> str:
+    """Return the type of an end, "" if it is not known; where the node has the port of another kind only, that one's.
+
+    A port that its node does not declare is told where the port is.
+    """
     component = whole.component(end.component)
     ports = component.ports if component else ()
-    return next((port for port in ports if port.name == end.port and port.kind is kind), None)
-
-
-def _type(kind: PortKind, name: str, node: Node) -> str:
-    """Return the type of a node's port, "" if it is not known; where it has the kind only otherwise, that one's."""
-    declared = [port for port in node.ports if port.name == name]
-    return next((port.type for port in sorted(declared, key=lambda port: port.kind is not kind)), "")
+    reference = next((port.reference for port in ports if port.name == end.port and port.kind is kind), None)
+    node = library.node(reference) if reference else None
+    if component is None or reference is None or node is None or isinstance(node, Unknown):
+        return ""
+    declared = sorted(declarations(reference, node, component), key=lambda port: (port.kind is not kind, not port.type))
+    return declared[0].type if declared else ""

@@ -22,9 +22,10 @@ if TYPE_CHECKING:
         Reference,
         RosSystem,
     )
-    from ros_model.language.packages import Node
+    from ros_model.language.packages import Node, PortDeclaration
 
 _PACKAGE = re.compile(r"[A-Za-z0-9_][\w.-]*", re.ASCII)  # and no path
+_SHOWN = 5  # ports of a node that are named
 
 
 def incomplete(system: RosSystem) -> Iterator[Finding]:
@@ -72,7 +73,7 @@ def followed(system: RosSystem, library: Library) -> Iterator[Finding]:
                 yield from _unknown_node(reference, element.position, library, told)
             elif isinstance(element, RosParameter):
                 yield from _wrong_parameter(element, reference, node)
-            elif problem := wrong_port(element.kind, reference, node):
+            elif problem := _wrong_port(element.kind, reference, node, component):
                 text, rule = problem
                 yield Finding(text, _place(reference, element.position), rule)
 
@@ -84,13 +85,24 @@ def _unknown_node(reference: Reference, position: Position, library: Library, to
         yield Finding(found.message, _place(reference, position), "unknown-reference", found.severity)
 
 
-def wrong_port(kind: PortKind, reference: Reference, node: Node) -> tuple[str, str] | None:
+def declarations(reference: Reference, node: Node, component: Component) -> list[PortDeclaration]:
+    """Return what a node declares of a port: under its name, else under names that resolve to the same.
+
+    Models from source have names as the code has them, those of running systems as the node's namespace sees them.
+    """
+    exact = [declared for declared in node.ports if declared.name == reference.name]
+    name = component.resolved(reference.name)
+    return exact or [declared for declared in node.ports if component.resolved(declared.name) == name]
+
+
+def _wrong_port(kind: PortKind, reference: Reference, node: Node, component: Component) -> tuple[str, str] | None:
     """Return what is wrong with a reference to a port of a node, and the rule that says so."""
-    declared = [declaration for declaration in node.ports if declaration.name == reference.name]
+    declared = declarations(reference, node, component)
     where = f"'{reference.package}.{reference.artifact}.{reference.node}'"
     if not declared:
         known = [declaration.name for declaration in node.ports if declaration.kind is kind]
-        return f"{where} declares no {kind.value} '{reference.name}'{hint(reference.name, known)}", "unknown-reference"
+        meant = hint(reference.name, known) or f": it declares {', '.join(known[:_SHOWN]) or 'none'}"
+        return f"{where} declares no {kind.value} '{reference.name}'{meant}", "unknown-reference"
     if all(declaration.kind is not kind for declaration in declared):
         return f"{where} declares '{reference.name}' as a {declared[0].kind.value}, not a {kind.value}", "wrong-kind"
     return None

@@ -11,7 +11,7 @@ from ros_model.language.packages import Node
 
 if TYPE_CHECKING:
     from ros_model.language.library import Library
-    from ros_model.language.metamodel import Port, RosSystem
+    from ros_model.language.metamodel import Component, Port, RosSystem
 
 
 @dataclass(frozen=True)
@@ -30,14 +30,14 @@ def signals(system: RosSystem, library: Library) -> list[Signal]:
         for port in component.ports:
             if port.kind is PortKind.PUBLISHER:
                 topic = topic_of(component, port, system)
-                found.setdefault(topic, Signal(topic, _type(port, library), component.graph_name))
+                found.setdefault(topic, Signal(topic, _type(port, component, library), component.graph_name))
     return list(found.values())
 
 
-def _type(port: Port, library: Library) -> str:
+def _type(port: Port, component: Component, library: Library) -> str:
     node = library.node(port.reference) if port.reference else None
     if port.reference is None or not isinstance(node, Node):
         return ""
-    name = port.reference.name
-    declared = (p for p in node.ports if p.kind is port.kind and p.name.strip("/") == name.strip("/"))
-    return next((found.type for found in declared), "")
+    name = component.resolved(port.reference.name)
+    declared = (p.type for p in node.ports if p.kind is port.kind and component.resolved(p.name) == name)
+    return next(filter(None, declared), "")

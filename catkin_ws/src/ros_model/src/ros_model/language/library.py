@@ -84,13 +84,15 @@ class Library:
     def __init__(self, packages: Iterable[Package] = (), installed: Installed = NothingInstalled()) -> None:  # noqa: B008 - without state
         self.installed = installed
         self._nodes: dict[str, dict[str, dict[str, Node]]] = {}
+        self._models: dict[tuple[str, str, str], set[int]] = defaultdict(set)  # by their numbers, which declare a node
         self._specs: dict[str, dict[tuple[SpecKind, str], Spec]] = defaultdict(dict)
-        for package in packages:
+        for number, package in enumerate(packages):
             artifacts = self._nodes.setdefault(package.name, {})
             for artifact in package.artifacts:
                 nodes = artifacts.setdefault(artifact.name, {})
                 for node in artifact.nodes:
                     nodes[node.name] = _joined(nodes[node.name], node) if node.name in nodes else node
+                    self._models[package.name, artifact.name, node.name].add(number)
             for spec in package.specs:
                 self._specs[package.name].setdefault((spec.kind, spec.name), spec)
 
@@ -99,7 +101,11 @@ class Library:
         return bool(self._nodes)
 
     def node(self, reference: Reference) -> Node | Unknown:
-        """Return the node that a reference names."""
+        """Return the node that a reference names.
+
+        An executable may run under any name: models of a running system have that name, models from source the one in
+        the code. So what other models declare of the same artifact under another name is declared of the node, too.
+        """
         artifacts = self._nodes.get(reference.package)
         if artifacts is None:
             if self.installed.has_package(reference.package):
@@ -118,7 +124,12 @@ class Library:
         if reference.node not in nodes:
             where = f"artifact '{reference.package}.{reference.artifact}' declares no node '{reference.node}'"
             return Unknown(where + hint(reference.node, nodes))
-        return nodes[reference.node]
+        found, models = nodes[reference.node], self._models
+        for name, node in nodes.items():
+            keys = [(reference.package, reference.artifact, known) for known in (reference.node, name)]
+            if models[keys[0]].isdisjoint(models[keys[1]]):
+                found = _joined(found, node)
+        return found
 
     def missing_type(self, kind: SpecKind, name: str) -> Unknown | None:
         """Return what is wrong with the name of a message, service or action type; None if it is known."""

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import enum
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
+
+from ros_model.language.graph_names import resolve
 
 MAX_SIZE = 16_000_000
 """Bytes or characters of the largest model that is read; the largest published one has 432 thousand."""
@@ -175,6 +178,17 @@ class Component:
     def port(self, name: str) -> Port | None:
         """Return the port of that name, or None."""
         return next((port for port in self.ports if port.name == name), None)
+
+    def resolved(self, name: str) -> str:
+        """Return the full name of what the node calls `name`: relative, private (`~`) or global."""
+        return resolve(name, f"/{self.graph_name}")
+
+    def find_port(self, name: str, kinds: Collection[PortKind]) -> Port | None:
+        """Return the port of one of the kinds that has the name, or else one whose name resolves to the same."""
+        ports = [port for port in self.ports if port.kind in kinds]
+        exact = (port for port in ports if port.name == name)
+        alike = (port for port in ports if self.resolved(port.name) == self.resolved(name))
+        return next(exact, None) or next(alike, None)
 
 
 @dataclass(frozen=True)

@@ -37,11 +37,19 @@ class Setting:
 
 @dataclass(frozen=True)
 class Wire:
-    """A connection that a value of a column makes. Without a port, the target's is named as the connection."""
+    """A connection that a value of a column makes.
+
+    Attributes:
+        source: the publisher or server.
+        component: the one that is connected.
+        port: its port; None: the one that is named as the connection.
+        position: where the connection is written; None: nowhere but in a row of the table.
+    """
 
     source: PortPath
     component: str
     port: str | None = None
+    position: Position | None = field(default=None, compare=False)
 
     def leads_to(self, source: PortPath, target: PortPath) -> bool:
         """Return whether this is the wire between two ports."""
@@ -113,10 +121,11 @@ def parse_columns(section: Mapping[str, Any], where: Where = _nowhere) -> Column
         return Setting(owner, entry["name"], entry.get("factor"))
 
     def wire(column: str, value: str, number: int, entry: str | dict[str, str]) -> Wire:
+        keys = ("connections", column, value, number)
         if isinstance(entry, str):
-            return Wire(PortPath.parse(entry), default("connections", column, value, number))
+            return Wire(PortPath.parse(entry), default(*keys), position=where(*keys))
         target = PortPath.parse(entry["to"])
-        return Wire(PortPath.parse(entry["from"]), target.component, target.port)
+        return Wire(PortPath.parse(entry["from"]), target.component, target.port, where(*keys))
 
     return Columns(
         component,
@@ -163,6 +172,26 @@ def with_implied(columns: Columns, table: Table, base: RosSystem) -> Columns:
         wrong.add([ModelError(told, first_line)])
     wrong.tell()
     return replace(columns, parameters=parameters, expected=expected)
+
+
+def with_ports(columns: Columns, base: RosSystem) -> Columns:
+    """Return the columns with the names that the base gives the ports of connections.
+
+    metacontrol.yaml may write a name as the code has it (`/scan`, `~scan`), as it resolves, or as the base has it.
+    """
+
+    def named(wire: Wire) -> Wire:
+        source, component = base.component(wire.source.component), base.component(wire.component)
+        out = source.find_port(wire.source.port, TARGET_OF.keys()) if source else None
+        into = component.find_port(wire.port, {TARGET_OF[out.kind][1]}) if component and out and wire.port else None
+        path = replace(wire.source, port=out.name) if out else wire.source
+        return replace(wire, source=path, port=into.name if into else wire.port)
+
+    wires = {
+        column: {value: tuple(map(named, entries)) for value, entries in choices.items()}
+        for column, choices in columns.wires.items()
+    }
+    return replace(columns, wires=wires)
 
 
 def check_columns(columns: Columns, base: RosSystem) -> None:
@@ -218,5 +247,5 @@ def _other_outlet(base: RosSystem, source: PortPath) -> str:
 def outlet(system: RosSystem, source: PortPath) -> PortKind | None:
     """Return the kind of the port that a connection may come from, or None."""
     component = system.component(source.component)
-    kinds = (port.kind for port in component.ports if port.name == source.port) if component else ()
-    return next((kind for kind in kinds if kind in TARGET_OF), None)
+    port = component.find_port(source.port, TARGET_OF.keys()) if component else None
+    return port.kind if port else None

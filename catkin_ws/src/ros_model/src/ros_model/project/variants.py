@@ -23,7 +23,7 @@ from ros_model.language.metamodel import (
     SystemParameter,
     Value,
 )
-from ros_model.project.columns import TARGET_OF, check_columns, outlet, with_implied
+from ros_model.project.columns import TARGET_OF, check_columns, outlet, with_implied, with_ports
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -56,7 +56,7 @@ def make_systems(
         ModelError: the base, the columns and the tables do not fit together; says where, of every row.
     """
     check_columns(columns, base)
-    columns = with_implied(columns, table, base)
+    columns = with_ports(with_implied(columns, table, base), base)
     check_columns(columns, base)
     doubles = {column for column in table.columns if any(isinstance(row.cells[column], float) for row in table.rows)}
     found = []
@@ -177,9 +177,10 @@ def _wired(system: RosSystem, wire: Wire, names: dict[PortPath, str], where: Pos
         missing = wire.source.component if outlet_kind is None else wire.component
         raise ModelError(f"connects {missing!r}, which this variant lacks", where)
     kind, port_kind = TARGET_OF[outlet_kind]
-    name = names.get(wire.source, wire.source.port)
-    target = PortPath(wire.component, wire.port or name)
-    if not any(port.name == target.port and port.kind is port_kind for port in component.ports):
+    name, where = names.get(wire.source, wire.source.port), wire.position or where
+    port = component.find_port(wire.port or name, {port_kind})
+    target = PortPath(wire.component, port.name if port else wire.port or name, where)
+    if port is None:
         system = _with_port(system, component, target.port, port_kind, where)
     connections = list(system.connections)
     for number, connection in enumerate(connections):

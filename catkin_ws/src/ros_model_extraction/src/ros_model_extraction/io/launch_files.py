@@ -13,12 +13,13 @@ import rospkg
 from node_kit.yaml_text import YamlError, parse_yaml
 from ros_model.errors import ModelError
 from ros_model.io.launch_files import load as load_by_roslaunch
+from ros_model.language.graph_names import resolve
 from ros_model.language.metamodel import PortKind, Reference
 
 from ros_model_extraction import ros_defaults as plumbing
 from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.io.source_files import read_xml
-from ros_model_extraction.names import node_name, resolve, split_name
+from ros_model_extraction.names import node_name, split_name
 from ros_model_extraction.node_facts import NodeSource, SourceError
 from ros_model_extraction.packages.catkin_package import CatkinPackage, read_package
 from ros_model_extraction.packages.package_source import named, read_executable

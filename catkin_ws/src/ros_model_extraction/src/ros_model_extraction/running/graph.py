@@ -6,6 +6,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from ros_model.language.graph_names import resolve
 from ros_model.language.metamodel import (
     Component,
     Connection,
@@ -21,7 +22,7 @@ from ros_model.language.metamodel import (
 from ros_model.language.packages import Artifact, Node, Package, PackageSet, ParameterDeclaration, PortDeclaration
 
 from ros_model_extraction import ros_defaults as plumbing
-from ros_model_extraction.names import as_seen_from, is_known_type, node_name, resolve, split_name
+from ros_model_extraction.names import as_seen_from, is_known_type, node_name, split_name
 from ros_model_extraction.values import UnwritableValueError, leaves, typed
 
 if TYPE_CHECKING:

@@ -37,13 +37,6 @@ def relative(name: str, namespace: str = "/") -> str | None:
     return name.removeprefix(prefix) if name.startswith(prefix) else None
 
 
-def in_node(name: str, node: str) -> str:
-    """Return the name in the graph for a name that a node uses, given the node's resolved name: `~` is the node."""
-    if name.startswith("~"):
-        return f"{node}/{name[1:].lstrip('/')}"
-    return resolved(name, node.rpartition("/")[0] or "/")
-
-
 def is_ignored_node(name: str, patterns: Iterable[str]) -> bool:
     """Return whether a node may run that the model lacks: its name is anonymous or fits a shell pattern."""
     return _ANONYMOUS.fullmatch(name) is not None or any(fnmatch.fnmatchcase(name, p.lstrip("/")) for p in patterns)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ros_model.language.graph_names import resolve
 from ros_model.language.metamodel import ConnectionKind, PortKind
 
 from rosgraph_monitor.graph.findings import (
@@ -14,13 +15,13 @@ from rosgraph_monitor.graph.findings import (
     PortFinding,
     WrongType,
 )
-from rosgraph_monitor.graph.names import COMMON_TOPICS, in_node, is_ignored_port, relative
+from rosgraph_monitor.graph.names import COMMON_TOPICS, is_ignored_port, relative
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from ros_model.graph.snapshot import GraphSnapshot, NodeState
-    from ros_model.language.metamodel import Component, Connection, Port, PortPath, Reference, RosSystem
+    from ros_model.language.metamodel import Component, Connection, Port, PortPath, RosSystem
     from ros_model.language.packages import PackageSet
 
 _SERVER_SENDS = ("status", "feedback", "result")
@@ -31,21 +32,22 @@ _CONNECTS = {
 }
 _UNKNOWN_TYPES = ("", "*")
 
-PortTypes = dict[tuple[str, str, str, PortKind, str], str]
-"""Type of a port by package, artifact, node, kind and name, as `.ros` models declare them."""
+PortTypes = dict[tuple[str, str, str, PortKind], dict[str, str]]
+"""Types of ports by their names, by package, artifact, node and kind, as `.ros` models declare them."""
 
 
 def port_types(models: Iterable[PackageSet]) -> PortTypes:
     """Collect the types that `.ros` models declare."""
-    return {
-        (package.name, artifact.name, node.name, port.kind, port.name): port.type
-        for model in models
-        for package in model.packages
-        for artifact in package.artifacts
-        for node in artifact.nodes
-        for port in node.ports
-        if port.type
-    }
+    found: PortTypes = {}
+    for model in models:
+        for package in model.packages:
+            for artifact in package.artifacts:
+                for node in artifact.nodes:
+                    for port in node.ports:
+                        if port.type:
+                            key = (package.name, artifact.name, node.name, port.kind)
+                            found.setdefault(key, {})[port.name] = port.type
+    return found
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ def _wanted(called: Mapping[tuple[str, str], Iterable[str]], entry: Live) -> _Wa
             names.add(port.reference.name)
         for name in called.get((component.name, port.name), ()):
             names |= {name, f"/{name.lstrip('/')}"}
-        wanted[port.kind, port.name] = port, frozenset(in_node(name, node) for name in names)
+        wanted[port.kind, port.name] = port, frozenset(resolve(name, node) for name in names)
     return wanted
 
 
@@ -120,7 +122,7 @@ def _component_ports(
         present = names & has[kind]
         if not present:
             yield MissingPort(name, kind.value, port_name)
-        expected = types.get(_declared(port)) if port.reference else None
+        expected = _declared_type(port, types, entry.node.name)
         for topic in present if expected else ():
             actual = _type(snapshot, topic)
             if expected and actual not in _UNKNOWN_TYPES and _stem(actual, kind) != _stem(expected, kind):
@@ -226,9 +228,17 @@ def _unfolded(actions: Iterable[str], suffixes: Iterable[str]) -> Iterator[str]:
     return (f"{action}/{suffix}" for action in actions for suffix in suffixes)
 
 
-def _declared(port: Port) -> tuple[str, str, str, PortKind, str]:
-    reference: Reference = port.reference  # type: ignore[assignment]
-    return reference.package, reference.artifact, reference.node, port.kind, reference.name
+def _declared_type(port: Port, types: PortTypes, node: str) -> str:
+    """Return the type that a `.ros` model declares for a port, by the name in the node's code; "" if none does.
+
+    Models from source write the name as the code has it, models of running systems as the node's namespace sees it.
+    """
+    if not port.reference:
+        return ""
+    code = port.reference
+    declared = types.get((code.package, code.artifact, code.node, port.kind), {})
+    alike = (kind for name, kind in declared.items() if resolve(name, node) == resolve(code.name, node))
+    return declared.get(code.name) or next(alike, "")
 
 
 def _stem(type_name: str, kind: PortKind) -> str:
