@@ -32,6 +32,7 @@ RULES = {
     "value": "A value fits its declared type.",
     "settings": "metacontrol.yaml says what its schema allows, and names what is there.",
     "table": "A table has the rows, columns and cells that its family needs.",
+    "requirement": "What metacontrol.yaml says of who requires a component changes something.",
     "level": "An expected level is of a quality attribute, and within its range.",
     "name": "A name is one that ROS allows.",
     "substitution": "A value holds nothing that a launch file would evaluate, as $(...), or can't hold.",

@@ -64,7 +64,7 @@ def application_model(project: Project, iri: str) -> str:
     nodes = _own_nodes(project)
     required = {name: names - nodes[name] for name, names in project.required_components().items()}
     components = {name for names in (*required.values(), *nodes.values()) for name in names}
-    for component in sorted(components | set(settings["components"])):
+    for component in sorted(components | set(project.components)):
         of_designs = {
             f"mros:{link}": [variant.name for variant in project.variants if component in names[variant.name]]
             for link, names in (("requiredBy", required), ("deployedBy", nodes))
@@ -95,7 +95,7 @@ def _own_nodes(project: Project) -> dict[str, frozenset[str]]:
     """Return, for each variant, the components that it brings as nodes, by the names that the monitor gives them."""
     component_of = {
         str(entry["node"]).strip("/"): str(name)
-        for name, entry in project.settings["components"].items()
+        for name, entry in project.components.items()
         if "node" in entry
     }
     return {

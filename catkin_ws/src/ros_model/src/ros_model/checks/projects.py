@@ -6,6 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
+from ros_model.findings import WARNING, Finding
+from ros_model.project.requirements import ALL, REQUIRED, WORDS, designs_of, named
+from ros_model.project.schema_check import dotted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -39,6 +42,48 @@ def wrong_names(project: Project) -> Iterator[ModelError]:
                     f"{component!r} is a component neither of the base nor of components: add it to one",
                     *("requires", parameter, value),
                 )
+
+
+def wrong_requirements(project: Project) -> Iterator[ModelError]:
+    """Yield entries of `components` that stand for nothing, or say of designs what can't be meant."""
+    known = {
+        name
+        for system in (project.whole_base, *project.variants)
+        for component in system.components
+        for name in (component.name, component.graph_name)
+    }
+    for name, entry in project.settings["components"].items():
+        if name not in project.components and name not in known:
+            yield project.source.error(
+                "is no component of the base or of a variant: correct the name, or add its node or topic",
+                *("components", name),
+            )
+        meant: dict[str, str] = {}
+        for word in WORDS:
+            for number, other in enumerate(named(entry, word)):
+                keys = ("components", name, word, *(() if other == ALL else (number,)))
+                if other != ALL and not designs_of(project, other) and other not in project.settings["functions"]:
+                    yield project.source.error(f"{other!r} is no function and none of the variants", *keys)
+                twice = [design for design in designs_of(project, other) if meant.setdefault(design, word) != word]
+                if twice:
+                    yield project.source.error(
+                        f"{twice[0]} is meant by {meant[twice[0]]}, too: take it out of one", *keys
+                    )
+
+
+def needless_words(project: Project) -> Iterator[Finding]:
+    """Yield words of `components` that change nothing for any design that they mean."""
+    for name, entry in project.settings["components"].items():
+        for word in WORDS:
+            designs = [design for other in named(entry, word) for design in designs_of(project, other)]
+            meant = {(word, other) for other in project.names_of(name)}
+            if designs and all(meant <= project.requirements[design].needless for design in designs):
+                why = (
+                    "the designs bring it themselves" if word == REQUIRED else "none of the designs requires it anyway"
+                )
+                keys = ("components", name, word)
+                text = f"{dotted(keys)}: {why}: take it out, or correct the name"
+                yield Finding(text, project.source.at(*keys), "requirement", WARNING)
 
 
 def wrong_levels(project: Project) -> Iterator[ModelError]:

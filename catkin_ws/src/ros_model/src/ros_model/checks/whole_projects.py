@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ros_model.checks.families import check_family
+from ros_model.checks.projects import needless_words
 from ros_model.checks.systems import check_system
 from ros_model.findings import Finding
 from ros_model.language.metamodel import compose
@@ -37,6 +38,7 @@ def check_project(project: Project, library: Library) -> Iterator[Finding]:
             yield Finding(text, project.source.at("functions"), "settings")
     for function in project.settings["functions"]:  # designs of one function are compared, and only with each other
         yield from check_family(project.designs(function))
+    yield from needless_words(project)
     yield from unknown_observed_types(project, library)
 
 

@@ -107,7 +107,7 @@ def reasoner(project: Project) -> dict[str, Any]:
         **{f"nfr_{qa}": float(level) for qa, level in thresholds.items()},
         "utility": settings["utility"],
         "qa_direction": {qa: entry["direction"] for qa, entry in settings["quality_attributes"].items()},
-        "components": settings["components"],
+        "components": project.components,
     }
 
 
@@ -121,7 +121,7 @@ def monitor(project: Project) -> dict[str, Any]:
             f"package://{project.package}/models/{path.relative_to(project.folder)}"
             for path in files_in(project.folder, PACKAGES)
         ],
-        "components": settings["components"],
+        "components": project.components,
         "observers": [entry["name"] if isinstance(entry, dict) else entry for entry in settings["observers"]],
         **({"topics": settings["topics"]} if "topics" in settings else {}),
     }

@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING
 
 from node_kit.io.input_files import real_path
 
-from ros_model.checks.projects import levels_of_nothing, two_meanings, wrong_levels, wrong_names
+from ros_model.checks.projects import (
+    levels_of_nothing,
+    two_meanings,
+    wrong_levels,
+    wrong_names,
+    wrong_requirements,
+)
 from ros_model.errors import Gathered, ModelError, first_of
 from ros_model.io.files import read_text
 from ros_model.io.models import files_in, read_library, read_system
@@ -73,6 +79,7 @@ def load_project(folder: str | Path) -> Project:
     )
     wrong.add(wrong_names(project))
     wrong.add(wrong_levels(project))
+    wrong.add(wrong_requirements(project))
     wrong.add(wrong_corrections(project))
     wrong.add(levels_of_nothing(project, levels))
     wrong.tell()

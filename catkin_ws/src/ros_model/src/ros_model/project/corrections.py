@@ -60,7 +60,7 @@ def _likeness(project: Project, variant: RosSystem, name: str) -> str:
     component, dot, parameter = name.partition(".")
     if not dot:
         own = variant.component(name)
-        uses = own is not None or name in project.required_components()[variant.name]
+        uses = own is not None or not project.names_of(name).isdisjoint(project.required_components()[variant.name])
         return f"{name}: {own.executable if own else uses}"
     owner = compose(project.base, variant).component(component)
     values = [p.value for p in owner.parameters if p.key == parameter] if owner else []

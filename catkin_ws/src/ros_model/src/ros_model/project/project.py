@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ros_model.language.library import Library
-from ros_model.project.wiring import required_by_parameters, required_components
+from ros_model.project.requirements import WORDS, requirements_of
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import RosSystem
+    from ros_model.project.requirements import Requirements
     from ros_model.project.settings import Settings
 
 DIRECTIONS = ("lower_is_better", "higher_is_better")
@@ -90,9 +91,37 @@ class Project:
         return tuple(required.get(variant, ()) if isinstance(required, dict) else required)
 
     def required_components(self) -> dict[str, frozenset[str]]:
-        """Return, for each variant, the components that it can't do without: by its wiring, and by `requires`."""
-        by_value = self.settings["requires"]
-        return {
-            variant.name: required_components(self.base, variant) | required_by_parameters(variant, by_value)
-            for variant in self.variants
+        """Return, for each variant, the components that it can't do without."""
+        return {name: frozenset(found.components) for name, found in self.requirements.items()}
+
+    @cached_property
+    def requirements(self) -> dict[str, Requirements]:
+        """What each variant requires, and why."""
+        return requirements_of(self)
+
+    @property
+    def components(self) -> dict[str, dict[str, Any]]:
+        """What stands for each component in the running graph, by its name, without what is said of designs."""
+        entries = {
+            name: {key: value for key, value in entry.items() if key not in WORDS}
+            for name, entry in self.settings["components"].items()
         }
+        return {name: entry for name, entry in entries.items() if entry}
+
+    def names_of(self, component: str) -> frozenset[str]:
+        """Return the names that a component of the models, or of metacontrol.yaml, has in the running system.
+
+        It is the name of the entry of `components` that has its node, else the node's own. Two components of one name
+        in two namespaces have two names.
+        """
+        mapped = self.components
+        if component in mapped:
+            return frozenset([component])
+        named = {str(entry["node"]).strip("/"): str(name) for name, entry in mapped.items() if "node" in entry}
+        nodes = [
+            found.graph_name
+            for system in (self.base, *self.variants)
+            for found in system.components
+            if component in {found.name, found.graph_name}
+        ]
+        return frozenset(named.get(node, node) for node in nodes or [component])

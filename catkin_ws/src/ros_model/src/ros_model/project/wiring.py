@@ -1,50 +1,156 @@
-"""The components that a variant requires, by its wiring or by the values of its parameters."""
+"""The components that feed a variant, by its wiring: which of them it requires, by which way, and which not."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import enum
+from collections import defaultdict, deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
-from ros_model.language.metamodel import RosSystem, compose
+from ros_model.language.metamodel import Connection, ConnectionKind, PortPath, RosSystem, compose
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+_SHARED = frozenset(["bond", "diagnostics", "diagnostics_agg", "diagnostics_toplevel_state", "tf", "tf_static"])
+"""Last parts of the names of topics on which any node may publish, in the namespace of any robot."""
+_SHARED_BY_ALL = frozenset(["clock", "rosout", "rosout_agg", "statistics"])
+"""Topics of ROS itself, which are in no namespace."""
+_COMMANDS = frozenset(["cmd", "cmds", "command", "commands", "setpoint", "setpoints"])
+"""Words in the names of topics that carry commands, by the conventions of ros_control, mobile bases and mavros."""
+_GOAL = "goal"
+"""Last part of the name of a topic that carries goals, such as move_base_simple/goal."""
+_ANSWERS = frozenset(["echo", "feedback", "result", "state", "states", "status"])
+"""Words in the last part of the name of a topic that tells of a command: arm/command_status."""
 
 
-def required_components(base: RosSystem, variant: RosSystem) -> frozenset[str]:
+class Uncounted(enum.Enum):
+    """Why a variant does not require a component that feeds it, or that feeds a component that it requires."""
+
+    SHARED = "any node may publish there"
+    COMMAND = "it commands, and who obeys can do without it"
+    PLANT = "the variant commands that component itself"
+
+
+@dataclass(frozen=True)
+class Feed:
+    """A connection by which one component feeds another: a publisher its subscriber, a server its client."""
+
+    source: str
+    connection: str
+    target: str
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """What the wiring of a system says of a variant.
+
+    Attributes:
+        chains: required component -> the feeds that lead from it to a component of the variant, the shortest way.
+        uncounted: component that feeds the variant or what this requires, but is not required itself -> the feed, and
+            why it does not count.
+    """
+
+    chains: Mapping[str, tuple[Feed, ...]] = field(default_factory=dict)
+    uncounted: Mapping[str, tuple[Feed, Uncounted]] = field(default_factory=dict)
+
+
+def wiring_of(base: RosSystem, variant: RosSystem) -> Wiring:
     """Return the components of the base that feed the variant's, directly or through others.
 
-    The search stops at a component that the variant itself drives: that one is the plant (a robot's base takes
-    the velocity and gives the odometry). The variant requires it, but not the other components that act on it.
+    The plant is what the variant commands, itself or through a server that it uses, or through a node that passes
+    commands on: a robot's base takes the velocity and gives the odometry. These feeds do not count:
+
+    - topics that carry commands: as the server of an action needs none of its clients, a driver needs none of the nodes
+      that command it;
+    - topics on which any node may publish, such as /tf: they do not tell who needs whom;
+    - what else acts on the plant: the variant requires the plant if that feeds it, but not what feeds the plant.
+
+    On topics of the first two kinds, components of the plant do count: they close the loop of the variant.
     """
     system = compose(base, variant)
-    own = {component.name for component in variant.components}
-    feeds: dict[str, set[str]] = {}
+    own = [component.name for component in variant.components]
+    feeds = defaultdict(list)
     for connection in system.connections:
-        for target in connection.targets:
-            feeds.setdefault(target.component, set()).update(source.component for source in connection.sources)
-    driven = {target for target, sources in feeds.items() if sources & own}
-    required: set[str] = set()
+        for feed, why in _feeds(connection, system):
+            feeds[feed.target].append((feed, why))
+    plant = _plant(system, frozenset(own))
+    chains: dict[str, tuple[Feed, ...]] = {}
+    uncounted: dict[str, tuple[Feed, Uncounted]] = {}
+    waiting = deque(own)
+    while waiting:
+        name = waiting.popleft()
+        for feed, why in feeds[name]:
+            if feed.source in own or feed.source in chains:
+                continue
+            if not why and name in plant:
+                uncounted.setdefault(feed.source, (feed, Uncounted.PLANT))
+            elif why and feed.source not in plant:
+                uncounted.setdefault(feed.source, (feed, why))
+            else:
+                chains[feed.source] = (feed, *chains.get(name, ()))
+                waiting.append(feed.source)
+    return Wiring(chains, {name: found for name, found in uncounted.items() if name not in chains})
+
+
+def _feeds(connection: Connection, system: RosSystem) -> Iterator[tuple[Feed, Uncounted | None]]:
+    """Yield who feeds whom by a connection, and why that does not count, where it does not."""
+    for target in connection.targets:
+        for source in connection.sources:
+            why = None
+            if connection.kind is ConnectionKind.TOPIC:
+                names = {connection.name, *_names(source, system), *_names(target, system)}
+                if any(_is_shared(name) for name in names):
+                    why = Uncounted.SHARED
+                elif any(_is_command(name) for name in names):
+                    why = Uncounted.COMMAND
+            yield Feed(source.component, connection.name, target.component), why
+
+
+def _names(end: PortPath, system: RosSystem) -> Iterator[str]:
+    """Yield the names of a port: in the model, and in the node's code."""
+    yield end.port
+    component = system.component(end.component)
+    port = component.port(end.port) if component else None
+    if port and port.reference:
+        yield port.reference.name
+
+
+def _is_shared(name: str) -> bool:
+    name = name.strip("/")
+    return name in _SHARED_BY_ALL or name.rpartition("/")[2] in _SHARED
+
+
+def _is_command(name: str) -> bool:
+    parts = [part.split("_") for part in name.strip("~/").lower().split("/")]
+    if parts[-1] == [_GOAL]:
+        return True
+    return any(not _COMMANDS.isdisjoint(words) for words in parts) and _ANSWERS.isdisjoint(parts[-1])
+
+
+def _plant(system: RosSystem, own: frozenset[str]) -> frozenset[str]:
+    """Return the components that the variant commands, itself, through servers that it uses, or through one another."""
+    commands = defaultdict(set)
+    for connection in system.connections:
+        for feed, why in _feeds(connection, system):
+            if why is Uncounted.COMMAND:
+                commands[feed.source].add(feed.target)
+    plant: set[str] = set()
+    waiting = [*own, *_servers(system, own)]
+    while waiting:
+        reached = commands[waiting.pop()] - plant - own
+        plant |= reached
+        waiting += reached
+    return frozenset(plant)
+
+
+def _servers(system: RosSystem, own: frozenset[str]) -> set[str]:
+    """Return the components whose services and actions the variant uses, and those that these use in turn."""
+    calls = [connection for connection in system.connections if connection.kind is not ConnectionKind.TOPIC]
+    used: set[str] = set()
     waiting = list(own)
     while waiting:
-        for source in feeds.get(waiting.pop(), ()):
-            if source not in required | own:
-                required.add(source)
-                if source not in driven:
-                    waiting.append(source)
-    return frozenset(required)
-
-
-def required_by_parameters(variant: RosSystem, requires: Mapping[str, Mapping[str, str]]) -> frozenset[str]:
-    """Return the components that a variant's parameter values ask for, for models that have no wiring.
-
-    Args:
-        variant: the system.
-        requires: parameter (its key, or the key's last part) -> value -> component. A value of the variant may be
-            several, separated by blanks, as in costmap_2d's observation_sources.
-    """
-    found: set[str] = set()
-    for component in variant.components:
-        for parameter in component.parameters:
-            choices = requires.get(parameter.key) or requires.get(parameter.key.rsplit("/", 1)[-1]) or {}
-            found.update(choices[value] for value in str(parameter.value).split() if value in choices)
-    return frozenset(found)
+        client = waiting.pop()
+        for connection in calls:
+            if any(end.component == client for end in connection.targets):
+                servers = {end.component for end in connection.sources} - used - own
+                used |= servers
+                waiting += servers
+    return used
