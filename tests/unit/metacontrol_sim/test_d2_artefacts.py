@@ -45,10 +45,13 @@ def test_variant_requires_the_sensor_it_is_wired_to_and_the_battery_if_it_is_fas
         assert required[variant.name] == {"simulator", sensor} | battery
 
 
-def test_models_are_sound_with_all_references_known(capsys):
+def test_models_are_sound_with_all_references_known_and_requirements_shown(capsys):
     with pytest.raises(SystemExit) as done:
         main(["check", str(MODELS)])
-    assert (done.value.code, capsys.readouterr().out) == (0, "")
+    told = capsys.readouterr().out
+    assert done.value.code == 0
+    assert not any(severity in told for severity in ("error", "warning"))
+    assert "  front_laser -> front/scan -> move_base" in told
 
 
 def test_base_is_in_canonical_form():

@@ -205,3 +205,19 @@ def test_what_is_required_and_what_not_is_shown_with_the_way_once_for_all_design
 
 def test_designs_that_require_the_same_share_their_lines(load):
     assert next(requirement_lines(load())) == "soft, firm require:"
+
+
+def test_check_shows_requirements_to_people_and_findings_only_to_programs(load, run, tmp_path):
+    load()
+    status, out, _ = run("check", tmp_path)
+    assert status == 0
+    assert "seen requires:\n  head/eye: eye -> image -> packer\n" in out
+    assert "requires" not in run("check", "--format", "json", tmp_path)[1]
+
+
+def test_init_shows_what_its_first_variant_requires(load, run, tmp_path):
+    load()
+    (tmp_path / "metacontrol.yaml").unlink()
+    status, out, _ = run("init", tmp_path / "cell.rossystem", "--component", "packer")
+    assert status == 0
+    assert "cell_default requires:\n  touch -> wrench -> packer\n" in out

@@ -16,7 +16,7 @@ from ros_model.checks.systems import check_system
 from ros_model.checks.whole_projects import check_project
 from ros_model.cli import BAD_INPUT
 from ros_model.cli.reports import FORMATS
-from ros_model.errors import ModelError
+from ros_model.errors import ModelError, printable
 from ros_model.findings import ERROR, WARNING, Finding
 from ros_model.generators import MARK
 from ros_model.io.installed import InstalledPackages
@@ -25,6 +25,7 @@ from ros_model.language.any_language import PACKAGES
 from ros_model.language.library import Library
 from ros_model.language.metamodel import compose
 from ros_model.language.packages import PackageSet
+from ros_model.project.requirements import requirement_lines
 from ros_model.project.settings import FILE_NAME
 
 if TYPE_CHECKING:
@@ -64,6 +65,7 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
     found with --path. Message types of installed ROS packages are known. A variant is checked with its project's base.
     Of a launch file, the machines and the executables are checked, with the defaults of its arguments. Programs that it
     names in `command=` are run, as roslaunch does.
+    Of a project, the text also tells which components each design requires, and by which way.
 
     Exit status: 0 all is well or only warnings were given, 1 something is wrong in a model, 2 a file can't be read.
     """
@@ -73,6 +75,10 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
     findings = checked.findings()
     if text := FORMATS[form](findings):
         click.echo(text)
+    if form == "text":
+        for project in checked.projects:
+            for line in requirement_lines(project):
+                click.echo(printable(line))
     if any(finding.severity == ERROR and finding.rule in _UNREADABLE for finding in findings):
         return BAD_INPUT
     return int(any(finding.severity == ERROR for finding in findings))

@@ -13,7 +13,9 @@ from node_kit.io.input_files import real_path
 from ros_model.errors import ModelError, printable
 from ros_model.generators import write_files
 from ros_model.io.models import read_system
+from ros_model.io.project import load_project
 from ros_model.project.first_project import Choices, first_project
+from ros_model.project.requirements import requirement_lines
 
 _QUALITY = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -28,6 +30,7 @@ def init(base: str, package: str | None, component: str | None, qualities: tuple
     """Write a first metacontrol.yaml, and its tables, beside the .rossystem file BASE.
 
     It checks clean as it is; places marked CHANGE are guesses. Files that exist are never overwritten.
+    The command shows which components the variant requires, and by which way.
     """
     if package is not None and not _PACKAGE.fullmatch(package):
         raise click.UsageError(f"--package {package!r} is no name of letters, digits, '_' and '-'")
@@ -45,8 +48,8 @@ def init(base: str, package: str | None, component: str | None, qualities: tuple
             raise ModelError(f"{folder / name}: is there already: move it away, or edit it")
     for written in write_files({folder / name: text for name, text in first.texts.items()}, folder):
         click.echo(f"wrote {written}")
-    for remark in first.remarks:
-        click.echo(printable(remark))
+    for line in (*first.remarks, *requirement_lines(load_project(folder))):
+        click.echo(printable(line))
     click.echo(f"Change the places marked CHANGE, then: rosmodel check {folder}")
 
 

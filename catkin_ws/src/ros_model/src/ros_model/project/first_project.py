@@ -44,7 +44,8 @@ variants:
   # Column of the table -> parameters that it sets. {{name: PARAMETER, factor: 0.5}} scales the column, and
   # {{name: PARAMETER, component: NAME}} sets it on another component.
   parameters:{parameters}
-  # Column -> its value -> publishers (COMPONENT.PORT) that the component is connected to.
+  # Column -> its value -> publishers or servers (COMPONENT.PORT) that the component is connected to.
+  # {{from: COMPONENT.PORT, to: COMPONENT.PORT}} names the port at the other end, too.
   # connections:
   #   sensor:
   #     laser: [{example_port}]
@@ -68,19 +69,22 @@ utility: {utility}
 objectives:
   {objective}: {{function: {function}, nfrs: {{}}}}
 
-# Components, and the node that each is in the running graph.
+# Components, and the node that each is in the running graph. A design requires those that feed it, as the connections
+# of the models say; `rosmodel check {folder}` shows which, and by which way. Where that is wrong, say so here:
+#   NAME: {{node: NAME, required_by: [VARIANT, FUNCTION], not_required_by: all}}
 components:{components}
 
 # Observers that the monitor starts. `rosmodel generate observer` asks for one, and adds it here.
 observers: []
 
+# What the manipulator does while the configuration changes. With several functions, put it under functions/NAME.
 manipulator:
   # CHANGE: an action whose pending goal is kept while the configuration changes, and its type.
 {action}
   # Nodes that a change may have to stop although it did not start them.
   kill_nodes: [{kill}]
 
-# Only for models without connections: parameter -> value -> the component that it needs.
+# Parameter -> value -> the component that a variant with this value needs, beside those that feed it.
 # requires:
 #   observation_sources: {{scan: front_laser}}
 """
