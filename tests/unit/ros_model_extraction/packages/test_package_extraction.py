@@ -285,6 +285,31 @@ def test_listed_executable_that_does_not_exist_is_told(tmp_path, capsys):
     ]
 
 
+@pytest.mark.parametrize(
+    ("place", "given"), [("", "src"), ("src/demo", "."), ("src/demo/src", ".."), ("src", "./demo")]
+)
+def test_paths_in_messages_are_relative_where_a_relative_one_is_given(tmp_path, monkeypatch, capsys, place, given):
+    cmake = "add_executable(demo src/demo.cpp)\nadd_executable(gone src/gone.cpp)\n"
+    folder = make_package(tmp_path / "src" / "demo", cmake=cmake)
+    (folder / "src").mkdir(exist_ok=True)
+    (folder / "include" / "demo").mkdir(parents=True)
+    (folder / "src" / "demo.cpp").write_text(
+        '#include <ros/ros.h>\n#include "demo/made.h"\n'
+        'int main(int c, char** v) { ros::init(c, v, "demo"); ros::NodeHandle n; make(n); ros::spin(); }\n'
+    )
+    (folder / "include" / "demo" / "made.h").write_text(
+        "#include <std_msgs/String.h>\n"
+        'inline void make(ros::NodeHandle& n) { static auto p = n.advertise<std_msgs::String>("said", 1); }\n'
+    )
+    monkeypatch.chdir(tmp_path / place)
+    assert run("extract", given, "-o", tmp_path / "out") == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("CMakeLists.txt:2:1: not read: the source src/gone.cpp of gone is not in the package")
+    assert str(tmp_path) not in line
+    node = read_packages(tmp_path / "out" / "demo.ros").node("demo", "demo", "demo")
+    assert [port.name for port in node.ports] == ["said"]
+
+
 @pytest.mark.parametrize("name", ["main.cpp", "package.xml", "noextension"])
 def test_file_that_is_no_launch_file_is_told_what_is_taken(tmp_path, capsys, name):
     (tmp_path / name).write_text("int main() {}")

@@ -170,6 +170,18 @@ def test_type_of_a_topic_by_the_package_model(actual, differs):
     assert found == ((WrongType("laser", "scan", "m/Scan", actual),) if differs else ())
 
 
+@pytest.mark.parametrize(
+    ("inside", "declared"), [("scan", "/cart/scan"), ("/cart/scan", "scan"), ("laser/scan", "~scan")]
+)
+def test_type_is_that_of_the_name_that_resolves_to_the_same(inside, declared):
+    source = PackageSet((Package("p", (Artifact("a", (Node("n", (PortDeclaration(declared, PUB, "m/Scan"),)),)),)),))
+    topic = "/cart/laser/scan" if "~" in declared else "/cart/scan"
+    live = graph(pubs=[[topic, ["/cart/laser"]]], types=[[topic, "m/Cloud"]], nodes=("/cart/laser",))
+    laser = Component("laser", namespace="cart", ports=(Port(inside, PUB, Reference("p", "a", "n", inside)),))
+    found = compare(live, RosSystem("s", (laser,)), dead={}, scope=Scope(types=port_types([source])))
+    assert found == (WrongType("cart/laser", topic[1:], "m/Scan", "m/Cloud"),)
+
+
 def test_type_of_an_action_has_the_suffix_that_ros_gives_it():
     scope = Scope(types=port_types([DECLARED]))
     live = graph(**action("/move", ["/nav"], []), nodes=("/nav",))

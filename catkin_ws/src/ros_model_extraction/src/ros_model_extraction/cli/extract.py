@@ -56,7 +56,7 @@ def _packages(path: Path, output: str) -> int:
     from ros_model_extraction.packages.catkin_package import find_packages
     from ros_model_extraction.packages.package_source import extract_package
 
-    folders, unread = find_packages(Path(os.path.abspath(path)))  # without `..`, but links stay as they are named
+    folders, unread = find_packages(Path(os.path.normpath(path)))  # without `a/..`, but links stay as they are named
     for remark in unread:
         click.echo(f"rosmodel: {remark.position.file}: {remark.text}", err=True)
     status = _INCOMPLETE if unread else 0

@@ -84,6 +84,10 @@ def _included(file: File, path: Path, folder: Path) -> Iterator[Path]:
             name = text(child_of(node, "path")).strip('<>"')
             for place in (path.parent, folder / "include", folder / "src"):
                 header = place / name
-                if name.endswith(_HEADERS) and os.path.isfile(header) and header.resolve().is_relative_to(folder):
+                if (
+                    name.endswith(_HEADERS)
+                    and os.path.isfile(header)
+                    and header.resolve().is_relative_to(folder.resolve())
+                ):
                     yield header
                     break
