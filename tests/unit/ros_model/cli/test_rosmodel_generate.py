@@ -320,3 +320,27 @@ def test_names_of_generators_complete(run):
 
 def test_project_of_d2_loads_unchanged_through_its_file():
     assert load_project(SOURCES / "metacontrol_sim" / "models").base_file == "d2.rossystem"
+
+
+def test_arguments_of_nodes_reach_the_launch_files(run, models, tmp_path):
+    folder = models({"a": {"speed": 1}}, arguments={"nav": '--frame odom --name "left arm" <&>'})
+    assert run("generate", "all", folder, "-o", tmp_path)[0] == 0
+    (node,) = launch_files.read(tmp_path / "launch/variants/a.launch").nodes
+    assert (node.name, node.args) == ("nav", '--frame odom --name "left arm" <&>')
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"guard": "-x"}, "arguments.guard: no variant starts such a node: correct the name"),
+        ({"navi": "-x"}, "arguments.navi: no variant starts such a node: correct the name"),
+        ({"nav": "$(eval 1)"}, "arguments.nav: '$(eval 1)' holds '$(', which roslaunch would evaluate: take it out"),
+        ({"nav": ""}, "arguments.nav: is '', must be a text"),
+        ({"nav": ["-x"]}, "arguments.nav: is \"['-x']\", must be a text"),
+    ],
+)
+def test_arguments_that_no_node_can_have_are_refused(run, models, tmp_path, arguments, message):
+    folder = models({"a": {"speed": 1}}, arguments=arguments)
+    status, out, _ = run("check", folder)
+    assert (status, message in out) == (1, True)
+    assert run("generate", "all", folder, "-o", tmp_path)[0] == 2

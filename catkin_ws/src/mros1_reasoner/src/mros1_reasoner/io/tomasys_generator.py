@@ -94,9 +94,7 @@ def application_model(project: Project, iri: str) -> str:
 def _own_nodes(project: Project) -> dict[str, frozenset[str]]:
     """Return, for each variant, the components that it brings as nodes, by the names that the monitor gives them."""
     component_of = {
-        str(entry["node"]).strip("/"): str(name)
-        for name, entry in project.components.items()
-        if "node" in entry
+        str(entry["node"]).strip("/"): str(name) for name, entry in project.components.items() if "node" in entry
     }
     return {
         variant.name: frozenset(

@@ -46,14 +46,8 @@ def wrong_names(project: Project) -> Iterator[ModelError]:
 
 def wrong_requirements(project: Project) -> Iterator[ModelError]:
     """Yield entries of `components` that stand for nothing, or say of designs what can't be meant."""
-    known = {
-        name
-        for system in (project.whole_base, *project.variants)
-        for component in system.components
-        for name in (component.name, component.graph_name)
-    }
     for name, entry in project.settings["components"].items():
-        if name not in project.components and name not in known:
+        if name not in project.components and name not in project.nodes:
             yield project.source.error(
                 "is no component of the base or of a variant: correct the name, or add its node or topic",
                 *("components", name),

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 from ros_model.checks.families import check_family
 from ros_model.checks.projects import needless_words
 from ros_model.checks.systems import check_system
+from ros_model.errors import ModelError
 from ros_model.findings import Finding
+from ros_model.generators.launch_parameters import harmless
 from ros_model.language.metamodel import compose
 from ros_model.language.packages import SpecKind
 from ros_model.project.schema_check import dotted
@@ -39,7 +41,21 @@ def check_project(project: Project, library: Library) -> Iterator[Finding]:
     for function in project.settings["functions"]:  # designs of one function are compared, and only with each other
         yield from check_family(project.designs(function))
     yield from needless_words(project)
+    yield from wrong_arguments(project)
     yield from unknown_observed_types(project, library)
+
+
+def wrong_arguments(project: Project) -> Iterator[Finding]:
+    """Yield arguments for a node that no variant starts, and those that a launch file can't hold."""
+    for name, text in project.settings.get("arguments", {}).items():
+        where = project.source.at("arguments", name)
+        started = {component.graph_name for variant in project.variants for component in variant.components}
+        if started.isdisjoint(project.nodes.get(name, ())):
+            yield Finding(f"arguments.{name}: no variant starts such a node: correct the name", where, "settings")
+        try:
+            harmless(text, where)
+        except ModelError as error:
+            yield Finding(f"arguments.{name}: {error.message}", where, "substitution")
 
 
 def unknown_observed_types(project: Project, library: Library) -> Iterator[Finding]:

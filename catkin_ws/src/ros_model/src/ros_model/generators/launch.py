@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from ros_model.errors import ModelError
 from ros_model.file_names import safe_file_name
 from ros_model.generators import variant_packages, write_files
-from ros_model.generators.launch_parameters import parameter_element, sent
+from ros_model.generators.launch_parameters import harmless, parameter_element, sent
 from ros_model.language.metamodel import CONNECTION_OF, ConnectionKind, PortPath, compose
 from ros_model.language.packages import Node
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     from ros_model.language.library import Library
@@ -43,7 +43,7 @@ def generate(project: Project, output: Path) -> list[Path]:
         ModelError: a model can't be launched, or a file can't be written.
     """
     texts = {
-        variant.name: launch_file(variant, compose(project.base, variant), project.library)
+        variant.name: launch_file(variant, compose(project.base, variant), project.library, project.arguments)
         for variant in project.variants
     }
     if project.packages_folder:
@@ -54,13 +54,19 @@ def generate(project: Project, output: Path) -> list[Path]:
     )
 
 
-def launch_file(system: RosSystem, whole: RosSystem | None = None, library: Library | None = None) -> str:
+def launch_file(
+    system: RosSystem,
+    whole: RosSystem | None = None,
+    library: Library | None = None,
+    arguments: Mapping[str, tuple[str, Position]] | None = None,
+) -> str:
     """Return the text of a launch file that starts a system's components.
 
     Args:
         system: what to start.
         whole: the system whose connections hold, where `system` is a part of it; itself if None.
         library: the models that declare the parameters' types; without one, a value's own type counts.
+        arguments: what nodes are started with, by their graph names, and where that is written.
 
     Raises:
         ModelError: a component names no executable, a name is not fit for ROS, or a text holds `$(`, which roslaunch
@@ -74,7 +80,10 @@ def launch_file(system: RosSystem, whole: RosSystem | None = None, library: Libr
             name = legal_name(global_name(parameter), parameter.position)
             launch.append(parameter_element(name, value, parameter.position))
     for component in system.components:
-        launch.append(_node(component, whole or system, library))
+        node = _node(component, whole or system, library)
+        if component.graph_name in (arguments or {}):
+            node.set("args", harmless(*(arguments or {})[component.graph_name]))
+        launch.append(node)
     ET.indent(launch, "  ")
     return ET.tostring(launch, encoding="unicode") + "\n"
 

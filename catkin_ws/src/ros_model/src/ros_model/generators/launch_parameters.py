@@ -75,12 +75,12 @@ def parameter_element(name: str, value: Sent, where: Position) -> ET.Element:
     for kind, word in ((bool, "bool"), (int, "int"), (float, "double"), (str, "str")):
         if isinstance(value, kind) and not (isinstance(value, str) and value != value.strip()):
             text = str(value).lower() if kind is bool else str(value)
-            return ET.Element("param", {"name": name, "type": word, "value": _harmless(text, where)})
+            return ET.Element("param", {"name": name, "type": word, "value": harmless(text, where)})
     element = ET.Element("rosparam", {"param": name, "subst_value": "false"})
     text = yaml.dump(
         value, Dumper=_Quoting, default_flow_style=True, sort_keys=False, width=math.inf, allow_unicode=True
     )
-    element.text = _harmless(text.removesuffix("\n...\n").strip(), where)
+    element.text = harmless(text.removesuffix("\n...\n").strip(), where)
     return element
 
 
@@ -99,7 +99,12 @@ def check_range(value: Sent, where: Position) -> None:
         raise ModelError(f"the value {value} is no number: give a finite one", where)
 
 
-def _harmless(text: str, where: Position) -> str:
+def harmless(text: str, where: Position) -> str:
+    """Return a text that a launch file can hold, and that roslaunch does not evaluate.
+
+    Raises:
+        ModelError: it is none.
+    """
     if _SUBSTITUTION.search(text):
         raise ModelError(f"{text!r} holds '$(', which roslaunch would evaluate: take it out", where)
     if bad := _NO_XML.search(text):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +13,7 @@ from ros_model.language.library import Library
 from ros_model.project.requirements import WORDS, requirements_of
 
 if TYPE_CHECKING:
-    from ros_model.language.metamodel import RosSystem
+    from ros_model.language.metamodel import Position, RosSystem
     from ros_model.project.requirements import Requirements
     from ros_model.project.settings import Settings
 
@@ -99,7 +100,7 @@ class Project:
         """What each variant requires, and why."""
         return requirements_of(self)
 
-    @property
+    @cached_property
     def components(self) -> dict[str, dict[str, Any]]:
         """What stands for each component in the running graph, by its name, without what is said of designs."""
         entries = {
@@ -107,6 +108,26 @@ class Project:
             for name, entry in self.settings["components"].items()
         }
         return {name: entry for name, entry in entries.items() if entry}
+
+    @property
+    def arguments(self) -> dict[str, tuple[str, Position]]:
+        """What nodes are started with, by their names in the graph, and where that is written."""
+        given = self.settings.get("arguments", {})
+        return {
+            node: (text, self.source.at("arguments", name))
+            for name, text in given.items()
+            for node in self.nodes.get(name, ())
+        }
+
+    @cached_property
+    def nodes(self) -> dict[str, list[str]]:
+        """Graph names of the nodes of the base and the variants, by the names of their components and by themselves."""
+        found: dict[str, dict[str, None]] = defaultdict(dict)
+        for system in (self.whole_base, *self.variants):
+            for component in system.components:
+                for name in (component.name, component.graph_name):
+                    found[name][component.graph_name] = None
+        return {name: list(nodes) for name, nodes in found.items()}
 
     def names_of(self, component: str) -> frozenset[str]:
         """Return the names that a component of the models, or of metacontrol.yaml, has in the running system.
@@ -118,10 +139,4 @@ class Project:
         if component in mapped:
             return frozenset([component])
         named = {str(entry["node"]).strip("/"): str(name) for name, entry in mapped.items() if "node" in entry}
-        nodes = [
-            found.graph_name
-            for system in (self.base, *self.variants)
-            for found in system.components
-            if component in {found.name, found.graph_name}
-        ]
-        return frozenset(named.get(node, node) for node in nodes or [component])
+        return frozenset(named.get(node, node) for node in self.nodes.get(component, [component]))

@@ -376,8 +376,8 @@ class _Remarks:
         for node, origin in sorted(details.origins.items()):
             if origin.arguments and node not in details.dead and (self._everything or node not in self.metacontrol):
                 yield (
-                    f"Left out: the arguments of {node}: {' '.join(origin.arguments)}. Models hold none, so a launch "
-                    "file that is made from this model starts the node without them."
+                    f"Left out: the arguments of {node}: {' '.join(origin.arguments)}. Models hold none. If variants "
+                    "bring the node, give them under `arguments` in metacontrol.yaml."
                 )
         if details.dead:
             yield f"Left out: {', '.join(sorted(details.dead))}: the master lists them, but nobody listens there."
