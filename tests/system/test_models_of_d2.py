@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -21,10 +22,11 @@ from node_kit.io.xml_rpc import CallError
 from ros_model.graph.snapshot import GraphSnapshot
 from ros_model.io.master import take_snapshot
 from ros_model.io.models import read_system
+from ros_model.io.project import load_project
+from ros_model.language.graph_names import resolve
 from ros_model.language.metamodel import PortKind
 from ros_model_extraction import ros_defaults as plumbing
 from ros_model_extraction.io.live_nodes import ask_nodes
-from ros_model_extraction.names import resolve
 from ros_model_extraction.node_facts import FoundPort
 from ros_model_extraction.packages.catkin_package import find_packages
 from ros_model_extraction.packages.package_source import ExtractedPackage, extract_package
@@ -135,6 +137,15 @@ def test_snapshot_checks_and_lacks_no_component_of_the_models(seen):
     assert [line for line in lines if line.startswith("+ component 'move_base', ")]  # the form that is expected
     assert "+ component 'reasoner'" not in lines  # a snapshot leaves the meta-controller out
     assert "who calls which service" in (seen.folder / "snapshot.rossystem").read_text()
+
+
+def test_variant_of_the_snapshot_requires_the_laser_and_the_robot_and_nothing_else(seen, tmp_path):
+    for name in ("snapshot.ros", "snapshot.rossystem"):
+        shutil.copy(seen.folder / name, tmp_path)
+    made = rosmodel("init", tmp_path / "snapshot.rossystem", "--component", "move_base")
+    assert made.returncode == 0, made.stdout + made.stderr
+    assert "  front_laser -> front/scan -> move_base\n" in made.stdout
+    assert load_project(tmp_path).required_components() == {"snapshot_default": {"front_laser", "simulator"}}
 
 
 def test_source_has_every_interface_that_the_running_nodes_have(seen):

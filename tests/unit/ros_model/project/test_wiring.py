@@ -91,6 +91,12 @@ def test_variant_that_obeys_does_not_require_who_commands_it(topic):
     assert required("smoother", f"planner > {topic} > smoother", "laser > scan > planner") == set()
 
 
+def test_who_gets_goals_over_a_topic_is_required_with_its_sensors_as_a_server_is():
+    lines = ["mission > move_base_simple/goal > nav", "nav > status > mission", "laser > scan > nav"]
+    assert required("mission", *lines) == {"nav", "laser"}
+    assert wiring("nav", *lines).uncounted["mission"][1] is Uncounted.GOAL
+
+
 @pytest.mark.parametrize("topic", ["arm/command_state", "cmd_vel_feedback", "goal_distance", "recommended_speed"])
 def test_topic_that_tells_of_a_command_is_no_command(topic):
     assert required("planner", f"arm > {topic} > planner") == {"arm"}

@@ -15,8 +15,6 @@ _SHARED_BY_ALL = frozenset(["clock", "rosout", "rosout_agg", "statistics"])
 """Topics of ROS itself, which are in no namespace."""
 _COMMANDS = frozenset(["cmd", "cmds", "command", "commands", "setpoint", "setpoints"])
 """Words in the names of topics that carry commands, by the conventions of ros_control, mobile bases and mavros."""
-_GOAL = "goal"
-"""Last part of the name of a topic that carries goals, such as move_base_simple/goal."""
 _ANSWERS = frozenset(["echo", "feedback", "result", "state", "states", "status"])
 """Words in the last part of the name of a topic that tells of a command: arm/command_status."""
 
@@ -26,6 +24,7 @@ class Uncounted(enum.Enum):
 
     SHARED = "any node may publish there"
     COMMAND = "it commands, and who obeys can do without it"
+    GOAL = "it sets goals, and who pursues them can do without it"
     PLANT = "the variant commands that component itself"
 
 
@@ -58,8 +57,8 @@ def wiring_of(base: RosSystem, variant: RosSystem) -> Wiring:
     The plant is what the variant commands, itself or through a server that it uses, or through a node that passes
     commands on: a robot's base takes the velocity and gives the odometry. These feeds do not count:
 
-    - topics that carry commands: as the server of an action needs none of its clients, a driver needs none of the nodes
-      that command it;
+    - topics that carry commands or goals: as the server of an action needs none of its clients, a driver needs none of
+      the nodes that command it;
     - topics on which any node may publish, such as /tf: they do not tell who needs whom;
     - what else acts on the plant: the variant requires the plant if that feeds it, but not what feeds the plant.
 
@@ -99,6 +98,8 @@ def _feeds(connection: Connection, system: RosSystem) -> Iterator[tuple[Feed, Un
                 names = {connection.name, *_names(source, system), *_names(target, system)}
                 if any(_is_shared(name) for name in names):
                     why = Uncounted.SHARED
+                elif any(_is_goal(name) for name in names):
+                    why = Uncounted.GOAL
                 elif any(_is_command(name) for name in names):
                     why = Uncounted.COMMAND
             yield Feed(source.component, connection.name, target.component), why
@@ -118,10 +119,12 @@ def _is_shared(name: str) -> bool:
     return name in _SHARED_BY_ALL or name.rpartition("/")[2] in _SHARED
 
 
+def _is_goal(name: str) -> bool:
+    return name.rpartition("/")[2] == "goal"
+
+
 def _is_command(name: str) -> bool:
     parts = [part.split("_") for part in name.strip("~/").lower().split("/")]
-    if parts[-1] == [_GOAL]:
-        return True
     return any(not _COMMANDS.isdisjoint(words) for words in parts) and _ANSWERS.isdisjoint(parts[-1])
 
 
