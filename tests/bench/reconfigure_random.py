@@ -30,7 +30,7 @@ def run() -> list[dict[str, Any]]:
             began = time.monotonic()
             subprocess.run(
                 [sys.executable, "-m", "unittest", _TEST],
-                cwd=_TESTS / "integration" / "rosgraph_manipulator",
+                cwd=_TESTS / "integration" / "rosgraph_manipulator" / "changes",
                 env={**os.environ, **own, "MROS_RANDOM_REQUESTS": str(_REQUESTS), "PYTHONPATH": path},
                 check=True,
             )

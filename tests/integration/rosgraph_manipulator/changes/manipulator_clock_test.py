@@ -8,7 +8,7 @@ import rosgraph
 import rospy
 import rostest
 from helpers.waiting import wait_for
-from manipulator_harness import Node
+from integration.rosgraph_manipulator.manipulator_harness import Node
 from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationResult
 from node_kit.ros.action_server import is_connected, wait_for_server
 from rosgraph_msgs.msg import Clock

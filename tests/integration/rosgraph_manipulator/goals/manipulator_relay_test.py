@@ -7,7 +7,7 @@ import rostest
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from helpers.waiting import DEADLINE_S, wait_for
-from manipulator_harness import PairTest, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import PairTest, pid_of
 
 
 class RelayTest(PairTest):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from helpers.other_host import other_host, run_rostest
 
-FOLDER = Path(__file__).parent / "hosts"
+FOLDER = Path(__file__).parent
 
 
 @pytest.mark.parametrize("name", ["hosts", "changes"])

@@ -14,7 +14,7 @@ from actionlib_msgs.msg import GoalID, GoalStatus
 from helpers.cases import case
 from helpers.connections import reaches
 from helpers.waiting import DEADLINE_S, wait_for
-from manipulator_harness import CONFIGURATIONS, PairTest, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import CONFIGURATIONS, PairTest, pid_of
 from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
 from rosgraph_manipulator.ros import client
 

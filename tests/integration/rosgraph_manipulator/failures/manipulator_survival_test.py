@@ -19,7 +19,7 @@ from geometry_msgs.msg import Twist
 from helpers.cases import case
 from helpers.ports import reserved_port
 from helpers.waiting import DEADLINE_S, wait_for
-from manipulator_harness import Node, PairTest, is_alive, later, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import Node, PairTest, is_alive, later, pid_of
 from metacontrol_msgs.msg import MvpReconfigurationGoal
 
 

@@ -11,15 +11,16 @@ import psutil
 import rospy
 import rostest
 from helpers.waiting import DEADLINE_S, wait_for
-from manipulator_harness import HERE, PairTest, is_alive, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import PairTest, is_alive, pid_of
 from manipulator_hosts_harness import ADDRESS, FAR_LAUNCHER, Respawned, link
 
+DATA = Path(__file__).resolve().parent / "data"
 NEAR, FAR = "/near_node", "/far_node"
 LIFE = Path(tempfile.mkdtemp()) / "life"
 
 
 def configuration(name, *args):
-    return {"function": "f_wait", "launch": str(HERE / f"{name}.launch"), "args": list(args)}
+    return {"function": "f_wait", "launch": str(DATA / f"{name}.launch"), "args": list(args)}
 
 
 class HostsTest(PairTest):

@@ -11,7 +11,14 @@ import rostest
 from geometry_msgs.msg import Twist
 from helpers.cases import case
 from helpers.waiting import wait_for
-from manipulator_harness import CONFIGURATIONS, SERVER, PairTest, configuration, is_alive, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import (
+    CONFIGURATIONS,
+    SERVER,
+    PairTest,
+    configuration,
+    is_alive,
+    pid_of,
+)
 
 FOLDER = tempfile.mkdtemp()
 

@@ -13,7 +13,7 @@ from actionlib_msgs.msg import GoalStatus
 from dynamic_reconfigure.msg import Config
 from helpers.cases import case
 from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
-from manipulator_harness import PairTest, is_alive, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import PairTest, is_alive, pid_of
 
 RANDOM_REQUESTS = int(os.environ.get("MROS_RANDOM_REQUESTS", "10"))  # the benchmark makes 200
 

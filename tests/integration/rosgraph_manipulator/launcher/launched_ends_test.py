@@ -12,9 +12,10 @@ import rosgraph
 import rostest
 from helpers.cases import case
 from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
-from manipulator_harness import HERE, PairTest, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import PairTest, pid_of
 
-LAUNCH = str(HERE / "ends.launch")
+DATA = Path(__file__).resolve().parent / "data"
+LAUNCH = str(DATA / "ends.launch")
 KINDS = {
     "respawned": ["respawn:=true"],
     "required": ["required:=true"],

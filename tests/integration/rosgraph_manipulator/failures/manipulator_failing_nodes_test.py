@@ -9,7 +9,7 @@ import rospy
 import rostest
 from helpers.cases import case
 from helpers.waiting import wait_for
-from manipulator_harness import PairTest, is_alive, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import PairTest, is_alive, pid_of
 
 
 class FailingNodesTest(PairTest):

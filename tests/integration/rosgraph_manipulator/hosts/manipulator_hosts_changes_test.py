@@ -11,17 +11,18 @@ import psutil
 import rospy
 import rostest
 from helpers.waiting import DEADLINE_S, wait_for
-from manipulator_harness import HERE, PairTest, is_alive, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import PairTest, is_alive, pid_of
 from manipulator_hosts_harness import ADDRESS, FAR_LAUNCHER, Respawned
 from metacontrol_msgs.msg import ChangeFunctionAction, ChangeFunctionGoal
 
+DATA = Path(__file__).resolve().parent / "data"
 CAMERA, VIEWER, GRIPPER, ONE, TWO = "/camera", "/viewer", "/gripper", "/one", "/two"
 LIVES = Path(tempfile.mkdtemp())
 HERE_ADDRESS = "localhost"
 
 
 def configuration(function, name, *args):
-    return {"function": function, "launch": str(HERE / f"hosts_{name}.launch"), "args": list(args)}
+    return {"function": function, "launch": str(DATA / f"hosts_{name}.launch"), "args": list(args)}
 
 
 def moving(one, two):

@@ -10,7 +10,7 @@ import rostest
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import Twist
 from helpers.waiting import DEADLINE_S, wait_for
-from manipulator_harness import Node
+from integration.rosgraph_manipulator.manipulator_harness import Node
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry
 

@@ -11,7 +11,7 @@ import rostest
 from actionlib.msg import TestAction
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
-from manipulator_harness import HERE, PairTest, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import HERE, PairTest, pid_of
 from metacontrol_msgs.msg import ChangeFunctionAction, ChangeFunctionGoal
 
 CAMERA, VIEWER, GRIPPER, SORTER = "/cell/camera", "/cell/viewer", "/cell/arm/gripper", "/sorter"

@@ -16,10 +16,11 @@ import rosgraph
 import rospy
 import rostest
 from helpers.waiting import DEADLINE_S, wait_for
-from manipulator_harness import HERE, PairTest, is_alive, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import PairTest, is_alive, pid_of
 from rosgraph_launcher.io.processes import MARK
 from rosgraph_launcher.io.warm_start.sitecustomize import SETTING
 
+DATA = Path(__file__).resolve().parent / "data"
 RECORDED = ("/eye", "/left/twin", "/left/deeper/twin", "/right/twin", "/someone", "/shell/wrapped")
 ALL = (
     *RECORDED,
@@ -49,7 +50,7 @@ def build_nodelet(folder):
     (folder / "nodelets.xml").write_text(PLUGINS)
     include = [f"-I/usr/include/{name}" for name in ("pluginlib", "class_loader", "rcpputils", "rcutils")]
     library = str(folder / "lib" / "libcounting.so")
-    source = str(HERE / "counting_nodelet.cpp")
+    source = str(DATA / "counting_nodelet.cpp")
     subprocess.run(["g++", "-O0", "-fPIC", "-shared", *include, "-o", library, source], check=True, timeout=DEADLINE_S)
 
 
@@ -199,7 +200,7 @@ def settled():
 class LaunchedNodesTest(PairTest):
     maxDiff = None
     configurations = {
-        f"shared_{value}": {"function": "f", "launch": str(HERE / "launched.launch"), "args": [f"shared:={value}"]}
+        f"shared_{value}": {"function": "f", "launch": str(DATA / "launched.launch"), "args": [f"shared:={value}"]}
         for value in (1, 2)
     }
     manipulator_parameters = {"save_action": "", "initial_configuration": "", "ready_timeout": 100.0, "probation": 0.0}
@@ -223,7 +224,7 @@ class LaunchedNodesTest(PairTest):
         self.forget()
         with tempfile.TemporaryFile("w+") as output:
             process = subprocess.Popen(
-                ["/usr/bin/roslaunch", str(HERE / "launched.launch"), f"shared:={value}"],
+                ["/usr/bin/roslaunch", str(DATA / "launched.launch"), f"shared:={value}"],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
                 stderr=subprocess.STDOUT,

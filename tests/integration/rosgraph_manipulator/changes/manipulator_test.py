@@ -13,7 +13,7 @@ from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from helpers.cases import case
 from helpers.connections import reaches
 from helpers.waiting import DEADLINE_S, wait_for
-from manipulator_harness import is_alive, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import is_alive, pid_of
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
     FunctionGrounding,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import rostest
 from helpers.waiting import DEADLINE_S, wait_for
-from manipulator_harness import HERE, PairTest, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import HERE, PairTest, pid_of
 from rosgraph_launcher.io.ownership import launcher_mark, look_up
 from rosgraph_launcher.launching.ownership import Owner
 
