@@ -118,6 +118,15 @@ def test_death_is_told_at_once(watcher):
         wait_for(lambda: watcher.lives()[("/n", uri)] is Life.DEAD, known(watcher))
 
 
+@pytest.mark.parametrize("odd", ["http://[", "http://odd:port/", "http://odd:99999999/", "", "http://\udcff:1/"])
+def test_node_that_registered_a_senseless_address_ends_no_watch(watcher, odd):
+    with node() as (uri, _end):
+        watcher.watch({"/odd": odd})
+        wait_for(lambda: watcher.lives().get(("/odd", odd)) is Life.UNREACHABLE, known(watcher))
+        watcher.watch({"/odd": odd, "/n": uri})
+        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE, known(watcher))
+
+
 @hasty
 def test_silent_node_is_hung_until_it_answers(watcher):
     with socket.create_server(("127.0.0.1", 0)) as silent:

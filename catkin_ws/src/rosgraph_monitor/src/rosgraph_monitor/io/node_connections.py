@@ -146,8 +146,8 @@ class NodeConnections:
             self._known = {key: (target.state.life, target.pid) for key, target in self._targets.items()}
 
     def _target(self, key: Key) -> _Target:
-        parts = urlsplit(key[1])
         try:
+            parts = urlsplit(key[1])
             host, port = parts.hostname or "", parts.port or 0
         except ValueError:
             host, port = "", 0

@@ -6,7 +6,6 @@ import os
 import threading
 import time
 from concurrent.futures import wait
-from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -62,14 +61,18 @@ class UsageWatch:
         self._topic = rospy.resolve_name(_LAUNCHERS)
         self._meter = UsageMeter()
         self._asked: dict[str, Future[dict[int, Sample]]] = {}  # launchers that have not answered yet
+        self._warned: set[tuple[str, type[BaseException]]] = set()
         threading.Thread(target=self._run, name="usage", daemon=True).start()
 
     def _run(self) -> None:
         while not rospy.is_shutdown():
-            graph = self._graph()
-            if graph is not None:
-                with suppress(rospy.ROSException):  # the node ends
+            try:
+                graph = self._graph()
+                if graph is not None:
                     self._publish(self._meter.tell(self._measure(graph)))
+            except Exception as error:  # it costs this look, and not those to come
+                if not rospy.is_shutdown():
+                    self._warn("CPU and memory are not reported", error)
             time.sleep(_PERIOD)
 
     def _measure(self, graph: GraphSnapshot) -> dict[tuple[str, str], Sample]:
@@ -117,7 +120,23 @@ class UsageWatch:
         }
         self._asked.update(new)
         wait(new.values(), _DEADLINE)
-        return {name: question.result() for name, question in new.items() if question.done()}
+        told = {}
+        for name, question in new.items():
+            if not question.done():
+                continue
+            error = question.exception()
+            if error is None:
+                told[name] = question.result()
+            else:
+                self._warn(f"CPU and memory of nodes on the host of {name} are not reported", error)
+        return told
+
+    def _warn(self, what: str, error: BaseException) -> None:
+        """Warn once of each kind of error."""
+        trouble = what, type(error)
+        if trouble not in self._warned:
+            self._warned.add(trouble)
+            rospy.logwarn("%s: %s: %s", what, type(error).__name__, error)
 
 
 def _read(launcher: str, nodes: Mapping[str, int], alone: Collection[str]) -> dict[int, Sample]:
