@@ -131,7 +131,7 @@ class MonitorTest(unittest.TestCase):
         self.assertEqual(len({s.values[0].value for s in self.seen.statuses("navigation", "Component status")}), 1)
         rospy.set_param("/navigation/planner/max_vel", 0.5)
         self.seen.wait_status("navigation", "Wrong param configuration", "0.5")
-        self.activate("", "")
+        self.activate("usual", FunctionGrounding.STABLE)
         self.seen.forget()
         self.seen.wait_status("ROS Graph", "running OK")
 
@@ -148,9 +148,20 @@ class MonitorTest(unittest.TestCase):
                 f"problem of {name}", lambda s, place=place: "desired model" in s.message and place in s.message
             )
             self.assertEqual((status.name, status.level), ("ROS Graph", DiagnosticStatus.ERROR))
-        self.activate("", "")
+        self.activate("usual", FunctionGrounding.STABLE)
         self.seen.forget()
         self.seen.wait_status("ROS Graph", "running OK")
+
+    def test_node_that_only_a_released_function_has_is_not_missed(self):
+        self.activate("usual", FunctionGrounding.STABLE)
+        self.end("navigation", signal.SIGINT)
+        self.seen.wait_status("navigation", "Missing node")
+        self.seen.forget()
+        self.activate("", "")
+        self.seen.wait_status("ROS Graph", "running OK")
+        self.start("navigation")
+        self.activate("usual", FunctionGrounding.STABLE)
+        self.seen.wait_status("navigation", "Component status", "TRUE")
 
     def test_safety_and_energy_from_topics(self):
         odometry = rospy.Publisher("odometry/filtered", Odometry, queue_size=1)

@@ -91,6 +91,25 @@ def test_excused_nodes_raise_no_alarm():
     }
 
 
+def test_nodes_of_idle_functions_may_run_or_not_and_are_not_judged():
+    watched = monitor()
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.0)
+    released = Desired(
+        RosSystem("rest", components=(Component("move_base"),)),
+        idle=(Component("front_laser", ports=(Port("front/scan", PortKind.PUBLISHER),)),),
+        idle_topics=frozenset({"rear/scan"}),
+    )
+    fine = {("move_base", "Component status", "TRUE"), ("ROS Graph", "running OK", "")}
+    assert said(watched.evaluate(BOTH, ALIVE, released, 1.0)) == fine
+    assert said(watched.evaluate(graph("/move_base"), ALIVE, released, 30.0)) == fine
+    assert watched.excused_topics(graph("/move_base"), released, ["front/scan", "rear/scan", "odom"]) == {
+        "front/scan",
+        "rear/scan",
+    }
+    published = build_snapshot([[["/rear/scan", ["/move_base"]]], [], []], [], {}, {"/move_base": "http://h"})
+    assert watched.excused_topics(published, released, ["rear/scan"]) == frozenset()
+
+
 def test_problem_of_the_model_is_told_in_place_of_running_ok():
     (problem,) = monitor().evaluate(BOTH, {}, Desired(SYSTEM, problem="no model x"), 0.0)
     assert problem.message == "desired model: no model x"

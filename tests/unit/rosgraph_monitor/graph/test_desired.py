@@ -1,7 +1,7 @@
 """What should run, by the active configuration."""
 
 from ros_model.errors import ModelError
-from ros_model.language.metamodel import Component, RosSystem
+from ros_model.language.metamodel import Component, Port, PortKind, RosSystem
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding
 
 BASE = RosSystem("base", components=(Component("laser"), Component("move_base")))
@@ -54,7 +54,52 @@ def test_variant_that_can_not_be_read_keeps_the_last_good_model():
     assert model.follow([Grounding("f", "fast", "STABLE")]).problem == ""
 
 
-def test_no_configuration_any_more_leads_back_to_the_base():
+CELL = RosSystem(
+    "cell", components=tuple(Component(name) for name in ("conveyor", "camera", "gripper", "viewer", "welder"))
+)
+PARTS = {
+    "pick": RosSystem("pick", components=(Component("gripper"), Component("camera"))),
+    "pick_blindly": RosSystem("pick_blindly", components=(Component("gripper"),)),
+    "look": RosSystem("look", components=(Component("viewer"), Component("camera"))),
+}
+
+
+def cell(*configurations):
+    model = DesiredModel(CELL, PARTS.__getitem__, PARTS.values)
+    assert names(model.current) == {"conveyor", "camera", "gripper", "viewer", "welder"}  # nobody deploys anything yet
+    for active in configurations:
+        model.follow([Grounding(function, name, "STABLE") for function, name in active.items()])
+    return model.current
+
+
+def test_nodes_that_only_a_released_function_has_are_idle():
+    desired = cell({"f_pick": "pick", "f_look": "look"}, {"f_look": "look"})
+    assert names(desired) == {"conveyor", "camera", "viewer", "welder"}
+    assert desired.idle_nodes == {"gripper"}
+    desired = cell({"f_pick": "pick"}, {})
+    assert names(desired) == {"conveyor", "welder"}
+    assert desired.idle_nodes == {"camera", "gripper", "viewer"}
+
+
+def test_function_that_was_released_before_the_monitor_came_is_idle_too():
+    assert cell({"f_look": "look"}).idle_nodes == {"gripper"}
+
+
+def test_nodes_that_the_running_design_of_a_function_does_without_are_idle():
+    assert cell({"f_pick": "pick_blindly"}).idle_nodes == {"camera", "viewer"}
+
+
+def test_topics_that_only_idle_components_publish_are_idle():
+    ports = {name: (Port(f"{name}/out", PortKind.PUBLISHER), Port("shared", PortKind.PUBLISHER)) for name in "abc"}
+    base = RosSystem("base", components=(Component("a", ports=ports["a"]), Component("b", ports=ports["b"])))
+    variants = [RosSystem(name, components=(Component(name, ports=ports[name]),)) for name in "bc"]
+    model = DesiredModel(base, {v.name: v for v in variants}.__getitem__, lambda: variants)
+    assert model.current.idle_topics == frozenset()
+    assert model.follow([Grounding("f", "c", "STABLE")]).idle_topics == {"b/out"}
+    assert model.follow([]).idle_topics == {"b/out", "c/out"}
+
+
+def test_no_configuration_any_more_leads_back_to_the_base_if_its_variants_are_unknown():
     model = DesiredModel(BASE, read)
     model.follow([Grounding("f", "slow", "STABLE")])
     assert model.follow([]).system == BASE

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from ros_model.graph.snapshot import GraphSnapshot
-    from ros_model.language.metamodel import RosSystem
 
     from rosgraph_monitor.graph.desired import Desired
 
@@ -108,6 +107,8 @@ class GraphEvaluator:
         life = {name: lives.get((name, node.uri), Life.UNKNOWN) for name, node in snapshot.nodes.items()}
         conditions = {**self._conditions(life, desired), **(others or {})}
         self._add_topics(conditions, snapshot, life, topics)
+        for idle in desired.idle_nodes:
+            conditions.pop(idle, None)
         components = self._tracker.update(
             conditions,
             now,
@@ -125,18 +126,19 @@ class GraphEvaluator:
         return statuses
 
     def excused_topics(self, snapshot: GraphSnapshot, desired: Desired, topics: Iterable[str]) -> frozenset[str]:
-        """Return the topics that only nodes under reconfiguration publish."""
-        if not desired.excused:
+        """Return the topics that only nodes publish that are under reconfiguration or whose functions are idle."""
+        quiet = desired.excused | desired.idle_nodes
+        if not (quiet or desired.idle_topics):
             return frozenset()
         modelled: dict[str, set[str]] = {}
-        for component in desired.system.components if desired.system else ():
+        for component in (*(desired.system.components if desired.system else ()), *desired.idle):
             for port in component.ports:
                 if port.kind is PortKind.PUBLISHER:
                     modelled.setdefault(port.name.strip("/"), set()).add(component.graph_name)
         found = set()
         for topic in topics:
             nodes = {self._relative(node) for node in self._publishers(snapshot, topic)} | modelled.get(topic, set())
-            if nodes and nodes <= desired.excused:
+            if nodes <= quiet if nodes else topic in desired.idle_topics:
                 found.add(topic)
         return frozenset(found)
 
@@ -152,19 +154,22 @@ class GraphEvaluator:
             return [*wrong_topic_types(snapshot, self._scope.topic_types, self._scope.namespace)]
         dead = {name: (known.name.lower(), known.value) for name, known in life.items() if known not in _CONDITION}
         excused = desired.excused | self._tracker.waited_for
-        findings = self._compared(snapshot, desired.system, dead, excused)
+        findings = self._compared(snapshot, desired, dead, excused)
         settled = self._settled([f for f in findings if isinstance(f, PortFinding)], now)
         return [self._worded(f, is_fresh) for f in findings if not isinstance(f, PortFinding) or f in settled]
 
     def _compared(
-        self, snapshot: GraphSnapshot, system: RosSystem, dead: dict[str, tuple[str, str]], excused: frozenset[str]
+        self, snapshot: GraphSnapshot, desired: Desired, dead: dict[str, tuple[str, str]], excused: frozenset[str]
     ) -> tuple[Finding, ...]:
         """Compare the graph if something has changed since the last time: mostly, nothing has."""
+        system = desired.system
+        if system is None:
+            return ()
         if self._last is not None:
             (last_snapshot, last_system, *last), findings = self._last
             if last_snapshot is snapshot and last_system is system and last == [dead, excused]:
                 return findings
-        findings = compare(snapshot, system, dead=dead, excused=excused, scope=self._scope)
+        findings = compare(snapshot, system, dead=dead, excused=excused, idle=desired.idle_nodes, scope=self._scope)
         self._last = (snapshot, system, dead, excused), findings
         return findings
 

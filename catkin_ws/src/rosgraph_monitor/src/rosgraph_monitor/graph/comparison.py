@@ -68,6 +68,7 @@ def compare(
     *,
     dead: Mapping[str, tuple[str, str]],
     excused: Collection[str] = (),
+    idle: Collection[str] = (),
     scope: Scope = Scope(),
 ) -> tuple[Finding, ...]:
     """Compare a snapshot with the desired system.
@@ -77,6 +78,7 @@ def compare(
         desired: what should run: the base composed with the active variants.
         dead: resolved names of nodes that are known not to run, with their state in one word and the reason in words.
         excused: names (relative, as in the findings) of desired nodes that raise no alarm now.
+        idle: names of nodes that may run or not.
         scope: what is compared.
 
     Returns:
@@ -102,7 +104,7 @@ def compare(
     additional = [
         AdditionalNode(name)
         for name in (relative(node, scope.namespace) for node in own)
-        if name is not None and name not in excused and not is_ignored_node(name, scope.ignored_nodes)
+        if name is not None and name not in (*excused, *idle) and not is_ignored_node(name, scope.ignored_nodes)
     ]
     return (
         *missing,

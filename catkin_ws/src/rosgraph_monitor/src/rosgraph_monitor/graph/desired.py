@@ -1,17 +1,19 @@
-"""The desired system: the base model composed with the variants that the active configuration names."""
+"""The desired system: what runs for the functions, by the active configuration, and what belongs to no function."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import TYPE_CHECKING
 
 from metacontrol_msgs.msg import FunctionGrounding
 from ros_model.errors import ModelError
-from ros_model.language.metamodel import RosSystem, compose
+from ros_model.language.metamodel import PortKind, RosSystem, compose
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Collection, Iterable, Sequence
+
+    from ros_model.language.metamodel import Component
 
 _IN_CHANGE = frozenset({FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING})
 
@@ -33,27 +35,45 @@ class Desired:
         system: the composed model; None where there is no base.
         variant_nodes: names of the nodes that a variant brings, and that the manipulator looks after.
         excused: names of the nodes that are being reconfigured, and raise no alarm.
+        idle: components of the base that belong only to functions for which nothing is deployed, such as a function
+            that was released. Their nodes may run or not.
+        idle_topics: topics that by their models only variants publish, and none that is deployed.
         problem: why the last good model was kept; empty if all is well.
     """
 
     system: RosSystem | None
     variant_nodes: frozenset[str] = frozenset()
     excused: frozenset[str] = frozenset()
+    idle: tuple[Component, ...] = ()
+    idle_topics: frozenset[str] = frozenset()
     problem: str = ""
+
+    @property
+    def idle_nodes(self) -> frozenset[str]:
+        """Names of the nodes of the idle components."""
+        return frozenset(component.graph_name for component in self.idle)
 
 
 class DesiredModel:
     """Follows the active configuration. A variant that can't be read leaves the last good model in force."""
 
-    def __init__(self, base: RosSystem | None, read_variant: Callable[[str], RosSystem]) -> None:
-        """Start from the base alone.
+    def __init__(
+        self,
+        base: RosSystem | None,
+        read_variant: Callable[[str], RosSystem],
+        read_all: Callable[[], Iterable[RosSystem]] = tuple,
+    ) -> None:
+        """Start from the base alone: as long as nobody tells what is deployed, all of it should run.
 
         Args:
             base: the base system, or None to desire nothing in particular.
             read_variant: reads the variant of a name; raises ModelError.
+            read_all: reads all variants: a component that one of them has belongs to a function.
         """
         self._base = base
         self._read = read_variant
+        self._read_all = read_all
+        self._of_functions: tuple[Component, ...] | None = None
         self._variants: dict[str, RosSystem] = {}
         self._stable: dict[str, str] = {}
         self.current = Desired(base)
@@ -65,17 +85,25 @@ class DesiredModel:
             active = [self._variant(g.configuration) for g in groundings if g.configuration]
             in_change = [self._variant(name) for g in groundings if g.state in _IN_CHANGE for name in self._names(g)]
         except ModelError as error:
-            self.current = Desired(
-                self.current.system, self.current.variant_nodes, self.current.variant_nodes, problem=str(error)
-            )
+            self.current = replace(self.current, excused=self.current.variant_nodes, problem=str(error))
             return self.current
         self._stable |= {g.function: g.configuration for g in groundings if g.state == FunctionGrounding.STABLE}
-        self.current = Desired(
-            None if self._base is None else reduce(compose, active, self._base),
-            variant_nodes=_nodes(active),
-            excused=_nodes(in_change),
-        )
+        desired = Desired(None, _nodes(active), _nodes(in_change))
+        self.current = desired if self._base is None else self._with_system(desired, self._base, active)
         return self.current
+
+    def _with_system(self, desired: Desired, base: RosSystem, active: Sequence[RosSystem]) -> Desired:
+        """Return what should run, with the base composed with the active variants, and without what is idle."""
+        if self._of_functions is None:
+            self._of_functions = tuple(c for variant in self._read_all() for c in variant.components)
+        idle = {c.name for c in self._of_functions} - {c.name for variant in active for c in variant.components}
+        system = reduce(compose, active, _without(base, idle))
+        return replace(
+            desired,
+            system=system,
+            idle=tuple(component for component in base.components if component.name in idle),
+            idle_topics=_published(self._of_functions) - _published(system.components),
+        )
 
     def _names(self, grounding: Grounding) -> list[str]:
         """Return the configurations between which a function changes."""
@@ -85,6 +113,16 @@ class DesiredModel:
         if name not in self._variants:
             self._variants[name] = self._read(name)
         return self._variants[name]
+
+
+def _without(system: RosSystem, names: Collection[str]) -> RosSystem:
+    """Return a system without some of its components; a connection that has lost an end is not judged."""
+    return replace(system, components=tuple(c for c in system.components if c.name not in names))
+
+
+def _published(components: Iterable[Component]) -> frozenset[str]:
+    """Return the topics that components publish by their models."""
+    return frozenset(p.name.strip("/") for c in components for p in c.ports if p.kind is PortKind.PUBLISHER)
 
 
 def _nodes(systems: Iterable[RosSystem]) -> frozenset[str]:

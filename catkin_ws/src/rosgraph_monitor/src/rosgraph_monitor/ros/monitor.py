@@ -35,7 +35,7 @@ from rosgraph_monitor.ros.topics import BatteryListener, TopicListener
 from rosgraph_monitor.ros.usage import UsageWatch
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from ros_model.graph.snapshot import GraphSnapshot
     from ros_model.language.metamodel import RosSystem
@@ -93,7 +93,9 @@ class MonitorNode:
             components.of_node, scope=parameters_node.scope(self._topic_specs), patience=patience
         )
         base = parameters_node.text("desired_rossystem")
-        self._model = DesiredModel(read_system(resolve(base)) if base else None, self._read_variant)
+        self._model = DesiredModel(
+            read_system(resolve(base)) if base else None, self._read_variant, self._read_variants
+        )
         self._observers_due = 0.0
         self._running_observers = 0
         self._evaluation = 0.0
@@ -228,6 +230,14 @@ class MonitorNode:
         """Watch the topics for which the settings or the active model have expectations; settings take precedence."""
         system = self._model.current.system
         self._topics.follow(merged(model_topics(system) if system else {}, self._topic_specs))
+
+    def _read_variants(self) -> Iterator[RosSystem]:
+        """Read all variants; one that can't be read is a problem only when it is deployed."""
+        for path in sorted(resolve(self._variants).glob("*.rossystem")) if self._variants else ():
+            try:
+                yield read_system(path)
+            except ModelError as error:
+                rospy.logwarn("left out, so nodes that only this variant has count as the base's: %s", error)
 
     def _read_variant(self, name: str) -> RosSystem:
         if not self._variants:
