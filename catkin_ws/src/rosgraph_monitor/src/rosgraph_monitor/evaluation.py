@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ros_model.language.metamodel import PortKind
 
 from rosgraph_monitor.diagnostics.status import Status, graph_ok, graph_problem
-from rosgraph_monitor.graph.comparison import NOT_REGISTERED, Scope, compare, wrong_topic_types
-from rosgraph_monitor.graph.findings import Finding, MissingNode, PortFinding, concerned, finding_statuses
+from rosgraph_monitor.graph.comparison import NOT_REGISTERED, Scope, compare, running_nodes, wrong_topic_types
+from rosgraph_monitor.graph.findings import Finding, MissingNode, finding_statuses
 from rosgraph_monitor.graph.names import instance, relative, resolved
+from rosgraph_monitor.graph.settling import Look, Settling
 from rosgraph_monitor.health.components import DEFAULT_RECOVERY, ComponentTracker, NodeCondition, component_statuses
 from rosgraph_monitor.health.liveness import Life
 from rosgraph_monitor.health.topics import TopicVerdict, verdict_statuses
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from ros_model.graph.snapshot import GraphSnapshot
+    from ros_model.language.metamodel import RosSystem
 
     from rosgraph_monitor.graph.desired import Desired
 
@@ -31,7 +33,8 @@ class Patience:
     """How long the monitor waits, in wall s, before it reports something that may still change.
 
     Attributes:
-        startup: in which an expected node may come up for the first time, and complete its interfaces.
+        startup: in which an expected node may come up for the first time, complete its interfaces and set its
+            parameters, and in which the monitor itself may learn what is deployed.
         restart: in which the manipulator may announce that it restarts a variant's node, before that node's death is
             reported. Deaths of the base's nodes are reported at once.
         ports: for which a difference in interfaces must last: nodes connect one after the other.
@@ -42,15 +45,6 @@ class Patience:
     restart: float = 1.0
     ports: float = 1.0
     recovery: float = DEFAULT_RECOVERY
-
-
-@dataclass
-class _Told:
-    """What is known about the nodes so far."""
-
-    gone: dict[str, tuple[str, str]] = field(default_factory=dict)
-    alive_since: dict[tuple[str, str], float] = field(default_factory=dict)
-    ports_since: dict[PortFinding, float] = field(default_factory=dict)
 
 
 class GraphEvaluator:
@@ -74,9 +68,10 @@ class GraphEvaluator:
         self._scope = scope or Scope()
         self._patience = patience
         self._tracker = ComponentTracker(component_of, patience.startup, patience.recovery)
-        self._told = _Told()
+        self._settling = Settling(patience.startup, patience.ports)
+        self._gone: dict[str, tuple[str, str]] = {}  # how each node that is missing has gone
         self._publisher: dict[str, str] = {}
-        self._last: tuple[tuple[Any, ...], tuple[Finding, ...]] | None = None
+        self._last: tuple[tuple[Any, ...], Look] | None = None
 
     def evaluate(
         self,
@@ -145,48 +140,32 @@ class GraphEvaluator:
     def _findings(
         self, snapshot: GraphSnapshot, life: Mapping[str, Life], desired: Desired, now: float, is_fresh: bool
     ) -> list[Finding]:
-        self._told.alive_since = {
-            (name, node.uri): self._told.alive_since.get((name, node.uri), now)
-            for name, node in snapshot.nodes.items()
-            if life[name] is Life.ALIVE
-        }
         if desired.system is None:
             return [*wrong_topic_types(snapshot, self._scope.topic_types, self._scope.namespace)]
         dead = {name: (known.name.lower(), known.value) for name, known in life.items() if known not in _CONDITION}
         excused = desired.excused | self._tracker.waited_for
-        findings = self._compared(snapshot, desired, dead, excused)
-        settled = self._settled([f for f in findings if isinstance(f, PortFinding)], now)
-        return [self._worded(f, is_fresh) for f in findings if not isinstance(f, PortFinding) or f in settled]
+        look = self._look(snapshot, desired.system, dead, excused, desired.idle_nodes)
+        return [self._worded(finding, is_fresh) for finding in self._settling.told(look, now)]
 
-    def _compared(
-        self, snapshot: GraphSnapshot, desired: Desired, dead: dict[str, tuple[str, str]], excused: frozenset[str]
-    ) -> tuple[Finding, ...]:
+    def _look(
+        self,
+        snapshot: GraphSnapshot,
+        system: RosSystem,
+        dead: dict[str, tuple[str, str]],
+        excused: frozenset[str],
+        idle: frozenset[str],
+    ) -> Look:
         """Compare the graph if something has changed since the last time: mostly, nothing has."""
-        system = desired.system
-        if system is None:
-            return ()
         if self._last is not None:
-            (last_snapshot, last_system, *last), findings = self._last
+            (last_snapshot, last_system, *last), look = self._last
             if last_snapshot is snapshot and last_system is system and last == [dead, excused]:
-                return findings
-        findings = compare(snapshot, system, dead=dead, excused=excused, idle=desired.idle_nodes, scope=self._scope)
-        self._last = (snapshot, system, dead, excused), findings
-        return findings
-
-    def _settled(self, findings: Sequence[PortFinding], now: float) -> set[PortFinding]:
-        """Return the findings that have lasted, and whose nodes have had time to start."""
-        since = {finding: self._told.ports_since.get(finding, now) for finding in findings}
-        self._told.ports_since = since
-        young = {
-            self._relative(name)
-            for (name, _), at in self._told.alive_since.items()
-            if now - at < self._patience.startup
-        }
-        return {
-            finding
-            for finding, at in since.items()
-            if now - at >= self._patience.ports and young.isdisjoint(concerned(finding))
-        }
+                return look
+        findings = compare(snapshot, system, dead=dead, excused=excused, idle=idle, scope=self._scope)
+        running = running_nodes(snapshot, system, dead.keys(), self._scope.namespace)
+        processes = {name: node.uri for name, node in running.items()}
+        look = Look(findings, processes, frozenset(processes) - excused, system)
+        self._last = (snapshot, system, dead, excused), look
+        return look
 
     def _worded(self, finding: Finding, is_fresh: bool) -> Finding:
         """Return the finding with the reason: the node has ended, has died, or never came."""
@@ -194,9 +173,9 @@ class GraphEvaluator:
             return finding
         state, reason = finding.state, finding.reason
         if (state, reason) == NOT_REGISTERED and self._tracker.has_run(finding.node):
-            state, reason = self._told.gone.get(finding.node, _ENDED)
+            state, reason = self._gone.get(finding.node, _ENDED)
         elif (state, reason) != NOT_REGISTERED and is_fresh:
-            self._told.gone[finding.node] = state, reason
+            self._gone[finding.node] = state, reason
         return MissingNode(finding.node, state, reason)
 
     def _conditions(self, life: Mapping[str, Life], desired: Desired) -> dict[str, NodeCondition]:
@@ -211,7 +190,7 @@ class GraphEvaluator:
             condition = NodeCondition.GONE if running is None else self._condition(life[running])
             conditions[name] = condition
             if condition is NodeCondition.ALIVE:
-                self._told.gone.pop(name, None)
+                self._gone.pop(name, None)
         return conditions
 
     def _add_topics(

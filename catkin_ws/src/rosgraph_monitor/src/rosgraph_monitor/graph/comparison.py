@@ -32,7 +32,7 @@ from rosgraph_monitor.graph.wiring import Live, PortTypes, compare_ports
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
-    from ros_model.graph.snapshot import GraphSnapshot
+    from ros_model.graph.snapshot import GraphSnapshot, NodeState
     from ros_model.language.metamodel import Component, RosSystem
 
 NOT_REGISTERED = "absent", "not registered with the master"
@@ -84,23 +84,21 @@ def compare(
     Returns:
         Missing nodes, wrong parameters, findings on ports, additional nodes; names are relative to the namespace.
     """
-    alive = snapshot.nodes.keys() - dead.keys()
+    running = running_nodes(snapshot, desired, dead, scope.namespace)
     missing: list[Finding] = []
     live: dict[str, Live] = {}
-    expected = set()
     for component in desired.components:
-        name = resolved(component.graph_name, scope.namespace)
-        running = instance(name, alive)
-        expected.add(running or name)
         if component.graph_name in excused:
             continue
-        if running:
-            live[component.name] = Live(component, snapshot.nodes[running])
+        if component.graph_name in running:
+            live[component.name] = Live(component, running[component.graph_name])
         else:
+            name = resolved(component.graph_name, scope.namespace)
             state = dead.get(instance(name, dead) or name, NOT_REGISTERED)
             missing.append(MissingNode(component.graph_name, *state))
     others = robots_inside(scope.namespace, snapshot.nodes)
-    own = (node for node in sorted(alive - expected) if not is_of_another(node, others))
+    expected = {node.name for node in running.values()}
+    own = (n for n in sorted(snapshot.nodes.keys() - dead.keys() - expected) if not is_of_another(n, others))
     additional = [
         AdditionalNode(name)
         for name in (relative(node, scope.namespace) for node in own)
@@ -120,6 +118,15 @@ def compare(
         *wrong_topic_types(snapshot, scope.topic_types, scope.namespace),
         *additional,
     )
+
+
+def running_nodes(
+    snapshot: GraphSnapshot, desired: RosSystem, dead: Collection[str], namespace: str = "/"
+) -> dict[str, NodeState]:
+    """Return the nodes of the desired system that run, by their names in the findings."""
+    alive = snapshot.nodes.keys() - dead
+    names = ((c.graph_name, instance(resolved(c.graph_name, namespace), alive)) for c in desired.components)
+    return {name: snapshot.nodes[running] for name, running in names if running}
 
 
 def wrong_topic_types(snapshot: GraphSnapshot, types: Mapping[str, str], namespace: str = "/") -> list[PortFinding]:

@@ -92,11 +92,6 @@ PortFinding = MissingPort | AdditionalPort | WrongType | MissingConnection
 Finding = MissingNode | AdditionalNode | WrongParameter | PortFinding
 
 
-def concerned(finding: PortFinding) -> tuple[str, ...]:
-    """Return the nodes to which a finding applies."""
-    return finding.nodes if isinstance(finding, MissingConnection) else (finding.node,)
-
-
 def finding_statuses(findings: Iterable[Finding]) -> list[Status]:
     """Return one status for each finding; only the wrong parameters of one node share a status.
 
