@@ -98,6 +98,14 @@ class MonitorNamesTest(GraphTest):
         self.seen.wait_status("arm/move", "Missing connection")
         self.restore(nav)
 
+    def test_client_of_an_action_that_is_made_for_each_goal_is_not_missed(self):
+        task = "/robot/task"
+        self.start(task, "pub=odd:std_msgs/String")  # it has no goal now, and differs in something else
+        self.seen.wait_status("task", "Additional port", "odd")
+        found = {(status.name, status.message) for status in self.seen.all()}
+        self.assertTrue(found.isdisjoint({("task", "Missing port"), ("arm/move", "Missing connection")}), found)
+        self.restore(task)
+
 
 if __name__ == "__main__":
     rostest.rosrun("metacontrol_tests", "monitor_names", MonitorNamesTest)

@@ -2,7 +2,7 @@
 
 import pytest
 from ros_model.graph.snapshot import build_snapshot
-from ros_model.language.metamodel import Component, Reference, RosParameter, RosSystem
+from ros_model.language.metamodel import Component, Port, PortKind, Reference, RosParameter, RosSystem
 from rosgraph_monitor.evaluation import GraphEvaluator, Patience
 from rosgraph_monitor.graph.desired import Desired
 from rosgraph_monitor.health.liveness import Life
@@ -99,3 +99,60 @@ def test_parameter_that_is_wrong_stays_wrong_when_another_function_changes(watch
     assert watched.told(0.0, SOFT, {"force": 1}) == []
     assert watched.told(1.0, SOFT, {"force": 2}) == WRONG
     assert watched.told(1.1, system(*SOFT.system.components, Component("late")), {"force": 2}) == WRONG
+
+
+SPOKEN = system(Component("gripper", namespace="arm", ports=(Port("state", PortKind.PUBLISHER),)))
+PORTS = {"additional": ["state", "voice"], "missing": []}
+
+
+def ports(watched, now, *topics, desired=SPOKEN, address="http://a:1"):
+    """Return which messages on ports are told of a gripper that publishes these topics."""
+    publishers = [[f"/arm/{topic}", ["/arm/gripper"]] for topic in topics]
+    snapshot = build_snapshot([publishers, [], []], [], {}, {"/arm/gripper": address})
+    lives = {("/arm/gripper", address): Life.ALIVE}
+    statuses = watched.evaluator.evaluate(snapshot, lives, desired, now)
+    return [status.message for status in statuses if "port" in status.message]
+
+
+@pytest.mark.parametrize(("difference", "message"), [("additional", "Additional port"), ("missing", "Missing port")])
+def test_port_that_comes_and_goes_is_told_twice_and_then_no_more(watched, difference, message):
+    assert ports(watched, 0.0, "state") == []
+    told = []
+    for cycle in range(5):
+        begin = STARTUP + 10.0 * cycle
+        ports(watched, begin, *PORTS[difference])
+        told += ports(watched, begin + 2.0, *PORTS[difference])
+        assert ports(watched, begin + 4.0, "state") == []
+    assert told == [message] * 2
+
+
+def test_short_lived_port_is_told_no_more_though_no_life_was_long_enough_to_be_told(watched):
+    for tick in range(4 * int(STARTUP)):
+        ports(watched, 0.5 * tick, "state", *(["voice"] if tick % 2 else []))
+    assert ports(watched, 100.0, "state", "voice") == []
+    assert ports(watched, 102.0, "state", "voice") == []
+
+
+def test_port_that_comes_late_and_then_goes_for_good_is_told(watched):
+    ports(watched, 0.0)
+    assert ports(watched, 2 * STARTUP) == ["Missing port"]
+    assert ports(watched, 2 * STARTUP + 1.0, "state") == []
+    ports(watched, 3 * STARTUP)
+    assert ports(watched, 3 * STARTUP + 1.0) == ["Missing port"]
+    assert ports(watched, 90 * STARTUP) == ["Missing port"]
+
+
+def test_difference_that_lasts_over_a_reconfiguration_has_not_gone(watched):
+    ports(watched, 0.0)
+    changing = Desired(SPOKEN.system, excused=frozenset({"arm/gripper"}))
+    for cycle in range(1, 6):
+        assert ports(watched, 20.0 * cycle) == ["Missing port"]
+        assert ports(watched, 20.0 * cycle + 5.0, desired=changing) == []
+
+
+def test_new_process_begins_anew(watched):
+    for tick in range(4 * int(STARTUP)):
+        ports(watched, 0.5 * tick, *(["state"] if tick % 2 else []))
+    assert ports(watched, 100.0) == []
+    ports(watched, 101.0, address="http://a:2")
+    assert ports(watched, 101.0 + STARTUP, address="http://a:2") == ["Missing port"]

@@ -16,6 +16,7 @@ from ros_model.language.packages import Artifact, Node, Package, PackageSet, Por
 from rosgraph_monitor.diagnostics.status import Level
 from rosgraph_monitor.graph.comparison import Scope, compare
 from rosgraph_monitor.graph.findings import (
+    AdditionalNode,
     AdditionalPort,
     MissingConnection,
     MissingPort,
@@ -143,8 +144,60 @@ def test_action_and_its_topics():
     assert findings(model, **action("/move", ["/nav"], ["/laser"])) == ()
     by_topics = system(nav=[port("move/goal", SUB), port("move/result", PUB)])
     assert findings(by_topics, **action("/move", ["/nav"], ["/driver"]), nodes=("/nav", "/driver")) == ()
-    found = findings(model, **action("/move", ["/nav"], []))
+    found = findings(model, **action("/move", [], ["/laser"]))
     assert [type(f).__name__ for f in found] == ["MissingPort", "MissingConnection"]
+
+
+HAND = system(
+    connection("grasp", "hand.grasp", "task.grasp", ConnectionKind.ACTION),
+    hand=[port("grasp", SERVER)],
+    task=[port("grasp", CLIENT), port("events", PUB)],
+)
+EVENTS = [["/events", ["/task"]]]
+TASK = {"nodes": ("/hand", "/task", "/other"), "services": []}
+
+
+def with_events(parts):
+    return {**TASK, **parts, "pubs": [*parts["pubs"], *EVENTS]}
+
+
+def test_client_of_an_action_that_is_made_for_each_goal_need_not_be_there():
+    assert findings(HAND, **with_events(action("/grasp", ["/hand"], []))) == (AdditionalNode("other"),)
+
+
+@pytest.mark.parametrize("server", [["/hand"], []])
+def test_client_of_a_modelled_action_is_nothing_additional_even_while_its_server_restarts(server):
+    model = system(hand=[port("grasp", SERVER)], task=[port("events", PUB)])
+    additional = [f for f in findings(model, **with_events(action("/grasp", server, ["/task"]))) if "task" in f.node]
+    assert additional == []
+
+
+def test_client_of_an_action_that_a_node_outside_the_model_serves_is_nothing_additional():
+    model = system(task=[port("events", PUB)])
+    assert findings(model, **with_events(action("/grasp", ["/other"], ["/task"])))[:-2] == ()
+
+
+def test_client_of_an_action_that_nobody_serves_is_additional():
+    found = findings(HAND, **with_events(action("/gasp", [], ["/task"])))
+    assert AdditionalPort("task", "action client", "gasp") in found
+
+
+@pytest.mark.parametrize("parts", [("goal",), ("goal", "cancel"), ("goal", "cancel", "status"), ("result", "feedback")])
+def test_client_of_which_only_some_topics_are_there_is_on_its_way(parts):
+    whole = action("/grasp", ["/hand"], [])
+    live = {
+        **whole,
+        "pubs": [[t, [*n, "/task"] if t[7:] in parts and PARTS[t[7:]] else n] for t, n in whole["pubs"]],
+        "subs": [[t, [*n, "/task"] if t[7:] in parts and not PARTS[t[7:]] else n] for t, n in whole["subs"]],
+    }
+    assert findings(HAND, **with_events(live)) == (AdditionalNode("other"),)
+    by_topics = system(hand=[port("grasp", SERVER)], task=[port("grasp/goal", PUB), port("grasp/result", SUB)])
+    assert [f for f in findings(by_topics, **live) if isinstance(f, MissingPort)] == []
+
+
+def test_server_of_an_action_must_be_whole():
+    (first, *_) = findings(HAND, **with_events({**action("/grasp", [], ["/task"]), "subs": []}))
+    assert first == MissingPort("hand", "action server", "grasp")
 
 
 DECLARED = PackageSet(

@@ -15,10 +15,10 @@ from rosgraph_monitor.graph.findings import (
     PortFinding,
     WrongType,
 )
-from rosgraph_monitor.graph.names import COMMON_TOPICS, is_ignored_port, relative
+from rosgraph_monitor.graph.names import COMMON_TOPICS, is_ignored_port, relative, resolved
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from ros_model.graph.snapshot import GraphSnapshot, NodeState
     from ros_model.language.metamodel import Component, Connection, Port, PortPath, RosSystem
@@ -70,7 +70,8 @@ def compare_ports(
     """Compare the interfaces of the components that run, given by their names, with the model.
 
     A component that has no port in the model is not judged: its model says nothing about interfaces. If nobody listens
-    to a node, it may lack subscriptions, as lazy publishers do. The master does not know the clients of services.
+    to a node, it may lack subscriptions, as lazy publishers do. The master does not know the clients of services. Nodes
+    may make a client of an action for each goal: it need not be there, and it may be one of any action that is served.
 
     Yields:
         Missing ports, wrong types, additional ports, missing connections. Names are relative to the namespace.
@@ -80,9 +81,17 @@ def compare_ports(
     for connection in system.connections:
         for end in (*connection.sources, *connection.targets):
             called.setdefault((end.component, end.port), set()).add(connection.name)
-    wanted = {name: _wanted(called, entry) for name, entry in live.items()}
+    wanted = {
+        component.name: _wanted(called, component, live[component.name].node.name)
+        if component.name in live
+        else _wanted(called, component, resolved(component.graph_name, namespace))
+        for component in system.components
+    }
+    served = {action.name for action in snapshot.actions.values() if action.servers}
+    for ports in wanted.values():
+        served.update(*(names for (kind, _), (_, names) in ports.items() if kind is PortKind.ACTION_SERVER))
     for name, entry in live.items():
-        yield from _component_ports(snapshot, entry, wanted[name], patterns, types, namespace)
+        yield from _component_ports(snapshot, entry, wanted[name], served, patterns, types, namespace)
     for connection in system.connections:
         yield from _connection(snapshot, connection, live, wanted, namespace)
 
@@ -91,12 +100,11 @@ _Wanted = dict[tuple[PortKind, str], tuple["Port", frozenset[str]]]
 """Of one component: by kind and name of the port, the port and the resolved names that it may have in the graph."""
 
 
-def _wanted(called: Mapping[tuple[str, str], Iterable[str]], entry: Live) -> _Wanted:
-    """Return what a component should have, given the connections' names by component and port.
+def _wanted(called: Mapping[tuple[str, str], Iterable[str]], component: Component, node: str) -> _Wanted:
+    """Return what a component should have, given the connections' names by component and port, and its node's name.
 
     A port has the name of its connection, its own name, or the name in the node's code. The launch file decides which.
     """
-    component, node = entry.component, entry.node.name
     wanted = {}
     for port in component.ports:
         names = {port.name, port.name.lstrip("/") if port.namespace is not None else port.name}
@@ -109,7 +117,13 @@ def _wanted(called: Mapping[tuple[str, str], Iterable[str]], entry: Live) -> _Wa
 
 
 def _component_ports(
-    snapshot: GraphSnapshot, entry: Live, wanted: _Wanted, patterns: tuple[str, ...], types: PortTypes, namespace: str
+    snapshot: GraphSnapshot,
+    entry: Live,
+    wanted: _Wanted,
+    served: Collection[str],
+    patterns: tuple[str, ...],
+    types: PortTypes,
+    namespace: str,
 ) -> Iterator[PortFinding]:
     name = entry.component.graph_name
     if not wanted:
@@ -120,7 +134,8 @@ def _component_ports(
         if kind is PortKind.SERVICE_CLIENT or (kind is PortKind.SUBSCRIBER and idle):
             continue
         present = names & has[kind]
-        if not present:
+        may_lack = kind is PortKind.ACTION_CLIENT or any(_is_of_client(kind, topic, served) for topic in names)
+        if not present and not may_lack:
             yield MissingPort(name, kind.value, port_name)
         expected = _declared_type(port, types, entry.node.name)
         for topic in present if expected else ():
@@ -130,7 +145,9 @@ def _component_ports(
     for kind, listed in _listed(entry.node).items():
         known = {topic for (_, _), (port, topics) in wanted.items() for topic in _covered(port.kind, topics, kind)}
         for topic in listed:
-            if topic not in known and not is_ignored_port(topic, entry.node.name, patterns):
+            if topic in known or _is_of_client(kind, topic, served):
+                continue
+            if not is_ignored_port(topic, entry.node.name, patterns):
                 yield AdditionalPort(name, kind.value, _shown(topic, namespace))
 
 
@@ -149,6 +166,8 @@ def _connection(
         for target in connection.targets:
             into = _names_of(target, kinds[1], live, wanted)
             if out is None or into is None or _is_lazy(snapshot, target, kinds[1], live):
+                continue
+            if kinds[1] is PortKind.ACTION_CLIENT and not into:
                 continue
             if not out & into:
                 given = ", ".join(sorted(_shown(topic, namespace) for topic in out)) or "nothing"
@@ -201,6 +220,15 @@ def _has(node: NodeState, kind: PortKind) -> frozenset[str]:
                 )
             )
     return frozenset(_listed(node).get(kind, ()))
+
+
+def _is_of_client(kind: PortKind, name: str, served: Collection[str]) -> bool:
+    """Return whether a port is a client of an action that is served, or one of the client's topics."""
+    if kind is PortKind.ACTION_CLIENT:
+        return name in served
+    ends = {PortKind.PUBLISHER: _CLIENT_SENDS, PortKind.SUBSCRIBER: _SERVER_SENDS}.get(kind, ())
+    action, _, end = name.rpartition("/")
+    return end in ends and action in served
 
 
 def _listed(node: NodeState) -> dict[PortKind, tuple[str, ...]]:
