@@ -1,6 +1,9 @@
 #!/usr/bin/env python3
 """The relay before an unmodified server: its clients see one goal, at work from the beginning to the end."""
 
+import subprocess
+import sys
+
 import actionlib
 import rospy
 import rostest
@@ -8,6 +11,16 @@ from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from helpers.waiting import DEADLINE_S, wait_for
 from integration.rosgraph_manipulator.manipulator_harness import PairTest, pid_of
+
+SCRIPT = """
+import actionlib, rospy
+from actionlib.msg import TestAction, TestGoal
+rospy.init_node("script")
+client = actionlib.ActionClient("asked", TestAction)
+client.wait_for_server()
+goal = client.send_goal(TestGoal(0))
+rospy.spin()
+"""
 
 
 class RelayTest(PairTest):
@@ -44,6 +57,20 @@ class RelayTest(PairTest):
         wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, "the goal is taken back")
         self.assertEqual(handle.get_goal_status(), GoalStatus.PREEMPTED)
         wait_for(lambda: not self.at_work(), "the server has dropped it")
+
+    def test_goal_of_a_client_that_is_gone_ends_with_its_server(self):
+        script = subprocess.Popen([sys.executable, "-c", SCRIPT])
+        self.addCleanup(script.kill)
+        self.addCleanup(script.wait, DEADLINE_S)
+        wait_for(lambda: len(self.at_work()) == 1, "the server has the goal")
+        goals = {goal for goal, state in self.seen if goal.startswith("/script") and state == GoalStatus.ACTIVE}
+        script.kill()
+        script.wait(DEADLINE_S)
+        server = self.server
+        self.assertEqual(self.request("fast"), 1)
+        wait_for(lambda: {(goal, GoalStatus.PREEMPTED) for goal in goals} & set(self.seen), "its goal has ended")
+        wait_for(lambda: self.server is not server, "the next server is there")
+        self.assertEqual(self.at_work(), [])
 
     def test_results_are_passed_on(self):
         client = actionlib.SimpleActionClient("asked", TestAction)

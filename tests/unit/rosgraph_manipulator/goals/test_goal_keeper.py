@@ -4,6 +4,7 @@ import genpy
 import pytest
 from actionlib import msg as actionlib_test_messages
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+from rosgraph_manipulator.goals.clients import Client
 from rosgraph_manipulator.goals.goal_keeper import GoalKeeper
 
 
@@ -146,6 +147,15 @@ def test_goal_at_work_that_is_not_pending_is_a_stray():
     assert keeper.strays == {"old"}
 
 
+def test_goal_at_work_of_which_no_message_has_come_is_missed(keeper):
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    assert keeper.missed == frozenset()
+    keeper.on_cancel(GoalID(id="a"))
+    assert keeper.missed == frozenset()
+    keeper.on_status(status("b", GoalStatus.ACTIVE))
+    assert keeper.missed == {"b"}
+
+
 def test_goal_that_a_new_server_lacks_is_sent_again_and_again_until_it_has_it(keeper):
     keeper.server_changes(True)
     keeper.server_changes(False)
@@ -171,3 +181,68 @@ def test_goal_that_was_cancelled_meanwhile_is_not_sent(keeper):
     keeper.server_changes(False)
     assert keeper.to_send(10.0) is None
     assert keeper.is_delivered
+
+
+CLIENT = Client("/script", "http://host:1")
+
+
+def waited_for(client=CLIENT):
+    keeper = GoalKeeper()
+    keeper.on_goal(goal("a"), client)
+    keeper.on_status(status("a", GoalStatus.ACTIVE))
+    return keeper
+
+
+def next_server(keeper, takes_over=False, died=True, why_gone=""):
+    """Let the server end, and another one come; return why the goal was dropped."""
+    reason = keeper.keep_for_next_server(why_gone, died)
+    keeper.server_changes(True)
+    keeper.on_status(status("a", GoalStatus.ACTIVE) if takes_over else GoalStatusArray())
+    keeper.server_changes(False)
+    sent = keeper.to_send(0.0)
+    if sent:
+        keeper.on_goal(sent)  # it comes back on the topic
+        keeper.on_status(status("a", GoalStatus.ACTIVE))
+    return reason
+
+
+@pytest.mark.parametrize("died", [True, False])
+def test_goal_whose_client_is_gone_is_dropped_when_its_server_ends(died):
+    keeper = waited_for()
+    reason = next_server(keeper, died=died, why_gone="its client /script has ended")
+    assert reason == "goal a is not sent to the next server: its client /script has ended"
+    assert keeper.pending is None
+
+
+def test_goal_that_servers_take_over_is_kept_over_any_number_of_deaths():
+    keeper = waited_for()
+    assert [next_server(keeper, takes_over=True) for _ in range(20)] == [""] * 20
+    assert keeper.pending_id == "a"
+
+
+@pytest.mark.parametrize(("client", "takes_over"), [(CLIENT, False), (None, False), (None, True)])
+def test_goal_that_nobody_may_wait_for_is_repeated_a_few_times_after_deaths(client, takes_over):
+    keeper = waited_for(client)
+    assert [next_server(keeper, takes_over) for _ in range(3)] == [""] * 3
+    assert "has died 4 times" in next_server(keeper, takes_over)
+    assert keeper.pending is None
+
+
+@pytest.mark.parametrize("client", [CLIENT, None])
+def test_goal_is_sent_again_after_every_change_that_somebody_asks_for(client):
+    keeper = waited_for(client)
+    assert [next_server(keeper, died=False) for _ in range(20)] == [""] * 20
+    assert keeper.pending_id == "a"
+
+
+def test_new_goal_of_the_same_client_is_counted_anew():
+    keeper = waited_for()
+    assert [next_server(keeper) for _ in range(3)] == [""] * 3
+    keeper.on_goal(goal("b", 2), CLIENT)
+    assert next_server(keeper) == ""
+    assert keeper.pending_id == "b"
+    assert keeper.client == CLIENT
+
+
+def test_without_a_goal_there_is_nothing_to_drop():
+    assert GoalKeeper().keep_for_next_server("its client /script has ended", died=True) == ""

@@ -11,6 +11,8 @@ from typing import Any
 
 from actionlib_msgs.msg import GoalStatus
 
+from rosgraph_manipulator.goals.clients import Client
+
 AT_WORK = frozenset({GoalStatus.PENDING, GoalStatus.ACTIVE})
 TERMINAL = frozenset(
     {GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.RECALLED}
@@ -19,6 +21,9 @@ TERMINAL = frozenset(
 DROPPED_BY_SHUTDOWN = frozenset({GoalStatus.PREEMPTED, GoalStatus.ABORTED, GoalStatus.RECALLED})
 REMEMBERED = 1000  # ids of goals that have ended: many more than can be told twice
 SEND_PERIOD = 0.1  # s, after which a goal is sent again: the first one is mostly lost, before the server listens
+REPEATS = 3
+"""How often a goal is repeated after its server died although nobody is known to wait: as often as the launcher starts
+a node again by default, before the configuration fails and the next one gets the goal."""
 CONFIRMATIONS = 3  # statuses with a goal at work, every 0.2 s: more than a server needs to heed a cancellation
 
 
@@ -27,6 +32,9 @@ class GoalKeeper:
 
     def __init__(self) -> None:
         self._goal: Any = None
+        self._client: Client | None = None
+        self._repeats = 0  # how often the goal was repeated after a death, with nobody who is known to wait for it
+        self._is_repeat = False  # whether sending it to the next server counts as such
         self._finished: OrderedDict[str, None] = OrderedDict()
         self._changing = False
         self._doubted = False  # the goal was known to an earlier keeper: the server has to confirm it
@@ -46,6 +54,11 @@ class GoalKeeper:
         return self._goal.goal_id.id if self._goal is not None else None
 
     @property
+    def client(self) -> Client | None:
+        """Who waits for the pending goal; None: nobody who is known."""
+        return self._client if self._goal is not None else None
+
+    @property
     def is_at_work(self) -> bool:
         """Whether the server's last status lists the pending goal as PENDING or ACTIVE."""
         return self.pending_id in self._listed
@@ -56,13 +69,42 @@ class GoalKeeper:
         return self._listed - {self.pending_id}
 
     @property
+    def missed(self) -> frozenset[str]:
+        """Goals that the server works at, although no message of them has come: they can't be kept."""
+        return frozenset() if self._goal is not None else self._listed - self._finished.keys()
+
+    @property
     def server_is_changing(self) -> bool:
         """Whether the server is being replaced."""
         return self._changing
 
-    def adopt(self, goal: Any) -> None:
+    def adopt(self, goal: Any, client: Client | None = None) -> None:
         """Begin with the pending goal of an earlier keeper, unless the server's next status shows that it has ended."""
-        self._goal, self._doubted = copy.deepcopy(goal), True
+        self._goal, self._client, self._doubted = copy.deepcopy(goal), client, True
+
+    def keep_for_next_server(self, why_gone: str, died: bool) -> str:
+        """Decide whether the next server gets the pending goal; else drop it, and return why.
+
+        A client that waits keeps the goal alive, as long as no gap shows: the server takes the goal over. A goal that
+        had to be sent again is lost for its client, and one without a client has nobody who waits. Both are repeated
+        after every change that somebody asks for, but only a few times after a death, which they may have caused.
+
+        Args:
+            why_gone: why the client does not wait any more; empty: it does, or there is none.
+            died: whether the server has died, and is not replaced on request.
+        """
+        if self._goal is None:
+            return ""
+        reason = why_gone
+        if not reason and died and self._repeats >= REPEATS:
+            reason = f"its server has died {REPEATS + 1} times while it was pending, and nobody is known to wait for it"
+        if reason:
+            goal_id = self.pending_id
+            self.drop()
+            return f"goal {goal_id} is not sent to the next server: {reason}"
+        self._repeats += died and self._client is None
+        self._is_repeat = died and self._client is not None
+        return ""
 
     def server_changes(self, changing: bool) -> None:
         """Note whether the server is being replaced. A goal that it drops meanwhile stays pending."""
@@ -82,12 +124,21 @@ class GoalKeeper:
         if self.is_delivered or now - self._sent_at <= SEND_PERIOD:
             return None
         self._sent_at = now
+        self._repeats += self._is_repeat
+        self._is_repeat = False
         return self.pending
 
-    def on_goal(self, goal: Any) -> None:
-        """Process a message of the topic `goal`; a newer goal replaces the pending one."""
+    def on_goal(self, goal: Any, client: Client | None = None) -> None:
+        """Process a message of the topic `goal`; a newer goal replaces the pending one.
+
+        Args:
+            goal: the message.
+            client: who waits for it; None: nobody who is known, or it is a goal that was sent before.
+        """
         if goal.goal_id.id and goal.goal_id.id in self._finished:
             return
+        if client or not goal.goal_id.id or goal.goal_id.id != self.pending_id:
+            self._client, self._repeats, self._is_repeat = client, 0, False
         self._goal, self._doubted, self._cancelled = copy.deepcopy(goal), False, None
 
     def on_status(self, status: Any) -> None:

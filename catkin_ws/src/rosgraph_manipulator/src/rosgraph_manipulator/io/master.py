@@ -47,6 +47,15 @@ def publishers(topic: str) -> set[str]:
     return set(dict(system_state()[0]).get(topic, ()))
 
 
+def subscribers(topic: str) -> set[str]:
+    """Return the nodes that subscribe to a topic.
+
+    Raises:
+        CallError: the master does not answer.
+    """
+    return set(dict(system_state()[1]).get(topic, ()))
+
+
 def services_of(node: str) -> list[str]:
     """Return the services that a node offers.
 

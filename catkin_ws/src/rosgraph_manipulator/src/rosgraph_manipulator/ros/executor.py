@@ -255,7 +255,7 @@ class RosExecutor:
         self._servers_died[function] = bool(servers & set(report.dead))
         if self._servers_died[function]:
             now = self._progress.report(function)
-            goal.server_stops(is_back=now is not None and not servers & set(now.dead))
+            goal.server_stops(died=True, is_back=now is not None and not servers & set(now.dead))
 
     def end_recovery(self, function: str) -> None:
         """Wait until the nodes of a function that the launcher has started again are ready.

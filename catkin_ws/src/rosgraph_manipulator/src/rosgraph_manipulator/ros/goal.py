@@ -21,7 +21,9 @@ import rospy
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 
 from rosgraph_manipulator.configuration.configurations import ConfigurationError
+from rosgraph_manipulator.goals.clients import Client
 from rosgraph_manipulator.goals.goal_keeper import GoalKeeper
+from rosgraph_manipulator.ros.goal_clients import GoalClients
 
 QUEUE = 10
 
@@ -45,6 +47,7 @@ class PendingGoal:
         self._parameter = f"{action}/resume_goal"
         self._goal_type = action_type + "Goal"
         self._keeper = GoalKeeper()
+        self._clients = GoalClients(action)
         self._lock = threading.RLock()
         self._stored: str | None = None  # id of the goal in the parameter
         self._server: object = None  # what stands for the present server's connection
@@ -56,7 +59,7 @@ class PendingGoal:
         self._goal_publisher = rospy.Publisher(f"{action}/goal", goal_class, queue_size=1)
         self._cancel_publisher = rospy.Publisher(f"{action}/cancel", GoalID, queue_size=QUEUE)
         self._subscribers = [
-            rospy.Subscriber(f"{action}/goal", goal_class, self._locked(self._keeper.on_goal), queue_size=QUEUE),
+            rospy.Subscriber(f"{action}/goal", goal_class, self._on_goal, queue_size=QUEUE),
             rospy.Subscriber(f"{action}/result", result_class, self._locked(self._keeper.on_result), queue_size=QUEUE),
             rospy.Subscriber(f"{action}/cancel", GoalID, self._locked(self._keeper.on_cancel), queue_size=QUEUE),
             rospy.Subscriber(f"{action}/status", GoalStatusArray, self._locked(self._on_status), queue_size=QUEUE),
@@ -67,17 +70,25 @@ class PendingGoal:
         """Full name of the server's status topic."""
         return str(rospy.resolve_name(f"{self._action}/status"))
 
-    def server_stops(self, is_back: bool = False) -> None:
-        """Note that the server will be stopped now, or has died.
+    def server_stops(self, died: bool = False, is_back: bool = False) -> None:
+        """Note that the server will be stopped now, or has died; drop the goal where nobody waits for it any more.
 
         Args:
+            died: whether it has died.
             is_back: whether it was started again, so that the last status may be that of the new one.
         """
+        why_gone = self._clients.why_gone(self._keeper.client)
+        for goal_id in self._keeper.missed:
+            missed = f"its client sent it before {rospy.get_name()} was connected to it: use action_relay"
+            rospy.logwarn("%s: goal %s is not kept: %s", self._action, goal_id, missed)
         with self._lock:
+            dropped = self._keeper.keep_for_next_server(why_gone, died)
             self._keeper.server_changes(True)
             self._server = None if is_back else self._server
             self._old_server = self._server
             self._store(again=True)
+        if dropped:
+            rospy.logwarn("%s: %s", self._action, dropped)
 
     @property
     def is_between_servers(self) -> bool:
@@ -108,11 +119,25 @@ class PendingGoal:
     def deliver(self) -> bool:
         """Send the goal if it is time; return whether the server has it or no goal is pending."""
         with self._lock:
-            goal = self._keeper.to_send(time.monotonic())
-            if goal is not None:
+            goal, client = self._keeper.to_send(time.monotonic()), self._keeper.client
+        if goal is None:
+            return self._keeper.is_delivered
+        why_gone = self._clients.why_gone(client)
+        with self._lock:
+            if why_gone:
+                rospy.logwarn("%s: goal %s is not sent to the new server: %s", self._action, goal.goal_id.id, why_gone)
+                self._keeper.drop()
+                self._store()
+            elif self._keeper.pending_id == goal.goal_id.id:
                 rospy.loginfo("sending the pending goal %s to the new server of %s", goal.goal_id.id, self._action)
                 self._goal_publisher.publish(goal)
             return self._keeper.is_delivered
+
+    def _on_goal(self, goal: Any) -> None:
+        client = self._clients.of(goal)  # it asks the master, so nobody is kept waiting
+        with self._lock:
+            self._keeper.on_goal(goal, client)
+            self._store()
 
     def _on_status(self, status: GoalStatusArray) -> None:
         # Each connection has a header of its own, so another one is another process.
@@ -140,7 +165,9 @@ class PendingGoal:
                 buffer = io.BytesIO()
                 self._keeper.pending.serialize(buffer)
                 data = base64.b64encode(buffer.getvalue()).decode("ascii")
-                rospy.set_param(self._parameter, {"type": self._goal_type, "data": data})
+                client = self._keeper.client
+                waits = {"client": [client.node, client.address]} if client else {}
+                rospy.set_param(self._parameter, {"type": self._goal_type, "data": data, **waits})
             self._stored = goal_id
 
     def _recall(self, goal_class: Any, adopt: bool) -> None:
@@ -151,10 +178,14 @@ class PendingGoal:
             if not adopt or left["type"] != self._goal_type:
                 raise ValueError("it is from another time")
             goal = goal_class().deserialize(base64.b64decode(left["data"], validate=True))
+            client = Client(*map(str, left["client"])) if "client" in left else None
+            if why_gone := self._clients.why_gone(client):
+                rospy.logwarn("%s: goal %s is not kept: %s", self._action, goal.goal_id.id, why_gone)
+                raise ValueError(why_gone)
         except (KeyError, TypeError, ValueError, binascii.Error, genpy.DeserializationError):
             rospy.delete_param(self._parameter)
             return
-        self._keeper.adopt(goal)
+        self._keeper.adopt(goal, client)
         self._stored = goal.goal_id.id
         rospy.loginfo("took over the pending goal %s of %s", goal.goal_id.id, self._action)
 

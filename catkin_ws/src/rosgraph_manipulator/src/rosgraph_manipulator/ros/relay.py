@@ -13,7 +13,9 @@ from node_kit.ros.action_server import is_connected
 from node_kit.ros.lifetime import Lifetime
 
 from rosgraph_manipulator.configuration.configurations import ConfigurationError, action_type
+from rosgraph_manipulator.goals.clients import Client
 from rosgraph_manipulator.goals.relay import Ending, Link
+from rosgraph_manipulator.ros.goal_clients import GoalClients
 
 PERIOD = 0.05  # s, wall, between two looks at whether goals can be sent
 BUSY = (FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING)
@@ -39,6 +41,9 @@ class Relay:
         self._client = actionlib.ActionClient(server, kind)
         self._server = actionlib.ActionServer(action, kind, self._on_goal, self._on_cancel, auto_start=False)
         rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)
+        self._waits = GoalClients(action)
+        self._waiting: dict[str, Client | None] = {}  # who waits for each goal
+        self._subscriber = rospy.Subscriber(f"{action}/goal", type(kind().action_goal), self._on_goal_message)
         self._server.start()
 
     def spin(self) -> None:
@@ -53,15 +58,26 @@ class Relay:
             return
         if not is_connected(self._client):
             return
+        again = [name for name, goal in list(self._goals.items()) if goal.inner and goal.link.needs_sending(False)]
+        gone = {name: why for name in again if (why := self._waits.why_gone(self._waiting.get(name)))}
         with self._lock:
-            for goal in list(self._goals.values()):
-                if goal.link.needs_sending(self._changing):
+            for name, goal in list(self._goals.items()):
+                if name in gone:
+                    rospy.logwarn("goal %s is not sent again: %s", name, gone[name])
+                    self._end(goal, Ending.CANCELLED, None, gone[name])
+                elif goal.link.needs_sending(self._changing):
                     goal.link.sent = True
                     goal.inner = self._client.send_goal(
                         goal.outer.get_goal(),
                         transition_cb=lambda inner, goal=goal: self._on_transition(goal, inner),
                         feedback_cb=lambda _inner, feedback, goal=goal: goal.outer.publish_feedback(feedback),
                     )
+
+    def _on_goal_message(self, message: Any) -> None:
+        client = self._waits.of(message)
+        with self._lock:
+            known = {name: self._waiting[name] for name in self._goals if name in self._waiting}
+            self._waiting = {**known, message.goal_id.id: client}
 
     def _on_goal(self, handle: actionlib.ServerGoalHandle) -> None:
         with self._lock:
