@@ -4,6 +4,11 @@ Definitions
 - Mission time runs from the event MISSION_START to MISSION_END; `stamp_s` is simulated seconds since MISSION_START.
 - Shares and means of a QA are weighted by time: a sample holds until the next one. `time_above_threshold` and `mean_qa`
   are those of the ground truth, `observed_qa` those of what the observers reported, over the time they were not stale.
+- `violations` of the ground truth: each from the first moment above the threshold to the relief, from which on the
+  level kept the threshold for 5 s or to the end of the mission. `relief_s` is the time between the two, null where the
+  mission ended above the threshold; `above_s` and `pieces` are the time above it and in how many pieces.
+  `violation_places` are cells [i, j, seconds above the threshold]; a cell covers x from i to i + 1 times `cell_m`, in m
+  in the map frame, and y from j to j + 1.
 - `detect_s` of a component: from the perturbation that hit it to the stamp of the first diagnostic that reports it
   FALSE. Of a QA: from the moment when the ground truth rose above the threshold (the rise that the observers' first
   report falls into) to the first report above the threshold of that violation; null where the ground truth was below
@@ -26,6 +31,7 @@ from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import MissionRecord, Samples
 from metacontrol_bags.series import held, mean, periods_missed, share_above, start_of_run
+from metacontrol_bags.violations import CELL_M, describe
 from metacontrol_bags.words import DiagnosticWords, FunctionGrounding, MissionEvent
 
 if TYPE_CHECKING:
@@ -68,6 +74,10 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
     closing = ended.values if ended else {}
     limits = thresholds(record)
     above = {name: share_above(record.true_quality.get(name, ()), limit, start, end) for name, limit in limits.items()}
+    violated = {
+        name: describe(record.true_quality.get(name, ()), record.poses, limit, start, end)
+        for name, limit in limits.items()
+    }
     means = {name: mean(record.true_quality.get(name, ()), start, end) for name in limits}
     goals = mission_goals(record)
     reached = bool(goals) and all(status is GoalStatus.SUCCEEDED for status in goals.values())
@@ -94,6 +104,8 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
         "final_configuration": configuration_at(record, end) or told.get("initial_configuration"),
         "time_above_threshold": {name: _rounded(value) for name, value in above.items()},
         "mean_qa": {name: _rounded(value) for name, value in means.items()},
+        "violations": {name: found for name, (found, _) in violated.items()},
+        "violation_places": {"cell_m": CELL_M} | {name: cells for name, (_, cells) in violated.items()},
         "reconfigurations": reconfigurations(record, EXECUTED),
         "reconfigurations_failed": reconfigurations(record, FAILED),
         "perturbations": _perturbations(record),

@@ -59,6 +59,8 @@ def _column(summary: Mapping[str, Any]) -> dict[str, str]:
         "configuration": " -> ".join(configurations) or UNKNOWN,
     }
     rows |= {f"time above the {name} threshold": _share(v) for name, v in summary["time_above_threshold"].items()}
+    for name, violations in summary["violations"].items():
+        rows[f"violations of the {name} threshold"] = _violations(violations)
     rows |= {f"mean {name}": _number(level) for name, level in summary["mean_qa"].items()}
     for name, observed in summary["observed_qa"].items():
         rows[f"time above the {name} threshold, as observed"] = _share(observed["time_above_threshold"])
@@ -70,6 +72,15 @@ def _column(summary: Mapping[str, Any]) -> dict[str, str]:
         "control periods missed": _share(control["periods_missed"]),
         "simulated / wall time": _number(summary["real_time_factor"]),
     }
+
+
+def _violations(found: Sequence[Mapping[str, Any]] | None) -> str:
+    """Return how many violations there were, and how long it took on average until relief."""
+    if not found:
+        return UNKNOWN if found is None else "0"
+    times = [violation["relief_s"] for violation in found if violation["relief_s"] is not None]
+    last = ", the last one to the end" if len(times) < len(found) else ""
+    return f"{len(found)}{f', relief after {statistics.fmean(times):.2f} s' if times else ''}{last}"
 
 
 def _contingency(told: Mapping[str, Any]) -> str:

@@ -14,10 +14,8 @@ from metacontrol_bags.record import (
     Event,
     QualityReport,
 )
+from metacontrol_bags.violations import CALM_S
 from metacontrol_bags.words import DiagnosticWords, FunctionGrounding, MissionEvent
-
-CALM_S = 5.0
-"""s: a QA that was below its threshold for this long gets a new line when it rises above the threshold."""
 
 _WELL_AGAIN = (DiagnosticWords.COMPONENT_RECOVERED, DiagnosticWords.COMPONENT_TRUE)
 
@@ -76,6 +74,7 @@ class Timeline:
         return (Entry(report.stamp, "R1", f"component {report.component} {text}", bad),)
 
     def _quality(self, report: QualityReport) -> tuple[Entry, ...]:
+        """Tell a level above its threshold, again only after it was below for a while."""
         if report.level is None:
             if report.name in self._stale:
                 return ()
