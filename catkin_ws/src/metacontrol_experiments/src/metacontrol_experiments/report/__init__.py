@@ -1,0 +1,1 @@
+"""The report of a campaign: from the rows of its table to statistics, verdicts, pages and figures. Pure."""
