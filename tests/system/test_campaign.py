@@ -13,6 +13,7 @@ from helpers.waiting import wait_for
 from metacontrol_experiments.io.processes import free_port
 from pyarrow import parquet
 
+SOURCES = Path(__file__).parents[2] / "catkin_ws" / "src"
 CAMPAIGN = """
 timeout: 2
 deadline: 100
@@ -113,6 +114,23 @@ def test_campaign_that_is_interrupted_leaves_a_table_and_no_process(ended, tmp_p
     table = parquet.read_table(tmp_path / "out" / "results.parquet").to_pylist()
     assert len(table) == len(results(tmp_path)) >= 1
     wait_for(lambda: not [process for process in started if runs(process)], "the end of all processes")
+
+
+def test_campaign_of_the_tests_leaves_a_table_from_which_a_report_is_made(ended, tmp_path):
+    folder = SOURCES / "metacontrol_experiments" / "campaigns"
+    command = campaign(ended, tmp_path, "--jobs", "2", text=(folder / "ci.yaml").read_text())
+    assert command.wait(400) == 0
+    made = start(ended, "metacontrol_experiments.cli.main", "report", "out", "--no-drive", cwd=tmp_path)
+    assert made.wait(200) == 0
+    text = (tmp_path / "out" / "report" / "report.md").read_text()
+    assert text.startswith(
+        "# Results\n\n8 missions (engine lockstep) of the managers `none`, `mros`, `respawn`, `rules`"
+    )
+    assert "asks for" not in text and "crashed or hung" not in text
+    assert "### A pair of missions" in text and "| `mros` | `component` | 1 |" in text
+    page = (tmp_path / "out" / "report" / "report.html").read_text()
+    assert page.count('src="data:image/png;base64,') == text.count("](figures/") == 3
+    assert 'src="figures' not in page
 
 
 def test_runs_on_ros_side_by_side_have_masters_of_their_own(ended, tmp_path):

@@ -10,6 +10,7 @@ from metacontrol_experiments.cli.campaign import campaign
 from metacontrol_experiments.cli.compare import compare
 from metacontrol_experiments.cli.delays import delays
 from metacontrol_experiments.cli.figure import figure
+from metacontrol_experiments.cli.report import report
 from metacontrol_experiments.cli.run import run
 from metacontrol_experiments.cli.summary import summary
 from metacontrol_experiments.cli.variants import variants
@@ -20,7 +21,7 @@ def metacontrol() -> None:
     """Missions of a robot that adapts, and what their bags tell."""
 
 
-for _command in (run, summary, figure, calibrate, variants, compare, delays, campaign, bag):
+for _command in (run, summary, figure, calibrate, variants, compare, delays, campaign, report, bag):
     metacontrol.add_command(_command)
 
 
