@@ -2,6 +2,7 @@
 
 import pytest
 from click.testing import CliRunner
+from helpers.office import write_office
 from metacontrol_experiments.cli import run as cli
 from metacontrol_experiments.cli.main import metacontrol
 
@@ -42,12 +43,11 @@ def test_short_options_add_to_the_others(monkeypatch):
 
 
 def test_world_and_routes_of_the_users_own(monkeypatch, tmp_path):
-    (tmp_path / "routes.yaml").write_text("home: {start: [0, 0], goal: [3, 0]}\n")
-    (tmp_path / "hall.yaml").write_text("image: hall.pgm\n")
-    files = ("--world", str(tmp_path / "hall.yaml"), "--routes", str(tmp_path / "routes.yaml"), "--route", "home")
+    world, routes = write_office(tmp_path)
+    files = ("--world", str(world), "--routes", str(routes), "--route", "aisle")
     settings = settings_of(monkeypatch, *files)
-    assert settings.route.name == "home"
-    assert f"world:={tmp_path / 'hall.yaml'}" in settings.launch_command(4000)
+    assert settings.route.name == "aisle"
+    assert f"world:={world}" in settings.launch_command(4000)
     assert not any(argument.startswith("world:=") for argument in settings_of(monkeypatch).launch_command(4000))
 
 

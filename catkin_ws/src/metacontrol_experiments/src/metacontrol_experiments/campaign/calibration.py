@@ -61,6 +61,7 @@ class Run:
         safety_above: share of time above the threshold of safety.
         energy: mean.
         energy_above: share of time above the threshold of energy.
+        ground: what tells the ground from others; empty for the factory.
         commit: of the code that drove it.
     """
 
@@ -76,6 +77,7 @@ class Run:
     safety_above: float
     energy: float
     energy_above: float
+    ground: str
     commit: str
 
     @property
@@ -107,13 +109,14 @@ def plan(variants: Sequence[str], routes: Sequence[str], seeds: int) -> list[Job
     return [Job(*job) for job in ((v, r, s) for s, v, r in itertools.product(range(1, seeds + 1), variants, routes))]
 
 
-def run_of(job: Job, record: MissionRecord, thresholds: Mapping[str, float], commit: str) -> Run:
+def run_of(job: Job, record: MissionRecord, thresholds: Mapping[str, float], ground: str, commit: str) -> Run:
     """Return what a mission's record tells.
 
     Args:
         job: what was asked for.
         record: of the mission.
         thresholds: level that must not be exceeded, by quality attribute.
+        ground: what tells the ground from others; empty for the factory.
         commit: of the code that drove it.
     """
     summary = summarise(record)
@@ -130,8 +133,27 @@ def run_of(job: Job, record: MissionRecord, thresholds: Mapping[str, float], com
         safety_above=round(share_above(risk, thresholds["safety"], start, end) or 0.0, 4),
         energy=summary["mean_qa"]["energy"],
         energy_above=round(share_above(load, thresholds["energy"], start, end) or 0.0, 4),
+        ground=ground,
         commit=commit,
     )
+
+
+def check_ground(runs: Sequence[Run], ground: str, where: str) -> None:
+    """Check that runs were driven on a ground.
+
+    Args:
+        runs: what is checked.
+        ground: what tells it from others; empty for the factory.
+        where: their file, for messages.
+
+    Raises:
+        CalibrationError: one was not.
+    """
+    other = next((run.ground for run in runs if run.ground != ground), None)
+    if other is not None:
+        raise CalibrationError(
+            f"{where}: holds runs on {other or 'the factory'}, not on {ground or 'the factory'}: name another by --runs"
+        )
 
 
 def missing_runs(runs: Sequence[Run], variants: Sequence[str]) -> list[Job]:

@@ -13,6 +13,7 @@ from ros_model.project.schema_check import violations
 from metacontrol_experiments.contingency.contingency import Contingency, Kind
 from metacontrol_experiments.contingency.parsing import ContingencyError, make, parse_contingency
 from metacontrol_experiments.managers.manager import MROS, NONE
+from metacontrol_experiments.mission.ground import FACTORY, Ground
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -68,6 +69,8 @@ _SCHEMA = {
         "timeout": {"type": "number", "exclusiveMinimum": 0, "title": "simulated s, more than 0"},
         "deadline": {"type": "number", "exclusiveMinimum": 0, "title": "wall s for a run, more than 0"},
         "logs": {"type": "boolean", "title": "true or false"},
+        "world": {"type": "string", "title": "the path of a world file or of a map's YAML file"},
+        "routes_file": {"type": "string", "title": "the path of a YAML file of routes"},
         "parts": {
             "type": "object",
             "minProperties": 1,
@@ -100,6 +103,7 @@ class Run:
         seed: of everything random; the same for all managers.
         engine: lockstep or ros.
         timeout: simulated s after which the mission has failed.
+        ground: what tells the ground from others; empty for the factory.
     """
 
     part: str
@@ -114,6 +118,7 @@ class Run:
     seed: int
     engine: str = "lockstep"
     timeout: float = TIMEOUT_S
+    ground: str = ""
 
     @property
     def name(self) -> str:
@@ -130,21 +135,35 @@ class Campaign:
         runs: repeat by repeat, so that the first part is of use, too.
         deadline: wall s for a run.
         logs: whether each run leaves its log.
+        ground: of all runs.
     """
 
     runs: tuple[Run, ...]
     deadline: float = DEADLINE_S
     logs: bool = False
+    ground: Ground = FACTORY
 
 
 @dataclass(frozen=True)
 class Known:
-    """Names that a campaign may use."""
+    """Names that a campaign may use, and the ground of its routes."""
 
     routes: Collection[str]
     configurations: Collection[str]
     managers: Collection[str]
     components: Collection[str]
+    ground: Ground = FACTORY
+
+
+def ground_files(content: Any, where: str) -> tuple[str | None, str | None]:
+    """Return the files of world and routes that a campaign names, relative to its own; None for one that it does not.
+
+    Raises:
+        CampaignError: it is no campaign; the message names the place.
+    """
+    for violation in violations(content, _SCHEMA):
+        raise CampaignError(f"{where}: {violation}")
+    return content.get("world"), content.get("routes_file")
 
 
 def parse_campaign(content: Any, known: Known, where: str) -> Campaign:
@@ -158,8 +177,7 @@ def parse_campaign(content: Any, known: Known, where: str) -> Campaign:
     Raises:
         CampaignError: it is none; the message names the place.
     """
-    for violation in violations(content, _SCHEMA):
-        raise CampaignError(f"{where}: {violation}")
+    ground_files(content, where)
     seed = _whole(content.get("seed", 0), 0, f"{where}: seed")
     engine, timeout = content.get("engine", "lockstep"), float(content.get("timeout", TIMEOUT_S))
     runs = [
@@ -168,7 +186,8 @@ def parse_campaign(content: Any, known: Known, where: str) -> Campaign:
         for run in _runs(name, part, known, f"{where}: parts.{name}", (seed, engine, timeout))
     ]
     runs.sort(key=lambda run: run.repeat)  # stable
-    return Campaign(tuple(runs), float(content.get("deadline", DEADLINE_S)), bool(content.get("logs", False)))
+    deadline, logs = float(content.get("deadline", DEADLINE_S)), bool(content.get("logs", False))
+    return Campaign(tuple(runs), deadline, logs, known.ground)
 
 
 def contingencies_of(run: Run) -> tuple[Contingency, ...]:
@@ -206,7 +225,7 @@ def _runs(name: str, part: Mapping[str, Any], known: Known, where: str, given: t
             seed = seed_of(base, *cell[:3], f"{cell[3]:g}", cell[4], repeat)
             for manager, count in repeats.items():
                 if repeat <= count:
-                    yield Run(name, *cell, contingencies, manager, repeat, seed, engine, timeout)
+                    yield Run(name, *cell, contingencies, manager, repeat, seed, engine, timeout, known.ground.mark)
 
 
 def _disturbances(clutter: int, power: float, where: str) -> tuple[str, ...]:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from metacontrol_experiments.campaign.calibration import CalibrationError, missing_runs, plan
+from metacontrol_experiments.campaign.calibration import CalibrationError, check_ground, missing_runs, plan
+from metacontrol_experiments.cli.options import ground_options
 from metacontrol_experiments.io.calibration_runs import drive
 from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.display import CONSOLE, refusing, tell
-from metacontrol_experiments.io.input_files import PackageError, read_route, route_names, simulation_package
+from metacontrol_experiments.io.ground_files import read_ground, read_routes, routes_file
+from metacontrol_experiments.io.input_files import PackageError, route_names, simulation_package
 from metacontrol_experiments.io.tables import append_runs, read_runs, write_levels
 from metacontrol_experiments.mission.routes import RouteError
 
@@ -28,16 +30,18 @@ runs_option = click.option(
 
 @click.command()
 @click.option("--seeds", type=click.IntRange(1), default=5, show_default=True, help="How many: 1, 2, ...")
-@click.option("--route", "routes", multiple=True, help="Only this one; any number of times.  [default: all]")
+@click.option("--route", "only_routes", multiple=True, help="Only this one; any number of times.  [default: all]")
 @click.option("--variant", "variants", multiple=True, help="Only this one; any number of times.  [default: all]")
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Missions driven side by side.")
 @runs_option
 @click.option(
     "--levels",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="Where the measured levels go, when all variants are measured.  [default: metacontrol_sim/models/qa.csv]",
+    help="Where the measured levels go, when all variants are measured.  [default: metacontrol_sim/models/qa.csv; of "
+    "another world or other routes: qa.csv beside the file of runs]",
 )
-def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tuple[str, ...]) -> None:
+@ground_options
+def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **options: Any) -> None:
     """Measure the expected quality levels: drive every variant over routes and seeds, in lockstep.
 
     A line is added to the file of runs for each mission; what is in it already is not driven again. Then run
@@ -46,17 +50,17 @@ def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tu
     with refusing(CalibrationError, RouteError, PackageError):
         package = simulation_package()
         known = sorted(path.stem for path in (package / "models" / "variants").glob("*.rossystem"))
-        file = package / "worlds" / "routes.yaml"
-        variants = _chosen("--variant", only["variants"], known)
-        routes = _chosen("--route", only["routes"], route_names(file))
-        for name in routes:
-            read_route(file, name)
+        ground = read_ground(options["world"], options["routes"])
+        variants = _chosen("--variant", options["variants"], known)
+        routes = _chosen("--route", options["only_routes"], route_names(routes_file(ground)))
+        read_routes(ground, routes)
         done = read_runs(runs)
+        check_ground(done, ground.mark, str(runs))
         driven = {run.job for run in done}
         missing = [job for job in plan(variants, routes, seeds) if job not in driven]
         with _progress() as bar:
             task = bar.add_task("missions", total=len(missing))
-            for run in append_runs(runs, drive(missing, file, current_commit(), jobs)):
+            for run in append_runs(runs, drive(missing, ground, current_commit(), jobs)):
                 done.append(run)
                 bar.update(task, advance=1, description=f"{run.variant} {run.route} seed {run.seed}: {run.outcome}")
         _tell_runs(done, len(missing), runs)
@@ -65,9 +69,9 @@ def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **only: tu
             first = ", ".join(map(str, lacking[:3]))
             tell(f"no levels written: {len(lacking)} missions are missing, {first} ...")
             return
-        target = levels or package / "models" / "qa.csv"
+        target = levels or (runs.with_name("qa.csv") if ground.mark else package / "models" / "qa.csv")
         write_levels(target, done)
-    tell(f"measured levels are in {target}; now: rosmodel generate all")
+    tell(f"measured levels are in {target}" + ("" if ground.mark else "; now: rosmodel generate all"))
 
 
 def _chosen(option: str, asked: tuple[str, ...], known: list[str]) -> list[str]:

@@ -12,11 +12,13 @@ from node_kit.plugins import find
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from metacontrol_experiments.campaign.matrix import CampaignError, Known, parse_campaign
+from metacontrol_experiments.campaign.matrix import CampaignError, Known, ground_files, parse_campaign
 from metacontrol_experiments.campaign.progress import Status, remaining
+from metacontrol_experiments.cli.options import ground_options
 from metacontrol_experiments.io.campaign_folder import RUNS, read_results, write_result, write_table
 from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.display import CONSOLE, refusing, tell
+from metacontrol_experiments.io.ground_files import read_ground, read_routes, routes_file
 from metacontrol_experiments.io.input_files import PackageError, read_components, route_names, simulation_package
 from metacontrol_experiments.io.processes import RunError, alone_in, signals_as_interrupts
 from metacontrol_experiments.managers.manager import PACKAGE
@@ -41,15 +43,17 @@ _FAILED = 1
 )
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Worker processes on this machine.")
 @click.option("--scheduler", metavar="ADDRESS", help="Drive by the workers of this scheduler of Dask instead.")
-def campaign(file: Path, output: Path | None, jobs: int, scheduler: str | None) -> None:
+@ground_options
+def campaign(file: Path, output: Path | None, jobs: int, scheduler: str | None, **ground: Path | None) -> None:
     """Drive the missions that a FILE asks for, and leave a table of their results.
 
-    What is there already is not driven again: after an interruption, the same command goes on.
+    What is there already is not driven again: after an interruption, the same command goes on. --world and --routes
+    take the place of what FILE names.
 
     Exit status: 0 all missions were driven, 1 some crashed or hung twice, 2 bad input, 130 interrupted.
     """
     with refusing(CampaignError, PackageError, RouteError, RunError):
-        asked = _read(file)
+        asked = _read(file, ground)
         folder = output or Path("results/campaign") / file.stem
         folder.mkdir(parents=True, exist_ok=True)
         with alone_in(folder), signals_as_interrupts():
@@ -64,23 +68,35 @@ def campaign(file: Path, output: Path | None, jobs: int, scheduler: str | None) 
     raise click.exceptions.Exit(0 if all(result.status is Status.DONE for result in results.values()) else _FAILED)
 
 
-def _read(file: Path) -> Campaign:
+def _read(file: Path, given: dict[str, Path | None]) -> Campaign:
     """Return the campaign of a file.
+
+    Args:
+        file: of the campaign.
+        given: files of `world` and `routes` that take the place of those that it names.
 
     Raises:
         CampaignError: it cannot be read, or makes no sense.
+        RouteError: a world or a route of it cannot be used.
     """
     package = simulation_package()
+    try:
+        content = read_yaml(file)
+    except InputFileError as error:
+        raise CampaignError(str(error)) from error
+    named = [None if name is None else file.parent / name for name in ground_files(content, str(file))]
+    files = [given[option] or path for option, path in zip(("world", "routes"), named, strict=True)]
+    ground = read_ground(*(path and path.absolute() for path in files))
     known = Known(
-        routes=route_names(package / "worlds" / "routes.yaml"),
+        routes=route_names(routes_file(ground)),
         configurations=sorted(path.stem for path in (package / "launch" / "variants").glob("*.launch")),
         managers=sorted(find(PACKAGE, "manager")),
         components=list(read_components(package / "models" / "metacontrol.yaml")),
+        ground=ground,
     )
-    try:
-        return parse_campaign(read_yaml(file), known, str(file))
-    except InputFileError as error:
-        raise CampaignError(str(error)) from error
+    asked = parse_campaign(content, known, str(file))
+    read_routes(ground, dict.fromkeys(run.route for run in asked.runs))
+    return asked
 
 
 def _drive(

@@ -12,9 +12,9 @@ from metacontrol_bags.bag import BagError, read_record
 from metacontrol_bags.decision import DECIDED
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S, MetricsError, summarise
 from metacontrol_bags.timeline import Timeline
-from node_kit.io.input_files import is_file
 
 from metacontrol_experiments.cli.figure import draw_figure
+from metacontrol_experiments.cli.options import ground_options
 from metacontrol_experiments.cli.summary import write_summary
 from metacontrol_experiments.contingency.contingency import Contingency, Kind, Moment
 from metacontrol_experiments.contingency.parsing import (
@@ -26,11 +26,11 @@ from metacontrol_experiments.contingency.parsing import (
 )
 from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.display import Display, refusing
+from metacontrol_experiments.io.ground_files import read_ground, read_routes
 from metacontrol_experiments.io.input_files import (
     PackageError,
     read_components,
     read_contingencies,
-    read_route,
     simulation_package,
 )
 from metacontrol_experiments.io.processes import RunError
@@ -118,10 +118,7 @@ class _Number(click.FloatRange):
     "from the start.",
 )
 @click.option("--timeline", type=click.Path(path_type=Path), help="YAML file of contingencies.")
-@click.option(
-    "--world", type=click.Path(path_type=Path), help="World file, or a map's YAML file.  [default: the factory]"
-)
-@click.option("--routes", type=click.Path(path_type=Path), help="YAML file of routes.  [default: the factory's]")
+@ground_options
 @click.option(
     "--real-time-factor",
     type=_Number(0),
@@ -177,8 +174,8 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
 
     Raises:
         PackageError: metacontrol_sim is missing.
-        RunError: it has no such configuration, or there is no such world.
-        RouteError: there is no such route.
+        RunError: it has no such configuration.
+        RouteError: there is no such world or route, or the robot cannot stand at its ends.
         ContingencyError, ComponentError: what is to go wrong makes no sense.
         ManagerError: there is no such manager.
     """
@@ -189,18 +186,16 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
         known = ", ".join(variants) or "none generated yet"
         raise RunError(f"--initial-configuration: no configuration {name!r}; there are {known}")
     components = read_components(simulation / "models" / "metacontrol.yaml")
-    world = options["world"]
-    if world is not None and not is_file(world):
-        raise RunError(f"--world: {world} is no file; give the path of a world file or of a map's YAML file")
+    ground = read_ground(options["world"], options["routes"])
     return Settings(
-        route=read_route(options["routes"] or simulation / "worlds" / "routes.yaml", options["route"]),
+        route=read_routes(ground, [options["route"]])[options["route"]],
         output=output,
         manager=_manager(options["manager"], options["engine"], baseline=options["no_metacontrol"]),
         seed=options["seed"],
         initial_configuration=name,
         contingencies=_contingencies(options, components),
         components=components,
-        world=world,
+        world=options["world"],
         real_time_factor=options["real_time_factor"],
         timeout_s=options["timeout"],
         thresholds={"safety": options["nfr_safety"], "energy": options["nfr_energy"]},

@@ -56,16 +56,18 @@ def _drive(asked: dict[str, Any]) -> dict[str, Any]:
     from metacontrol_experiments.mission.settings import Settings
 
     began = time.monotonic()
-    run = Run(**{**asked, "contingencies": tuple(asked["contingencies"])})
+    run = Run(**{**asked["run"], "contingencies": tuple(asked["run"]["contingencies"])})
+    world, routes = (asked["ground"][name] and Path(asked["ground"][name]) for name in ("world", "routes"))
     package = simulation_package()
     settings = Settings(
-        route=read_route(package / "worlds" / "routes.yaml", run.route),
+        route=read_route(routes or package / "worlds" / "routes.yaml", run.route),
         output=Path(),  # nothing is written
         manager=run.manager,
         seed=run.seed,
         initial_configuration=run.initial_configuration,
         contingencies=contingencies_of(run),
         components=read_components(package / "models" / "metacontrol.yaml"),
+        world=world,
         timeout_s=run.timeout,
         commit=current_commit(),
     )

@@ -48,7 +48,13 @@ def drive_all(
         token = uuid.uuid4().hex  # a scheduler keeps results by key
         waiting = {
             client.submit(
-                drive, run, campaign.deadline, keep_log=campaign.logs, key=f"{run.name}#{token}", pure=False
+                drive,
+                run,
+                campaign.deadline,
+                keep_log=campaign.logs,
+                ground=campaign.ground,
+                key=f"{run.name}#{token}",
+                pure=False,
             ): run
             for run in runs
         }

@@ -18,9 +18,12 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from metacontrol_experiments.campaign.progress import LONGEST_LOG, Attempt, Result, Status, is_final
+from metacontrol_experiments.campaign.progress import LONGEST_LOG, MOST_ATTEMPTS, Attempt, Result, Status, is_final
 from metacontrol_experiments.io.campaign_on_ros import drive_on_ros
 from metacontrol_experiments.io.code_version import current_commit
+from metacontrol_experiments.io.ground_files import read_ground
+from metacontrol_experiments.mission.ground import FACTORY, Ground
+from metacontrol_experiments.mission.routes import RouteError
 
 if TYPE_CHECKING:
     from metacontrol_experiments.campaign.matrix import Run
@@ -31,25 +34,27 @@ _PACKAGES = ("distributed", "jpype1", "numpy", "opencv-python-headless", "owlrea
 _own = threading.local()
 
 
-def drive(run: Run, deadline: float, *, keep_log: bool) -> tuple[Result, str | None]:
+def drive(run: Run, deadline: float, *, keep_log: bool, ground: Ground = FACTORY) -> tuple[Result, str | None]:
     """Drive a run, once more where it crashes or hangs.
 
     Args:
         run: what is asked for.
         deadline: wall s for an attempt.
         keep_log: return the mission's log, too.
+        ground: of the run; its files must be on this machine, too.
 
     Returns:
         What became of it, and its log.
     """
-    attempts: list[Attempt] = []
+    problem = _ground_problem(run, ground)
+    attempts = [Attempt(Status.CRASHED, 0.0, problem)] * MOST_ATTEMPTS if problem else []
     answer: dict[str, Any] = {}
     while not is_final(attempts):
         if run.engine == "ros":
-            attempt, answer = drive_on_ros(run, deadline)
+            attempt, answer = drive_on_ros(run, deadline, ground)
         else:
             child = _child()
-            attempt, answer = child.drive(run, deadline)
+            attempt, answer = child.drive(run, deadline, ground)
             if attempt.status is not Status.DONE:
                 child.close()
         attempts.append(attempt)
@@ -66,6 +71,15 @@ def provenance() -> dict[str, str]:
         "versions": f"python {platform.python_version()} "
         + " ".join(f"{name} {importlib.metadata.version(name)}" for name in _PACKAGES),
     }
+
+
+def _ground_problem(run: Run, ground: Ground) -> str:
+    """Return why a run cannot be driven with the files of world and routes that are here; empty where it can."""
+    try:
+        found = read_ground(ground.world, ground.routes).mark
+    except RouteError as error:
+        return str(error)
+    return f"the files of world and routes are {found} here, not {run.ground}" if found != run.ground else ""
 
 
 def _child() -> _Child:
@@ -94,13 +108,14 @@ class _Child:
     def runs(self) -> bool:
         return self._process.poll() is None
 
-    def drive(self, run: Run, deadline: float) -> tuple[Attempt, dict[str, Any]]:
+    def drive(self, run: Run, deadline: float, ground: Ground) -> tuple[Attempt, dict[str, Any]]:
         """Drive a run; return how that went, and the answer."""
         began = time.monotonic()
         start = os.fstat(self._log.fileno()).st_size
         line = b""
         try:
-            self._stream("stdin").write(json.dumps(asdict(run)).encode() + b"\n")
+            asked = {"run": asdict(run), "ground": asdict(ground)}
+            self._stream("stdin").write(json.dumps(asked, default=str).encode() + b"\n")
             line = self._answer(began + deadline)
         except BrokenPipeError:
             pass

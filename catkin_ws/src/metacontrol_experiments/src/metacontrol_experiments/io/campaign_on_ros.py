@@ -16,6 +16,7 @@ from metacontrol_experiments.mission.settings import SUMMARY_NAME
 
 if TYPE_CHECKING:
     from metacontrol_experiments.campaign.matrix import Run
+    from metacontrol_experiments.mission.ground import Ground
 
 _OWN = ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
 """It ends what it started when it is interrupted, and is interrupted when this process dies."""
@@ -23,19 +24,20 @@ _GRACE_S = 60.0
 _CONSOLE = Path("log", "console.log")
 
 
-def drive_on_ros(run: Run, deadline: float) -> tuple[Attempt, dict[str, Any]]:
+def drive_on_ros(run: Run, deadline: float, ground: Ground) -> tuple[Attempt, dict[str, Any]]:
     """Drive a run; return how that went, and its summary with the log of the console.
 
     Args:
         run: what is asked for.
         deadline: wall s for it.
+        ground: where it is driven.
     """
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="campaign-") as folder:
         output, said = Path(folder, "mission"), Path(folder, "said.log")
         with said.open("wb") as log:
             process = subprocess.Popen(
-                [*_OWN, *_command(run, output)], stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+                [*_OWN, *_command(run, ground, output)], stdout=log, stderr=subprocess.STDOUT, start_new_session=True
             )
         in_time = _ends(process, deadline)
         if not in_time:
@@ -55,7 +57,7 @@ def drive_on_ros(run: Run, deadline: float) -> tuple[Attempt, dict[str, Any]]:
         return Attempt(Status.CRASHED, wall_s, problem, told + console), {}
 
 
-def _command(run: Run, output: Path) -> list[str]:
+def _command(run: Run, ground: Ground, output: Path) -> list[str]:
     asked = {
         "--manager": run.manager,
         "--route": run.route,
@@ -65,7 +67,9 @@ def _command(run: Run, output: Path) -> list[str]:
         "--failure": "none",
         "--output": output,
     }
+    files = {"--world": ground.world, "--routes": ground.routes}
     options = [*asked.items(), *(("--contingency", text) for text in run.contingencies)]
+    options += [(option, path) for option, path in files.items() if path is not None]
     words = [str(word) for option in options for word in option]
     return [sys.executable, "-m", "metacontrol_experiments.cli.main", "run", "--engine", "ros", "--quiet", *words]
 
