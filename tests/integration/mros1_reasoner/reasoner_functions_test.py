@@ -6,6 +6,7 @@ import unittest
 import actionlib
 import rospy
 import rostest
+from helpers.robot_side import Diagnostics
 from helpers.waiting import wait_for
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
@@ -16,7 +17,7 @@ from metacontrol_msgs.msg import (
     MvpReconfigurationResult,
     ReconfigurationResult,
 )
-from reasoner_harness import HERE, Diagnostics, Reasoner
+from reasoner_harness import HERE, Reasoner
 
 FUNCTION_OF = {"grasp_firm": "f_grasp", "grasp_soft": "f_grasp", "see_far": "f_see", "see_near": "f_see"}
 SETTINGS = {

@@ -7,10 +7,11 @@ import actionlib
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
+from helpers.robot_side import Diagnostics, Manipulator, status
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_msgs.msg import MvpReconfigurationAction, MvpReconfigurationGoal
 from metacontrol_msgs.srv import Feasible
-from reasoner_harness import NOTHING_RUNS, Diagnostics, Manipulator, Reasoner, status
+from reasoner_harness import NOTHING_RUNS, Reasoner
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import rosbag
 import rospy
 import rostest
+from helpers.robot_side import Diagnostics, Manipulator, status
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_msgs.msg import Decision, ExpectedQA, ReasonerJournal
 from metacontrol_msgs.srv import (
@@ -23,7 +24,7 @@ from metacontrol_msgs.srv import (
     SetNfr,
 )
 from mros1_reasoner.io.ontology_files import read_knowledge_base
-from reasoner_harness import MODEL, NODE, Diagnostics, Manipulator, Reasoner, status
+from reasoner_harness import MODEL, NODE, Reasoner
 from rosgraph_msgs.msg import Log
 from std_srvs.srv import Trigger
 

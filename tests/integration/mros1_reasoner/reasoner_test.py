@@ -11,8 +11,9 @@ import unittest
 import psutil
 import rospy
 import rostest
+from helpers.robot_side import Diagnostics, Manipulator, status
 from helpers.waiting import DEADLINE_S, wait_for
-from reasoner_harness import MODEL, NODE, Diagnostics, Listener, Manipulator, node_pid, status
+from reasoner_harness import MODEL, NODE, Listener, node_pid
 
 PACKAGE = "metacontrol_tests"
 
