@@ -56,11 +56,11 @@ class Manipulator:
         failures: results of the next requests; None: it does not answer. It carries out all others.
     """
 
-    def __init__(self, namespace="", serves=True):
+    def __init__(self, namespace="", serves=True, function="f_move"):
         self.failures = []
         self.requests = []
         self.running = ""
-        self._namespace = namespace
+        self._namespace, self._function = namespace, function
         self._active = rospy.Publisher(
             f"{namespace}/rosgraph_manipulator/active_configuration", ActiveConfiguration, queue_size=5, latch=True
         )
@@ -83,7 +83,7 @@ class Manipulator:
     def announce(self, configuration, state="STABLE"):
         """Say what runs."""
         self.running = configuration
-        grounding = FunctionGrounding("f_move", configuration, state)
+        grounding = FunctionGrounding(self._function, configuration, state)
         self._active.publish(ActiveConfiguration(functions=[grounding]))
 
     def _execute(self, goal):

@@ -138,3 +138,15 @@ def test_interrupted_mission_leaves_nothing_but_its_bag(tmp_path):
     assert process.returncode == 130, said
     assert left_behind(tmp_path) == []
     assert (tmp_path / "mission.bag").exists()
+
+
+def test_manager_in_place_of_the_reasoner_starts_the_dead_laser_again(tmp_path):
+    (tmp_path / "routes.yaml").write_text("short: {start: [-8, -8, 0.78], goal: [-5, -5.6, 0]}\n")
+    route = ("--routes", str(tmp_path / "routes.yaml"), "--route", "short")
+    strike = ("--contingency", "kill:front_laser@time:2")
+    result = metacontrol("run", "--output", str(tmp_path), "--manager", "respawn", *route, *strike, *FACTOR)
+    assert result.returncode == 0, account(result, tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["goal_reached"] and summary["reconfigurations"] == []
+    assert "component front_laser is back" in result.stdout
+    assert left_behind(tmp_path) == []

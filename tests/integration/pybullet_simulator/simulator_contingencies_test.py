@@ -139,6 +139,13 @@ class ContingenciesTest(unittest.TestCase):
         self.assertTrue(self.strike(kind="light", value=0.25).success)
         self.assertIsNotNone(self.light.wait(lambda m: abs(m.data - 0.25) < 1e-6))
 
+    def test_6_unplugged_device_is_missing_at_the_next_start_of_its_driver(self):
+        self.assertTrue(self.strike(kind="unplug", target="camera").success)
+        struck = self.events.wait(lambda e: e.name == "component:camera")
+        pid = int({pair.key: pair.value for pair in struck.values}["pid"])
+        self.assertTrue(becomes(lambda: is_dead(pid)))
+        self.assertIs(rospy.get_param("/camera/unplugged"), True)
+
 
 if __name__ == "__main__":
     rostest.rosrun("metacontrol_tests", "simulator_contingencies_test", ContingenciesTest)

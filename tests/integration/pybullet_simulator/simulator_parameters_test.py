@@ -15,6 +15,7 @@ REFUSED = (
     ("simulator", "_initial_pose_x:=99", "initial pose (99, 0) is off the floor"),
     ("rear_laser", "_seed:=-4", "/seed is -4: it must be a whole number, at least 0"),
     ("camera", "_range_max:=0.01", "/range_max is 0.01: it must be a finite number, at least 0.15"),
+    ("camera", "_unplugged:=true", "its device is unplugged: delete parameter /start_5/unplugged to plug it in again"),
 )
 
 

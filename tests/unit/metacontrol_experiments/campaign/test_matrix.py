@@ -106,7 +106,6 @@ def test_other_campaigns_of_the_project(name, count):
         ({"parts": {}}, "parts: is '{}', must be a mapping of names to matrices"),
         ({**SMALL, "engines": "ros"}, "engines: unknown key, allowed here: engine, seed"),
         ({**SMALL, "engine": "gazebo"}, "engine: is 'gazebo', must be lockstep or ros"),
-        ({**SMALL, "engine": "ros"}, "managers: rules: on ROS there are only mros and none so far; use engine"),
         ({**SMALL, "seed": 1.5}, "seed: is 1.5; give a whole number, 0 or more"),
         ({**SMALL, "deadline": 0}, "deadline: is '0', must be wall s for a run, more than 0"),
         ({"parts": {"a/b": SMALL["parts"]["small"]}}, "'a/b' must be a name of letters, digits and _"),

@@ -55,7 +55,6 @@ def test_world_and_routes_of_the_users_own(monkeypatch, tmp_path):
     ("arguments", "said"),
     [
         (("--manager", "magic"), "no manager 'magic'; there are mros, none, random, respawn, rules"),
-        (("--manager", "rules"), "--manager rules: on ROS there are only mros and none so far; use --engine lockstep"),
         (("--manager", "rules", "--no-metacontrol"), "--no-metacontrol is --manager none"),
     ],
 )
@@ -68,3 +67,18 @@ def test_baseline_is_the_manager_none(monkeypatch):
     assert settings_of(monkeypatch, "--no-metacontrol").manager == "none"
     assert settings_of(monkeypatch, "--manager", "none").manager == "none"
     assert settings_of(monkeypatch).manager == "mros"
+
+
+@pytest.mark.parametrize(
+    ("manager", "file", "node"),
+    [
+        ("mros", "metacontrol_sim metacontrol_sim_reasoner.launch", "reasoner"),
+        ("none", "metacontrol_sim MVP_metacontrol_world.launch", ""),
+        ("rules", "metacontrol_experiments managed.launch", "mission_manager"),
+    ],
+)
+def test_manager_is_what_the_launch_file_starts(monkeypatch, manager, file, node):
+    settings = settings_of(monkeypatch, "--manager", manager)
+    command = settings.launch_command(4000)
+    assert f" {file} " in " ".join(command) and settings.decider == node
+    assert ("manager:=rules" in command) == (manager == "rules")

@@ -138,6 +138,17 @@ def test_mean_of_the_window_counts_and_the_worst_quality_comes_first():
     assert found.found(9.0) == ["flow"]
 
 
+def test_request_that_failed_is_followed_by_another_choice_after_a_while():
+    chosen = iter(["quiet", "valved"])
+    manager = reactive(lambda trouble, running, others: next(chosen))
+    (decision,) = fed(manager, "noise", 0.7)
+    failed = manager.failed(3.0, decision.id, "no power")
+    assert (failed.state, failed.id) == ("FAILED", decision.id) and failed.explanation.endswith("; failed: no power")
+    assert fed(manager, "noise", 0.7, 3.0, 3.0 + COOL_DOWN_S - 0.1) == []
+    (second,) = fed(manager, "noise", 0.7, 3.0 + COOL_DOWN_S, 6.0 + COOL_DOWN_S)
+    assert second.to_configuration == "valved" and second.id != decision.id
+
+
 def test_driver_that_ended_is_started_again_after_a_while():
     manager = RespawnManager()
     manager.ended(1.0, "laser")

@@ -12,7 +12,6 @@ from ros_model.project.schema_check import violations
 
 from metacontrol_experiments.contingency.contingency import Contingency, Kind
 from metacontrol_experiments.contingency.parsing import ContingencyError, make, parse_contingency
-from metacontrol_experiments.managers.manager import MROS, NONE
 from metacontrol_experiments.mission.ground import FACTORY, Ground
 
 if TYPE_CHECKING:
@@ -207,10 +206,6 @@ def _runs(name: str, part: Mapping[str, Any], known: Known, where: str, given: t
     _check_names(part["routes"], known.routes, f"{where}.routes", "route")
     _check_names(part["initial_configurations"], known.configurations, f"{where}.initial_configurations", "variant")
     _check_names(part["managers"], known.managers, f"{where}.managers", "manager")
-    lacking = [manager for manager in part["managers"] if engine == "ros" and manager not in (MROS, NONE)]
-    if lacking:
-        there = f"on ROS there are only {MROS} and {NONE} so far"
-        raise CampaignError(f"{where}.managers: {lacking[0]}: {there}; use engine lockstep, or leave it out")
     clutter = [_whole(number, 0, f"{where}.clutter") for number in part.get("clutter", [0])]
     power = [float(number) for number in part.get("power", [1.0])]
     _check_once(clutter, f"{where}.clutter")

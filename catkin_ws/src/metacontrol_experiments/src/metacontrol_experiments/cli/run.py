@@ -190,7 +190,7 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
     return Settings(
         route=read_routes(ground, [options["route"]])[options["route"]],
         output=output,
-        manager=_manager(options["manager"], options["engine"], baseline=options["no_metacontrol"]),
+        manager=_manager(options["manager"], baseline=options["no_metacontrol"]),
         seed=options["seed"],
         initial_configuration=name,
         contingencies=_contingencies(options, components),
@@ -206,18 +206,16 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
     )
 
 
-def _manager(asked: str, engine: str, *, baseline: bool) -> str:
+def _manager(asked: str, *, baseline: bool) -> str:
     """Return the manager that is asked for.
 
     Raises:
         ManagerError: no package exports one of that name.
-        RunError: the engine has no such manager, or two are asked for.
+        RunError: two are asked for.
     """
     if baseline and asked not in (MROS, NONE):
         raise RunError(f"--no-metacontrol is --manager none, and --manager is {asked}: leave one of them out")
     find_manager(asked)
-    if engine == "ros" and asked not in (MROS, NONE):
-        raise RunError(f"--manager {asked}: on ROS there are only {MROS} and {NONE} so far; use --engine lockstep")
     return NONE if baseline else asked
 
 

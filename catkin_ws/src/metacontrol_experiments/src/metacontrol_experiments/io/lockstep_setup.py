@@ -37,7 +37,7 @@ from metacontrol_experiments.lockstep.observation import Observers
 from metacontrol_experiments.lockstep.reconfiguration import plan_change, restarts
 from metacontrol_experiments.lockstep.system import LockstepError, System, private_parameters
 from metacontrol_experiments.managers.d2_rules import RuleError
-from metacontrol_experiments.managers.manager import Manager, ManagerError, Situation, find_manager
+from metacontrol_experiments.managers.manager import ManagerError, Situation, make_manager
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -158,8 +158,6 @@ def _robot(settings: Settings, base: RosSystem) -> Robot:
 
 def _cores(settings: Settings, launched: SystemDescription, drivers: Drivers) -> Cores:
     """Return the manager, and the deciding parts of the nodes beside it, with the parameters of these nodes."""
-    plugin = find_manager(settings.manager)
-    make = plugin.load()
     situation = Situation(settings.initial_configuration, settings.seed)
     observers, parameters = Observers([], {}), Parameters({})
     reader, tactics = DiagnosticsReader([], []), {}
@@ -172,10 +170,7 @@ def _cores(settings: Settings, launched: SystemDescription, drivers: Drivers) ->
         observers = Observers(_observers(private_parameters(launched, *_MONITOR)), drivers.topics)
         reader = DiagnosticsReader(knowledge.qualities, knowledge.components, parameters.nodes)
         tactics = load_tactics()
-    with plugin.guard(*_UNUSABLE):
-        manager = make(situation)
-    if not isinstance(manager, Manager):
-        raise plugin.error(f"returned {manager!r}", "return a metacontrol_experiments Manager")
+    manager = make_manager(settings.manager, situation, *_UNUSABLE)
     if not manager.observes:
         observers = Observers([], {})
     return Cores(manager, observers, reader, parameters.period, tactics)

@@ -12,10 +12,10 @@ from ros_model.project.tables import parse_table
 
 from metacontrol_experiments.io.input_files import simulation_package
 from metacontrol_experiments.managers.d2_rules import RuleError, by_rules, variants_of
-from metacontrol_experiments.managers.manager import Manager
+from metacontrol_experiments.managers.manager import Manager, ManagerError
 from metacontrol_experiments.managers.mros import MrosManager
 from metacontrol_experiments.managers.reactive import ReactiveManager, at_random
-from metacontrol_experiments.managers.respawn import RespawnManager
+from metacontrol_experiments.managers.respawn import LOOK_S, RESPAWN_S, RespawnManager
 
 if TYPE_CHECKING:
     from metacontrol_experiments.managers.manager import Situation
@@ -29,7 +29,7 @@ def none(_situation: Situation) -> Manager:
 def mros(situation: Situation) -> Manager:
     """Return the meta-controller, with a reasoner's process of its own."""
     if situation.knowledge is None:
-        raise ValueError("manager mros needs a knowledge base")
+        raise ManagerError("manager mros needs a model: set the reasoner's ~model_file")
     behaviour = Parameters(situation.parameters).settings(situation.knowledge)
     reasoner = make_reasoner()
     try:
@@ -41,9 +41,9 @@ def mros(situation: Situation) -> Manager:
     return MrosManager(loop, reasoner)
 
 
-def respawn(_situation: Situation) -> Manager:
+def respawn(situation: Situation) -> Manager:
     """Return roslaunch's respawn of dead drivers."""
-    return RespawnManager()
+    return RespawnManager(LOOK_S if situation.starts_take_time else RESPAWN_S)
 
 
 def random(situation: Situation) -> Manager:

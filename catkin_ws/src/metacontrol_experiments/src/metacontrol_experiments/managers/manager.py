@@ -26,7 +26,7 @@ NONE, MROS = "none", "mros"
 
 
 class ManagerError(ValueError):
-    """There is no such manager; the message lists those that there are."""
+    """There is no such manager, or what it needs; the message has the remedy."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ class Situation:
         knowledge: the models; None for a manager that observes nothing.
         objectives: what is needed, with the limits of the mission.
         parameters: of the reasoner's node.
+        starts_take_time: whether a driver that is started again takes its time to come up, as processes do; in lockstep
+            it is there at once.
     """
 
     configuration: str
@@ -46,6 +48,7 @@ class Situation:
     knowledge: KnowledgeBase | None = None
     objectives: tuple[Objective, ...] = ()
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    starts_take_time: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,8 +86,35 @@ class Manager:
         """Take in that the decision of this id was carried out, and return it as it is now."""
         raise NotImplementedError(f"{type(self).__name__} decides nothing, so {decision} is not its own ({now:.2f} s)")
 
+    def failed(self, now: float, decision: str, reason: str) -> Decision:
+        """Take in that the decision of this id could not be carried out, and return it as it is now."""
+        raise NotImplementedError(
+            f"{type(self).__name__} decides nothing, {decision} is not its own ({reason}, {now:.2f} s)"
+        )
+
     def close(self) -> None:
         """End what was started for it."""
+
+
+def make_manager(name: str, situation: Situation, *passing: type[Exception]) -> Manager:
+    """Return the manager of a name.
+
+    Args:
+        name: of the plug-in.
+        situation: what it is made for.
+        passing: errors of the plug-in that blame the situation, and are raised as they are.
+
+    Raises:
+        ManagerError: no package exports one of that name.
+        PluginError: it cannot be loaded or made.
+    """
+    plugin = find_manager(name)
+    make = plugin.load()
+    with plugin.guard(*passing):
+        manager = make(situation)
+    if not isinstance(manager, Manager):
+        raise plugin.error(f"returned {manager!r}", "return a metacontrol_experiments Manager")
+    return manager
 
 
 def find_manager(name: str) -> Plugin:

@@ -49,6 +49,10 @@ class MrosManager(Manager):
         """See Manager.executed."""
         return self._loop.report(now, decision, True)
 
+    def failed(self, now: float, decision: str, reason: str) -> Decision:
+        """See Manager.failed."""
+        return self._loop.report(now, decision, False, reason)
+
     def close(self) -> None:
         """End the reasoner's process."""
         self._reasoner.close()

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from metacontrol_bags.decision import DECIDED, EXECUTED, Cause, Decision
+from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED, Cause, Decision
 from metacontrol_msgs.msg import DiagnosticWords, FunctionGrounding
 from mros1_reasoner.loop.entries import ActiveFact, ComponentFact, LevelFact, StaleFact
 
-from metacontrol_experiments.managers.manager import Manager
+from metacontrol_experiments.managers.manager import Manager, ManagerError
 from metacontrol_experiments.managers.violations import Violations
 
 if TYPE_CHECKING:
@@ -67,10 +67,10 @@ class ReactiveManager(Manager):
             choose: the next variant.
 
         Raises:
-            ValueError: there is no knowledge or no objective.
+            ManagerError: there is no knowledge or no objective.
         """
         if situation.knowledge is None or not situation.objectives:
-            raise ValueError(f"manager {name} needs a knowledge base with an objective")
+            raise ManagerError(f"manager {name} needs a model with an objective: set the reasoner's ~model_file")
         self._name, self._choose = name, choose
         self._objective: Objective = situation.objectives[0]
         self._designs = {design.name: design for design in situation.knowledge.solving(self._objective.function)}
@@ -78,6 +78,7 @@ class ReactiveManager(Manager):
         self._failed: set[str] = set()
         self._running = ""
         self._calm_until = 0.0
+        self._waits_until = 0.0
         self._count = 0
         self._pending: Decision | None = None
 
@@ -96,7 +97,7 @@ class ReactiveManager(Manager):
 
     def step(self, now: float, *, heartbeat: bool) -> list[Decision]:  # noqa: ARG002
         """See Manager.step."""
-        if self._pending is not None or self._running not in self._designs:
+        if self._pending is not None or self._running not in self._designs or now < self._waits_until:
             return []
         others = tuple(sorted(name for name in self._designs if name != self._running and not self._lacks(name)))
         for trouble in self._troubles(now):
@@ -108,12 +109,23 @@ class ReactiveManager(Manager):
 
     def executed(self, now: float, decision: str) -> Decision:
         """See Manager.executed."""
+        return replace(self._ended(now, decision), state=EXECUTED, stamp_executed=now)
+
+    def failed(self, now: float, decision: str, reason: str) -> Decision:
+        """See Manager.failed: it waits as after a change, and chooses anew."""
+        ended = self._ended(now, decision)
+        self._waits_until = now + COOL_DOWN_S
+        words = f"{ended.explanation}; failed: {reason}"
+        return replace(ended, state=FAILED, explanation=words, stamp_executed=now)
+
+    def _ended(self, now: float, decision: str) -> Decision:
+        """Let limits rest for a while, and return the decision that has ended."""
         pending, self._pending = self._pending, None
         if pending is None or pending.id != decision:
             raise ValueError(f"no decision {decision!r} is under way")
         self._calm_until = now + COOL_DOWN_S
         self._violations.forget()
-        return replace(pending, state=EXECUTED, stamp_executed=now)
+        return pending
 
     def _lacks(self, variant: str) -> list[str]:
         return sorted(self._designs[variant].components & self._failed)

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from metacontrol_experiments.mission.routes import Route
 
+MANAGER_NODE = "mission_manager"
+"""Name of the node that runs a manager on ROS."""
 BAG_NAME, SUMMARY_NAME, FIGURE_NAME, LOG_NAME = "mission.bag", "summary.json", "mission.png", "mission.log"
 """Files that a mission leaves in its folder: a bag on ROS, a log in lockstep."""
 
@@ -101,9 +103,19 @@ class Settings:
             arguments |= {f"nfr_{name}": repr(level) for name, level in self.thresholds.items()}
         return [f"{name}:={value}" for name, value in arguments.items()]
 
+    @property
+    def decider(self) -> str:
+        """Name of the node that decides on ROS; empty for the baseline."""
+        return {NONE: "", MROS: "reasoner"}.get(self.manager, MANAGER_NODE)
+
     def launch_command(self, port: int) -> list[str]:
         """Return the roslaunch command of the whole system, with a master on this port."""
-        return ["roslaunch", "-p", str(port), self.launch_package, self.launch_file, *self.launch_arguments]
+        file = [self.launch_package, self.launch_file]
+        arguments = self.launch_arguments
+        if self.decider == MANAGER_NODE:
+            file = ["metacontrol_experiments", "managed.launch"]
+            arguments += [f"manager:={self.manager}"]
+        return ["roslaunch", "-p", str(port), *file, *arguments]
 
     def describe(self) -> dict[str, str]:
         """Return the values of the event MISSION_START, by which the bag alone tells what was run."""

@@ -21,6 +21,7 @@ from node_kit.io.xml_rpc import CallError, Client
 from pybullet_simulator.io.fault_signals import SIGNALS
 from pybullet_simulator.messages.grid import GridMessageError, read_grid
 from pybullet_simulator.robot.faults import Fault
+from pybullet_simulator.ros.device import UNPLUGGED
 from pybullet_simulator.world.clutter import ClutterError, scatter
 from robot_formulas.geometry import Pose
 from simulator_msgs.srv import SetLight, SpawnObstacle
@@ -37,7 +38,7 @@ SERVICE = "contingency/strike"
 _SIGNALS = {
     Kind.KILL: signal.SIGKILL,
     Kind.STOP: signal.SIGINT,
-    Kind.UNPLUG: signal.SIGKILL,  # nothing on ROS starts a driver again
+    Kind.UNPLUG: signal.SIGKILL,
     Kind.FREEZE: signal.SIGSTOP,
     Kind.THAW: signal.SIGCONT,
     Kind.REPEAT: SIGNALS[Fault.REPEAT],
@@ -98,6 +99,8 @@ class FaultInjector:
         number = _SIGNALS[contingency.kind]
         if contingency.kind.spoils_data and not _handles(pid, number):
             raise InjectionError(f"{node} (pid {pid}) is not a driver that can simulate wrong data")
+        if contingency.kind is Kind.UNPLUG:
+            rospy.set_param(f"{node}/{UNPLUGGED}", True)  # whoever starts the driver again
         os.kill(pid, number)
         if contingency.kind is Kind.FREEZE:
             self._pids[node] = pid

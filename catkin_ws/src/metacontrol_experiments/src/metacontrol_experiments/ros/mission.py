@@ -102,8 +102,8 @@ class MissionNode:
         for condition, what in self._readiness.conditions(self._settings.thresholds):
             self._startup.wait(condition, what)
         self._startup.wait(lambda: self._goal.is_heard, "the action server of move_base")
-        if self._settings.metacontrol:
-            self._startup.wait_for_reasoner()
+        if self._settings.decider:
+            self._startup.wait_for_decider(self._settings.decider)
 
     def wait_recorded(self, recorder: str) -> None:
         """Wait until the node `recorder` has subscribed to everything that is to be recorded.

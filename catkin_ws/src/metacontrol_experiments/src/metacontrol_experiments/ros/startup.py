@@ -1,4 +1,4 @@
-"""Wait for a system that is starting: its master, its reasoner, the recorder."""
+"""Wait for a system that is starting: its master, the node that decides, the recorder."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from metacontrol_experiments.io.processes import wait_until
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-REASONER = "/reasoner"
 DECISION_TOPIC = "mros1_reasoner/decision"
 
 START_S = 90.0
@@ -60,13 +59,14 @@ class Startup:
         """
         self.wait(self._simulated_time, "the ROS master with /use_sim_time")
 
-    def wait_for_reasoner(self) -> None:
-        """Wait until the reasoner has told the master of its decisions.
+    def wait_for_decider(self, node: str) -> None:
+        """Wait until a node has told the master of its decisions.
 
         Raises:
             StartError: it did not come up in time.
         """
-        self.wait(self._decisions_offered, f"the node {REASONER} with its topic {DECISION_TOPIC}")
+        name = rospy.resolve_name(node)
+        self.wait(lambda: self._offers_decisions(name), f"the node {name} with its topic {DECISION_TOPIC}")
 
     def wait_for_recorder(self, recorder: str, *publishers: rospy.Publisher) -> None:
         """Wait until the node `recorder` subscribes to all that is recorded, and is connected to these of this node.
@@ -80,9 +80,9 @@ class Startup:
     def _simulated_time(self) -> bool:
         return bool(self._master.call("getParam", "/use_sim_time"))
 
-    def _decisions_offered(self) -> bool:
+    def _offers_decisions(self, node: str) -> bool:
         publishers, _, _ = self._master.call("getSystemState")
-        return any(topic == rospy.resolve_name(DECISION_TOPIC) and REASONER in nodes for topic, nodes in publishers)
+        return any(topic == rospy.resolve_name(DECISION_TOPIC) and node in nodes for topic, nodes in publishers)
 
     def _recorded(self, recorder: str, own: set[str]) -> bool:
         _, subscribers, _ = self._master.call("getSystemState")

@@ -32,9 +32,9 @@ ESCAPE_WEIGHT, PUSH_WEIGHT = 30.0, 300.0
 """Weights of inscribed and of obstacle cells around a start that lies among them; high, for a short way out."""
 
 TIGHT_FACTOR = 3.0
-"""Factor of the weight of cells where the robot cannot turn: those with less clearance than its circumscribed radius. So
-a plan keeps off corners and enters a gap straight, and takes the gap where the way round is longer than three times its
-length."""
+"""Factor of the weight of cells where the robot cannot turn: those with less clearance than its circumscribed radius.
+So a plan keeps off corners and enters a gap straight, and takes the gap where the way round is longer than three times
+its length."""
 
 PINCH_WEIGHT = 10.0
 """Weight of cells where the robot fits with half of its padding only. NavFn refuses them, and so loses every passage

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from pybullet_simulator.world.obstacles import Shown
 
 MAP, ODOM, BASE, IMU = "map", "odom", "base_link", "imu_link"
+_IMU_PERIOD = 0.02
+"""s; its rate is 50 Hz."""
 _SMALL = 1e-6
 """Variance of what the simulation knows exactly; 0 would mean "unknown"."""
 
@@ -73,7 +75,7 @@ class ImuWriter:
         # The vibration at 0.5 m/s, a usual speed.
         sideways = max(errors.imu**2, _SMALL)
         self._message.linear_acceleration_covariance = [
-            vibration_variance(0.5, MOTION_STEPS * STEP),
+            vibration_variance(0.5, _IMU_PERIOD),
             *_diagonal(sideways, 3)[1:],
         ]
         self._message.linear_acceleration.z = GRAVITY

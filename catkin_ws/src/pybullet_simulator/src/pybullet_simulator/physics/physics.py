@@ -27,8 +27,8 @@ GRAVITY = 9.81
 """m/s2."""
 
 _RAY_GROUP, _ROBOT_GROUP, _FLOOR_GROUP, _MAP_GROUP, _WORLD_GROUP = 1, 2, 4, 8, 16
-"""Two bodies meet if the mask of each has the other's group. Bullet gives rays the group 1. The masks of robot and floor
-lack it: a mask in the call that casts rays would only drop hits that Bullet has computed.
+"""Two bodies meet if the mask of each has the other's group. Bullet gives rays the group 1. The masks of robot and
+floor lack it: a mask in the call that casts rays would only drop hits that Bullet has computed.
 """
 _EVERYTHING = _RAY_GROUP | _ROBOT_GROUP | _FLOOR_GROUP | _MAP_GROUP | _WORLD_GROUP
 _BOXES_PER_MESH = 4000  # PyBullet takes no more than 131,072 vertices at once

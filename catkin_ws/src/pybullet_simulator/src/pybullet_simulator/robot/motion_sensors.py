@@ -116,7 +116,7 @@ class Odometry:
 
 
 def vibration_variance(speed: float, duration: float) -> float:
-    """Return the variance of the shaken forward acceleration, (m/s2)^2, at a speed (m/s) and time between samples (s)."""
+    """Return the variance of the shaken acceleration, (m/s2)^2, at a speed (m/s), for samples so far apart (s)."""
     jolts = 2.0 * speed * duration / JOLT_SPACING  # samples with a jolt, or with the rebound after it
     return (VIBRATION * speed) ** 2 + jolts * 2.0 * (JOLT * speed) ** 2
 

@@ -16,6 +16,7 @@ from pybullet_simulator.io.fault_signals import listen
 from pybullet_simulator.messages.sensors import point_cloud, read_depth
 from pybullet_simulator.robot.faults import Outlet
 from pybullet_simulator.robot.laser_and_camera import DEPTH_NOISE, DepthProjector, SensorError, measure_depth
+from pybullet_simulator.ros.device import DeviceError, check_device
 
 
 class CameraNode(rospy.SubscribeListener):
@@ -77,7 +78,8 @@ class CameraNode(rospy.SubscribeListener):
 
 def main() -> None:
     """Run the node; exit status 2 when a parameter cannot be used."""
-    with Lifetime("camera", ParameterError) as life:
+    with Lifetime("camera", ParameterError, DeviceError) as life:
         life.start()
+        check_device()
         CameraNode()
         rospy.spin()

@@ -13,6 +13,7 @@ from sensor_msgs.msg import LaserScan
 from pybullet_simulator.io.fault_signals import listen
 from pybullet_simulator.robot.faults import Outlet
 from pybullet_simulator.robot.laser_and_camera import LASER_NOISE, SensorError, measure_ranges
+from pybullet_simulator.ros.device import DeviceError, check_device
 
 SIDES = {"front": 3, "rear": 7}
 """Sides of the robot with a laser, and the stream of random numbers of each."""
@@ -67,7 +68,8 @@ class LaserNode(rospy.SubscribeListener):
 
 def main(side: str) -> None:
     """Run the node of one side; exit status 2 when a parameter cannot be used."""
-    with Lifetime(f"{side}_laser", ParameterError) as life:
+    with Lifetime(f"{side}_laser", ParameterError, DeviceError) as life:
         life.start()
+        check_device()
         LaserNode(side)
         rospy.spin()
