@@ -14,6 +14,7 @@ from metacontrol_experiments.cli.report import report
 from metacontrol_experiments.cli.run import run
 from metacontrol_experiments.cli.summary import summary
 from metacontrol_experiments.cli.variants import variants
+from metacontrol_experiments.cli.yardstick import yardstick
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -21,7 +22,7 @@ def metacontrol() -> None:
     """Missions of a robot that adapts, and what their bags tell."""
 
 
-for _command in (run, summary, figure, calibrate, variants, compare, delays, campaign, report, bag):
+for _command in (run, summary, figure, calibrate, variants, compare, delays, campaign, report, yardstick, bag):
     metacontrol.add_command(_command)
 
 

@@ -30,6 +30,8 @@ from metacontrol_experiments.mission import mission
 from metacontrol_experiments.mission.mission import Inject
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from pybullet_simulator.physics.simulation import Simulation
     from pybullet_simulator.world.grid import Grid
 
@@ -114,8 +116,11 @@ class Lockstep:
         self._state: State | None = None
         self._recorder = Recorder()
 
-    def run(self) -> Outcome:
+    def run(self, watch: Callable[[Simulation], None] = lambda _simulation: None) -> Outcome:
         """Run the mission to its end.
+
+        Args:
+            watch: is called after each step of 10 ms.
 
         Raises:
             LockstepError: a contingency of the start cannot happen, or an analysis failed.
@@ -128,6 +133,7 @@ class Lockstep:
             self._begin()
             while not self._mission.over:
                 self._step()
+                watch(self._simulation)
             self._end()
         finally:
             self.close()

@@ -80,6 +80,7 @@ class Simulation:
         pose: true pose of base_link in the map frame.
         velocity: true (forward, left, turn rate) in base_link, m/s, m/s, rad/s.
         acceleration: (forward, left) of the IMU in base_link, vibration included, m/s2.
+        smooth_acceleration: true forward acceleration in base_link, without vibration, m/s2.
         odometry: what the wheels and the IMU's turn rate tell of the motion since the start.
         localised: pose in the map frame as the localisation has it.
         map_to_odom: pose of the odom frame in the map frame, as the localisation has it.
@@ -113,6 +114,7 @@ class Simulation:
         self.pose = start
         self.velocity = (0.0, 0.0, 0.0)
         self.acceleration = (0.0, 0.0)
+        self.smooth_acceleration = 0.0
         self.odometry = Odometry(errors, seed)
         self.localised = start
         self.map_to_odom = start
@@ -266,6 +268,7 @@ class Simulation:
         cos, sin = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
         change_x, change_y = velocity_x - last_x, velocity_y - last_y
         change = (cos * change_x + sin * change_y, cos * change_y - sin * change_x)
+        self.smooth_acceleration = change[0] / duration
         self.acceleration = self._imu.measure(change, math.hypot(velocity_x, velocity_y), duration)
         self._meter.add_acceleration(self.acceleration[0])
         self.odometry.advance(last_pose.inverse() @ self.pose, self.velocity, self._slip.factors, duration)
