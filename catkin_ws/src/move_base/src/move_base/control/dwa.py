@@ -81,6 +81,7 @@ class DwaController:
         footprint, padded = np.array(parameters.local_costmap.footprint), parameters.local_costmap.padded_footprint()
         padding = inscribed_radius(padded) - inscribed_radius(footprint)
         self._shapes = [Footprint(footprint, share * padding) for share in HARD_PADDING]
+        self._reach = self.parameters.max_vel_x * self.parameters.sim_time + self._shapes[0].circumscribed
 
     def reset(self) -> None:
         """Forget the last command, for a new goal."""
@@ -102,6 +103,7 @@ class DwaController:
         """
         p = self.parameters
         self._oscillation.follow(robot, p.oscillation_reset_dist)
+        snapshot.part_around(robot.x, robot.y, self._reach)  # at once, and not part by part
         horizon = min(p.sim_time, max(MIN_HORIZON, 2.0 * to_goal / p.max_vel_x))
         shapes = self._shapes_for(robot, snapshot)
         scene = _Scene(path, snapshot, shapes[0])
@@ -157,7 +159,8 @@ class DwaController:
         near = scene.path[np.hypot(*(scene.path - scene.path[0]).T) <= NARROW_AHEAD]
         g = scene.snapshot.geometry
         rows, columns = g.cells(near)
-        clearance = scene.snapshot.clearance[rows.clip(0, g.height - 1), columns.clip(0, g.width - 1)].min()
+        rows, columns = rows.clip(0, g.height - 1), columns.clip(0, g.width - 1)
+        clearance = scene.snapshot.part_with(rows, columns).clearance_at(rows, columns).min()
         narrow = clearance < scene.shape.circumscribed + scene.shape.margin
         return NARROW_ALIGN_ANGLE if narrow else ALIGN_ANGLE
 
@@ -229,8 +232,8 @@ class DwaController:
         turned = rollout.yaw[:, -1] - directions[np.minimum(nearest, len(directions) - 1)]
         misaligned = p.heading_lookahead * (1.0 - np.cos(turned))
         g = snapshot.geometry
-        rows, columns = g.cells(np.stack([rollout.x[:, steps], rollout.y[:, steps]], axis=-1))
-        cell_costs = snapshot.costs[rows, columns].astype(np.float32)
+        rows, columns = g.cells_at(rollout.x[:, steps], rollout.y[:, steps])
+        cell_costs = snapshot.part_with(rows, columns).costs_at(rows, columns).astype(np.float32)
         occupied = np.minimum(cell_costs, INSCRIBED).mean(axis=1) * g.resolution
         changes = np.abs(rollout.velocities - (self._last.x, self._last.y, self._last.yaw))
         jerk = changes @ (SPEED_CHANGE_COST, SPEED_CHANGE_COST, TURN_CHANGE_COST)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,8 @@ from robot_formulas.geometry import Pose, Velocity, inscribed_radius
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from move_base.costmap.snapshot import Snapshot
+    from move_base.costmap.grid import Geometry
+    from move_base.costmap.snapshot import Part, Snapshot
 
 EDGE_SPACING = 0.1
 """Distance between the points that stand for the footprint's edge, m."""
@@ -86,23 +88,42 @@ class Footprint:
         The clearance of the robot's centre decides most poses; the edge is looked at only in between.
         """
         g = snapshot.geometry
-        rows, columns = g.cells(np.stack([rollout.x, rollout.y], axis=-1))
-        inside = (rows >= 0) & (rows < g.height) & (columns >= 0) & (columns < g.width)
-        clearance = np.where(
-            inside, snapshot.clearance[rows.clip(0, g.height - 1), columns.clip(0, g.width - 1)], np.float32(0.0)
-        )
+        rows, columns = g.cells_at(rollout.x, rollout.y)
+        reach = math.ceil(self.circumscribed / g.resolution) + 1
+        needed_rows = int(rows.min()) - reach, int(rows.max()) + reach
+        needed_columns = int(columns.min()) - reach, int(columns.max()) + reach
+        part = snapshot.part(needed_rows, needed_columns)
+        amid = part.covers(needed_rows, needed_columns)  # no edge is outside the costmap
+        clearance = part.clearance_at(rows, columns) if amid else _clearance(part, rows, columns, g)
         margin = self.margin + 0.5 * g.resolution  # clearances end at the middle of an obstacle's cell
         blocked: NDArray[np.bool_] = np.any(clearance <= self.inscribed + margin, axis=1)
         unsure = (clearance <= self.circumscribed + margin) & ~blocked[:, None]
         if unsure.any():
             which, step = np.nonzero(unsure)
-            cos, sin = np.cos(rollout.yaw[which, step]), np.sin(rollout.yaw[which, step])
-            edge_x = rollout.x[which, step, None] + cos[:, None] * self.edge[:, 0] - sin[:, None] * self.edge[:, 1]
-            edge_y = rollout.y[which, step, None] + sin[:, None] * self.edge[:, 0] + cos[:, None] * self.edge[:, 1]
-            columns = ((edge_x - g.origin_x) * (1.0 / g.resolution)).astype(np.intp)
-            rows = ((edge_y - g.origin_y) * (1.0 / g.resolution)).astype(np.intp)
-            np.clip(columns, 0, g.width - 1, out=columns)
-            np.clip(rows, 0, g.height - 1, out=rows)
-            touching = (snapshot.clearance[rows, columns] <= margin).any(axis=1)
+            poses = (axis[which, step, None] for axis in (rollout.x, rollout.y, rollout.yaw))
+            columns, rows = self._edge_cells(*poses, g)
+            if not amid:
+                np.clip(columns, 0, g.width - 1, out=columns)
+                np.clip(rows, 0, g.height - 1, out=rows)
+            touching = (part.clearance_at(rows, columns) <= margin).any(axis=1)
             blocked[which[touching]] = True
         return ~blocked
+
+    def _edge_cells(
+        self, x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.float64], g: Geometry
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return columns and rows (P, N) of the edge at poses, three arrays (P, 1)."""
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        edge_x = x + cos * self.edge[:, 0] - sin * self.edge[:, 1]
+        edge_y = y + sin * self.edge[:, 0] + cos * self.edge[:, 1]
+        return (
+            ((edge_x - g.origin_x) * (1.0 / g.resolution)).astype(np.intp),
+            ((edge_y - g.origin_y) * (1.0 / g.resolution)).astype(np.intp),
+        )
+
+
+def _clearance(part: Part, rows: NDArray[np.intp], columns: NDArray[np.intp], g: Geometry) -> NDArray[np.float32]:
+    """Return the clearance of cells, 0 m outside the costmap."""
+    inside = (rows >= 0) & (rows < g.height) & (columns >= 0) & (columns < g.width)
+    nearest = part.clearance_at(rows.clip(0, g.height - 1), columns.clip(0, g.width - 1))
+    return np.where(inside, nearest, np.float32(0.0))

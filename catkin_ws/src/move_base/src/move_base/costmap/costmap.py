@@ -12,7 +12,7 @@ from robot_formulas.geometry import ORIGIN, Pose, inscribed_radius
 
 from move_base.costmap.grid import FREE, LETHAL, UNKNOWN, Geometry
 from move_base.costmap.inflation import Inflation
-from move_base.costmap.snapshot import Snapshot
+from move_base.costmap.snapshot import Radii, Snapshot
 from move_base.costmap.static_map import bounding_geometry, costs_of, resample
 from move_base.parameters.parameters import OBSTACLE_KINDS
 
@@ -276,10 +276,9 @@ class Costmap:
                 costs = _larger(costs, static) if layer.use_maximum else static.copy()
             elif layer.name in self._obstacles:
                 costs[self._obstacles[layer.name] == LETHAL] = LETHAL
-        inflated, clearance = self._inflation.apply(costs)
         pinch_radius = 0.5 * (inscribed_radius(self._footprint) + self.inscribed_radius)
-        radii = self.inscribed_radius, self.circumscribed_radius, pinch_radius
-        return Snapshot(self.geometry, inflated, costs, clearance, self._inflation.limit, *radii)
+        radii = Radii(self.inscribed_radius, self.circumscribed_radius, pinch_radius)
+        return Snapshot(self.geometry, costs, self._inflation, radii)
 
     def _place_static(self, map_pose: Pose) -> None:
         """Resample the static maps into the grid, where grid or map moved since the last time."""

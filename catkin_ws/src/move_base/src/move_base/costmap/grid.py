@@ -43,9 +43,13 @@ class Geometry:
 
     def cells(self, points: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return rows and columns of points (..., 2); they may lie outside the grid."""
+        return self.cells_at(points[..., 0], points[..., 1])
+
+    def cells_at(self, x: NDArray[np.floating], y: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return rows and columns of points by their coordinates, arrays of one shape."""
         scale = 1.0 / self.resolution
-        columns = np.floor((points[..., 0] - self.origin_x) * scale).astype(np.intp)
-        rows = np.floor((points[..., 1] - self.origin_y) * scale).astype(np.intp)
+        columns = np.floor((x - self.origin_x) * scale).astype(np.intp)
+        rows = np.floor((y - self.origin_y) * scale).astype(np.intp)
         return rows, columns
 
     def cell(self, x: float, y: float) -> tuple[int, int]:

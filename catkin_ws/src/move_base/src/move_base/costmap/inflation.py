@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import cv2
@@ -39,6 +40,7 @@ class Inflation:
         radius = layer.inflation_radius if layer is not None else 0.0
         factor = layer.cost_scaling_factor if layer is not None else 0.0
         reach = max(radius, circumscribed, inscribed) / resolution + 2.0
+        self._reach = math.ceil(reach)  # cells
         self._scale = 254.0 / reach  # entries per cell of distance
         self.limit = (LETHAL - 1) / self._scale * resolution
         distances = np.arange(256) / self._scale * resolution
@@ -50,9 +52,7 @@ class Inflation:
 
     def apply(self, costs: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Return the inflated costs (H, W), and each cell's distance to the nearest obstacle (H, W), m."""
-        cells = cv2.distanceTransform((costs != LETHAL).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        if not cells.size or float(cells.max()) > 1e6:  # no obstacle at all
-            cells = np.full(costs.shape, self.limit / self._resolution, dtype=np.float32)
+        cells = self._distances(costs)
         clearance = np.minimum(cells * np.float32(self._resolution), np.float32(self.limit))
         if not self._costs:
             return costs, clearance
@@ -62,3 +62,20 @@ class Inflation:
         if unknown.any():
             inflated[unknown & (inflated < self._least_known)] = UNKNOWN
         return inflated, clearance
+
+    def apply_within(
+        self, costs: NDArray[np.uint8], rows: slice, columns: slice
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Return the same for a part of the grid: no obstacle counts that is farther away than the table reaches."""
+        top, left = max(rows.start - self._reach, 0), max(columns.start - self._reach, 0)
+        window = costs[top : rows.stop + self._reach, left : columns.stop + self._reach]
+        part = (slice(rows.start - top, rows.stop - top), slice(columns.start - left, columns.stop - left))
+        inflated, clearance = self.apply(np.ascontiguousarray(window))
+        return np.ascontiguousarray(inflated[part]), np.ascontiguousarray(clearance[part])
+
+    def _distances(self, costs: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Return each cell's distance to the nearest obstacle, cells, and one beyond the table for larger distances."""
+        cells = cv2.distanceTransform((costs != LETHAL).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        np.minimum(cells, np.float32(self._reach + 1), out=cells)  # without any obstacle they are huge
+        cells *= cells  # a whole number; in cv2 the last bit of its root depends on the place in the row
+        return np.sqrt(np.rint(cells, out=cells), out=cells)

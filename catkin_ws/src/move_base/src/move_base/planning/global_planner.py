@@ -153,7 +153,7 @@ def _weigh(snapshot: Snapshot, cells: tuple[Any, Any], allow_unknown: bool) -> N
     table[INSCRIBED : LETHAL + 1] = np.inf
     table[UNKNOWN] = UNKNOWN_WEIGHT if allow_unknown else np.inf
     weights = table[snapshot.costs[cells]]
-    weights[snapshot.clearance[cells] < np.float32(snapshot.circumscribed_radius)] *= np.float32(TIGHT_FACTOR)
+    weights[snapshot.clearance[cells] < np.float32(snapshot.radii.circumscribed)] *= np.float32(TIGHT_FACTOR)
     weights[snapshot.pinched[cells]] = PINCH_WEIGHT
     return weights
 
