@@ -1,11 +1,12 @@
-"""Roll-outs: whether a footprint is free, found with a part of the costmap and with the whole of it."""
+"""Roll-outs: where velocities lead, and whether a footprint is free, found with a part of the costmap or all of it."""
 
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from move_base.control.rollout import Footprint, roll_out
+from move_base.control.rollout import Footprint, Rollout, roll_out
 from move_base.costmap.grid import FREE, LETHAL, Geometry
 from move_base.costmap.inflation import Inflation
 from move_base.costmap.snapshot import Snapshot
@@ -61,8 +62,31 @@ def test_trajectories_are_free_as_their_poses_are_one_by_one(corners, margin, se
     inflation = Inflation(None, GEOMETRY.resolution, inscribed_radius(corners), footprint.circumscribed + margin)
     velocities = rng.uniform((-0.2, -0.3, -1.5), (0.8, 0.3, 1.5), (12, 3))
     rollout = roll_out(velocities, robot, 1.5, 6)
-    lazy, eager = (Snapshot(GEOMETRY, costs, inflation, 0.1) for _ in range(2))
+    lazy, eager = (Snapshot(GEOMETRY, costs, inflation, RADII) for _ in range(2))
     free = footprint.is_free(rollout, lazy)
     assert eager.costs is not None  # from now on it looks up in the whole
     np.testing.assert_array_equal(free, footprint.is_free(rollout, eager))
     np.testing.assert_array_equal(free, free_plainly(footprint, rollout, costs))
+    here = Rollout(np.zeros((1, 3)), *(np.array([[value]]) for value in (robot.x, robot.y, robot.yaw)))
+    assert footprint.is_free_at(robot, lazy) == free_plainly(footprint, here, costs)[0]
+
+
+@given(
+    st.lists(st.tuples(*[st.sampled_from([-1.2, -0.3, 0.0, 1e-12, 0.1, 0.5])] * 3), min_size=1, max_size=30),
+    st.builds(Pose, st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-4.0, 4.0)),
+    st.integers(1, 7),
+)
+def test_velocities_that_turn_alike_lead_where_each_leads_alone(velocities, robot, steps):
+    together = roll_out(np.array(velocities), robot, 2.0, steps)
+    for index, velocity in enumerate(velocities):
+        alone = roll_out(np.array([velocity]), robot, 2.0, steps)
+        for axis in ("x", "y", "yaw"):
+            np.testing.assert_array_equal(getattr(together, axis)[index], getattr(alone, axis)[0])
+        # A constant turn moves the base on a circle: integrate it in small steps.
+        x, y, yaw = robot.x, robot.y, robot.yaw
+        for _ in range(2000):
+            middle = yaw + velocity[2] * 0.0005
+            x += 0.001 * (velocity[0] * math.cos(middle) - velocity[1] * math.sin(middle))
+            y += 0.001 * (velocity[0] * math.sin(middle) + velocity[1] * math.cos(middle))
+            yaw += 0.001 * velocity[2]
+        assert (alone.x[0, -1], alone.y[0, -1], alone.yaw[0, -1]) == pytest.approx((x, y, yaw), abs=1e-5)

@@ -23,7 +23,7 @@ def snapshots(draw):
     layer = Layer("inflation", "inflation", inflation_radius=radius, inflate_unknown=draw(st.booleans()))
     inflation = Inflation(draw(st.sampled_from([layer, None])), resolution, 0.1, draw(st.floats(0.1, 0.5)))
     geometry = Geometry(resolution, shape[1], shape[0], -1.0, 2.0)
-    return tuple(Snapshot(geometry, costs, inflation, 0.1) for _ in range(2))
+    return tuple(Snapshot(geometry, costs, inflation, RADII) for _ in range(2))
 
 
 ENDS = st.tuples(st.integers(-10, 70), st.integers(0, 40)).map(lambda pair: (pair[0], pair[0] + pair[1]))
@@ -72,6 +72,6 @@ def test_nothing_is_inflated_again_while_look_ups_stay_near():
 @pytest.mark.parametrize("shape", [(1, 1), (30, 50)])
 def test_without_obstacles_everything_is_as_far_as_can_be(shape):
     inflation = Inflation(Layer("inflation", "inflation"), 0.05, 0.1, 0.2)
-    snapshot = Snapshot(Geometry(0.05, shape[1], shape[0], 0.0, 0.0), np.zeros(shape, dtype=np.uint8), inflation, 0.1)
+    snapshot = Snapshot(Geometry(0.05, shape[1], shape[0], 0.0, 0.0), np.zeros(shape, dtype=np.uint8), inflation, RADII)
     assert not snapshot.costs.any()
     assert (snapshot.clearance == np.float32(snapshot.clearance_limit)).all()

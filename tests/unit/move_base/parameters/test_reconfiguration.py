@@ -77,13 +77,13 @@ def test_size_of_a_rolling_window_changes(simulate, walls, tree):
 
 def test_footprint_that_comes_later_is_kept_free(simulate, walls, tree):
     simulation = driving(simulate(walls(8.0, 8.0)), (2.0, 0.0, 0.0), seconds=1.0)
-    before = simulation.navigator.local_snapshot.inscribed_radius
+    before = simulation.navigator.local_snapshot.radii.inscribed
     _, parameters = changed(
         tree(), "local_costmap", {"footprint": "[[0.9, 0.8], [0.9, -0.8], [-0.9, -0.8], [-0.9, 0.8]]"}
     )
     simulation.navigator.reconfigure(parameters)
     simulation.run(0.05)
-    assert simulation.navigator.local_snapshot.inscribed_radius > before + 0.3
+    assert simulation.navigator.local_snapshot.radii.inscribed > before + 0.3
 
 
 def test_switched_off_obstacle_layer_neither_shows_nor_stops_the_robot(simulate, walls, tree):

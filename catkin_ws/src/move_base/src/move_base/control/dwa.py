@@ -76,12 +76,12 @@ class DwaController:
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
         """Take other parameters while the robot drives."""
-        self.parameters = parameters.controller
+        self.parameters = p = parameters.controller
         self._period = 1.0 / parameters.controller_frequency
         footprint, padded = np.array(parameters.local_costmap.footprint), parameters.local_costmap.padded_footprint()
         padding = inscribed_radius(padded) - inscribed_radius(footprint)
         self._shapes = [Footprint(footprint, share * padding) for share in HARD_PADDING]
-        self._reach = self.parameters.max_vel_x * self.parameters.sim_time + self._shapes[0].circumscribed
+        self._reach = p.max_vel_x * p.sim_time + self._shapes[0].circumscribed
 
     def reset(self) -> None:
         """Forget the last command, for a new goal."""
@@ -166,8 +166,7 @@ class DwaController:
 
     def _shapes_for(self, robot: Pose, snapshot: Snapshot) -> list[Footprint]:
         """Return the footprint with its margins, largest first, but those in which an obstacle is already."""
-        here = Rollout(np.zeros((1, 3)), *(np.array([[value]]) for value in (robot.x, robot.y, robot.yaw)))
-        free = (index for index, shape in enumerate(self._shapes) if shape.is_free(here, snapshot)[0])
+        free = (index for index, shape in enumerate(self._shapes) if shape.is_free_at(robot, snapshot))
         return self._shapes[next(free, len(self._shapes) - 1) :]
 
     def _arc_samples(self, velocity: Velocity) -> NDArray[np.float64]:
@@ -177,10 +176,15 @@ class DwaController:
         slowest = min(max(p.min_vel_x, velocity.x - reach), fastest)
         forward = np.linspace(fastest, slowest, p.vx_samples)
         turn_reach = p.acc_lim_theta * self._period
-        low, high = np.clip([velocity.yaw - turn_reach, velocity.yaw + turn_reach], p.min_vel_theta, p.max_vel_theta)
-        turns = np.linspace(low, high, p.vtheta_samples)
-        turns = np.unique(np.append(turns, [np.clip(0.0, turns[0], turns[-1])]))
-        return np.stack(np.meshgrid(forward, [0.0], turns, indexing="ij"), axis=-1).reshape(-1, 3)
+        low, high = (
+            min(max(yaw, p.min_vel_theta), p.max_vel_theta)
+            for yaw in (velocity.yaw - turn_reach, velocity.yaw + turn_reach)
+        )
+        turns = np.linspace(low, high, p.vtheta_samples).tolist()
+        turns = sorted({*turns, min(max(0.0, turns[0]), turns[-1])})
+        arcs = np.zeros((len(forward), len(turns), 3))
+        arcs[..., 0], arcs[..., 2] = forward[:, None], turns
+        return arcs.reshape(-1, 3)
 
     def _sideways_samples(self, velocity: Velocity) -> NDArray[np.float64]:
         p = self.parameters
@@ -206,7 +210,7 @@ class DwaController:
         free = scene.shape.is_free(rollout, scene.snapshot)
         if not free.any():
             return None
-        kept = rollout.only(free)
+        kept = rollout if free.all() else rollout.only(free)
         costs = self._score(kept, scene.path, scene.snapshot)
         best = int(costs.argmin())
         return kept.trajectory(best, float(costs[best]))
@@ -218,21 +222,23 @@ class DwaController:
     def _score(self, rollout: Rollout, path: NDArray[np.float64], snapshot: Snapshot) -> NDArray[np.float64]:
         """Return the cost of each trajectory (C,) in metres: off the path, short of its end, near obstacles, jerky."""
         p = self.parameters
-        lengths = np.hypot(*np.diff(path, axis=0).T)
-        remaining = np.append(np.cumsum(lengths[::-1])[::-1], 0.0)
+        along = np.diff(path, axis=0)
+        remaining = np.append(np.cumsum(np.hypot(along[::-1, 0], along[::-1, 1]))[::-1], 0.0)
         steps = slice(rollout.x.shape[1] - 1, None, -SCORED_EVERY)
-        dx = rollout.x[:, steps, None] - path[:, 0]
-        dy = rollout.y[:, steps, None] - path[:, 1]
-        squared = dx * dx + dy * dy
-        nearest = squared[:, 0].argmin(axis=1)
-        off_path = np.sqrt(squared.min(axis=2))
+        x, y = rollout.x[:, steps], rollout.y[:, steps]
+        squared = np.subtract.outer(path[:, 0], x)  # in place from here: new arrays of this size cost more than numbers
+        squared *= squared
+        squared_y = np.subtract.outer(path[:, 1], y)
+        squared_y *= squared_y
+        squared += squared_y
+        nearest = squared[:, :, 0].argmin(axis=0)
+        off_path = np.sqrt(squared.min(axis=0))
         to_goal = remaining[nearest] + off_path[:, 0]
-        steps_along = np.diff(path, axis=0)
-        directions = np.arctan2(steps_along[:, 1], steps_along[:, 0])
+        directions = np.arctan2(along[:, 1], along[:, 0])
         turned = rollout.yaw[:, -1] - directions[np.minimum(nearest, len(directions) - 1)]
         misaligned = p.heading_lookahead * (1.0 - np.cos(turned))
         g = snapshot.geometry
-        rows, columns = g.cells_at(rollout.x[:, steps], rollout.y[:, steps])
+        rows, columns = g.cells_at(x, y)
         cell_costs = snapshot.part_with(rows, columns).costs_at(rows, columns).astype(np.float32)
         occupied = np.minimum(cell_costs, INSCRIBED).mean(axis=1) * g.resolution
         changes = np.abs(rollout.velocities - (self._last.x, self._last.y, self._last.yaw))

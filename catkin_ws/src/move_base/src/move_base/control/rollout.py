@@ -56,15 +56,19 @@ class Rollout:
 def roll_out(velocities: NDArray[np.float64], robot: Pose, horizon: float, steps: int) -> Rollout:
     """Integrate constant velocities (C, 3) in closed form over the horizon (s), to so many poses."""
     times = np.linspace(horizon / steps, horizon, steps)
-    turned = velocities[:, 2:] * times
+    rates, which = np.unique(velocities[:, 2], return_inverse=True)  # few: many velocities turn alike
+    turned = rates[:, None] * times
     # sin(a)/a and (1 - cos(a))/a, whose limits at a = 0 are 1 and 0
-    sinc = np.sinc(turned / np.pi)
-    cosc = np.sinc(turned / (2.0 * np.pi)) * np.sin(turned / 2.0)
+    sinc = np.sinc(turned / np.pi).take(which, axis=0)
+    cosc = (np.sinc(turned / (2.0 * np.pi)) * np.sin(turned / 2.0)).take(which, axis=0)
     forward = (velocities[:, :1] * sinc - velocities[:, 1:2] * cosc) * times
     left = (velocities[:, :1] * cosc + velocities[:, 1:2] * sinc) * times
     cos, sin = np.cos(robot.yaw), np.sin(robot.yaw)
     return Rollout(
-        velocities, robot.x + cos * forward - sin * left, robot.y + sin * forward + cos * left, robot.yaw + turned
+        velocities,
+        robot.x + cos * forward - sin * left,
+        robot.y + sin * forward + cos * left,
+        (robot.yaw + turned).take(which, axis=0),
     )
 
 
@@ -109,17 +113,38 @@ class Footprint:
             blocked[which[touching]] = True
         return ~blocked
 
+    def is_free_at(self, robot: Pose, snapshot: Snapshot) -> bool:
+        """Whether the footprint is free of obstacles at one pose, as `is_free` has it."""
+        g = snapshot.geometry
+        x, y = np.array([[robot.x]]), np.array([[robot.y]])
+        rows, columns = g.cells_at(x, y)
+        row, column = int(rows[0, 0]), int(columns[0, 0])
+        if 0 <= row < g.height and 0 <= column < g.width:
+            part = snapshot.part((row, row), (column, column))
+            clearance = part.clearance[row - part.row, column - part.column]
+            margin = self.margin + 0.5 * g.resolution
+            if clearance <= self.inscribed + margin:
+                return False
+            if clearance > self.circumscribed + margin:
+                return True
+        return bool(self.is_free(Rollout(np.zeros((1, 3)), x, y, np.array([[robot.yaw]])), snapshot)[0])
+
     def _edge_cells(
         self, x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.float64], g: Geometry
     ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return columns and rows (P, N) of the edge at poses, three arrays (P, 1)."""
         cos, sin = np.cos(yaw), np.sin(yaw)
-        edge_x = x + cos * self.edge[:, 0] - sin * self.edge[:, 1]
-        edge_y = y + sin * self.edge[:, 0] + cos * self.edge[:, 1]
-        return (
-            ((edge_x - g.origin_x) * (1.0 / g.resolution)).astype(np.intp),
-            ((edge_y - g.origin_y) * (1.0 / g.resolution)).astype(np.intp),
-        )
+        # In place: new arrays of this size would cost more than the numbers in them.
+        edge_x, edge_y = cos * self.edge[:, 0], sin * self.edge[:, 0]
+        edge_x += x
+        edge_x -= sin * self.edge[:, 1]
+        edge_y += y
+        edge_y += cos * self.edge[:, 1]
+        edge_x -= g.origin_x
+        edge_x *= 1.0 / g.resolution
+        edge_y -= g.origin_y
+        edge_y *= 1.0 / g.resolution
+        return edge_x.astype(np.intp), edge_y.astype(np.intp)
 
 
 def _clearance(part: Part, rows: NDArray[np.intp], columns: NDArray[np.intp], g: Geometry) -> NDArray[np.float32]:
