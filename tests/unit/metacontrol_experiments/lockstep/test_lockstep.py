@@ -1,5 +1,6 @@
 """Missions in lockstep: deterministic, driven by the same cores as on ROS."""
 
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -7,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
 from metacontrol_bags.metrics import summarise
 from metacontrol_experiments.cli import main as cli
 from metacontrol_experiments.contingency.parsing import parse_contingency
@@ -47,6 +50,25 @@ def test_frames_answer_as_tf_does():
     assert frames.lookup("map", "nowhere", None) is None and frames.newest("map", "nowhere") is None
     assert frames.newest("map", "camera_link") == 1.02
     assert frames.newest("base_link", "camera_link") == math.inf
+
+
+POSES = st.builds(Pose, st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-3.0, 3.0))
+FRAMES = ("map", "odom", "base_link", "front_laser", "camera_link")
+
+
+@given(st.lists(st.tuples(st.sampled_from([Pose(1.0, 2.0, 0.3), Pose(-4.0, 0.0)]), POSES), min_size=1, max_size=6))
+def test_frames_are_placed_by_the_poses_of_their_time(moments):
+    robot, frames = Robot(), Frames(Robot())
+    for number, (map_to_odom, odometry) in enumerate(moments):
+        frames.add(float(number), map_to_odom, odometry)
+    for number, (map_to_odom, odometry) in enumerate(moments):
+        base = map_to_odom.matrix() @ odometry.matrix()
+        sensors = (base @ one.mount.pose.matrix(one.mount.z) for one in (robot.front_laser, robot.camera))
+        in_map = dict(zip(FRAMES, (np.eye(4), map_to_odom.matrix(), base, *sensors), strict=True))
+        for target, source in itertools.product(FRAMES, repeat=2):
+            expected = np.linalg.inv(in_map[target]) @ in_map[source]
+            np.testing.assert_array_equal(frames.lookup(target, source, float(number)), expected)
+    assert frames.lookup("map", "wheel", None) is None and frames.newest("map", "wheel") is None
 
 
 def test_frames_forget_what_is_old():
