@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from move_base.control.rollout import Footprint, Rollout, roll_out
 from move_base.costmap.grid import FREE, LETHAL, Geometry
 from move_base.costmap.inflation import Inflation
-from move_base.costmap.snapshot import Snapshot
+from move_base.costmap.snapshot import Radii, Snapshot
 from robot_formulas.geometry import Pose, inscribed_radius
 
+RADII = Radii(0.1, 0.2, 0.05)
 GEOMETRY = Geometry(0.05, 80, 60, -2.0, -1.5)
 CORNERS = st.sampled_from(
     [

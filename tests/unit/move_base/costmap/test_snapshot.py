@@ -6,8 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from move_base.costmap.grid import FREE, LETHAL, UNKNOWN, Geometry
 from move_base.costmap.inflation import Inflation
-from move_base.costmap.snapshot import Snapshot
+from move_base.costmap.snapshot import Radii, Snapshot
 from move_base.parameters.parameters import Layer
+
+RADII = Radii(0.1, 0.2, 0.05)
 
 
 @st.composite
@@ -61,7 +63,7 @@ def test_part_around_a_point_has_the_cells_within_reach(pair, x, y, reach):
 
 def test_nothing_is_inflated_again_while_look_ups_stay_near():
     snapshot = Snapshot(
-        Geometry(0.05, 400, 400, 0.0, 0.0), np.zeros((400, 400), dtype=np.uint8), Inflation(None, 0.05, 0.1, 0.2), 0.1
+        Geometry(0.05, 400, 400, 0.0, 0.0), np.zeros((400, 400), dtype=np.uint8), Inflation(None, 0.05, 0.1, 0.2), RADII
     )
     part = snapshot.part((100, 120), (200, 220))
     assert part.costs.size < 50 * 50

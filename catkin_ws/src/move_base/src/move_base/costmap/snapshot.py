@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-
 from move_base.costmap.grid import INSCRIBED, UNKNOWN
 
 if TYPE_CHECKING:
