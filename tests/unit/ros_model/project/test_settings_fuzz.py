@@ -7,14 +7,17 @@ from pathlib import Path
 import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from ros_model.checks.whole_projects import check_project
 from ros_model.errors import ModelError
 from ros_model.generators.deployment import manipulator, monitor, reasoner
 from ros_model.generators.launch import launch_file
 from ros_model.io.project import load_project, problems_of
+from ros_model.language.library import Library
 from ros_model.language.metamodel import compose
 from ros_model.language.packages_writer import write_packages
 from ros_model.language.system_writer import write_system
 from ros_model.project.observers import described_observers, observer_packages
+from ros_model.project.requirements import requirement_lines
 
 BASE = """RosSystem { Name base
     RosComponents (
@@ -45,7 +48,10 @@ SETTINGS = {
     "quality_attributes": {"safety": {"direction": "lower_is_better", "range": [0, 1]}},
     "utility": "safety",
     "objectives": {"o": {"function": "f", "nfrs": {"safety": 0.5}}},
-    "components": {"robot": {"node": "robot"}},
+    "components": {
+        "robot": {"node": "robot", "required_by": ["a"], "not_required_by": ["g"]},
+        "guard": {"not_required_by": "all"},
+    },
     "observers": [
         "X",
         {
@@ -60,6 +66,7 @@ SETTINGS = {
         },
     ],
     "manipulator": {"action_name": "c"},
+    "arguments": {"nav": "--frame odom"},
     "requires": {"speed": {"1": "robot"}},
 }
 TABLE = {
@@ -105,13 +112,14 @@ def try_all(folder):
     try:
         project = load_project(folder)
         for variant in project.variants:
-            launch_file(variant, compose(project.base, variant))
+            launch_file(variant, compose(project.base, variant), arguments=project.arguments)
             write_system(variant)
             project.required_functions(variant.name)
         for content in (manipulator(project), reasoner(project), monitor(project)):
             yaml.safe_dump(content)
         write_packages(observer_packages(described_observers(project)))
-        project.required_components()
+        assert list(requirement_lines(project))
+        assert all(finding.message for finding in check_project(project, Library()))
     except ModelError as error:
         return error
     return None
