@@ -171,6 +171,18 @@ class FunctionsTest(PairTest):
         self.assertEqual(rospy.get_param(f"{VIEWER}/controller_frequency"), 1.0)
         self.assert_same(VIEWER)
 
+    def test_parameters_that_no_node_takes_while_it_runs_are_put_back_by_a_request_that_says_so(self):
+        rospy.set_param(f"{GRIPPER}/force", 5)
+        rospy.delete_param("/cell/site")
+        self.assertEqual(self.request("pick_softly"), 1, self.text)
+        self.assertEqual((rospy.get_param(f"{GRIPPER}/force"), rospy.get_param("/cell/site")), (1, "hall"))
+        self.assertEqual(self.states[-1].tactic, "parameters")
+        words = f"put back: /cell/site (not set, not hall), {GRIPPER}/force (5, not 1)"
+        self.assertEqual(self.text, f"pick_softly is deployed by parameters; {words}")
+        self.assert_same(CAMERA, VIEWER, GRIPPER, SORTER)
+        self.assertEqual(self.request("pick_softly"), 1, self.text)
+        self.assertEqual(self.text, "pick_softly is deployed by nothing")
+
     def test_node_that_dies_starts_again_with_the_parameters_of_its_configuration(self):
         rospy.set_param(f"{VIEWER}/controller_frequency", 9.0)
         os.kill(self.pids[VIEWER], signal.SIGKILL)

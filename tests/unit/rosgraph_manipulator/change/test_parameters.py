@@ -1,7 +1,7 @@
 """What stood on the parameter server comes back when a configuration that wrote over it leaves."""
 
 import pytest
-from rosgraph_manipulator.change.parameters import OverwrittenParameters
+from rosgraph_manipulator.change.parameters import OverwrittenParameters, put_back
 
 
 def adopt(memory, server, wanted):
@@ -37,3 +37,9 @@ def test_former_values_survive_the_parameter_server():
 @pytest.mark.parametrize("value", [None, 3, {}, {"before": 3, "absent": []}, {"before": [["/a"]], "absent": []}])
 def test_parameter_of_another_form_tells_nothing(value):
     assert OverwrittenParameters.from_parameter(value).transition({}) == ({}, [])
+
+
+def test_words_tell_what_parameters_had_and_have_again():
+    wanted = {f"/arm/{name}": 1 for name in "abcdefg"}
+    assert put_back({"/arm/a": 5, "/arm/b": None}, wanted) == "put back: /arm/a (5, not 1), /arm/b (not set, not 1)"
+    assert put_back(dict.fromkeys(wanted, 2), wanted).endswith("/arm/e (2, not 1) and 2 more")

@@ -39,6 +39,18 @@ def test_equal_configurations_need_nothing():
     assert (first.tactic, first.touched) == ("nothing", ())
 
 
+def test_drifted_parameter_that_no_node_takes_while_it_runs_is_stored_only():
+    same = system(a={"sources": "scan"}, b={})
+    plans, _ = plan_change(same, same, Nodes(a=SPEED), TACTICS, drifted=["/a/sources", "/site"])
+    assert [(plan.tactic, plan.touched) for plan in plans] == [("parameters", ()), ("replace", ("/a", "/b") * 2)]
+
+
+def test_drifted_parameter_that_a_node_takes_is_set_while_it_runs():
+    running, wanted = system(a={"speed": 7.5}), system(a={"speed": 1.0})
+    plans, _ = plan_change(running, wanted, Nodes(a=SPEED), TACTICS, drifted=["/a/speed"])
+    assert plans[0].steps == (SetParameters("/a", {"speed": 1.0}), ChangeProcesses())
+
+
 def test_parameters_that_the_node_takes_are_set_while_it_runs():
     wanted = system(a={"speed": 2, "dwa/mode": "fast"})
     first = found(system(a={"speed": 1, "dwa/mode": "slow"}), wanted, Nodes(a=SPEED))[0]

@@ -105,6 +105,7 @@ def deploy(
     plans: Sequence[Plan],
     last_good: Configuration | None,
     watch: Stopwatch,
+    remark: str = "",
 ) -> Outcome:
     """Carry out plans until one succeeds; where none does, restore the last good configuration.
 
@@ -114,6 +115,7 @@ def deploy(
         plans: the plans, cheapest first.
         last_good: the configuration to restore; None: there is none.
         watch: measures the phases.
+        remark: what the plans do besides, in words.
     """
     reasons: list[str] = []
     touched = False
@@ -131,7 +133,8 @@ def deploy(
             reasons.append(f"{plan.tactic}: {error}")
         else:
             failed = f" ({'; '.join(reasons)})" if reasons else ""
-            return Outcome(Result.OK, wanted, f"{wanted.name} is deployed by {plan.tactic}{failed}", plan.tactic)
+            words = f"{wanted.name} is deployed by {plan.tactic}{failed}{remark and f'; {remark}'}"
+            return Outcome(Result.OK, wanted, words, plan.tactic)
     reason = f"{wanted.name}: {'; '.join(reasons) or 'no tactic has a plan'}"
     return _go_back(executor, wanted.function, last_good, reason, watch)
 

@@ -5,6 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+_SHOWN = 5  # parameters in a message
+
+
+def put_back(drifted: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+    """Return in words which parameters were put back.
+
+    Args:
+        drifted: the values that they had, by full name; None: they were not set.
+        wanted: the values of the configuration.
+    """
+    words = [
+        f"{name} ({'not set' if value is None else value}, not {wanted.get(name)})" for name, value in drifted.items()
+    ]
+    more = f" and {len(words) - _SHOWN} more" if len(words) > _SHOWN else ""
+    return f"put back: {', '.join(words[:_SHOWN])}{more}"
+
 
 class OverwrittenParameters:
     """The values that the parameter server had before configurations set others."""

@@ -165,13 +165,15 @@ Tactic = Callable[[Difference, RunningNodes], Plan | None]
 
 
 def nothing(difference: Difference, _nodes: RunningNodes) -> Plan | None:
-    """Leave all nodes alone, where none differs."""
-    return None if difference.touches_nodes else Plan("nothing", 0.0, (ChangeProcesses(),))
+    """Leave all nodes alone, where none differs and no parameter has drifted."""
+    return None if difference.touches_nodes or difference.drifted else Plan("nothing", 0.0, (ChangeProcesses(),))
 
 
 def parameters(difference: Difference, nodes: RunningNodes) -> Plan | None:
-    """Set parameters by dynamic_reconfigure, where only parameters differ and the nodes take them."""
-    if difference.starts or difference.stops or difference.replaced or not difference.parameters:
+    """Set parameters where only parameters differ: by dynamic_reconfigure those that nodes take while they run."""
+    if difference.starts or difference.stops or difference.replaced:
+        return None
+    if not (difference.parameters or difference.drifted):
         return None
     steps: list[Step] = []
     for node, values in difference.parameters.items():
@@ -179,7 +181,7 @@ def parameters(difference: Difference, nodes: RunningNodes) -> Plan | None:
         if taken is None:
             return None
         steps += taken
-    return Plan("parameters", PARAMETERS_COST, (*steps, ChangeProcesses()))
+    return Plan("parameters", PARAMETERS_COST, (*steps, ChangeProcesses()))  # which stores all of them
 
 
 def restart(difference: Difference, nodes: RunningNodes) -> Plan | None:
@@ -213,6 +215,7 @@ def plan_change(
     nodes: RunningNodes,
     tactics: Mapping[str, Tactic],
     shared_nodes: Collection[str] = (),
+    drifted: Collection[str] = (),
 ) -> tuple[list[Plan], list[str]]:
     """Return the plans that change one configuration into another, cheapest first.
 
@@ -226,11 +229,12 @@ def plan_change(
         nodes: answers what running nodes take by dynamic_reconfigure.
         tactics: the tactics to ask, by name.
         shared_nodes: nodes that another function needs; they run on.
+        drifted: parameters of the configuration, which runs already, that somebody has changed since.
 
     Returns:
         The plans, and a line for each tactic that raised.
     """
-    difference = compare(running, wanted, shared_nodes)
+    difference = compare(running, wanted, shared_nodes, drifted)
     proposed, problems = [], []
     for name, tactic in tactics.items():
         try:

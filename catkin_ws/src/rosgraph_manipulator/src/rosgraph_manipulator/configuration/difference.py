@@ -22,6 +22,9 @@ class Difference:
         parameters: the private parameters with a new value, for each node of both that is not replaced.
         shared: parameters outside the nodes' namespaces that get a new value, by full name.
         shared_nodes: nodes of both that another function needs, too; they run on.
+        drifted: parameters of the running configuration that somebody has changed on the parameter server since, by
+            full name; only if it is the wanted one, too. Nodes that take parameters while they run have theirs also in
+            `parameters`; the others read them at their next start.
     """
 
     running: SystemDescription
@@ -32,6 +35,7 @@ class Difference:
     parameters: Mapping[str, Mapping[str, Any]]
     shared: Mapping[str, Any]
     shared_nodes: tuple[str, ...] = ()
+    drifted: tuple[str, ...] = ()
 
     @property
     def touches_nodes(self) -> bool:
@@ -39,7 +43,12 @@ class Difference:
         return bool(self.starts or self.stops or self.replaced or self.parameters)
 
 
-def compare(running: SystemDescription, wanted: SystemDescription, shared_nodes: Collection[str] = ()) -> Difference:
+def compare(
+    running: SystemDescription,
+    wanted: SystemDescription,
+    shared_nodes: Collection[str] = (),
+    drifted: Collection[str] = (),
+) -> Difference:
     """Return what differs.
 
     A shared parameter that changes replaces all nodes, because any node may have read it at its start. Expected quality
@@ -50,6 +59,7 @@ def compare(running: SystemDescription, wanted: SystemDescription, shared_nodes:
         running: the configuration that runs.
         wanted: the configuration to deploy.
         shared_nodes: nodes that another function needs. They run on, because they are the same in both.
+        drifted: parameters of the configuration, which runs already, that somebody has changed since.
     """
     both = [name for name in wanted.nodes if name in running.nodes]
     shared = _changed(running.parameters, wanted.parameters)
@@ -74,6 +84,7 @@ def compare(running: SystemDescription, wanted: SystemDescription, shared_nodes:
         parameters=parameters,
         shared=shared,
         shared_nodes=tuple(name for name in both if name in shared_nodes),
+        drifted=tuple(drifted),
     )
 
 

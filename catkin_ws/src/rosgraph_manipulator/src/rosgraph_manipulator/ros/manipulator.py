@@ -47,6 +47,7 @@ from rosgraph_manipulator.ros.executor import RosExecutor
 from rosgraph_manipulator.ros.goal import PendingGoal
 from rosgraph_manipulator.ros.launchers import Launchers
 from rosgraph_manipulator.ros.requests import Order, RequestServer
+from rosgraph_manipulator.ros.running_system import Comparison
 
 ASK_DELAY = 2.0  # s, wall, after a change: nodes may offer dynamic_reconfigure later than all else
 
@@ -201,19 +202,20 @@ class Manipulator:
         self._announcer.announce(wanted, FunctionGrounding.RECONFIGURING)
         try:
             with watch.phase("plan"):
-                found = self._plans(wanted, restart)
-            outcome = deploy(self._executor, wanted, found, deployments.fallback(wanted), watch)
+                plans = self._plans(found := self._executor.system.compare(wanted, restart))
+            outcome = deploy(self._executor, wanted, plans, deployments.fallback(wanted), watch, found.remark)
         except (DeploymentError, rospy.ROSException, OSError) as error:
             outcome = deployments.refused(wanted, " ".join(str(error).split()))
         phases = durations(watch.phases, self._executor.launcher_phases, outcome.result is Result.OK)
         self._finish(wanted, outcome, {**phases, "total": time.monotonic() - began})
         return outcome
 
-    def _plans(self, wanted: Configuration, restart: tuple[str, ...]) -> list[Plan]:
-        system = self._executor.system
-        found = system.compare(wanted, restart)
-        nodes = SimpleNamespace(adjustable=functools.cache(system.nodes.adjustable))  # several tactics ask the same
-        plans, problems = plan_change(found.running, found.wanted, nodes, self._tactics, found.shared)
+    def _plans(self, found: Comparison) -> list[Plan]:
+        # Several tactics ask the same.
+        nodes = SimpleNamespace(adjustable=functools.cache(self._executor.system.nodes.adjustable))
+        plans, problems = plan_change(
+            found.running, found.wanted, nodes, self._tactics, found.shared, tuple(found.drifted)
+        )
         for problem in problems:
             rospy.logwarn("%s", problem)
         return plans

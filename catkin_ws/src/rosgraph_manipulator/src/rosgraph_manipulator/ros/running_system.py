@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -14,9 +14,10 @@ from rosgraph_launcher.io.command_lines import CommandLineError, command_line
 from rosgraph_launcher.io.master import NodeApi
 
 from rosgraph_manipulator.change.deployment import DeploymentError
+from rosgraph_manipulator.change.parameters import put_back
 from rosgraph_manipulator.change.progress import ChangeProgress
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
-from rosgraph_manipulator.configuration.difference import same_value
+from rosgraph_manipulator.configuration.difference import is_quality, same_value
 from rosgraph_manipulator.configuration.sharing import disagreement, seen_by
 from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError, read_launch_file
 from rosgraph_manipulator.io.master import get_parameters
@@ -33,11 +34,19 @@ class Comparison:
         running: what runs, as the function that changes sees it.
         wanted: the configuration to deploy.
         shared: nodes of both that another function needs, too.
+        drifted: what somebody has changed since the configuration was deployed, where it is the wanted one, too: the
+            values on the parameter server by full name; None: it is not set.
     """
 
     running: SystemDescription
     wanted: SystemDescription
     shared: frozenset[str]
+    drifted: Mapping[str, Any]
+
+    @property
+    def remark(self) -> str:
+        """What a change puts back, in words; empty: nothing."""
+        return put_back(self.drifted, self.wanted.all_parameters()) if self.drifted else ""
 
 
 class RunningSystem:
@@ -79,12 +88,14 @@ class RunningSystem:
         if reason:
             raise DeploymentError(f"{wanted.name}: {reason}")
         lost = set(restart)
-        if self._progress.running(function) == wanted.name:
+        is_repair = self._progress.running(function) == wanted.name
+        if is_repair:
             lost |= self._silent(self._progress.launched_for(function))
-        running = seen_by(self._with_live_values(function, self._runs(function)), system, others)
+        drifted = self._drifted(function)
+        running = seen_by(self._with_live_values(function, drifted), system, others)
         nodes = {name: node for name, node in running.nodes.items() if name not in lost}
         shared = self._progress.shared(function) & set(nodes) & set(system.nodes)
-        return Comparison(SystemDescription(nodes, running.parameters), system, shared)
+        return Comparison(SystemDescription(nodes, running.parameters), system, shared, drifted if is_repair else {})
 
     def describe(self, configuration: Configuration) -> SystemDescription:
         """Return what a configuration's launch file starts.
@@ -158,23 +169,27 @@ class RunningSystem:
                 return self._progress.running_system(function, None)
         return self._progress.running_system(function, self._deployed[function][1].system)
 
-    def _with_live_values(self, function: str, system: SystemDescription) -> SystemDescription:
+    def _drifted(self, function: str) -> dict[str, Any]:
+        """Return the values that the parameters of what runs have now, where they differ; None: not set."""
+        described = self._described_as_deployed(function).all_parameters()
+        wanted = {name: value for name, value in described.items() if not is_quality(name)}
+        try:
+            live = get_parameters(wanted)
+        except CallError as error:
+            rospy.logwarn("parameters are not compared with what the nodes have: %s", error)
+            return {}
+        differ = (n for n, value in wanted.items() if n not in live or not same_value(live[n], value))
+        return {name: live.get(name) for name in differ}
+
+    def _with_live_values(self, function: str, drifted: Mapping[str, Any]) -> SystemDescription:
         """Return what runs, with the values that somebody has set by dynamic_reconfigure since.
 
         Other parameters on the server are no sign of what a node works with: it has read them at its start.
         """
-        described = {
-            f"{node.name}/{key}": value for node in system.nodes.values() for key, value in node.parameters.items()
-        }
-        try:
-            live = get_parameters(described)
-        except CallError as error:
-            rospy.logwarn("parameters are not compared with what the nodes have: %s", error)
-            return system
-        drifted = {name: value for name, value in live.items() if not same_value(value, described[name])}
+        system = self._runs(function)
         values = {}
         for node in system.nodes:
-            own = {name: value for name, value in drifted.items() if name.startswith(f"{node}/")}
+            own = {n: value for n, value in drifted.items() if n.startswith(f"{node}/") and value is not None}
             adjustable = self.nodes.adjustable(node) if own else {}
             values.update({name: value for name, value in own.items() if name.removeprefix(f"{node}/") in adjustable})
         if not values:
