@@ -1,7 +1,7 @@
 """Evaluations of the monitor, one after the other."""
 
 from ros_model.graph.snapshot import GraphSnapshot, NodeState, build_snapshot
-from ros_model.language.metamodel import Component, Port, PortKind, RosSystem
+from ros_model.language.metamodel import Component, Port, PortKind, Reference, RosParameter, RosSystem
 from rosgraph_monitor.evaluation import GraphEvaluator, Patience
 from rosgraph_monitor.graph.desired import Desired
 from rosgraph_monitor.health.components import NodeCondition
@@ -108,6 +108,19 @@ def test_nodes_of_idle_functions_may_run_or_not_and_are_not_judged():
     }
     published = build_snapshot([[["/rear/scan", ["/move_base"]]], [], []], [], {}, {"/move_base": "http://h"})
     assert watched.excused_topics(published, released, ["rear/scan"]) == frozenset()
+
+
+def test_wrong_parameters_are_told_with_the_configurations_that_set_them():
+    parameter = RosParameter("speed", Reference("p", "a", "n", "speed"), 1.0)
+    system = RosSystem("s", components=(Component("belt", parameters=(parameter,)), Component("move_base")))
+    desired = Desired(system, deployed=(("run_slowly", system), ("rest", RosSystem("rest"))))
+    watched = GraphEvaluator({})
+    for speed in (1.0, 2.0):
+        nodes = {"/belt": NodeState("/belt", "http://host/belt")}
+        live = GraphSnapshot(nodes=nodes, parameters={"belt": {"speed": speed}})
+        statuses = watched.evaluate(live, lives(belt=Life.ALIVE), desired, speed)
+    (wrong,) = (status for status in statuses if status.message == "Wrong param configuration")
+    assert wrong.values == (("speed", "2.0"), ("expected/speed", "1.0"), ("in configuration", "run_slowly"))
 
 
 def test_problem_of_the_model_is_told_in_place_of_running_ok():

@@ -1,7 +1,7 @@
 """What should run, by the active configuration."""
 
 from ros_model.errors import ModelError
-from ros_model.language.metamodel import Component, Port, PortKind, RosSystem
+from ros_model.language.metamodel import Component, Port, PortKind, RosSystem, SystemParameter
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding
 
 BASE = RosSystem("base", components=(Component("laser"), Component("move_base")))
@@ -97,6 +97,24 @@ def test_topics_that_only_idle_components_publish_are_idle():
     assert model.current.idle_topics == frozenset()
     assert model.follow([Grounding("f", "c", "STABLE")]).idle_topics == {"b/out"}
     assert model.follow([]).idle_topics == {"b/out", "c/out"}
+
+
+def test_wrong_parameters_belong_to_the_configurations_that_set_them():
+    own = {
+        "look": RosSystem("look", components=(Component("eye", namespace="head"), Component("lamp"))),
+        "pick": RosSystem("pick", components=(Component("lamp"),), parameters=(SystemParameter("site"),)),
+        "sort": RosSystem("sort", parameters=(SystemParameter("site"), SystemParameter("speed", namespace="belt"))),
+    }
+    base = RosSystem("base", components=(Component("belt"),), parameters=(SystemParameter("floor"),))
+    desired = DesiredModel(base, own.__getitem__).follow(
+        [Grounding("f_look", "look", "STABLE"), Grounding("f_pick", "pick", "FAILED"), Grounding("f_sort", "sort", "")]
+    )
+    assert desired.configurations_of("head/eye", ["focus"]) == ("look",)
+    assert desired.configurations_of("lamp", ["power"]) == ("look", "pick")
+    assert desired.configurations_of("belt", ["speed"]) == ()
+    assert desired.configurations_of("ROS Graph", ["site"]) == ("pick", "sort")
+    assert desired.configurations_of("ROS Graph", ["floor", "belt/speed"]) == ("sort",)
+    assert desired.configurations_of("ROS Graph", ["floor"]) == ()
 
 
 def test_no_configuration_any_more_leads_back_to_the_base_if_its_variants_are_unknown():

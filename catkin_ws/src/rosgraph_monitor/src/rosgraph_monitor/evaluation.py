@@ -114,7 +114,7 @@ class GraphEvaluator:
         if desired.problem:
             statuses.append(graph_problem(f"desired model: {desired.problem}"))
         findings = self._findings(snapshot, life, desired, now, is_fresh)
-        problems = [*finding_statuses(findings), *verdict_statuses(topics)]
+        problems = [*finding_statuses(findings, desired.configurations_of), *verdict_statuses(topics)]
         statuses.extend(problems)
         if desired.system is not None and not problems and not desired.problem:
             statuses.append(graph_ok())

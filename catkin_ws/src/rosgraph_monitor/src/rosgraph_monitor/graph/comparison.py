@@ -25,6 +25,7 @@ from rosgraph_monitor.graph.names import (
     is_ignored_node,
     relative,
     resolved,
+    system_parameter_name,
 )
 from rosgraph_monitor.graph.values import same_value
 from rosgraph_monitor.graph.wiring import Live, PortTypes, compare_ports
@@ -164,7 +165,7 @@ def _wrong_system_parameters(snapshot: GraphSnapshot, desired: RosSystem, namesp
     for parameter in desired.parameters:
         if parameter.value is None or parameter.name.startswith(CONVENTIONS):
             continue
-        name = "/".join(part.strip("/") for part in (parameter.namespace, parameter.name) if part)
+        name = system_parameter_name(parameter)
         actual = _actual(snapshot, resolved(name, namespace))
         if not same_value(parameter.value, actual):
             wrong.append(WrongParameter(NO_NODE, name, parameter.value, actual))

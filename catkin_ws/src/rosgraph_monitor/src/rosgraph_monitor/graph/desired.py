@@ -10,6 +10,9 @@ from metacontrol_msgs.msg import FunctionGrounding
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import PortKind, RosSystem, compose
 
+from rosgraph_monitor.graph.findings import NO_NODE
+from rosgraph_monitor.graph.names import system_parameter_name
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
 
@@ -38,6 +41,7 @@ class Desired:
         idle: components of the base that belong only to functions for which nothing is deployed, such as a function
             that was released. Their nodes may run or not.
         idle_topics: topics that by their models only variants publish, and none that is deployed.
+        deployed: name and model of each configuration that is deployed.
         problem: why the last good model was kept; empty if all is well.
     """
 
@@ -46,12 +50,23 @@ class Desired:
     excused: frozenset[str] = frozenset()
     idle: tuple[Component, ...] = ()
     idle_topics: frozenset[str] = frozenset()
+    deployed: tuple[tuple[str, RosSystem], ...] = ()
     problem: str = ""
 
     @property
     def idle_nodes(self) -> frozenset[str]:
         """Names of the nodes of the idle components."""
         return frozenset(component.graph_name for component in self.idle)
+
+    def configurations_of(self, node: str, parameters: Collection[str]) -> tuple[str, ...]:
+        """Return the deployed configurations that set parameters of a node, or of the system if `node` is NO_NODE."""
+
+        def sets(system: RosSystem) -> bool:
+            if node != NO_NODE:
+                return any(component.graph_name == node for component in system.components)
+            return any(system_parameter_name(parameter) in parameters for parameter in system.parameters)
+
+        return tuple(name for name, system in self.deployed if sets(system))
 
 
 class DesiredModel:
@@ -88,7 +103,9 @@ class DesiredModel:
             self.current = replace(self.current, excused=self.current.variant_nodes, problem=str(error))
             return self.current
         self._stable |= {g.function: g.configuration for g in groundings if g.state == FunctionGrounding.STABLE}
-        desired = Desired(None, _nodes(active), _nodes(in_change))
+        names = (g.configuration for g in groundings if g.configuration)
+        deployed = tuple(zip(names, active, strict=True))
+        desired = Desired(None, _nodes(active), _nodes(in_change), deployed=deployed)
         self.current = desired if self._base is None else self._with_system(desired, self._base, active)
         return self.current
 

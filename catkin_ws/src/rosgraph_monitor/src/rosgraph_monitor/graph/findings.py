@@ -10,7 +10,7 @@ from metacontrol_msgs.msg import DiagnosticWords as Words
 from rosgraph_monitor.diagnostics.status import Level, Status
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Collection, Iterable
 
 
 class _NotSet:
@@ -92,11 +92,18 @@ PortFinding = MissingPort | AdditionalPort | WrongType | MissingConnection
 Finding = MissingNode | AdditionalNode | WrongParameter | PortFinding
 
 
-def finding_statuses(findings: Iterable[Finding]) -> list[Status]:
+def finding_statuses(
+    findings: Iterable[Finding],
+    configurations_of: Callable[[str, Collection[str]], Iterable[str]] = lambda _node, _parameters: (),
+) -> list[Status]:
     """Return one status for each finding; only the wrong parameters of one node share a status.
 
-    The values of "Wrong param configuration" are (parameter, actual value), and then (`expected/PARAMETER`, value).
-    Other findings have the values `expected` and `actual`.
+    The values of "Wrong param configuration" are (parameter, actual value), then (`expected/PARAMETER`, value), then
+    (`in configuration`, name). Other findings have the values `expected` and `actual`.
+
+    Args:
+        findings: what differs.
+        configurations_of: returns the deployed configurations that set parameters of a node.
     """
     statuses = []
     wrong: dict[str, list[WrongParameter]] = {}
@@ -108,7 +115,9 @@ def finding_statuses(findings: Iterable[Finding]) -> list[Status]:
     for node, parameters in wrong.items():
         actual = tuple((p.parameter, str(p.actual)) for p in parameters)
         expected = tuple((f"expected/{p.parameter}", str(p.expected)) for p in parameters)
-        statuses.append(Status(Level.ERROR, node, Words.WRONG_PARAMETER, actual + expected))
+        names = configurations_of(node, [p.parameter for p in parameters])
+        belongs = tuple((str(Words.IN_CONFIGURATION), name) for name in names)
+        statuses.append(Status(Level.ERROR, node, Words.WRONG_PARAMETER, actual + expected + belongs))
     return statuses
 
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
+    from ros_model.language.metamodel import SystemParameter
+
 IGNORED_NODES = (
     *("rosout", "rosgraph_*", "reasoner", "mission", "mission_*", "rviz*", "rosbag*", "record", "rostopic*"),
     *("rosservice*", "rqt*", "diagnostic_aggregator", "diagnostic_names", "roslaunch*", "rostest*"),
@@ -35,6 +37,11 @@ def relative(name: str, namespace: str = "/") -> str | None:
     """Return the name relative to the namespace, without a leading slash; None where it is outside."""
     prefix = f"/{namespace.strip('/')}/".replace("//", "/")
     return name.removeprefix(prefix) if name.startswith(prefix) else None
+
+
+def system_parameter_name(parameter: SystemParameter) -> str:
+    """Return the name of a parameter of the system, relative to the namespace."""
+    return "/".join(part.strip("/") for part in (parameter.namespace, parameter.name) if part)
 
 
 def is_ignored_node(name: str, patterns: Iterable[str]) -> bool:
