@@ -1,62 +1,21 @@
 #!/usr/bin/env python3
-"""An assembly station: assembling needs grasping, which needs looking; each level breaks and is repaired.
-
-Its package is generated from its models, and all parts of the meta-controller run.
-"""
+"""An assembly station: assembling needs grasping, which needs looking; each level breaks and is repaired."""
 
 import contextlib
 import os
-import shutil
 import signal
-import subprocess
-import tempfile
-import unittest
-from pathlib import Path
 
 import rospy
 import rostest
-from helpers.waiting import DEADLINE_S, wait_for, wait_for_equal
-from metacontrol_msgs.msg import ActiveConfiguration, Decision
+from helpers.waiting import wait_for, wait_for_equal
 from metacontrol_msgs.srv import AddObjective, RemoveObjective
 from reasoner_harness import node_pid
-
-STATION = Path(__file__).resolve().parent / "station"
-DRIVERS = ("/eye_left", "/eye_right", "/screwdriver")
-PARTS = {"f_assemble": "/assembler", "f_grasp": "/grasper", "f_look": "/looker"}
-BEST = {"f_assemble": "screw", "f_grasp": "grasp_fine", "f_look": "look_left"}
+from station_harness import PARTS, StationTest
 
 
-class HierarchyTest(unittest.TestCase):
-    def setUp(self):
-        rospy.init_node("hierarchy_test")
-        self.active, self.decisions = {}, []
-        rospy.Subscriber("mros1_reasoner/decision", Decision, self.decisions.append, queue_size=100)
-        rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self.take)
-        folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-        station = folder / "station"
-        shutil.copytree(STATION, station)
-        subprocess.run(["rosmodel", "generate", "all", station / "models", "-o", station], check=True)
-        environment = {**os.environ, "ROS_PACKAGE_PATH": f"{folder}:{os.environ['ROS_PACKAGE_PATH']}"}
-        launch = ["roslaunch", "--wait", "station", "station.launch"]
-        self.process = subprocess.Popen(launch, env=environment, stdin=subprocess.DEVNULL)
-        self.addCleanup(self.end)
-
-    def end(self):
-        self.process.send_signal(signal.SIGINT)
-        self.process.wait(DEADLINE_S)
-
-    def take(self, message):
-        self.active = {f.function: (f.configuration, f.state) for f in message.functions}
-
-    def wait_for_configurations(self, **configurations):
-        expected = {function: (name, "STABLE") for function, name in {**BEST, **configurations}.items()}
-        wait_for_equal(lambda: self.active, expected, "what runs")
-
+class HierarchyTest(StationTest):
     def executed(self):
         return [decision.to_configuration for decision in self.decisions if decision.state == "EXECUTED"]
-
-    def pids(self, *functions):
-        return {function: node_pid(PARTS[function]) for function in functions}
 
     def kill(self, node, how=signal.SIGKILL):
         pid = node_pid(node)
@@ -92,7 +51,7 @@ class HierarchyTest(unittest.TestCase):
         self.assertTrue(answer.ok, answer.message)
         wait_for_equal(lambda: self.active, {}, "what runs without an objective")
         for node in PARTS.values():
-            self.assertIsNone(self.answers(node), node)
+            self.assertIsNone(self.answers(self.name(node)), node)
         answer = rospy.ServiceProxy("reasoner/add_objective", AddObjective)("o_look", "f_look", [])
         self.assertTrue(answer.ok, answer.message)
         wait_for_equal(lambda: self.active, {"f_look": ("look_right", "STABLE")}, "what the new objective needs")

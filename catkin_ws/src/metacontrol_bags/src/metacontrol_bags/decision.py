@@ -21,7 +21,7 @@ class Cause:
 
     Attributes:
         stamp: since when it holds, s of ROS time.
-        trigger: its kind and name: component:NAME, qa:NAME, task:NAME, initial, operator.
+        trigger: its kind and name: component:NAME, qa:NAME, task:NAME, parameter:NODE, initial, operator.
         text: the cause in words.
         rules: labels of the rules that conclude it, separated by commas; empty where none is needed.
         quality: the quality attribute whose limit is passed; empty for other causes.

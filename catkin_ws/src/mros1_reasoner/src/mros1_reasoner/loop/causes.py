@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from metacontrol_bags.decision import Cause
+from metacontrol_msgs.msg import DiagnosticWords as Words
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Objective
@@ -13,6 +16,8 @@ RECOVERY = "compRecov"
 
 OPERATOR = "operator"
 """Trigger of a cause that an operator gave."""
+
+_PARAMETER = "parameter:"
 
 
 def is_chance(cause: Cause) -> bool:
@@ -30,12 +35,23 @@ def errors(view: View, name: str, now: float) -> list[Cause]:
         found += _component_errors(view, name, now)
     if result and v.IN_ERROR_NFR in result.causes:
         found += [_violation(view, view.objectives[name], quality, now) for quality in result.violated]
+    found += [_drift(node, running) for node in running.drifts]
     if running.task_failure:
         stamp, why = running.task_failure
         found.append(Cause(stamp, f"task:{name}", f"the task failed{f': {why}' if why else ''}", "S9"))
     elif result and v.IN_ERROR_NFR in result.causes and not result.violated and not _inherits(view, running):
         found.append(Cause(now, f"qa:{name}", f"a rule of the model finds an error of quality in {name}"))
     return sorted(found, key=_by_time)
+
+
+def is_drift(cause: Cause) -> bool:
+    """Return whether parameters have drifted."""
+    return cause.trigger.startswith(_PARAMETER)
+
+
+def drifted_nodes(causes: Iterable[Cause]) -> list[str]:
+    """Return the nodes whose parameters have drifted."""
+    return [cause.trigger.removeprefix(_PARAMETER) for cause in causes if is_drift(cause)]
 
 
 def heeds_chances(view: View, name: str) -> bool:
@@ -81,6 +97,14 @@ def _component_errors(view: View, name: str, now: float) -> list[Cause]:
         words = f"configuration {running.design} does not run"
         found.append(Cause(running.failed_stamp or now, f"component:{running.design}", words, "S1a"))
     return found
+
+
+def _drift(node: str, running: Running) -> Cause:
+    drift = running.drifts[node]
+    whose = "the system" if node == Words.GRAPH else f"node {node} of {running.design}"
+    again = f" again after they were put back {len(running.put_back.get(node, ()))} times" if drift.is_left else ""
+    words = f"parameters of {whose} have drifted{again}: {drift.parameters}"
+    return Cause(drift.since, f"{_PARAMETER}{node}", words)
 
 
 def _violation(view: View, objective: Objective, quality: str, now: float) -> Cause:

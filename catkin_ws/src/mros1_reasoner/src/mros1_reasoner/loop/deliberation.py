@@ -10,7 +10,7 @@ from metacontrol_bags.decision import ADVISED, DECIDED, FAILED, Cause, Decision
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Design, Direction, Objective
-from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance
+from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance, is_drift
 from mros1_reasoner.loop.readable_state import Running
 from mros1_reasoner.loop.state import State
 from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan
@@ -61,14 +61,15 @@ class Deliberation:
             return None
         if self._state.waits(name, timing.now):
             return None
+        if all(is_drift(cause) for cause in causes) and not running.to_put_back:
+            return self._leave(name, causes, timing)
         improves_only = all(is_chance(cause) for cause in causes)
         self._note_failure(name, timing.now)
         began = self._wall()
         level, outcome = self._choose(name, timing.now, climbs=not improves_only)
-        if self._state.waits(level, timing.now):
-            return None
         stays = not self._is_change(level, outcome)
-        if improves_only and (stays or not self._improves(running, outcome)):
+        is_enough = not improves_only or (not stays and self._improves(running, outcome))
+        if self._state.waits(level, timing.now) or not is_enough:
             return None
         if not stays:
             return self._adapt(name, level, outcome, causes, timing, began)
@@ -95,8 +96,8 @@ class Deliberation:
 
     def _is_change(self, name: str, outcome: Plan) -> bool:
         running = self._state.running[name]
-        is_lame = running.is_broken or bool(running.failed_nodes)
-        return outcome.choice is not None and (outcome.choice != running.design or is_lame)
+        needs_work = running.is_broken or bool(running.failed_nodes or running.to_put_back)
+        return outcome.choice is not None and (outcome.choice != running.design or needs_work)
 
     def _adapt(
         self, name: str, level: str, outcome: Plan, causes: list[Cause], timing: Timing, began: float
@@ -123,6 +124,8 @@ class Deliberation:
         words += f"{design or 'nothing'} -> {first.choice}"
         if running and running.failed_nodes and design == first.choice:
             words += f", with {', '.join(running.failed_nodes)} started anew"
+        if running and running.to_put_back and design == first.choice:
+            words += ", with its parameters put back"
         if objective != level:
             words += f", which {outcome.choice} of {level} requires: {first.reason}"
         words += f": {outcome.reason}"
@@ -148,6 +151,15 @@ class Deliberation:
         text = "; ".join(cause.text for cause in causes)
         words = f"{name}: {text}: stays with {running.design or 'nothing'}: {outcome.reason}"
         return self._decision(name, causes, outcome, timing, words, plan_wall)
+
+    def _leave(self, name: str, causes: list[Cause], timing: Timing) -> Decision | None:
+        """Return the decision to leave drifted parameters as they are; None if the last decision was the same."""
+        why = "somebody sets them again and again, so they are left as they are: find out who does"
+        outcome = Plan(self._state.running[name].design, False, (), why)
+        if not self._state.is_news(name, _gist(causes, outcome)):
+            return None
+        words = f"{name}: {'; '.join(cause.text for cause in causes)}: {why}"
+        return self._decision(name, causes, outcome, timing, words, 0.0)
 
     def _decision(
         self, objective: str, causes: list[Cause], outcome: Plan, timing: Timing, words: str, plan_wall: float
@@ -255,7 +267,8 @@ class Deliberation:
             factors=self.factors(name, now),
             worth=self._state.settings.worth,
         )
-        if running.failed_nodes and not is_tried and self._needs_only_a_restart(name, situation):
+        is_lame = running.failed_nodes or running.to_put_back
+        if is_lame and not is_tried and self._needs_only_a_restart(name, situation):
             same = plan(
                 objective, [self._state.kb.designs[running.design or ""]], situation, self._utility, self._distance
             )
@@ -267,7 +280,7 @@ class Deliberation:
         return plan(objective, designs, situation, self._utility, self._distance)
 
     def _needs_only_a_restart(self, name: str, situation: Situation) -> bool:
-        """Return whether nothing is wrong with a running design but that nodes of it do not work."""
+        """Return whether nothing is wrong with a running design but nodes that do not work, and drifted parameters."""
         running, result = self._state.running[name], self._state.analysis.objectives.get(name)
         is_in_error = running.is_broken or running.task_failure or (result and v.IN_ERROR_NFR in result.causes)
         return not is_in_error and situation.can_deploy(running.design or "")

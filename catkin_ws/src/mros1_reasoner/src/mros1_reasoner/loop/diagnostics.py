@@ -12,13 +12,23 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from metacontrol_msgs.msg import DiagnosticWords as Words
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.loop.entries import BindingFact, ComponentFact, Fact, LevelFact, StaleFact, TaskFact, subject
+from mros1_reasoner.loop.entries import (
+    BindingFact,
+    ComponentFact,
+    DriftFact,
+    Fact,
+    LevelFact,
+    StaleFact,
+    TaskFact,
+    subject,
+)
 
 TASK_KEYS = ("objetive_error", "objective_error")
 """Keys with which a "QA status" says that a task failed; the published observer of /obj_error writes the first."""
 _FAILED = (GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.LOST)
 _SHOWN = 60  # characters of foreign text in a warning
-_OPEN = ("level", "binding", "task")  # facts with a foreign name
+_OPEN = ("level", "binding", "task", "drift")  # facts with a foreign name
+_EXPECTED = "expected/"  # before the name of a wrong parameter, in the key of the value that it should have
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
 
 
@@ -74,6 +84,7 @@ class DiagnosticsReader:
             Words.QA_STALE: self._stale,
             Words.COMPONENT_STATUS: self._component,
             Words.MISSING_NODE: self._missing,
+            Words.WRONG_PARAMETER: self._drift,
             Words.BINDING_ERROR: self._binding,
         }
 
@@ -143,6 +154,15 @@ class DiagnosticsReader:
             return None
         node = status.name.strip("/")
         return self._known(self._nodes.get(node, node), v.FAILED, stamp)
+
+    @staticmethod
+    def _drift(status: Any, stamp: float) -> Fact | None:
+        names = [value.value for value in status.values if value.key == Words.IN_CONFIGURATION]
+        expected = {value.key for value in status.values}
+        wrong = [value.key for value in status.values if f"{_EXPECTED}{value.key}" in expected]
+        if not names:
+            return None  # it belongs to nothing that can be deployed again
+        return DriftFact(status.name.strip("/"), _plain(",".join(wrong)), ",".join(names), stamp)
 
     def _known(self, name: str, status: str, stamp: float) -> Fact | Remark:
         component = name if name in self._components else name.strip("/")

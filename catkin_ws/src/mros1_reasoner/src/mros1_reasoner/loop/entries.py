@@ -45,6 +45,23 @@ class ComponentFact:
 
 
 @dataclass(frozen=True)
+class DriftFact:
+    """Parameters of a node do not have the values of what is deployed.
+
+    Attributes:
+        node: its name; GRAPH of DiagnosticWords: they are the system's.
+        parameters: their names, separated by commas.
+        configurations: the deployed configurations that set them, separated by commas.
+        stamp: of the diagnostic, s; 0 where it has none.
+    """
+
+    node: str
+    parameters: str
+    configurations: str
+    stamp: float = 0.0
+
+
+@dataclass(frozen=True)
 class BindingFact:
     """A binding of a grounding is in error, or no longer is."""
 
@@ -78,7 +95,7 @@ class ActiveFact:
     state: str
 
 
-Fact = LevelFact | StaleFact | ComponentFact | BindingFact | TaskFact | ActiveFact
+Fact = LevelFact | StaleFact | ComponentFact | DriftFact | BindingFact | TaskFact | ActiveFact
 
 # What an operator asks for
 
@@ -204,16 +221,20 @@ class Entry:
 
 def subject(fact: Fact) -> tuple[str, ...]:
     """Return the subject of a fact: a later fact about the same subject replaces it."""
+    found: tuple[str, ...]
     match fact:
         case LevelFact():
-            return ("level", fact.quality, fact.grounding)
+            found = ("level", fact.quality, fact.grounding)
         case StaleFact():
-            return ("stale", fact.quality)
+            found = ("stale", fact.quality)
         case ComponentFact():
-            return ("component", fact.component)
+            found = ("component", fact.component)
+        case DriftFact():
+            found = ("drift", fact.node)
         case BindingFact():
-            return ("binding", fact.grounding)
+            found = ("binding", fact.grounding)
         case TaskFact():
-            return ("task", fact.name)
+            found = ("task", fact.name)
         case ActiveFact():
-            return ("active", fact.function)
+            found = ("active", fact.function)
+    return found

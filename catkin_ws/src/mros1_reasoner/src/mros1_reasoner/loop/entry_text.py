@@ -5,6 +5,7 @@
 | level | quality, level, grounding, stamp of the diagnostic |
 | stale | quality |
 | component | component, status, stamp of the diagnostic |
+| drift | node, parameters, configurations that set them, stamp of the diagnostic |
 | binding | grounding, in error |
 | task | objective or its function, failed, stamp, message; any other name means the only root objective |
 | active | function, configuration (empty: nothing runs), state |
@@ -35,6 +36,7 @@ _KINDS: Mapping[str, type[entries.Content]] = {
     "level": entries.LevelFact,
     "stale": entries.StaleFact,
     "component": entries.ComponentFact,
+    "drift": entries.DriftFact,
     "binding": entries.BindingFact,
     "task": entries.TaskFact,
     "active": entries.ActiveFact,

@@ -42,6 +42,8 @@ def apply(core: Mape, entry: Entry) -> list[Decision]:
             core.observe_stale(content.quality)
         case entries.ComponentFact():
             core.observe_component(now, content.component, content.status, content.stamp)
+        case entries.DriftFact():
+            core.observe_drift(now, content.node, content.parameters, content.configurations.split(","), content.stamp)
         case entries.BindingFact():
             core.observe_binding(now, content.grounding, content.in_error)
         case entries.TaskFact():

@@ -163,6 +163,14 @@ class Mape:
         if known is None or status != before:
             self._state.note_component(component, status, stamp or now)
 
+    def observe_drift(
+        self, now: float, node: str, parameters: str, configurations: Collection[str], stamp: float = 0.0
+    ) -> None:
+        """Take in that parameters of a node, named in one text, do not have the values of deployed configurations."""
+        for objective, running in self._state.running.items():
+            if running.design in configurations:
+                self._state.note_drift(now, objective, node, parameters, stamp)
+
     def observe_binding(self, now: float, grounding: str, in_error: bool) -> None:
         """Note whether a binding of a grounding is in error.
 

@@ -34,6 +34,23 @@ class Component:
 
 
 @dataclass(frozen=True)
+class Drift:
+    """Parameters of a node that do not have the values of the deployed design.
+
+    Attributes:
+        parameters: their names.
+        since: stamp of the diagnostic that reported it first.
+        seen: when it was reported last.
+        is_left: whether they are left as they are, because they drift again and again.
+    """
+
+    parameters: str
+    since: float
+    seen: float
+    is_left: bool = False
+
+
+@dataclass(frozen=True)
 class Running:
     """What runs for an objective.
 
@@ -46,6 +63,9 @@ class Running:
         failed_nodes: nodes of the design that do not work.
         deployed_at: when the design was deployed last.
         restarts: when the design was deployed again because nodes of it did not work.
+        drifts: drifted parameters, by node.
+        drifts_from: reports of drifted parameters are old ones before this moment.
+        put_back: when the parameters of a node were put back, by node.
         task_failure: when the task of the objective has failed, and why.
         calm_until: no limit counts before.
         not_before: no request is made before.
@@ -63,6 +83,9 @@ class Running:
     failed_nodes: tuple[str, ...] = ()
     deployed_at: float = -math.inf
     restarts: tuple[float, ...] = ()
+    drifts: Mapping[str, Drift] = field(default_factory=dict)
+    drifts_from: float = -math.inf
+    put_back: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     task_failure: tuple[float, str] | None = None
     calm_until: float = -math.inf
     not_before: float = -math.inf
@@ -75,6 +98,11 @@ class Running:
     def is_broken(self) -> bool:
         """Whether the design is known not to run, or not as a whole."""
         return self.state == FunctionGrounding.FAILED or self.binding_error
+
+    @property
+    def to_put_back(self) -> tuple[str, ...]:
+        """Nodes whose parameters have drifted and are to be put back."""
+        return tuple(sorted(node for node, drift in self.drifts.items() if not drift.is_left))
 
 
 class View:
@@ -244,6 +272,7 @@ class View:
             frozenset(facts.levels),
             passed,
             tuple(running.failed_nodes for running in self.running.values()),
+            tuple((n, d.parameters, d.is_left) for r in self.running.values() for n, d in r.drifts.items()),
             waits,
             improves,
             self.has_waited(now),
@@ -274,6 +303,7 @@ class View:
                 times.append(running.calm_until)
             if running.busy_since is not None:
                 times.append(running.busy_since + self.settings.busy_limit)
+            times += [drift.seen + self.settings.level_timeout for drift in running.drifts.values()]
             if self.failed_nodes_of(running.design):
                 times.append(running.deployed_at + self.settings.restart_grace)
         times += [expiry for expiry, _ in self.error_log.values()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +13,8 @@ from metacontrol_msgs.msg import FunctionGrounding
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
-from mros1_reasoner.loop.causes import OPERATOR
+from mros1_reasoner.loop import drifts
+from mros1_reasoner.loop.causes import OPERATOR, drifted_nodes, is_drift
 from mros1_reasoner.loop.levels import Levels
 from mros1_reasoner.loop.readable_state import BUSY, Component, Running, View
 from mros1_reasoner.loop.settings import Settings
@@ -67,6 +68,11 @@ class State(View):
         """Note another status of a component."""
         self.components[name] = Component(status, stamp)
 
+    def note_drift(self, now: float, name: str, node: str, parameters: str, stamp: float) -> None:
+        """Note that parameters of what runs for an objective have drifted; while it changes, that tells nothing."""
+        if not self.is_busy(self.running[name], now):
+            self.running[name] = drifts.noted(self.running[name], node, parameters, stamp, now)
+
     def note_binding(self, now: float, name: str, in_error: bool) -> None:
         """Note whether a binding of what runs for an objective is in error."""
         running = self.running[name]
@@ -85,6 +91,7 @@ class State(View):
                 self.levels.forget(name, now=now)
                 self.wanted.setdefault(name, running.design)  # what it requires is still needed
                 self._run(name, design=None, state="", busy_since=None, binding_error=False, task_failure=None)
+                self._run(name, drifts={})
                 # It may be about to come back: a manipulator starts anew.
                 self._run(name, not_before=max(running.not_before, now + self.settings.backoff))
 
@@ -103,7 +110,9 @@ class State(View):
     def _take_active(self, name: str, configuration: str, state: str, now: float) -> None:
         running = self.running[name]
         if state in BUSY:
-            self._run(name, busy_since=running.busy_since if running.state in BUSY else now)
+            self._run(name, busy_since=running.busy_since if running.state in BUSY else now, drifts={})
+        elif running.state in BUSY:
+            self._run(name, drifts_from=now + self.settings.restart_grace)
         if state != running.state and state == FunctionGrounding.FAILED:
             self._run(name, failed_stamp=max(now, 0.0))  # 0: before anything was asked for
         self._run(name, state=state)
@@ -116,9 +125,9 @@ class State(View):
         if running.design is not None and running.design != design:
             self._run(name, calm_until=max(running.calm_until, now + self.settings.cool_down))
         if running.design != design:
-            self._run(name, restarts=())
+            self._run(name, restarts=(), put_back={})
         self._run(name, design=design, degraded=False, binding_error=False, task_failure=None, refusal=())
-        self._run(name, deployed_at=now, failed_nodes=())
+        self._run(name, deployed_at=now, failed_nodes=(), drifts={}, drifts_from=now + self.settings.restart_grace)
         if self.wanted.get(name) == design:
             del self.wanted[name]
         self.levels.forget(name, now=now)
@@ -198,8 +207,10 @@ class State(View):
             self.started = now
 
     def forget_expired(self, now: float) -> None:
-        """Drop what has expired from the error log."""
+        """Drop what has expired from the error log, and drifted parameters that are reported no more."""
         self.error_log = {key: entry for key, entry in self.error_log.items() if entry[0] > now}
+        for name, running in self.running.items():
+            self.running[name] = drifts.judged(running, self.settings, now)
 
     def note_analysis(self, facts: Facts, analysis: Analysis, seen: tuple[object, ...]) -> None:
         """Keep an analysis. A RECOVERED component is a chance for every objective once; then it counts as working."""
@@ -291,15 +302,25 @@ class State(View):
         if before.failed_nodes and before.design == design:
             self._run(name, restarts=(*before.restarts, now), degraded=decision.degraded or before.degraded)
             self._run(name, not_before=now + self._wait_after(len(before.restarts)))
+        if before.design == design:
+            self._note_put_back(now, name, drifted_nodes(decision.reasons))
         for node in self.failed_nodes_of(design):
             self.components[node] = Component(v.WORKS, now)
+
+    def _note_put_back(self, now: float, name: str, nodes: Collection[str]) -> None:
+        """Note that drifted parameters of nodes have been put back; other functions may have the same nodes."""
+        for other, running in self.running.items():
+            if nodes and (other == name or not running.drifts.keys().isdisjoint(nodes)):
+                self.running[other] = drifts.put_back(running, nodes, self.settings, now)
 
     def fail(self, now: float, why: str | None) -> None:
         """Note that the pending decision was not carried out, and why; None: the configuration is not to blame."""
         decision = self._end()
-        if why is not None:
-            self.note_in_vain(now, decision.to_configuration, decision.objective, why)
         running = self.running[decision.objective]
+        if all(is_drift(cause) for cause in decision.reasons):  # the design runs on as it did
+            self._note_put_back(now, decision.objective, drifted_nodes(decision.reasons))
+        elif why is not None:
+            self.note_in_vain(now, decision.to_configuration, decision.objective, why)
         wait = self._wait_after(running.attempts)
         self._run(decision.objective, not_before=now + wait, attempts=running.attempts + 1)
 
