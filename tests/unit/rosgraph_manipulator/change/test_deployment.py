@@ -71,6 +71,16 @@ def test_cheapest_plan_that_works_is_the_only_one_carried_out():
     ]
 
 
+def test_configuration_that_runs_is_not_restored_when_its_parameters_cannot_be_put_back():
+    executor = Recorder(change_processes=DeploymentError("the master does not answer"))
+    outcome = run(executor, [SETTING], last_good=NEW)
+    assert (outcome.result, outcome.running) == (Result.FAILED, NEW)
+    assert outcome.message == "new: parameters: the master does not answer; it runs on as it did"
+    assert "restore new" not in executor.calls
+    assert run(executor, [SETTING, RESTART], last_good=NEW).tactic == "rollback"
+    assert run(executor, [SETTING]).tactic == "rollback"
+
+
 def test_started_nodes_must_settle():
     executor = Recorder()
     assert run(executor, [RESTART]).result is Result.OK

@@ -109,6 +109,8 @@ def deploy(
 ) -> Outcome:
     """Carry out plans until one succeeds; where none does, restore the last good configuration.
 
+    If the wanted configuration is the last good one and no node was touched, it runs on as it did.
+
     Args:
         executor: carries out steps on the running system.
         wanted: the configuration to deploy.
@@ -136,6 +138,8 @@ def deploy(
             words = f"{wanted.name} is deployed by {plan.tactic}{failed}{remark and f'; {remark}'}"
             return Outcome(Result.OK, wanted, words, plan.tactic)
     reason = f"{wanted.name}: {'; '.join(reasons) or 'no tactic has a plan'}"
+    if last_good == wanted and not any(plan.touched for plan in plans):
+        return Outcome(Result.FAILED, last_good, f"{reason}; it runs on as it did")
     return _go_back(executor, wanted.function, last_good, reason, watch)
 
 

@@ -219,7 +219,8 @@ def plan_change(
 ) -> tuple[list[Plan], list[str]]:
     """Return the plans that change one configuration into another, cheapest first.
 
-    A plan with the same steps as a cheaper one is left out. A tactic that raises does not keep the others from
+    A plan with the same steps as a cheaper one is left out. Where parameters have drifted that no node takes while it
+    runs, and nothing else differs, no node is touched. A tactic that raises does not keep the others from
     planning. Each plan ends with a step that stops the nodes that the wanted configuration lacks, where no earlier step
     of it does. A step that starts a nodelet's manager also restarts the nodes whose nodelets it has.
 
@@ -244,7 +245,10 @@ def plan_change(
         else:
             proposed += [_completed(_with_nodelets(plan, difference), difference)] if plan else []
     kept: list[Plan] = []
+    is_light = bool(difference.drifted) and not difference.touches_nodes
     for plan in sorted(proposed, key=lambda plan: plan.cost):
+        if is_light and plan.touched:
+            continue
         if plan.steps not in [other.steps for other in kept]:
             kept.append(plan)
     return kept, problems
