@@ -185,7 +185,7 @@ class ManagersTest(unittest.TestCase):
         Path(folder.name, "own_manager.py").write_text(MANAGER)
         more = {name: f"{folder.name}:{os.environ[name]}" for name in ("ROS_PACKAGE_PATH", "PYTHONPATH")}
         cases = (
-            ("magic", {}, "no manager 'magic'; there are mros, none, random"),
+            ("magic", {}, "no manager 'magic'; there are as_published, mros, none, random"),
             ("random", {}, "manager random needs a model with an objective: set the reasoner's ~model_file"),
             ("random", {"model_file": "/no/where.owl"}, "/no/where.owl"),
             ("respawn", {"seed": -1}, "~seed is -1"),

@@ -54,7 +54,7 @@ def test_world_and_routes_of_the_users_own(monkeypatch, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("--manager", "magic"), "no manager 'magic'; there are mros, none, random, respawn, rules"),
+        (("--manager", "magic"), "no manager 'magic'; there are as_published, mros, none, random, respawn, rules"),
         (("--manager", "rules", "--no-metacontrol"), "--no-metacontrol is --manager none"),
     ],
 )
@@ -73,6 +73,7 @@ def test_baseline_is_the_manager_none(monkeypatch):
     ("manager", "file", "node"),
     [
         ("mros", "metacontrol_sim metacontrol_sim_reasoner.launch", "reasoner"),
+        ("as_published", "metacontrol_sim metacontrol_sim_reasoner.launch", "reasoner"),
         ("none", "metacontrol_sim MVP_metacontrol_world.launch", ""),
         ("rules", "metacontrol_experiments managed.launch", "mission_manager"),
     ],
@@ -82,3 +83,4 @@ def test_manager_is_what_the_launch_file_starts(monkeypatch, manager, file, node
     command = settings.launch_command(4000)
     assert f" {file} " in " ".join(command) and settings.decider == node
     assert ("manager:=rules" in command) == (manager == "rules")
+    assert ("as_published:=true" in command) == (manager == "as_published")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,7 +17,7 @@ from metacontrol_experiments.contingency.parsing import parse_contingency
 from metacontrol_experiments.io.lockstep_setup import describe_system, restarts_between, set_up
 from metacontrol_experiments.lockstep.frames import KEPT_S, Frames
 from metacontrol_experiments.lockstep.reconfiguration import navigation_parameters
-from metacontrol_experiments.lockstep.system import LockstepError
+from metacontrol_experiments.lockstep.system import LockstepError, private_parameters
 from metacontrol_experiments.mission.mission import Outcome
 from metacontrol_experiments.mission.routes import Route
 from metacontrol_experiments.mission.settings import Settings
@@ -213,3 +214,27 @@ def test_random_choice_repeats_byte_for_byte_for_a_seed(tmp_path):
     logs = [set_up(settings(tmp_path, "power:2.5@time:1", **changes)).run() for _ in range(2)]
     assert summarise(logs[0].record)["reconfigurations"][0]["trigger"] == "qa:energy"
     assert logs[0].log == logs[1].log
+
+
+def test_published_behaviour_changes_at_a_single_level_and_stands_still_for_the_time_of_the_paper(tmp_path):
+    changes = {"route": FAR, "initial_configuration": "f3_v3_r1", "timeout_s": 12.0, "manager": "as_published"}
+    asked = settings(tmp_path, "power:2.5@time:1", **changes)
+    outcome = set_up(asked).run()
+    change = summarise(outcome.record)["reconfigurations"][0]
+    assert change["trigger"] == "qa:energy" and change["stamp_s"] < 3.0
+    assert change["execute_s"] == pytest.approx(4.3, abs=0.02)
+    began = outcome.record.start_stamp + change["stamp_s"]
+    during = outcome.record.poses[
+        (outcome.record.poses[:, 0] > began + 2.0) & (outcome.record.poses[:, 0] < began + 4), 1:
+    ]
+    assert np.ptp(during, axis=0).max() < 0.01
+    assert outcome.log == set_up(asked).run().log
+
+
+def test_launch_file_gives_the_reasoner_the_profile_of_the_published_one():
+    launched = describe_system(
+        Settings.launch_package, "metacontrol_sim_reasoner.launch", ["as_published:=true"]
+    ).launched
+    values = private_parameters(launched, "mros1_reasoner", "reasoner")
+    profile = yaml.safe_load((PACKAGE.parent / "mros1_reasoner/config/as_published.yaml").read_text())
+    assert profile and {name: values[name] for name in profile} == profile

@@ -157,11 +157,13 @@ def test_driver_that_ended_is_started_again_after_a_while():
     assert list(manager.step(9.0, heartbeat=False)) == []
 
 
-@pytest.mark.parametrize("name", ["none", "mros", "random", "rules", "respawn"])
+@pytest.mark.parametrize("name", ["none", "mros", "as_published", "random", "rules", "respawn"])
 def test_managers_are_plug_ins(name):
     assert callable(find_manager(name).load())
 
 
 def test_unknown_manager_is_refused_with_those_that_there_are():
-    with pytest.raises(ManagerError, match="no manager 'magic'; there are mros, none, random, respawn, rules"):
+    with pytest.raises(
+        ManagerError, match="no manager 'magic'; there are as_published, mros, none, random, respawn, rules"
+    ):
         find_manager("magic")

@@ -82,7 +82,7 @@ class _Number(click.FloatRange):
     "--manager",
     default=MROS,
     show_default=True,
-    help="What adapts: mros, none, random, rules, respawn, or one that a package exports.",
+    help="What adapts: mros, as_published, none, random, rules, respawn, or one that a package exports.",
 )
 @click.option("--no-metacontrol", is_flag=True, help="The baseline, everything but the reasoner: --manager none.")
 @click.option(

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import genpy
     from mros1_reasoner.loop.diagnostics import DiagnosticsReader
     from pybullet_simulator.physics.simulation import Simulation
-    from rosgraph_manipulator.change.tactics import Plan, Tactic
+    from rosgraph_manipulator.change.tactics import Tactic
 
     from metacontrol_experiments.lockstep.delays import Delays
     from metacontrol_experiments.lockstep.observation import Observers
@@ -70,17 +70,17 @@ class Change:
 
 @dataclass
 class _Pending:
-    """A decision under way: its plan, and when it is decided and done, s."""
+    """A decision under way: whether it starts nodes anew, and when it is decided and done, s."""
 
     decision: Decision
-    plan: Plan
+    restarts: bool
     decided: float
     done: float
     begun: bool = False
 
     def change(self, state: str) -> Change:
         """Return what it does to the system."""
-        return Change(self.decision.to_configuration, state, restarts(self.plan))
+        return Change(self.decision.to_configuration, state, self.restarts)
 
 
 class Metacontroller:
@@ -196,13 +196,24 @@ class Metacontroller:
             if isinstance(decision, Restart):
                 continue
             if decision.state == DECIDED:
-                decided = now + self._delays.draw("decide", self._rng)
-                plan = plan_change(self._system, self.configuration, decision.to_configuration, self._cores.tactics)
-                done = decided + self._delays.draw("restart" if restarts(plan) else "parameters", self._rng)
-                self._pending = _Pending(decision, plan, decided, done)
+                self._pending = self._prepare(decision, now)
             else:
                 self.decisions.append(replace(decision, stamp=now))
         return [decision for decision in decisions if isinstance(decision, Restart)]
+
+    def _prepare(self, decision: Decision, now: float) -> _Pending:
+        """Return how and when a decision will be carried out.
+
+        Raises:
+            LockstepError: it cannot be deployed.
+        """
+        decided = now + self._delays.draw("decide", self._rng)
+        plan = plan_change(self._system, self.configuration, decision.to_configuration, self._cores.tactics)
+        fixed = self._cores.manager.reconfiguration_s
+        if fixed is not None:
+            return _Pending(decision, True, decided, decided + fixed)
+        done = decided + self._delays.draw("restart" if restarts(plan) else "parameters", self._rng)
+        return _Pending(decision, restarts(plan), decided, done)
 
     def _carry_out(self, now: float) -> list[Change | Restart]:
         """Begin decisions that are due, and report those that are done."""

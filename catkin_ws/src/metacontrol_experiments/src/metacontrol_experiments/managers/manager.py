@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from mros1_reasoner.loop.entries import Fact
 
 PACKAGE = "metacontrol_experiments"
-NONE, MROS = "none", "mros"
-"""The baseline, and the meta-controller."""
+NONE, MROS, AS_PUBLISHED = "none", "mros", "as_published"
+"""The baseline, the meta-controller, and the meta-controller that behaves as the published one does."""
 
 
 class ManagerError(ValueError):
@@ -63,9 +63,12 @@ class Manager:
 
     Attributes:
         observes: whether the monitor and its observers run for it; only then it gets facts and a knowledge base.
+        reconfiguration_s: how long each of its reconfigurations takes in lockstep, with a restart of navigation; None:
+            as long as those of this project's manipulator, which restarts only what it has to.
     """
 
     observes: ClassVar[bool] = False
+    reconfiguration_s: ClassVar[float | None] = None
 
     def take(self, now: float, fact: Fact) -> None:
         """Take in what the monitor, an observer or the manipulator says."""

@@ -1,4 +1,4 @@
-"""The manager `mros`: the reasoner's loop."""
+"""The managers `mros` and `as_published`: the reasoner's loop."""
 
 from __future__ import annotations
 
@@ -56,3 +56,10 @@ class MrosManager(Manager):
     def close(self) -> None:
         """End the reasoner's process."""
         self._reasoner.close()
+
+
+class AsPublishedManager(MrosManager):
+    """Lets the reasoner's loop decide, whose settings are those of the published reasoner."""
+
+    reconfiguration_s = 4.3
+    """Mean of the published manipulator, which restarts move_base at each (paper, RQ2)."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S
 
 from metacontrol_experiments.contingency.contingency import Contingency, Kind, with_seed
-from metacontrol_experiments.managers.manager import MROS, NONE
+from metacontrol_experiments.managers.manager import AS_PUBLISHED, MROS, NONE
 from metacontrol_experiments.mission.mission import Plan
 
 if TYPE_CHECKING:
@@ -101,12 +101,14 @@ class Settings:
             arguments["world"] = str(self.world.resolve())
         if self.metacontrol:
             arguments |= {f"nfr_{name}": repr(level) for name, level in self.thresholds.items()}
+        if self.manager == AS_PUBLISHED:
+            arguments["as_published"] = "true"
         return [f"{name}:={value}" for name, value in arguments.items()]
 
     @property
     def decider(self) -> str:
         """Name of the node that decides on ROS; empty for the baseline."""
-        return {NONE: "", MROS: "reasoner"}.get(self.manager, MANAGER_NODE)
+        return {NONE: "", MROS: "reasoner", AS_PUBLISHED: "reasoner"}.get(self.manager, MANAGER_NODE)
 
     def launch_command(self, port: int) -> list[str]:
         """Return the roslaunch command of the whole system, with a master on this port."""

@@ -13,7 +13,7 @@ from mros1_reasoner.knowledge.model import Design, Direction, Objective
 from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance, is_drift
 from mros1_reasoner.loop.readable_state import Running
 from mros1_reasoner.loop.state import State
-from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan
+from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan, without_makeshift
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,10 @@ class Deliberation:
         is_possible = situation.can_deploy(desired) and desired not in strained and desired not in situation.tried
         if running.design is None and is_possible:
             designs = tuple(design for design in designs if design.name == desired) or designs
-        return plan(objective, designs, situation, self._utility, self._distance)
+        if self._state.settings.only_last_limit:
+            objective = replace(objective, limits=dict(sorted(objective.limits.items())[-1:]))
+        found = plan(objective, designs, situation, self._utility, self._distance)
+        return found if self._state.settings.makeshift else without_makeshift(found)
 
     def _needs_only_a_restart(self, name: str, situation: Situation) -> bool:
         """Return whether nothing is wrong with a running design but nodes that do not work, and drifted parameters."""

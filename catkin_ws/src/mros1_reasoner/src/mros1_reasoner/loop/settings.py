@@ -28,6 +28,9 @@ class Settings:
             or the operator has changed a limit; the setting of an objective takes precedence.
         improvement: by how much the utility of such a design must be greater.
         worth: by how much less another design must violate limits, as a share of a limit, when none keeps every limit.
+        only_last_limit: plan by the last limit of an objective alone, in the order of the qualities' names, as the
+            published reasoner does.
+        makeshift: take a design that does not keep every limit, or that failed recently, where there is no other.
         correct_expected: multiply expected levels by the ratio of observed to expected ones of the deployed design.
         correction_limit: the greatest ratio; the least is its reciprocal.
         correction_memory: time constant of the average ratio.
@@ -50,6 +53,8 @@ class Settings:
     always_improve: bool = False
     improvement: float = 0.05
     worth: float = 0.1
+    only_last_limit: bool = False
+    makeshift: bool = True
     correct_expected: bool = True
     correction_limit: float = 2.5
     correction_memory: float = 30.0

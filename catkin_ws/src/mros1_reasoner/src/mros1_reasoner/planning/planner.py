@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from metacontrol_bags.decision import Candidate
 
@@ -129,6 +129,16 @@ def plan(
     degraded = not best.keeps_limits
     lost = (c.lost(_loss(c, best, degraded)) for c in others)
     return Plan(best.design.name, degraded, (best.chosen(), *lost), reason, is_retry=not fit and not degraded)
+
+
+def without_makeshift(found: Plan) -> Plan:
+    """Return a plan that does nothing rather than take a design that is only better than nothing."""
+    if not found.is_makeshift:
+        return found
+    first, *others = found.candidates
+    why = first.refused_because or "only a makeshift"
+    rejected = (replace(first, chosen=False, lost_because=why), *others)
+    return Plan(None, False, rejected, f"nothing is done: {first.name} would be a makeshift ({why})")
 
 
 def feasible_designs(
