@@ -8,17 +8,26 @@ import pytest
 from click.testing import CliRunner
 from metacontrol_bags.series import quantile
 from metacontrol_experiments.campaign import calibration, variant_table
-from metacontrol_experiments.campaign.calibration import CalibrationError, Job, Run
+from metacontrol_experiments.campaign.calibration import OBSERVED, CalibrationError, Job, Run
+from metacontrol_experiments.campaign.definition import Definition
 from metacontrol_experiments.cli.main import metacontrol
 from metacontrol_experiments.io import calibration_runs, tables
 from metacontrol_experiments.io.ground_files import read_ground
 
+DEFINITION = Definition()
 SHORT = "short: {start: [-8, -8, 0.78], goal: [-6, -6.5, 0]}\n"
 
 
 def a_run(variant="f1_v1_r1", route="r1", seed=1, **changes):
     usual = {"outcome": "reached", "collisions": 0, "duration_s": 40.0, "path_m": 19.0, "safety": 0.3, "energy": 0.4}
-    rest = {"safety_mean": 0.1, "safety_above": 0.0, "energy_above": 0.0, "ground": "", "commit": "abc"}
+    rest = {
+        "safety_mean": 0.1,
+        "safety_above": 0.0,
+        "energy_above": 0.0,
+        "ground": "",
+        "definition": DEFINITION.describe(OBSERVED),
+        "commit": "abc",
+    }
     return Run(variant, route, seed, **(usual | rest | changes))
 
 
@@ -118,7 +127,7 @@ def test_one_seed_has_no_interval():
 def test_command_drives_once_and_writes_levels_only_when_all_variants_are_measured(tmp_path, monkeypatch):
     driven = []
 
-    def drive(jobs, ground, commit, processes):
+    def drive(jobs, ground, definition, commit, processes):
         for job in jobs:
             driven.append(job)
             yield a_run(job.variant, job.route, job.seed)
@@ -140,6 +149,14 @@ def test_command_drives_once_and_writes_levels_only_when_all_variants_are_measur
     }
 
 
+def test_levels_by_different_definitions_do_not_mix(tmp_path):
+    list(tables.append_runs(tmp_path / "runs.csv", [a_run()]))
+    options = ["calibrate", "--route", "r1", "--runs", str(tmp_path / "runs.csv"), "--quantile", "energy=0.95"]
+    refused = CliRunner().invoke(metacontrol, options)
+    assert refused.exit_code == 2
+    assert "holds levels by energy:mean safety:0.95, not by energy:0.95 safety:0.95: name another" in refused.output
+
+
 def test_command_refuses_what_is_not_there(tmp_path):
     for option, name in (("--variant", "f9"), ("--route", "r9")):
         result = CliRunner().invoke(metacontrol, ["calibrate", option, name, "--runs", str(tmp_path / "runs.csv")])
@@ -153,6 +170,6 @@ def test_processes_side_by_side_drive_the_same_missions(tmp_path):
     routes.write_text(SHORT)
     ground = read_ground(None, routes)
     jobs = [Job(variant, "short", 1) for variant in ("f1_v3_r1", "f2_v2_r2")]
-    alone = list(calibration_runs.drive(jobs, ground, "abc", 1))
+    alone = list(calibration_runs.drive(jobs, ground, DEFINITION, "abc", 1))
     assert [run.reached for run in alone] == [True, True]
-    assert alone == list(calibration_runs.drive(jobs, ground, "abc", 2))
+    assert alone == list(calibration_runs.drive(jobs, ground, DEFINITION, "abc", 2))

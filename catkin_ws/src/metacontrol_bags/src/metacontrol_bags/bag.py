@@ -17,7 +17,7 @@ import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import TypesysError
 
-from metacontrol_bags import messages
+from metacontrol_bags import messages, ownership
 from metacontrol_bags.bag_file import BagError, BagFile
 from metacontrol_bags.record import (
     ComponentReport,
@@ -107,22 +107,23 @@ def read_record(path: Path) -> MissionRecord:
     return found.record
 
 
-def salvage(path: Path, topics: Collection[str] = ()) -> Salvaged:
+def salvage(path: Path, topics: Collection[str] = (), namespace: str = "/") -> Salvaged:
     """Return what can be read of a mission from its bag, however damaged it is.
 
     Args:
         path: of the bag.
-        topics: the only ones to read; all that the record needs where empty.
+        topics: the only ones to read, as they are called in the root namespace; all that the record needs where empty.
+        namespace: of the robot; /diagnostics is there for all robots.
 
     Raises:
         BagError: the file is missing, unreadable, empty or no bag.
     """
-    builder = _Builder()
+    builder = _Builder(namespace)
     wanted = set(topics or builder.handlers)
     decoders: dict[tuple[str, str], Callable[[bytes], Any] | str] = {}
     lost: Counter[str] = Counter()
     with BagFile(path) as bag:
-        for connection, stamp, data in bag.messages(lambda connection: connection.topic in wanted):
+        for connection, stamp, data in bag.messages(lambda connection: builder.topic_of(connection) in wanted):
             kind = connection.type, connection.definition
             if kind not in decoders:
                 decoders[kind] = _decoder(*kind)
@@ -159,11 +160,12 @@ def publisher_of(connection: RosbagsConnection) -> str:
 class _Builder:
     """Collects what the messages say; one handler for each topic, with the time of recording in s and the message."""
 
-    def __init__(self) -> None:
+    def __init__(self, namespace: str = "/") -> None:
+        self._home = namespace.rstrip("/")
         self._found: dict[str, list[tuple[int, Any]]] = {}
         self.handlers: dict[str, Callable[[float, Any, str], Iterable[Any]]] = {
             "/mission/event": lambda t, m, _: [messages.event(m, t)],
-            "/diagnostics": lambda t, m, publisher: messages.diagnostics(m, t, publisher=publisher),
+            "/diagnostics": lambda t, m, publisher: messages.diagnostics(m, t, namespace, publisher),
             "/mros1_reasoner/decision": lambda t, m, _: [messages.decision(m, t)],
             "/move_base/goal": lambda t, m, _: [messages.goal(m, t)],
             "/move_base/result": lambda t, m, _: [messages.result(m, t)],
@@ -177,9 +179,16 @@ class _Builder:
             "/map": _map,
         }
 
+    def topic_of(self, connection: Connection) -> str:
+        """Return what the topic of a connection is called in the root namespace; empty where it is another robot's."""
+        topic = connection.topic
+        if topic == ownership.TOPIC or not self._home:
+            return topic
+        return topic.removeprefix(self._home) if topic.startswith(f"{self._home}/") else ""
+
     def take(self, connection: Connection, nanoseconds: int, message: Any) -> None:
         """Keep what a message says."""
-        topic = connection.topic
+        topic = self.topic_of(connection)
         said = self.handlers[topic](nanoseconds * 1e-9, message, connection.publisher)
         self._found.setdefault(topic, []).extend((nanoseconds, item) for item in said)
 

@@ -39,14 +39,28 @@ def share_above(samples: Samples, limit: float, start: float, end: float) -> flo
 
 def mean(samples: Samples, start: float, end: float) -> float | None:
     """Return the mean level weighted by time; None without any sample."""
-    levels, durations = held(samples, start, end)
+    return mean_of(*held(samples, start, end))
+
+
+def mean_of(levels: np.ndarray, durations: np.ndarray) -> float | None:
+    """Return the mean of levels weighted by how long each held; None without any time."""
     total = float(durations.sum())
     return float((levels * durations).sum()) / total if total > 0 else None
 
 
 def quantile(samples: Samples, share: float, start: float, end: float) -> float | None:
     """Return the level that the series did not exceed for a share of the time; None without any sample."""
-    levels, durations = held(samples, start, end)
+    return quantile_of(*held(samples, start, end), share)
+
+
+def quantile_of(levels: np.ndarray, durations: np.ndarray, share: float) -> float | None:
+    """Return the level that is not exceeded for a share of the time; None without any time.
+
+    Args:
+        levels: in any order.
+        durations: for how long each level held, s.
+        share: of the time, 0..1.
+    """
     total = float(durations.sum())
     if total <= 0:
         return None

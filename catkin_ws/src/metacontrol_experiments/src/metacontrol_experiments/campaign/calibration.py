@@ -2,30 +2,32 @@
 
 Every variant drives routes with several seeds, in lockstep and without contingency.
 
-Measured levels of a variant, over all its missions:
-- safety: the mean of the risk that a mission stays below for 95 % of its time (paper: below the threshold for more than
-  95 % of the time). A mean over time would say little: the risk is 0 wherever nothing is near.
-- energy: the mean over time.
-- performance: the mean of the shortest time that any variant took on the route by the time taken, 0 for a goal missed.
+The measured level of safety and energy of a variant is the mean over all its missions of what `definition` makes of
+one. That of performance is the mean of the shortest time that any variant took on the route by the time taken, 0 for a
+goal missed.
 """
 
 from __future__ import annotations
 
 import itertools
-import statistics
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
-from metacontrol_bags.metrics import MAX_SHARE, summarise
-from metacontrol_bags.series import quantile, share_above
+from metacontrol_bags.metrics import summarise
+from metacontrol_bags.series import held, share_above
+
+from metacontrol_experiments.campaign.definition import over_runs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from metacontrol_bags.record import MissionRecord
 
-SAFETY_SHARE = 1.0 - MAX_SHARE["safety"]
-QUALITIES = ("safety", "energy", "performance")
+    from metacontrol_experiments.campaign.definition import Definition, Level
+
+OBSERVED = ("safety", "energy")
+QUALITIES = (*OBSERVED, "performance")
+"""Qualities that have levels during a mission, and all."""
 
 
 class CalibrationError(RuntimeError):
@@ -56,12 +58,13 @@ class Run:
         collisions: contact episodes.
         duration_s: simulated s.
         path_m: length of the way driven, m.
-        safety: risk that it stayed below for 95 % of the time.
+        safety: its level, as `definition` has it.
         safety_mean: mean risk.
         safety_above: share of time above the threshold of safety.
-        energy: mean.
+        energy: its level, likewise.
         energy_above: share of time above the threshold of energy.
         ground: what tells the ground from others; empty for the factory.
+        definition: of the levels, in words.
         commit: of the code that drove it.
     """
 
@@ -78,6 +81,7 @@ class Run:
     energy: float
     energy_above: float
     ground: str
+    definition: str
     commit: str
 
     @property
@@ -91,64 +95,61 @@ class Run:
         return self.outcome == "reached"
 
 
-@dataclass(frozen=True)
-class Level:
-    """A measured level.
-
-    Attributes:
-        value: mean over missions.
-        spread: standard deviation over missions.
-    """
-
-    value: float
-    spread: float
-
-
 def plan(variants: Sequence[str], routes: Sequence[str], seeds: int) -> list[Job]:
     """Return the missions with seeds 1 to `seeds`, seed by seed, so that the first part is of use, too."""
     return [Job(*job) for job in ((v, r, s) for s, v, r in itertools.product(range(1, seeds + 1), variants, routes))]
 
 
-def run_of(job: Job, record: MissionRecord, thresholds: Mapping[str, float], ground: str, commit: str) -> Run:
+def run_of(
+    job: Job, record: MissionRecord, thresholds: Mapping[str, float], definition: Definition, ground: str, commit: str
+) -> Run:
     """Return what a mission's record tells.
 
     Args:
         job: what was asked for.
         record: of the mission.
         thresholds: level that must not be exceeded, by quality attribute.
+        definition: of the levels.
         ground: what tells the ground from others; empty for the factory.
         commit: of the code that drove it.
     """
     summary = summarise(record)
     start, end = record.start_stamp, record.end_stamp
-    risk, load = record.true_quality["safety"], record.true_quality["energy"]
+    risk, load = (record.true_quality[name] for name in OBSERVED)
+    levels = {name: definition.level(name, *held(record.true_quality[name], start, end)) for name in OBSERVED}
     return Run(
         **asdict(job),
         outcome=summary["outcome"],
         collisions=summary["collisions"],
         duration_s=summary["duration_s"],
         path_m=summary["path_length_m"],
-        safety=round(quantile(risk, SAFETY_SHARE, start, end) or 0.0, 4),
+        safety=round(levels["safety"] or 0.0, 4),
         safety_mean=summary["mean_qa"]["safety"],
         safety_above=round(share_above(risk, thresholds["safety"], start, end) or 0.0, 4),
-        energy=summary["mean_qa"]["energy"],
+        energy=round(levels["energy"] or 0.0, 4),
         energy_above=round(share_above(load, thresholds["energy"], start, end) or 0.0, 4),
         ground=ground,
+        definition=definition.describe(OBSERVED),
         commit=commit,
     )
 
 
-def check_ground(runs: Sequence[Run], ground: str, where: str) -> None:
-    """Check that runs were driven on a ground.
+def check_alike(runs: Sequence[Run], ground: str, definition: Definition, where: str) -> None:
+    """Check that runs were driven on a ground and measured by a definition.
 
     Args:
         runs: what is checked.
         ground: what tells it from others; empty for the factory.
+        definition: of the levels.
         where: their file, for messages.
 
     Raises:
         CalibrationError: one was not.
     """
+    told = definition.describe(OBSERVED)
+    measured = next((run.definition for run in runs if run.definition != told), None)
+    if measured is not None:
+        raise CalibrationError(f"{where}: holds levels by {measured}, not by {told}: name another by --runs")
     other = next((run.ground for run in runs if run.ground != ground), None)
     if other is not None:
         raise CalibrationError(
@@ -174,12 +175,8 @@ def measure(runs: Sequence[Run]) -> dict[str, dict[str, Level]]:
     for variant in sorted({run.variant for run in runs}):
         own = sorted((run for run in runs if run.variant == variant), key=lambda run: (run.route, run.seed))
         levels[variant] = {
-            "safety": _level([run.safety for run in own]),
-            "energy": _level([run.energy for run in own]),
-            "performance": _level([fastest[run.route] / run.duration_s if run.reached else 0.0 for run in own]),
+            "safety": over_runs([run.safety for run in own]),
+            "energy": over_runs([run.energy for run in own]),
+            "performance": over_runs([fastest[run.route] / run.duration_s if run.reached else 0.0 for run in own]),
         }
     return levels
-
-
-def _level(values: Sequence[float]) -> Level:
-    return Level(statistics.fmean(values), statistics.stdev(values) if len(values) > 1 else 0.0)

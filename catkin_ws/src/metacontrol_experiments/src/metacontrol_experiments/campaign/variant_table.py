@@ -33,8 +33,8 @@ class Figure:
 
 
 DURATION = Figure("duration, s", 2, lambda run: run.duration_s)
-RISK = Figure("risk, 95 %", 3, lambda run: run.safety)
-ENERGY = Figure("energy, mean", 3, lambda run: run.energy)
+RISK = Figure("risk, level", 3, lambda run: run.safety)
+ENERGY = Figure("energy, level", 3, lambda run: run.energy)
 FIGURES = (
     DURATION,
     Figure("way, m", 2, lambda run: run.path_m),
@@ -60,7 +60,7 @@ def markdown(runs: Sequence[Run]) -> str:
     commits = sorted({run.commit[:12] for run in runs})
     parts = [
         f"{len(runs)} missions in lockstep without contingency: routes {', '.join(routes)}, seeds "
-        f"{', '.join(map(str, seeds))}, code {', '.join(commits)}.",
+        f"{', '.join(map(str, seeds))}, levels {runs[0].definition}, code {', '.join(commits)}.",
         "\n".join(_variants(runs)),
         "\n".join(_comparisons(runs)),
     ]

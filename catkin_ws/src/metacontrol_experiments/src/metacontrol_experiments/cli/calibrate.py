@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from metacontrol_bags.bag import BagError
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from ros_model.errors import ModelError
 
-from metacontrol_experiments.campaign.calibration import CalibrationError, check_ground, missing_runs, plan
+from metacontrol_experiments.campaign.calibration import CalibrationError, check_alike, missing_runs, plan
+from metacontrol_experiments.campaign.definition import DefinitionError, parse_definition
 from metacontrol_experiments.cli.options import ground_options
 from metacontrol_experiments.io.calibration_runs import drive
 from metacontrol_experiments.io.code_version import current_commit
@@ -40,14 +43,41 @@ runs_option = click.option(
     help="Where the measured levels go, when all variants are measured.  [default: metacontrol_sim/models/qa.csv; of "
     "another world or other routes: qa.csv beside the file of runs]",
 )
+@click.option(
+    "--quantile",
+    "quantiles",
+    multiple=True,
+    metavar="QUALITY=SHARE",
+    help="The level that a quality keeps for a share of the time, such as 0.95, or mean; any number of times.",
+)
 @ground_options
+@click.option("--bags", "from_bags", is_flag=True, help="Measure from these bags of a robot, and drive nothing.")
+@click.argument("bags", metavar="[BAG...]", nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    "--project",
+    type=click.Path(path_type=Path),
+    help="Of --bags: metacontrol.yaml or its folder.  [default: that of D2]",
+)
+@click.option("--initial", default="", metavar="NAME", help="Of --bags: what runs in bags without configurations.")
+@click.option("--namespace", default="/", show_default=True, help="Of --bags: of the robot.")
 def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **options: Any) -> None:
     """Measure the expected quality levels: drive every variant over routes and seeds, in lockstep.
 
     A line is added to the file of runs for each mission; what is in it already is not driven again. Then run
     `rosmodel generate all` to take the levels into variants and ontology.
+
+    With --bags, nothing is driven: which variant ran when, and what its levels were, comes from the bags. Exit status 1
+    says that a bag could not be used.
     """
-    with refusing(CalibrationError, RouteError, PackageError):
+    with refusing(BagError, CalibrationError, DefinitionError, ModelError, RouteError, PackageError):
+        definition = parse_definition(options["quantiles"])
+        if options["from_bags"] or options["bags"]:
+            if not (options["from_bags"] and options["bags"]):
+                raise CalibrationError("give bags and --bags together, or neither")
+            from metacontrol_experiments.cli.calibrate_bags import calibrate_from_bags  # scipy takes a while to import
+
+            asked = {name: options[name] for name in ("project", "initial", "namespace")}
+            raise click.exceptions.Exit(calibrate_from_bags(options["bags"], definition, **asked, levels=levels))
         package = simulation_package()
         known = sorted(path.stem for path in (package / "models" / "variants").glob("*.rossystem"))
         ground = read_ground(options["world"], options["routes"])
@@ -55,12 +85,12 @@ def calibrate(seeds: int, jobs: int, runs: Path, levels: Path | None, **options:
         routes = _chosen("--route", options["only_routes"], route_names(routes_file(ground)))
         read_routes(ground, routes)
         done = read_runs(runs)
-        check_ground(done, ground.mark, str(runs))
+        check_alike(done, ground.mark, definition, str(runs))
         driven = {run.job for run in done}
         missing = [job for job in plan(variants, routes, seeds) if job not in driven]
         with _progress() as bar:
             task = bar.add_task("missions", total=len(missing))
-            for run in append_runs(runs, drive(missing, ground, current_commit(), jobs)):
+            for run in append_runs(runs, drive(missing, ground, definition, current_commit(), jobs)):
                 done.append(run)
                 bar.update(task, advance=1, description=f"{run.variant} {run.route} seed {run.seed}: {run.outcome}")
         _tell_runs(done, len(missing), runs)

@@ -22,15 +22,17 @@ from metacontrol_experiments.mission.settings import Settings
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from metacontrol_experiments.campaign.definition import Definition
     from metacontrol_experiments.mission.ground import Ground
 
 
-def drive(jobs: Sequence[Job], ground: Ground, commit: str, processes: int) -> Iterator[Run]:
+def drive(jobs: Sequence[Job], ground: Ground, definition: Definition, commit: str, processes: int) -> Iterator[Run]:
     """Drive missions, and yield each in the order of `jobs` as soon as it is over.
 
     Args:
         jobs: the missions.
         ground: where they are driven.
+        definition: of the levels.
         commit: of the code that runs.
         processes: how many drive side by side.
 
@@ -38,12 +40,12 @@ def drive(jobs: Sequence[Job], ground: Ground, commit: str, processes: int) -> I
         CalibrationError: one cannot be driven, or its process has died.
     """
     if processes == 1 or len(jobs) < 2:
-        yield from (_drive(job, ground, commit) for job in jobs)
+        yield from (_drive(job, ground, definition, commit) for job in jobs)
         return
     # Spawned: PyBullet and numpy's threads do not survive a fork.
     spawn, ignore = multiprocessing.get_context("spawn"), (signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for this process
     with ProcessPoolExecutor(processes, spawn, signal.signal, ignore) as pool:
-        pending = [pool.submit(_drive, job, ground, commit) for job in jobs]
+        pending = [pool.submit(_drive, job, ground, definition, commit) for job in jobs]
         try:
             for run in pending:
                 yield run.result()
@@ -56,7 +58,7 @@ def drive(jobs: Sequence[Job], ground: Ground, commit: str, processes: int) -> I
                 run.cancel()
 
 
-def _drive(job: Job, ground: Ground, commit: str) -> Run:
+def _drive(job: Job, ground: Ground, definition: Definition, commit: str) -> Run:
     from metacontrol_experiments.io.lockstep_setup import set_up  # PyBullet and navigation take a while to import
     from metacontrol_experiments.lockstep.system import LockstepError
 
@@ -73,4 +75,4 @@ def _drive(job: Job, ground: Ground, commit: str) -> Run:
         record = set_up(asked).run().record
     except (LockstepError, MissionError) as error:
         raise CalibrationError(f"{job}: {error}") from error
-    return run_of(job, record, asked.thresholds, ground.mark, commit)
+    return run_of(job, record, asked.thresholds, definition, ground.mark, commit)

@@ -18,7 +18,9 @@ from metacontrol_experiments.campaign.calibration import QUALITIES, CalibrationE
 from metacontrol_experiments.lockstep.delays import KINDS, DelayError, Delays
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from metacontrol_experiments.campaign.bag_levels import BagLevels, Measured
 
 _COLUMNS = tuple(field.name for field in fields(Run))
 
@@ -102,6 +104,61 @@ def write_levels(path: Path, runs: Sequence[Run]) -> None:
             values = [f"{levels[name].value:.3f}" for name in QUALITIES]
             deviations = [f"{levels[name].spread:.3f}" for name in QUALITIES]
             writer.writerow([variant, *values, "measured", *deviations, len(own), f"{seeds[0]}-{seeds[-1]}"])
+
+
+def write_bag_levels(
+    path: Path, expected: Mapping[str, Mapping[str, float]], measured: Mapping[str, Mapping[str, Measured]]
+) -> None:
+    """Write the expected levels of all variants, as `rosmodel generate all` reads them.
+
+    Args:
+        path: of the file.
+        expected: variant -> quality -> level of the project, which stays where nothing was measured.
+        measured: variant -> quality -> what bags tell.
+    """
+    qualities = dict.fromkeys(quality for own in (*expected.values(), *measured.values()) for quality in own)
+    rows = []
+    for variant, known in expected.items():
+        own = measured.get(variant, {})
+        levels = {**known, **{quality: found.level.value for quality, found in own.items()}}
+        bags = max((found.estimate.count for found in own.values()), default=0)
+        rows.append(
+            [
+                variant,
+                *(f"{levels[quality]:.3f}" if quality in levels else "" for quality in qualities),
+                "measured" if own else "kept",
+                *(f"{own[quality].level.spread:.3f}" if quality in own else "" for quality in qualities),
+                bags or "",
+            ]
+        )
+    header = ["name", *qualities, "source", *(f"{name}_spread" for name in qualities), "missions"]
+    _write(path, header, rows)
+
+
+def write_bag_intervals(path: Path, measured: Mapping[str, Mapping[str, Measured]], found: Sequence[BagLevels]) -> None:
+    """Write the measured levels with their intervals: a line for each variant and quality.
+
+    Args:
+        path: of the file.
+        measured: variant -> quality -> what bags tell.
+        found: what single bags tell.
+    """
+    rows = []
+    for variant, own in measured.items():
+        for quality, level in own.items():
+            seconds = sum(e.seconds for e in found if e.configuration == variant and quality in e.levels)
+            ends = ("" if end is None else f"{end:.4f}" for end in (level.estimate.low, level.estimate.high))
+            rows.append(
+                [variant, quality, f"{level.estimate.value:.4f}", *ends, level.estimate.count, f"{seconds:.1f}"]
+            )
+    _write(path, ["name", "quality", "level", "low", "high", "bags", "seconds"], rows)
+
+
+def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
 
 
 def _run(row: dict[str, str]) -> Run:
