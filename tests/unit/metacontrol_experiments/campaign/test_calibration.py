@@ -151,10 +151,10 @@ def test_command_drives_once_and_writes_levels_only_when_all_variants_are_measur
 
 def test_levels_by_different_definitions_do_not_mix(tmp_path):
     list(tables.append_runs(tmp_path / "runs.csv", [a_run()]))
-    options = ["calibrate", "--route", "r1", "--runs", str(tmp_path / "runs.csv"), "--quantile", "energy=0.95"]
+    options = ["calibrate", "--route", "r1", "--runs", str(tmp_path / "runs.csv"), "--quantile", "energy=0.9"]
     refused = CliRunner().invoke(metacontrol, options)
     assert refused.exit_code == 2
-    assert "holds levels by energy:mean safety:0.95, not by energy:0.95 safety:0.95: name another" in refused.output
+    assert "holds levels by energy:0.95 safety:0.95, not by energy:0.9 safety:0.95: name another" in refused.output
 
 
 def test_command_refuses_what_is_not_there(tmp_path):
