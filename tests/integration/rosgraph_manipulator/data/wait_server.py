@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""An unmodified actionlib server: a goal of 0 is pending until cancelled, any other succeeds at once.
+"""An actionlib server: a goal of 0 is pending until cancelled, any other succeeds at once.
 
 Arguments make it misbehave: --exit-at-once, --hang, --stubborn, --die-after SECONDS, --port NUMBER.
 """
@@ -15,6 +15,7 @@ import time
 import actionlib
 import rospy
 from actionlib.msg import TestAction, TestResult
+from node_kit.ros.action_server import EndsQuietly
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--exit-at-once", action="store_true")
@@ -38,13 +39,17 @@ rospy.init_node("wait_server", disable_signals=options.stubborn)
 sys.stdout.write("it writes to its log\n")
 
 
+class Server(EndsQuietly, actionlib.ActionServer):
+    """A server as any, but what a node prints when it ends stands in the launcher's output, which tests read."""
+
+
 def accept(handle):
     handle.set_accepted()
     if handle.get_goal().goal:
         handle.set_succeeded(TestResult(handle.get_goal().goal))
 
 
-server = actionlib.ActionServer("wait", TestAction, accept, lambda handle: handle.set_canceled(), auto_start=False)
+server = Server("wait", TestAction, accept, lambda handle: handle.set_canceled(), auto_start=False)
 server.start()
 if options.die_after:
     threading.Timer(options.die_after, os._exit, [3]).start()

@@ -425,9 +425,6 @@ def test_invalid_published_file_gives_its_errors_at_their_lines(check):
         (31, "wrong-kind"),
         (32, "unknown-reference"),
         (34, "type-mismatch"),
-        (35, "wrong-kind"),
-        (36, "wrong-kind"),
-        (36, "unknown-reference"),
     ]
 
 

@@ -20,6 +20,7 @@ from move_base_msgs.msg import (
     RecoveryStatus,
 )
 from node_kit.io.inbox import Inbox
+from node_kit.ros.action_server import EndsQuietly
 from robot_formulas.geometry import Pose
 
 from move_base.navigation.result import Outcome
@@ -43,7 +44,7 @@ FEEDBACK_PERIOD = 0.2
 """s; the action's status has the same rate."""
 
 
-class _TakingOverActionServer(actionlib.ActionServer):
+class _TakingOverActionServer(EndsQuietly, actionlib.ActionServer):
     """An action server that may start with an active goal."""
 
     def __init__(self, *arguments: Any, resumed: MoveBaseActionGoal | None = None, **options: Any) -> None:

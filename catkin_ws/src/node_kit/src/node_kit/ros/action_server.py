@@ -1,4 +1,4 @@
-"""Looks for an action's server in wall time.
+"""Servers of actions: clients look for them in wall time, and they end without a traceback.
 
 `wait_for_server` of actionlib waits in ROS time. Under simulated time, ROS time is 0 until the first /clock, and jumps
 when that comes: a wait that began before ends at once, however long it was meant to be. While no clock runs, the wait
@@ -46,3 +46,19 @@ def wait_for_server(client: Any, patience_s: float) -> bool:
             return False
         time.sleep(_LOOK_PERIOD)
     return True
+
+
+class EndsQuietly:
+    """Goes before actionlib's ActionServer in a list of bases: such a server may end at any time.
+
+    Its timer publishes the status now and then. Where that happens just when the node closes its topics, actionlib lets
+    a traceback be printed.
+    """
+
+    def publish_status(self) -> None:
+        """Publish the status of all goals, unless the node is ending."""
+        try:
+            super().publish_status()  # type: ignore[misc]
+        except rospy.ROSException:
+            if not rospy.is_shutdown():
+                raise

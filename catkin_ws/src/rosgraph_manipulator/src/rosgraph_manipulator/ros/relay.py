@@ -15,6 +15,7 @@ from node_kit.ros.lifetime import Lifetime
 from rosgraph_manipulator.configuration.configurations import ConfigurationError, action_type
 from rosgraph_manipulator.goals.clients import Client
 from rosgraph_manipulator.goals.relay import Ending, Link
+from rosgraph_manipulator.ros.action_server import ActionServer
 from rosgraph_manipulator.ros.goal_clients import GoalClients
 
 PERIOD = 0.05  # s, wall, between two looks at whether goals can be sent
@@ -39,7 +40,7 @@ class Relay:
         self._lock = threading.RLock()
         self._changing = False
         self._client = actionlib.ActionClient(server, kind)
-        self._server = actionlib.ActionServer(action, kind, self._on_goal, self._on_cancel, auto_start=False)
+        self._server = ActionServer(action, kind, self._on_goal, self._on_cancel, auto_start=False)
         rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)
         self._waits = GoalClients(action)
         self._waiting: dict[str, Client | None] = {}  # who waits for each goal

@@ -20,6 +20,7 @@ from node_kit.io.inbox import Inbox
 from rosgraph_manipulator.change.deployment import CancelledError, Outcome, Result
 from rosgraph_manipulator.change.request_queue import Policy, RequestQueue
 from rosgraph_manipulator.configuration.configurations import ManipulatorOptions
+from rosgraph_manipulator.ros.action_server import ActionServer
 
 CHANGE_FUNCTION = "rosgraph_manipulator/change_function"
 
@@ -70,7 +71,7 @@ class RequestServer:
         self._lock = threading.Lock()
         self._interruption: CancelledError | None = None
         self._servers = [
-            actionlib.ActionServer(name, kind, on_goal, self._on_cancel, auto_start=False)
+            ActionServer(name, kind, on_goal, self._on_cancel, auto_start=False)
             for name, kind, on_goal in (
                 (options.reconfiguration_action_name, MvpReconfigurationAction, self._on_configuration),
                 (CHANGE_FUNCTION, ChangeFunctionAction, self._on_function),
