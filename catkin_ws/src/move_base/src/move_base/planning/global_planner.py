@@ -7,6 +7,7 @@ only choose the way around the obstacles: dynamic programming over straight shor
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -152,8 +153,10 @@ def _weigh(snapshot: Snapshot, cells: tuple[Any, Any], allow_unknown: bool) -> N
     table = (1.0 + COST_FACTOR * np.arange(256)).astype(np.float32)
     table[INSCRIBED : LETHAL + 1] = np.inf
     table[UNKNOWN] = UNKNOWN_WEIGHT if allow_unknown else np.inf
-    weights = table[snapshot.costs[cells]]
-    weights[snapshot.clearance[cells] < np.float32(snapshot.radii.circumscribed)] *= np.float32(TIGHT_FACTOR)
+    costs = snapshot.costs[cells]
+    weights = np.asarray(cv2.LUT(costs, table), dtype=np.float32).reshape(costs.shape)
+    tight = snapshot.clearance[cells] < np.float32(snapshot.radii.circumscribed)
+    np.multiply(weights, np.float32(TIGHT_FACTOR), out=weights, where=tight)
     weights[snapshot.pinched[cells]] = PINCH_WEIGHT
     return weights
 
@@ -205,7 +208,8 @@ def _biased(weights: NDArray[np.float32], start: tuple[int, int], end: tuple[int
     normal = direction[::-1] * np.array([1.0, -1.0], dtype=np.float32) / length
     rows = (np.arange(weights.shape[0], dtype=np.float32) - start[0]) * normal[0]
     columns = (np.arange(weights.shape[1], dtype=np.float32) - start[1]) * normal[1]
-    bias = np.abs(rows[:, None] + columns[None, :])
+    bias = rows[:, None] + columns[None, :]
+    np.abs(bias, out=bias)
     bias *= np.float32(STRAIGHT_BIAS * PATH_SPACING)
     bias += weights
     return bias
@@ -221,35 +225,41 @@ def _straighten(
     longest = min(count - 1, longest)
     spacing = float(np.hypot(*(nodes[1] - nodes[0])))
     samples_per_step = max(2, round(spacing / (SAMPLE_CELLS * geometry.resolution)))
-    # In units of cells and all positive, so that truncation finds the cell.
-    pixels = ((nodes - (geometry.origin_x, geometry.origin_y)) / geometry.resolution).astype(np.float32)
+    # In units of cells and all positive, so that truncation finds the cell; x and y are the rows.
+    pixels = ((nodes - (geometry.origin_x, geometry.origin_y)) / geometry.resolution).astype(np.float32).T.copy()
     flat = weights.ravel()
-    costs = np.full((longest + 1, count), np.inf)  # costs[k, j]: shortcut from node j - k to node j
+    costs = np.full((count, longest), np.inf)  # costs[j, k]: shortcut from node j - k - 1 to node j
     for step in range(1, longest + 1):
-        starts = pixels[:-step]
-        spans = pixels[step:] - starts
-        samples = step * samples_per_step
-        fractions = (np.arange(samples, dtype=np.float32) + np.float32(0.5)) / np.float32(samples)
-        columns = (starts[:, :1] + spans[:, :1] * fractions).astype(np.int32)
-        cells = (starts[:, 1:] + spans[:, 1:] * fractions).astype(np.int32)
+        starts = pixels[:, :-step]
+        spans = pixels[:, step:] - starts
+        fractions = _fractions(step * samples_per_step)
+        places = spans[:, :, None] * fractions
+        places += starts[:, :, None]
+        columns, cells = places.astype(np.intp)
         cells *= geometry.width
         cells += columns
-        means = flat.take(cells).sum(axis=1) / samples
-        costs[step, step:] = means * np.hypot(spans[:, 0], spans[:, 1]) * geometry.resolution
-    best = np.zeros(count)
+        means = flat.take(cells).sum(axis=1) / len(fractions)
+        costs[step:, step - 1] = means * np.hypot(spans[0], spans[1]) * geometry.resolution
+    best = np.zeros(count)  # from the last node to the first one, so that nearer ones come first
     previous = np.zeros(count, dtype=np.intp)
     for j in range(1, count):
-        reach = min(j, longest)
-        totals = best[j - reach : j][::-1] + costs[1 : reach + 1, j]
-        step = int(totals.argmin()) + 1
-        if not np.isfinite(totals[step - 1]):  # the piece between two nodes cuts a corner: keep it as A* had it
-            best[j], previous[j] = best[j - 1] + spacing * ESCAPE_WEIGHT, j - 1
-        else:
-            best[j], previous[j] = totals[step - 1], j - step
+        here = count - 1 - j
+        totals = best[here + 1 : here + 1 + longest][:j] + costs[j, :j]
+        step = int(totals.argmin())
+        if totals[step] < np.inf:
+            best[here], previous[j] = totals[step], j - step - 1
+        else:  # the piece between two nodes cuts a corner: keep it as A* had it
+            best[here], previous[j] = best[here + 1] + spacing * ESCAPE_WEIGHT, j - 1
     chain = [count - 1]
     while chain[-1] > 0:
         chain.append(int(previous[chain[-1]]))
     return nodes[chain[::-1]]
+
+
+@lru_cache(maxsize=128)
+def _fractions(samples: int) -> NDArray[np.float32]:
+    """Return the middles of so many equal parts of 1."""
+    return (np.arange(samples, dtype=np.float32) + np.float32(0.5)) / np.float32(samples)
 
 
 def _smooth(points: NDArray[np.float64], weights: NDArray[np.float32], geometry: Geometry) -> NDArray[np.float64]:
