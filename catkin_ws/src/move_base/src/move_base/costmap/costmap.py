@@ -11,8 +11,8 @@ import numpy as np
 from robot_formulas.geometry import ORIGIN, Pose, inscribed_radius
 
 from move_base.costmap.grid import FREE, LETHAL, UNKNOWN, Geometry
-from move_base.costmap.inflation import Inflation
-from move_base.costmap.snapshot import Radii, Snapshot
+from move_base.costmap.inflation import IncrementalInflation, Inflation
+from move_base.costmap.snapshot import Part, Radii, Snapshot
 from move_base.costmap.static_map import bounding_geometry, costs_of, resample
 from move_base.parameters.parameters import OBSTACLE_KINDS
 
@@ -59,7 +59,7 @@ class Costmap:
         self.inscribed_radius = inscribed_radius(padded)
         self.circumscribed_radius = float(np.hypot(*padded.T).max())
         self._footprint = np.array(parameters.footprint)
-        self._inflation = self._make_inflation()
+        self._make_inflation()
 
     @property
     def needs_map(self) -> bool:
@@ -89,7 +89,7 @@ class Costmap:
         if geometry != self.geometry:
             self.geometry = geometry
             self._obstacles = self._no_obstacles()
-            self._inflation = self._make_inflation()
+            self._make_inflation()
 
     def update_map(self, part: MapPart, topic: str) -> None:
         """Replace a part of the map from a topic, for the layers that subscribe to updates.
@@ -190,9 +190,11 @@ class Costmap:
             p.origin_y,
         )
 
-    def _make_inflation(self) -> Inflation:
+    def _make_inflation(self) -> None:
         layer = next(iter(self.parameters.layers_of("inflation")), None)
-        return Inflation(layer, self.geometry.resolution, self.inscribed_radius, self.circumscribed_radius)
+        radii = self.inscribed_radius, self.circumscribed_radius
+        self._inflation = Inflation(layer, self.geometry.resolution, *radii)
+        self._incremental = IncrementalInflation(self._inflation)
 
     def _roll(self, robot: Pose) -> None:
         """Move the window so that the robot is in its middle, by whole cells, keeping what overlaps."""
@@ -276,9 +278,12 @@ class Costmap:
                 costs = _larger(costs, static) if layer.use_maximum else static.copy()
             elif layer.name in self._obstacles:
                 costs[self._obstacles[layer.name] == LETHAL] = LETHAL
+        whole = None
+        if not self.parameters.rolling_window:  # the grid stays, and the planner looks at all of it
+            whole = Part(0, 0, *self._incremental.update(costs))
         pinch_radius = 0.5 * (inscribed_radius(self._footprint) + self.inscribed_radius)
         radii = Radii(self.inscribed_radius, self.circumscribed_radius, pinch_radius)
-        return Snapshot(self.geometry, costs, self._inflation, radii)
+        return Snapshot(self.geometry, costs, self._inflation, radii, whole)
 
     def _place_static(self, map_pose: Pose) -> None:
         """Resample the static maps into the grid, where grid or map moved since the last time."""

@@ -87,7 +87,14 @@ class Snapshot:
         radii: of the footprint.
     """
 
-    def __init__(self, geometry: Geometry, costs: NDArray[np.uint8], inflation: Inflation, radii: Radii) -> None:
+    def __init__(
+        self,
+        geometry: Geometry,
+        costs: NDArray[np.uint8],
+        inflation: Inflation,
+        radii: Radii,
+        whole: Part | None = None,
+    ) -> None:
         """Keep what it is made of.
 
         Args:
@@ -95,22 +102,24 @@ class Snapshot:
             costs: of all layers before inflation (H, W); nobody writes to them again.
             inflation: of the costmap.
             radii: see above.
+            whole: all of it, where it is inflated already.
         """
         self.geometry = geometry
         self.radii = radii
         self._costs = costs
         self._inflation = inflation
+        self._whole = whole
         self._part: Part | None = None
 
     @property
     def costs(self) -> NDArray[np.uint8]:
         """0..255 (H, W)."""
-        return self._whole.costs
+        return self._all.costs
 
     @property
     def clearance(self) -> NDArray[np.float32]:
         """Distance from each cell's centre to the nearest obstacle cell's centre (H, W), m."""
-        return self._whole.clearance
+        return self._all.clearance
 
     @property
     def clearance_limit(self) -> float:
@@ -123,7 +132,7 @@ class Snapshot:
         The part lasts: as long as look-ups stay within it, nothing is inflated again.
         """
         rows, columns = _within(rows, self.geometry.height), _within(columns, self.geometry.width)
-        if "_whole" in self.__dict__:
+        if self._whole is not None:
             return self._whole
         if self._part is None or not self._part.covers(rows, columns):
             top, bottom = _within((rows[0] - SLACK, rows[1] + SLACK), self.geometry.height)
@@ -148,9 +157,11 @@ class Snapshot:
         near: NDArray[np.bool_] = (self.costs == INSCRIBED) & (self.clearance > self.radii.pinched)
         return near & (self._costs != UNKNOWN)
 
-    @cached_property
-    def _whole(self) -> Part:
-        return Part(0, 0, *self._inflation.apply(self._costs))
+    @property
+    def _all(self) -> Part:
+        if self._whole is None:
+            self._whole = Part(0, 0, *self._inflation.apply(self._costs))
+        return self._whole
 
 
 def _within(ends: tuple[int, int], size: int) -> tuple[int, int]:
