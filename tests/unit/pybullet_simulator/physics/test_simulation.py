@@ -2,11 +2,13 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pybullet_simulator.physics.simulation import Settings, Simulation, SimulationError
 from pybullet_simulator.robot.motion_sensors import REAL, VIBRATION, Errors
 from pybullet_simulator.world.obstacles import CLUTTER_MASS, CLUTTER_SIZE, ObstacleError
 from pybullet_simulator.world.walking import CLEARANCE, Walker
-from pybullet_simulator.world.world import Box, World
+from pybullet_simulator.world.world import MAPPED, Box, World
 from robot_formulas.geometry import Pose
 
 WALL = Box("wall", "wall", 4.5, 0.0, 1.0, 8.0, 2.0)
@@ -56,6 +58,40 @@ def test_rays_pass_through_robot_and_floor(simulate):
     physics = simulate().physics
     assert physics.sweep(Pose(-2.0, 0.0), 0.18, np.zeros(1), 10.0) == pytest.approx([4.0 - -2.0], abs=1e-3)
     assert np.isinf(physics.sweep(Pose(-2.0, 0.0), -0.2, np.zeros(1), 10.0))
+
+
+@pytest.fixture(scope="module")
+def physics_of_everything():
+    """Walls, boxes that stand askew, a loose one, a person and a wall of a map, and the robot at the origin."""
+    mapped = Box("map", MAPPED, -6.0, 0.0, 0.1, 3.0, 2.0, 0.4)
+    boxes = (
+        WALL,
+        Box("low", "box", 0.0, 2.0, 0.5, 1.0, 0.1, 0.7),
+        Box("askew", "box", -2.0, -2.0, 2.0, 0.1, 1.0, -0.5),
+    )
+    simulation = Simulation(World("hall", -20.0, 20.0, -20.0, 20.0, (*boxes, mapped)), Settings())
+    simulation.spawn(Box("", "clutter", 2.0, -2.0, *CLUTTER_SIZE), CLUTTER_MASS)
+    simulation.spawn_walker(Walker("ann", ((-3.0, 3.0), (-3.0, 5.0)), 1.0))
+    yield simulation.physics
+    simulation.close()
+
+
+@given(
+    x=st.floats(-8.0, 8.0),
+    y=st.floats(-6.0, 6.0),
+    height=st.sampled_from([0.06, 0.18]),
+    reach=st.floats(0.01, 3.0),
+)
+def test_rays_hit_nothing_where_it_is_empty(physics_of_everything, x, y, height, reach):
+    empty = physics_of_everything.is_empty(Pose(x, y), height, reach)
+    lengths = physics_of_everything.sweep(Pose(x, y), height, np.linspace(-math.pi, math.pi, 180), reach)
+    assert not empty or np.isinf(lengths).all()
+
+
+def test_robot_and_floor_leave_it_empty(physics_of_everything):
+    assert physics_of_everything.is_empty(Pose(0.0, 0.0), 0.06, 1.0)
+    for x, y in ((4.0, 0.0), (-2.0, -2.0), (2.0, -2.0), (-3.0, 3.0), (-6.0, 0.0)):
+        assert not physics_of_everything.is_empty(Pose(x - 0.5, y), 0.06, 1.0)
 
 
 def test_depth_image_sees_wall_and_floor(simulate):

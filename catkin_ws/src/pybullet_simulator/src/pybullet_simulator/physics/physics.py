@@ -28,8 +28,7 @@ GRAVITY = 9.81
 
 _RAY_GROUP, _ROBOT_GROUP, _FLOOR_GROUP, _MAP_GROUP, _WORLD_GROUP = 1, 2, 4, 8, 16
 """Two bodies meet if the mask of each has the other's group. Bullet gives rays the group 1. The masks of robot and
-floor lack it: a mask in the call that casts rays would only drop hits that Bullet has computed.
-"""
+floor lack it: a mask in the call that casts rays would only drop hits that Bullet has computed already."""
 _EVERYTHING = _RAY_GROUP | _ROBOT_GROUP | _FLOOR_GROUP | _MAP_GROUP | _WORLD_GROUP
 _BOXES_PER_MESH = 4000  # PyBullet takes no more than 131,072 vertices at once
 _COLOURS = {
@@ -71,9 +70,10 @@ class Physics:
         pybullet.setTimeStep(step, physicsClientId=self.client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=self.client)
         pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=self.client)
-        self._add_floor(world)
+        self._floor = self._add_floor(world)
         self.map_bodies = self._add_map([box for box in world.boxes if box.mapped])
         self._robot = self._add_robot(start)
+        self._unseen = (self._floor, self._robot)  # by rays
         # Twice what the acceleration limits need: the motors follow, but are too weak to push through an obstacle.
         inertia = robot.mass * (robot.length**2 + robot.width**2) / 12.0
         push = 2.0 * robot.mass * robot.max_acceleration
@@ -126,6 +126,19 @@ class Physics:
         hits = pybullet.rayTestBatch(origins, ends, physicsClientId=self.client)
         shares = np.array([hit[2] for hit in hits])
         return np.where(shares < 1.0, shares * length, math.inf)
+
+    def is_empty(self, middle: Pose, height: float, reach: float) -> bool:
+        """Tell whether level rays that start at a point on the map certainly hit nothing; see `sweep`.
+
+        Args:
+            middle: the start of the rays.
+            height: of the rays, m.
+            reach: length of the rays, m.
+        """
+        low = (middle.x - reach, middle.y - reach, height)
+        high = (middle.x + reach, middle.y + reach, height)
+        near = pybullet.getOverlappingObjects(low, high, physicsClientId=self.client) or ()
+        return all(body in self._unseen for body, _ in near)
 
     def depth_image(self, camera: DepthCamera, base: Pose) -> NDArray[np.float32]:
         """Return a camera's image from a pose of base_link: (height, width), m along the optical axis, inf beyond."""
@@ -209,12 +222,13 @@ class Physics:
         distance = 0.72 * max(0.75 * length, width)  # the window is 4:3
         pybullet.resetDebugVisualizerCamera(distance, 0.0, -65.0, middle, physicsClientId=self.client)
 
-    def _add_floor(self, world: World) -> None:
+    def _add_floor(self, world: World) -> int:
         half = ((world.x_max - world.x_min) / 2.0 + 2.0, (world.y_max - world.y_min) / 2.0 + 2.0, 0.5)
         shape = {"halfExtents": half}
         middle = Pose((world.x_max + world.x_min) / 2.0, (world.y_max + world.y_min) / 2.0, 0.0)
         floor = self._add(pybullet.GEOM_BOX, shape, shape, _FLOOR, middle, -1.0)
         pybullet.setCollisionFilterGroupMask(floor, -1, _FLOOR_GROUP, _WORLD_GROUP, physicsClientId=self.client)
+        return floor
 
     def _add_map(self, boxes: list[Box]) -> tuple[int, ...]:
         """Put the boxes of a map on the floor, thousands in one body: a body for each would slow every step."""

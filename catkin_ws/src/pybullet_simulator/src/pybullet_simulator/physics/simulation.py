@@ -246,10 +246,10 @@ class Simulation:
 
     def _drive(self) -> None:
         """Give the motors the velocity of the wheels, changed by their slip."""
-        wheels = self._base.advance(self.time_ns, STEP)
-        forward, left, turn = (value * grip for value, grip in zip(wheels, self._slip.factors, strict=True))
+        wheels, grip = self._base.advance(self.time_ns, STEP), self._slip.factors
+        forward, left = wheels[0] * grip[0], wheels[1] * grip[1]
         cos, sin = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
-        self.physics.drive(cos * forward - sin * left, sin * forward + cos * left, turn)
+        self.physics.drive(cos * forward - sin * left, sin * forward + cos * left, wheels[2] * grip[2])
 
     def _read_motion(self) -> None:
         """Take over pose and velocity."""
@@ -297,6 +297,8 @@ class Simulation:
         d_break = braking_distance(speed)
         mount = self.robot.front_laser.mount
         sensor = self.pose @ Pose(mount.x, mount.y, 0.0)
+        if self.physics.is_empty(sensor, _TRUTH_RAY_HEIGHT, d_break):
+            return 0.0
         angles = _TRUTH_ANGLES + math.atan2(velocity_y, velocity_x)
         distances = self.physics.sweep(sensor, _TRUTH_RAY_HEIGHT, angles, d_break)
         hit = np.isfinite(distances)

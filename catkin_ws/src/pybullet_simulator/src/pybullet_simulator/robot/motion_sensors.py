@@ -57,23 +57,27 @@ concrete, a scan matcher on a map of 0.05 m."""
 
 
 class Slip:
-    """The wheels' slip: the base moves a little less, or more, than its wheels turn."""
+    """The wheels' slip: the base moves a little less, or more, than its wheels turn.
+
+    Attributes:
+        factors: motion of the base as a share of the wheels': ahead, to the left, turning.
+    """
 
     def __init__(self, deviation: float, seed: int) -> None:
         """Start with the standard deviation of Errors.slip."""
         normals = Normals(seed, 4)
         self._axes = [Wander(deviation * share, SLIP_CORRELATION, normals) for share in (1.0, SLIP_SIDEWAYS, 1.0)]
-
-    @property
-    def factors(self) -> tuple[float, float, float]:
-        """Motion of the base as a share of the wheels': ahead, to the left, turning."""
-        ahead, left, turn = (1.0 - axis.error for axis in self._axes)
-        return ahead, left, turn
+        self.factors = self._factors()
 
     def advance(self, duration: float) -> None:
         """Let time (s) pass."""
         for axis in self._axes:
             axis.advance(duration)
+        self.factors = self._factors()
+
+    def _factors(self) -> tuple[float, float, float]:
+        ahead, left, turn = (1.0 - axis.error for axis in self._axes)
+        return ahead, left, turn
 
 
 class Odometry:
