@@ -14,7 +14,6 @@ from metacontrol_experiments.managers.manager import Manager
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.entries import ActiveFact, ComponentFact
 from pybullet_simulator.io.world_file import read_world
-from pybullet_simulator.messages.state import stamp
 from pybullet_simulator.physics.simulation import Settings as SimulationSettings
 from pybullet_simulator.physics.simulation import Simulation
 from robot_formulas.geometry import Pose
@@ -145,7 +144,7 @@ def test_observer_is_evaluated_at_its_rate_on_the_topics_that_it_names():
     try:
         for step in range(1, 201):
             simulation.step()
-            observers.listen(simulation, step, simulation.time, stamp(simulation.time_ns))
+            observers.listen(simulation, step, simulation.time)
             for statuses in observers.evaluate(step, simulation.time):
                 evaluated[step] = statuses
     finally:
@@ -195,7 +194,7 @@ def test_system_without_model_of_the_variant_is_refused(system):
 def test_manager_that_observes_nothing_is_told_nothing(system):
     metacontroller = Metacontroller(system, cores(Manager(), "gripper"), None, "slow", seed=1)
     metacontroller.component_changed(1.0, "gripper", works=False)
-    assert metacontroller.step(1.1, 1, stamp(1_100_000_000)) == [] and metacontroller.components == []
+    assert metacontroller.step(1.1, 1) == [] and metacontroller.components == []
 
 
 class NoDelays:
@@ -210,6 +209,6 @@ def test_component_that_the_reasoner_does_not_model_is_seen_but_left_out(system)
     metacontroller = Metacontroller(system, cores(manager, "gripper"), NoDelays(), "slow", seed=1)
     for component in ("gripper", "wheel"):
         metacontroller.component_changed(1.0, component, works=False)
-    assert metacontroller.step(1.1, 1, stamp(1_100_000_000)) == []
+    assert metacontroller.step(1.1, 1) == []
     assert [report.component for report in metacontroller.components] == ["gripper", "wheel"]
     assert manager.facts[1:] == [ComponentFact("gripper", "FALSE")]

@@ -8,14 +8,13 @@ ever waits for a processor, and detection and reconfiguration take times drawn a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import cv2
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import ConfigurationReport, Event, GoalReport, MissionRecord, OccupancyMap
 from metacontrol_msgs.msg import FunctionGrounding, MissionEvent
 from move_base.navigation.result import Outcome as GoalOutcome
-from pybullet_simulator.messages.state import stamp
 from pybullet_simulator.physics.simulation import LOCALISATION_STEPS, MOTION_STEPS
 
 from metacontrol_experiments.contingency.contingency import InjectionError, Kind
@@ -24,6 +23,7 @@ from metacontrol_experiments.lockstep.frames import Frames
 from metacontrol_experiments.lockstep.navigation import Navigation
 from metacontrol_experiments.lockstep.reconfiguration import navigation_parameters
 from metacontrol_experiments.lockstep.recorder import Recorder
+from metacontrol_experiments.lockstep.robot_topics import stamp_at
 from metacontrol_experiments.lockstep.system import LockstepError
 from metacontrol_experiments.managers.manager import Restart
 from metacontrol_experiments.mission import mission
@@ -206,7 +206,7 @@ class Lockstep:
         """Make the drivers that have listeners measure, and pass on their messages."""
         heard = self._navigation.topics | self._metacontroller.wanted_topics
         for topic in self._drivers.topics:
-            message = self._drivers.message(topic, _stamp(now)) if topic in heard else None
+            message = self._drivers.message(topic, stamp_at(now)) if topic in heard else None
             if message is None:
                 continue
             self._metacontroller.receive(topic, message, now)
@@ -214,11 +214,10 @@ class Lockstep:
 
     def _manage(self, now: float) -> None:
         """Step the meta-controller, and do what it decides."""
-        time = _stamp(now)
-        self._metacontroller.listen(self._simulation, self._steps, now, time)
+        self._metacontroller.listen(self._simulation, self._steps, now)
         if self._state is None:
             return
-        for change in self._metacontroller.step(now, self._steps, time):
+        for change in self._metacontroller.step(now, self._steps):
             if isinstance(change, Restart):
                 self._start_driver(change.component, now)
             else:
@@ -299,7 +298,3 @@ class Lockstep:
     def _drawn_map(self) -> OccupancyMap:
         grid = self._grid
         return OccupancyMap(grid.resolution, grid.origin_x, grid.origin_y, grid.cells >= _OCCUPIED)
-
-
-def _stamp(now: float) -> Any:
-    return stamp(round(now * 1e9))

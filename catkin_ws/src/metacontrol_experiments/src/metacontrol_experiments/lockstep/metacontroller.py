@@ -20,13 +20,13 @@ from pybullet_simulator.physics.simulation import STEP
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding
 
 from metacontrol_experiments.lockstep.reconfiguration import plan_change, restarts
+from metacontrol_experiments.lockstep.robot_topics import stamp_at
 from metacontrol_experiments.lockstep.system import LockstepError
 from metacontrol_experiments.managers.manager import Restart
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import genpy
     from mros1_reasoner.loop.diagnostics import DiagnosticsReader
     from pybullet_simulator.physics.simulation import Simulation
     from rosgraph_manipulator.change.tactics import Tactic
@@ -131,9 +131,9 @@ class Metacontroller:
         """Take a sensor's message."""
         self._cores.observers.receive(topic, message, now)
 
-    def listen(self, simulation: Simulation, step: int, now: float, stamp: genpy.Time) -> None:
-        """Take what the robot publishes in this step; `stamp` is the same time as `now`."""
-        self._cores.observers.listen(simulation, step, now, stamp)
+    def listen(self, simulation: Simulation, step: int, now: float) -> None:
+        """Take what the robot publishes in this step."""
+        self._cores.observers.listen(simulation, step, now)
 
     def ended(self, now: float, component: str) -> None:
         """Note that the process of a component's driver has ended."""
@@ -146,13 +146,12 @@ class Metacontroller:
         status = DiagnosticWords.COMPONENT_RECOVERED if works else DiagnosticWords.COMPONENT_FALSE
         self._due.append((now + self._delays.draw("detect", self._rng), component, status))
 
-    def step(self, now: float, step: int, stamp: genpy.Time) -> list[Change | Restart]:
+    def step(self, now: float, step: int) -> list[Change | Restart]:
         """Observe, reason, and carry out.
 
         Args:
             now: simulated time, s.
             step: number of the simulation's step.
-            stamp: the same time for messages.
 
         Returns:
             The changes that have just begun or ended, and drivers to start again.
@@ -163,19 +162,19 @@ class Metacontroller:
         found = [entry for entry in self._due if entry[0] <= now]
         for due in found:
             self._due.remove(due)
-            self._take_statuses([_component_status(due[1], due[2])], now, stamp)
+            self._take_statuses([_component_status(due[1], due[2])], now)
         for statuses in self._cores.observers.evaluate(step, now):
-            self._take_statuses(statuses, now, stamp)
+            self._take_statuses(statuses, now)
         if self._pending is not None:
             return self._carry_out(now)
         if found or step % REASON_STEPS == 0:
             return self._reason(now, heartbeat=step % self._heartbeat_steps == 0)
         return []
 
-    def _take_statuses(self, statuses: list[DiagnosticStatus], now: float, stamp: genpy.Time) -> None:
+    def _take_statuses(self, statuses: list[DiagnosticStatus], now: float) -> None:
         """Take in what the monitor or an observer says, as the reasoner's node does."""
         array = DiagnosticArray(status=statuses)
-        array.header.stamp = stamp
+        array.header.stamp = stamp_at(now)
         reports = diagnostics(array, now)
         self.observed += [report for report in reports if isinstance(report, QualityReport)]
         self.components += [report for report in reports if isinstance(report, ComponentReport)]

@@ -14,7 +14,6 @@ from metacontrol_experiments.lockstep.system import LockstepError
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    import genpy
     from diagnostic_msgs.msg import DiagnosticStatus
     from pybullet_simulator.physics.simulation import Simulation
     from ros_model.language.metamodel import RosSystem
@@ -68,10 +67,12 @@ class Observers:
                 if wanted.strip("/") == topic.strip("/"):
                     observer.receive(wanted, message, now)
 
-    def listen(self, simulation: Simulation, step: int, now: float, stamp: genpy.Time) -> None:
+    def listen(self, simulation: Simulation, step: int, now: float) -> None:
         """Hand on what the robot publishes in this step."""
+        if not self._observers:
+            return
         self._tell_frames(simulation, now)
-        for topic, message in due_messages(simulation, step, stamp, self.wanted_topics):
+        for topic, message in due_messages(simulation, step, self.wanted_topics):
             self.receive(topic, message, now)
 
     def evaluate(self, step: int, now: float) -> Iterator[list[DiagnosticStatus]]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
-from pybullet_simulator.messages.state import BASE, ODOM, OdometryWriter, battery_state, localised_pose
+from pybullet_simulator.messages.state import BASE, ODOM, OdometryWriter, battery_state, localised_pose, stamp
 from pybullet_simulator.physics.simulation import ENERGY_STEPS, LOCALISATION_STEPS, MOTION_STEPS
 from robot_formulas.geometry import quaternion_of
 from sensor_msgs.msg import BatteryState
@@ -58,13 +58,16 @@ TOPICS: dict[str, Topic] = {
 """The topics with a rate, by name without a leading slash. Frames that never move are told once (`static_frames`)."""
 
 
-def due_messages(
-    simulation: Simulation, step: int, now: genpy.Time, wanted: Collection[str]
-) -> Iterator[tuple[str, Any]]:
+def due_messages(simulation: Simulation, step: int, wanted: Collection[str]) -> Iterator[tuple[str, Any]]:
     """Yield those of the wanted topics that are published in this step, each with its message."""
     for name, topic in TOPICS.items():
         if step % topic.steps == 0 and name in wanted:
-            yield name, topic.message(simulation, now)
+            yield name, topic.message(simulation, stamp(simulation.time_ns))
+
+
+def stamp_at(now: float) -> genpy.Time:
+    """Return a time in s for messages."""
+    return stamp(round(now * 1e9))
 
 
 def static_frames(robot: Robot) -> TFMessage:
