@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.pellet.process import make_reasoner
 from node_kit.io.input_files import InputFileError, read_text, read_yaml
 from ros_model.io.files import resolve
 from ros_model.project.tables import parse_table
 
 from metacontrol_experiments.io.input_files import simulation_package
+from metacontrol_experiments.io.warm_reasoner import WarmReasoner
 from metacontrol_experiments.managers.d2_rules import RuleError, by_rules, variants_of
 from metacontrol_experiments.managers.manager import Manager, ManagerError
 from metacontrol_experiments.managers.mros import AsPublishedManager, MrosManager
@@ -29,7 +29,7 @@ def none(_situation: Situation) -> Manager:
 
 
 def mros(situation: Situation) -> Manager:
-    """Return the meta-controller, with a reasoner's process of its own."""
+    """Return the meta-controller, with a reasoner that no other mission uses."""
     return _reasoning(MrosManager, situation)
 
 
@@ -80,7 +80,7 @@ def _reasoning(kind: type[MrosManager], situation: Situation) -> Manager:
     if situation.knowledge is None:
         raise ManagerError("a manager that reasons needs a model: set the reasoner's ~model_file")
     behaviour = Parameters(situation.parameters).settings(situation.knowledge)
-    reasoner = make_reasoner()
+    reasoner = WarmReasoner()
     try:
         reasoner.load(situation.knowledge.ontology)
         loop = Mape(situation.knowledge, reasoner, situation.objectives, behaviour, wall=lambda: 0.0, name="lockstep")

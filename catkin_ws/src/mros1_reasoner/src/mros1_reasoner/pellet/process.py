@@ -228,6 +228,11 @@ class PelletWithFallback:
         self._ontology = ""
         self._retry_at = -math.inf
 
+    @property
+    def fallen_back(self) -> bool:
+        """Whether the child has failed and the slower reasoner is in its place."""
+        return self._retry_at > -math.inf
+
     def load(self, ontology: str) -> None:
         """See Reasoner.load."""
         self._ontology = ontology
@@ -244,7 +249,7 @@ class PelletWithFallback:
     def _by_child(self, fast: Callable[[], _Answer], otherwise: Callable[[Reasoner], _Answer]) -> _Answer:
         if self._clock() >= self._retry_at:
             try:
-                if self._retry_at > -math.inf:  # the child has gone since it has loaded the ontology
+                if self.fallen_back:  # the child has gone since it has loaded the ontology
                     self._child.load(self._ontology)
                     self._retry_at = -math.inf
                 return fast()
