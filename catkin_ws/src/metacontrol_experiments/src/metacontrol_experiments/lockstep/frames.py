@@ -60,7 +60,7 @@ class Frames:
         if target == _ODOM:
             to_target = moment.odom.inverse
         else:
-            to_target = _IDENTITY if target == _MAP else np.linalg.inv(self._in_map(target, moment))
+            to_target = _IDENTITY if target == _MAP else np.asarray(np.linalg.inv(self._in_map(target, moment)))
         transform: NDArray[np.float64] = to_target @ self._in_map(source, moment)
         return transform
 
@@ -91,7 +91,8 @@ class _Odom:
 
     @cached_property
     def inverse(self) -> NDArray[np.float64]:
-        return np.linalg.inv(self.in_map)
+        inverse: NDArray[np.float64] = np.asarray(np.linalg.inv(self.in_map))
+        return inverse
 
 
 @dataclass

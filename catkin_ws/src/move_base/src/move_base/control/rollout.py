@@ -104,8 +104,8 @@ class Footprint:
         unsure = (clearance <= self.circumscribed + margin) & ~blocked[:, None]
         if unsure.any():
             which, step = np.nonzero(unsure)
-            poses = (axis[which, step, None] for axis in (rollout.x, rollout.y, rollout.yaw))
-            columns, rows = self._edge_cells(*poses, g)
+            x, y, yaw = (axis[which, step, None] for axis in (rollout.x, rollout.y, rollout.yaw))
+            columns, rows = self._edge_cells(x, y, yaw, g)
             if not amid:
                 np.clip(columns, 0, g.width - 1, out=columns)
                 np.clip(rows, 0, g.height - 1, out=rows)
