@@ -26,7 +26,7 @@ from std_msgs.msg import Float32
 
 ROUTE = "short: {start: [-8, -8, 0.78], goal: [-3, -4.2, 0]}\n"
 POWER_AND_FAILURE = (
-    Contingency(Kind.POWER, Moment(time=3.0), value=2.5),
+    Contingency(Kind.POWER, Moment(time=3.0), value=2.15),
     Contingency(Kind.KILL, Moment(share=0.6), target="front_laser"),
 )
 
