@@ -2,11 +2,14 @@ import itertools
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.world.grid import FREE, OCCUPIED, UNKNOWN
-from pybullet_simulator.world.world import Box, WorldError, rasterise
+from pybullet_simulator.world.world import Box, World, WorldError, rasterise
 
 WORLDS = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_sim/worlds"
 FLOOR = "floor: {x: [-5, 5], y: [-5, 5]}\n"
@@ -97,6 +100,28 @@ def test_map_marks_boxes_floor_and_outside(tmp_path):
     assert cell(1.0, 2.0) == FREE
     assert cell(5.3, 0.0) == UNKNOWN
     assert (grid.cells == OCCUPIED).sum() == pytest.approx(1.0 * 0.5 / 0.05**2, rel=0.15)
+
+
+@given(
+    st.lists(
+        st.builds(
+            lambda x, y, length, width, yaw: Box("a", "box", x, y, length, width, 1.0, yaw),
+            *[st.floats(-4.0, 4.0)] * 2,
+            *[st.sampled_from([0.001, 0.05, 0.3, 2.0, 9.0])] * 2,
+            st.sampled_from([0.0, 0.4, math.pi / 2, 9.0]) | st.floats(-4.0, 4.0),
+        ),
+        max_size=4,
+    ),
+    st.sampled_from([0.05, 0.25]),
+)
+def test_map_marks_the_cells_that_any_box_touches(boxes, resolution):
+    grid = rasterise(World("hall", -3.0, 3.0, -2.0, 2.0, tuple(boxes)), resolution)
+    rows, columns = np.indices(grid.cells.shape)
+    x, y = grid.to_map((columns + 0.5) * resolution, (rows + 0.5) * resolution)
+    touched = np.zeros(grid.cells.shape, dtype=bool)
+    for box in boxes:
+        touched |= box.distance(x, y) < resolution / 2.0 - 1e-6
+    np.testing.assert_array_equal(grid.cells == OCCUPIED, touched)
 
 
 def test_factory_has_four_narrow_aisles_and_else_wide_ways():

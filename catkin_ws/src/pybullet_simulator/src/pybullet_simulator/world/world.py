@@ -176,13 +176,16 @@ def rasterise(world: World, resolution: float = 0.05, margin: float = 0.5) -> Gr
     columns = math.ceil((world.x_max - world.x_min + 2.0 * margin) / resolution - 1e-9)
     rows = math.ceil((world.y_max - world.y_min + 2.0 * margin) / resolution - 1e-9)
     origin_x, origin_y = world.x_min - margin, world.y_min - margin
-    x, y = np.meshgrid(
-        origin_x + (np.arange(columns) + 0.5) * resolution, origin_y + (np.arange(rows) + 0.5) * resolution
-    )
+    x = origin_x + (np.arange(columns) + 0.5) * resolution
+    y = (origin_y + (np.arange(rows) + 0.5) * resolution)[:, np.newaxis]
     on_floor = (x > world.x_min) & (x < world.x_max) & (y > world.y_min) & (y < world.y_max)
     cells = np.where(on_floor, FREE, UNKNOWN).astype(np.int8)
     for box in world.boxes:
-        cells[box.distance(x, y) < resolution / 2.0 - 1e-6] = OCCUPIED
+        reach = math.hypot(box.length, box.width) / 2.0 + resolution
+        left, right = np.searchsorted(x, (box.x - reach, box.x + reach))
+        low, high = np.searchsorted(y[:, 0], (box.y - reach, box.y + reach))
+        near = (slice(low, high), slice(left, right))
+        cells[near][box.distance(x[near[1]], y[near[0]]) < resolution / 2.0 - 1e-6] = OCCUPIED
     return Grid(cells, resolution, origin_x, origin_y)
 
 
