@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from metacontrol_bags.metrics import summarise
 from metacontrol_experiments.cli import main as cli
 from metacontrol_experiments.contingency.parsing import parse_contingency
-from metacontrol_experiments.io.lockstep_setup import describe_system, restarts_between, set_up
+from metacontrol_experiments.io.lockstep_setup import Library, describe_system, restarts_between, set_up
 from metacontrol_experiments.lockstep.frames import KEPT_S, Frames
 from metacontrol_experiments.lockstep.reconfiguration import navigation_parameters
 from metacontrol_experiments.lockstep.system import LockstepError, private_parameters
@@ -128,6 +128,16 @@ def test_meta_controller_goes_on_with_the_camera_and_repeats_byte_for_byte(tmp_p
     assert change["to"].endswith("_k") and summary["final_configuration"].endswith("_k")
     assert 0.0 < change["detect_s"] < 1.0 and 0.0 <= change["decide_s"] < 1.0 and 0.5 < change["execute_s"] < 5.0
     assert one.log == set_up(asked).run().log
+
+
+def test_missions_that_share_what_they_read_give_the_same_logs(tmp_path):
+    asked = [
+        settings(tmp_path, "clutter:2", "kill:front_laser@time:2", manager=manager, timeout_s=8.0)
+        for manager in ("mros", "none", "rules")
+    ]
+    alone = [set_up(one).run().log for one in asked]
+    library = Library()
+    assert [set_up(one, library).run().log for one in (*asked, *asked)] == alone * 2
 
 
 def test_energy_over_its_limit_is_answered_without_a_stop(tmp_path):

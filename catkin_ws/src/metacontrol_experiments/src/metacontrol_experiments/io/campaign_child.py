@@ -13,8 +13,12 @@ import queue
 import sys
 import threading
 import traceback
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from metacontrol_experiments.io.lockstep_setup import Library
 
 
 def main() -> None:
@@ -71,9 +75,17 @@ def _drive(asked: dict[str, Any]) -> dict[str, Any]:
         timeout_s=run.timeout,
         commit=current_commit(),
     )
-    outcome = set_up(settings).run()
+    outcome = set_up(settings, _library()).run()
     record = with_wall_time(outcome.record, time.monotonic() - began)
     return {"summary": summarise(record), "log": outcome.log}
+
+
+@cache
+def _library() -> Library:
+    """Return what the missions of this process have in common."""
+    from metacontrol_experiments.io.lockstep_setup import Library
+
+    return Library()
 
 
 if __name__ == "__main__":

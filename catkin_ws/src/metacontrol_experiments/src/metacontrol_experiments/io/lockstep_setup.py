@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
@@ -40,13 +40,15 @@ from metacontrol_experiments.managers.d2_rules import RuleError
 from metacontrol_experiments.managers.manager import ManagerError, Situation, make_manager
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Hashable, Sequence
 
     from ros_model.language.metamodel import RosSystem
     from rosgraph_launcher.description import SystemDescription
     from rosgraph_monitor.observer import Observer
 
     from metacontrol_experiments.mission.settings import Settings
+
+_Read = TypeVar("_Read")
 
 _MONITOR = ("rosgraph_monitor", "monitor")
 _REASONER = ("mros1_reasoner", "reasoner")
@@ -70,20 +72,40 @@ _UNUSABLE = (
 )
 
 
-def set_up(settings: Settings) -> Lockstep:
+class Library:
+    """What the missions of one process have in common: it is read for the first of them."""
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self._read: dict[Hashable, Any] = {}
+
+    def once(self, key: Hashable, read: Callable[[], _Read]) -> _Read:
+        """Return what was read under a key; nobody may change it."""
+        if key not in self._read:
+            self._read[key] = read()
+        made: _Read = self._read[key]
+        return made
+
+
+def set_up(settings: Settings, library: Library | None = None) -> Lockstep:
     """Return a mission, ready to run; its end also ends the processes that were started for it.
+
+    Args:
+        settings: the mission.
+        library: of the missions of this process; without it, all is read anew.
 
     Raises:
         LockstepError: something is not there in lockstep, or cannot be used; the message names it.
     """
+    library = library or Library()
     with ExitStack() as failing:
         try:
             system = describe_system(settings.launch_package, settings.launch_file, settings.launch_arguments)
-            robot = _robot(settings, system.base)
+            robot = _robot(settings, system.base, library)
             failing.callback(robot.simulation.close)
-            cores = _cores(settings, system.launched, robot.drivers)
+            cores = _cores(settings, system.launched, robot.drivers, library)
             failing.callback(cores.manager.close)
-            delays = read_delays()
+            delays = library.once("delays", read_delays)
             metacontroller = Metacontroller(system, cores, delays, settings.initial_configuration, settings.seed)
             lockstep = Lockstep(settings, robot, system, metacontroller)
         except _UNUSABLE as error:
@@ -149,14 +171,16 @@ def restarts_between(package: str, launch_file: str) -> Callable[[str, str], boo
     return cache(lambda running, wanted: restarts(plan_change(system, running, wanted, tactics)))
 
 
-def _robot(settings: Settings, base: RosSystem) -> Robot:
+def _robot(settings: Settings, base: RosSystem, library: Library) -> Robot:
     """Return the robot at the start of the route."""
-    world = read_world(settings.world or simulation_package() / "worlds" / "factory.yaml")
+    path = settings.world or simulation_package() / "worlds" / "factory.yaml"
+    world = library.once(("world", path), lambda: read_world(path))
+    grid = library.once(("map", path), lambda: rasterise(world))
     simulation = Simulation(world, SimulationSettings(settings.route.start, settings.seed, REAL))
-    return Robot(simulation, rasterise(world), Drivers(simulation, base, settings.seed))
+    return Robot(simulation, grid, Drivers(simulation, base, settings.seed))
 
 
-def _cores(settings: Settings, launched: SystemDescription, drivers: Drivers) -> Cores:
+def _cores(settings: Settings, launched: SystemDescription, drivers: Drivers, library: Library) -> Cores:
     """Return the manager, and the deciding parts of the nodes beside it, with the parameters of these nodes."""
     situation = Situation(settings.initial_configuration, settings.seed)
     observers, parameters = Observers([], {}), Parameters({})
@@ -164,23 +188,25 @@ def _cores(settings: Settings, launched: SystemDescription, drivers: Drivers) ->
     if settings.metacontrol:
         values = private_parameters(launched, *_REASONER)
         parameters = Parameters(values)
-        knowledge = parameters.knowledge_base()
+        files = tuple(repr(values.get(name)) for name in ("model_file", "tomasys_file", "qa_direction"))
+        knowledge = library.once(("knowledge", files), parameters.knowledge_base)
         objectives = parameters.objectives(knowledge)
         situation = replace(situation, knowledge=knowledge, objectives=objectives, parameters=values)
-        observers = Observers(_observers(private_parameters(launched, *_MONITOR)), drivers.topics)
+        observers = Observers(_observers(private_parameters(launched, *_MONITOR), library), drivers.topics)
         reader = DiagnosticsReader(knowledge.qualities, knowledge.components, parameters.nodes)
-        tactics = load_tactics()
+        tactics = library.once("tactics", load_tactics)
     manager = make_manager(settings.manager, situation, *_UNUSABLE)
     if not manager.observes:
         observers = Observers([], {})
     return Cores(manager, observers, reader, parameters.period, tactics)
 
 
-def _observers(monitor: dict[str, Any]) -> list[Observer]:
+def _observers(monitor: dict[str, Any], library: Library) -> list[Observer]:
     """Return the observers that the monitor's parameters name, made and configured as its node does."""
+    exported = library.once("observers", plugins.exported)
     made = []
     for name in monitor.get("observers", []):
-        observer = plugins.make(name)
+        observer = plugins.make(name, exported)
         try:
             observer.configure(monitor.get(observer.name, {}))
         except ValueError as error:
