@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from move_base.costmap.sensors import SensorError, cloud_observation, points_observation, scan_observation
+from move_base.costmap.sensors import FLOAT32, SensorError, cloud_observation, points_observation, scan_observation
 from move_base.parameters.parameters import ObservationSource
 
 SCAN = ObservationSource("scan", "LaserScan", "front/scan", raytrace_range=12.0, inf_is_valid=True)
@@ -88,6 +88,28 @@ def test_cloud_of_the_former_type_becomes_its_finite_points():
 
 def test_empty_cloud_is_an_observation_of_nothing():
     assert len(cloud_observation(cloud([]), CLOUD).points) == 0
+
+
+COORDINATES = st.floats(-9.0, 9.0, width=32) | st.sampled_from([math.nan, math.inf])
+
+
+@given(st.lists(st.tuples(*[COORDINATES] * 3), max_size=6), st.permutations("xyz"), st.booleans(), st.data())
+def test_points_are_the_same_however_they_are_laid_out(points, names, is_bigendian, data):
+    before, after, row_gap = (4 * data.draw(st.integers(0, 1)) for _ in range(3))
+    rows = data.draw(st.sampled_from([1, len(points)])) if points else 1
+    step = before + 12 + after
+    filled = np.zeros((rows, len(points) // rows * step + row_gap), dtype=np.uint8)
+    kind = ">f4" if is_bigendian else "<f4"
+    for place, point in enumerate(points):
+        row, column = divmod(place, len(points) // rows)
+        values = np.array([point["xyz".index(name)] for name in names], dtype=kind)
+        filled[row, column * step + before :][:12] = np.frombuffer(values.tobytes(), dtype=np.uint8)
+    fields = [
+        SimpleNamespace(name=name, offset=before + 4 * place, datatype=FLOAT32) for place, name in enumerate(names)
+    ]
+    layout = {"fields": fields, "point_step": step, "row_step": filled.shape[1], "is_bigendian": is_bigendian}
+    message = cloud([], data=filled.tobytes(), width=len(points) // rows, height=rows, **layout)
+    assert cloud_observation(message, CLOUD).points.tolist() == [list(p) for p in points if np.isfinite(p).all()]
 
 
 @pytest.mark.parametrize(

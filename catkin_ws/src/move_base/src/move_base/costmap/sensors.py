@@ -96,19 +96,10 @@ def cloud_observation(message: Any, source: ObservationSource) -> Observation:
     row_step = message.row_step or message.point_step * message.width
     if row_step < message.point_step * message.width or len(message.data) < row_step * message.height:
         raise SensorError(f"the cloud announces {count} points, its data hold {len(message.data)} bytes")
-    layout = np.dtype(
-        {
-            "names": ["x", "y", "z"],
-            "formats": [(">" if message.is_bigendian else "<") + "f4"] * 3,
-            "offsets": [offsets[name] for name in "xyz"],
-            "itemsize": message.point_step,
-        }
-    )
-    raw = np.ndarray(
-        (message.height, message.width), dtype=layout, buffer=message.data, strides=(row_step, message.point_step)
-    )
-    points = np.stack([raw[name].ravel() for name in "xyz"], axis=1).astype(np.float32, copy=False)
-    points = points[np.isfinite(points).all(axis=1)]
+    points = _points(message, [offsets[name] for name in "xyz"], row_step)
+    finite = np.isfinite(points)
+    if not finite.all():
+        points = points[finite.all(axis=1)]
     return Observation(
         source,
         _frame(message, source),
@@ -117,6 +108,20 @@ def cloud_observation(message: Any, source: ObservationSource) -> Observation:
         np.ones(len(points), dtype=np.bool_),
         False,
     )
+
+
+def _points(message: Any, offsets: list[int], row_step: int) -> NDArray[np.float32]:
+    """Return the points of a sensor_msgs/PointCloud2 (N, 3), by the offsets of x, y and z in a point's bytes."""
+    width, height = message.width, message.height
+    kind = (">" if message.is_bigendian else "<") + "f4"
+    packed = offsets == [0, 4, 8] and message.point_step == 12 and row_step == 12 * width
+    if packed and np.dtype(kind).isnative:
+        return np.frombuffer(message.data, dtype=np.float32, count=3 * width * height).reshape(-1, 3)
+    layout = np.dtype(
+        {"names": ["x", "y", "z"], "formats": [kind] * 3, "offsets": offsets, "itemsize": message.point_step}
+    )
+    raw = np.ndarray((height, width), dtype=layout, buffer=message.data, strides=(row_step, message.point_step))
+    return np.stack([raw[name].ravel() for name in "xyz"], axis=1).astype(np.float32, copy=False)
 
 
 def points_observation(message: Any, source: ObservationSource) -> Observation:
