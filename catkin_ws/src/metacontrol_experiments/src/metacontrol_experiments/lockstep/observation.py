@@ -72,8 +72,9 @@ class Observers:
         if not self._observers:
             return
         self._tell_frames(simulation, now)
-        for topic, message in due_messages(simulation, step, self.wanted_topics):
-            self.receive(topic, message, now)
+        if any(step % topic.steps == 0 for topic in TOPICS.values()):
+            for topic, message in due_messages(simulation, step, self.wanted_topics):
+                self.receive(topic, message, now)
 
     def evaluate(self, step: int, now: float) -> Iterator[list[DiagnosticStatus]]:
         """Yield the statuses of each observer that is due in this step.

@@ -6,6 +6,7 @@ A writer keeps its message and sets only the fields that change. At 100 Hz this 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import genpy
@@ -113,8 +114,7 @@ def localised_pose(pose: Pose, noise: float, now: genpy.Time) -> PoseWithCovaria
     message.header.frame_id = MAP
     _set_pose(message.pose.pose, pose)
     variance = max(noise**2, _SMALL)
-    message.pose.covariance = _diagonal(variance, 6)
-    message.pose.covariance[35] = max(0.01 * variance, _SMALL)
+    message.pose.covariance = [*_diagonal(variance, 6)[:35], max(0.01 * variance, _SMALL)]
     return message
 
 
@@ -163,6 +163,7 @@ def _transform(frame: str, child: str) -> TransformStamped:
     return transform
 
 
-def _diagonal(value: float, size: int) -> list[float]:
+@lru_cache(maxsize=16)
+def _diagonal(value: float, size: int) -> tuple[float, ...]:
     """Return a row-major square matrix with one value on its diagonal."""
-    return [value if row == column else 0.0 for row in range(size) for column in range(size)]
+    return tuple(value if row == column else 0.0 for row in range(size) for column in range(size))
