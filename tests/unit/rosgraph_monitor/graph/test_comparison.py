@@ -90,7 +90,9 @@ def test_dead_node_is_not_additional():
     assert compare(graph("/stray"), system(), dead={"/stray": ("dead", "no answer")}) == ()
 
 
-@pytest.mark.parametrize("name", ["rosout", "rosgraph_monitor", "rviz_1700000000123", "any_4711_1700000000123"])
+@pytest.mark.parametrize(
+    "name", ["action_relay", "rosout", "rosgraph_monitor", "rviz_1700000000123", "any_4711_1700000000123"]
+)
 def test_tools_and_anonymous_nodes_are_ignored(name):
     assert compare(graph(f"/{name}"), system(), dead={}) == ()
 

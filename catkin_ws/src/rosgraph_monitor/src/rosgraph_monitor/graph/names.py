@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 IGNORED_NODES = (
     *("rosout", "rosgraph_*", "reasoner", "mission", "mission_*", "rviz*", "rosbag*", "record", "rostopic*"),
-    *("rosservice*", "rqt*", "diagnostic_aggregator", "diagnostic_names", "roslaunch*", "rostest*"),
+    *("action_relay", "rosservice*", "rqt*", "diagnostic_aggregator", "diagnostic_names", "roslaunch*", "rostest*"),
 )
 """Nodes that never count as additional: the meta-controller's own, missions and tools."""
 COMMON_TOPICS = ("/rosout", "/rosout_agg", "/clock", "/tf", "/tf_static", "/diagnostics", "/statistics")
