@@ -2,10 +2,14 @@
 
 import os
 import signal
+import socket
 
+import psutil
 import pytest
+from helpers.ports import QUIET_HOST
 from helpers.waiting import wait_for
 from rosgraph_launcher.io import processes
+from rosgraph_launcher.io.master import NodeApi
 from rosgraph_launcher.io.node_processes import MOST_LOST_WARM, NodeProcesses
 from rosgraph_launcher.io.processes import Command
 from rosgraph_launcher.launching.options import LauncherOptions
@@ -49,6 +53,50 @@ def begun(nodes, command):
     for name in ("/a", "/b"):
         nodes.begin(name, command(name.strip("/")), None)
     return ["/a", "/b"]
+
+
+LONG = 60.0  # s, which no test waits for
+
+
+@pytest.fixture
+def patient(tmp_path, said):
+    """Nodes that have all the time that they want to end."""
+    owner = NodeProcesses(LauncherOptions(f"test {tmp_path}", "", LONG, LONG), said.append)
+    yield owner
+    owner.close()
+
+
+@pytest.fixture
+def stubborn(patient, tmp_path):
+    """Process id of the node /lidar, which heeds no SIGINT.
+
+    It is one process: a shell that is stopped between vfork and exec of its child waits on, and is not told as stopped.
+    """
+    words = ("/bin/sh", "-c", "trap '' INT; : > heedless; exec sleep 1000")
+    environment = {"PATH": os.environ["PATH"], "MROS_LAUNCHER": f"test {tmp_path}"}
+    patient.begin("/lidar", Command(words, str(tmp_path), environment), None)
+    wait_for((tmp_path / "heedless").exists, "it heeds no SIGINT")
+    (process,) = patient._running.values()
+    return process.pid
+
+
+def test_node_that_is_stopped_is_killed_without_any_wait(patient, stubborn, said):
+    pid = stubborn
+    os.killpg(pid, signal.SIGSTOP)
+    wait_for(lambda: psutil.Process(pid).status() == psutil.STATUS_STOPPED, "it is stopped")
+    patient.ask_to_end(["/lidar"])
+    patient.end(["/lidar"])
+    assert f"node /lidar (process {pid}) is stopped: killing it" in said
+    assert not psutil.pid_exists(pid)
+
+
+def test_node_that_takes_calls_and_answers_none_is_killed_soon(patient, stubborn, said, monkeypatch):
+    with socket.create_server((QUIET_HOST, 0)) as silent:
+        uri = f"http://{QUIET_HOST}:{silent.getsockname()[1]}/"
+        monkeypatch.setattr(NodeApi, "address", lambda name: uri)
+        patient.ask_to_end(["/lidar"])
+        patient.end(["/lidar"])
+    assert said[-1].endswith("does not answer: killing it")
 
 
 def test_processes_that_stand_by_are_started_one_by_one(nodes, prepared, begun):

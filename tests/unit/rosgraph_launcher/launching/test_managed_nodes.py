@@ -4,9 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rosgraph_launcher.description import NodeDescription
-from rosgraph_launcher.launching.managed_nodes import ManagedNodes, Verdict
+from rosgraph_launcher.launching.contested import HOLD
+from rosgraph_launcher.launching.managed_nodes import ManagedNodes
 from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE
-from rosgraph_launcher.launching.restarts import RestartPolicy
+from rosgraph_launcher.launching.restarts import RestartPolicy, Verdict
 
 POLICY = RestartPolicy(intensity=2, period=30.0, first_delay=0.5)
 
@@ -167,6 +168,79 @@ def test_node_whose_name_was_taken_has_not_done_its_work():
     )
 
 
+def test_node_that_has_served_before_has_not_done_its_work_when_it_ends_at_once(nodes):
+    nodes.ended("/a", 1, 5.0)
+    nodes.started("/a", 5.5)
+    assert nodes.ended("/a", 0, 5.9).verdict is Verdict.RESTART  # too early for anybody to have looked at it
+    change(nodes, "second", described("/a"), ["/a"], now=10.0)
+    assert nodes.ended("/a", 0, 10.4).verdict is Verdict.RESTART
+
+
+def test_function_recovers_only_when_its_node_has_held_its_name_for_a_while(nodes):
+    nodes.ended("/a", 0, 5.0, conflict="its name is taken by process 7 (x): end that process")
+    nodes.started("/a", 5.5)
+    assert nodes.report("f").dead == ()
+    assert not nodes.recovered()
+    assert nodes.contested == {"/a": "its name is taken by process 7 (x): end that process"}
+    nodes.seen("/a", False, 5.6)  # the other one is still there
+    nodes.seen("/a", True, 6.0)
+    nodes.seen("/a", True, 6.0 + HOLD - 0.1)
+    assert not nodes.recovered()
+    assert "process 7" in nodes.report("f").message
+    nodes.seen("/a", True, 6.0 + HOLD)
+    assert nodes.recovered()
+    assert (nodes.report("f").state, nodes.contested) == (STABLE, {})
+
+
+def test_name_that_is_taken_again_after_it_was_held_must_be_held_for_longer(nodes):
+    for now, hold in ((10.0, HOLD), (20.0, 2 * HOLD), (120.0, HOLD)):
+        nodes.ended("/a", 0, now, conflict="its name is taken by process 7 (x): end that process")
+        nodes.started("/a", now + 0.5)
+        nodes.seen("/a", True, now + 1.0)
+        nodes.seen("/a", True, now + 1.0 + hold - 0.1)
+        assert not nodes.recovered()
+        nodes.seen("/a", True, now + 1.0 + hold)
+        assert nodes.recovered()
+
+
+def test_node_whose_name_is_taken_again_and_again_is_given_up_with_the_name_of_who_does(nodes):
+    nodes.ended("/a", 0, 5.0, conflict="its name is taken by process 7 (x): end that process")
+    nodes.started("/a", 5.5)
+    nodes.seen("/a", True, 6.0)
+    nodes.ended("/a", 0, 6.5)  # nobody could be asked who it was
+    nodes.started("/a", 7.0)
+    nodes.seen("/a", True, 7.5)
+    assert not nodes.recovered(), "it has to hold the name anew"
+    nodes.seen("/a", True, 6.0 + HOLD + 0.1)
+    assert not nodes.recovered()
+    ending = nodes.ended("/a", 0, 9.5)
+    assert ending.verdict is Verdict.GIVE_UP
+    assert "its name is taken by process 7" in nodes.report("f").message
+    assert nodes.contested == {}
+
+
+def test_change_that_starts_a_contested_node_begins_anew(nodes):
+    nodes.ended("/a", 0, 5.0, conflict="its name is taken by process 7 (x): end that process")
+    change(nodes, "second", described("/a"), ["/a"], now=6.0)
+    assert nodes.contested == {}
+    nodes.ended("/a", -9, 8.0)
+    nodes.started("/a", 8.5)
+    assert nodes.recovered()
+
+
+def test_node_that_ends_at_once_has_not_done_its_work_where_somebody_else_had_its_name(nodes):
+    taken = {"/c": "its name is taken by process 7 (x): end that process", "/b": ""}
+    nodes.ask_for_change("f")
+    nodes.begin_change("f", ["/a"], ["/c"])
+    nodes.stopped("/a")
+    nodes.adopt("f", "second", described("/b", "/c"), ["/a"], ["/c"], 10.0, taken)
+    nodes.started("/c", 10.0)
+    nodes.end_change("f", 10.0)
+    assert nodes.report("f").state == STABLE  # the manipulator waits
+    assert nodes.ended("/c", 0, 10.4).verdict is Verdict.RESTART  # both have ended, so nobody answers
+    assert "process 7" in nodes.report("f").message
+
+
 def test_respawned_node_may_end_with_status_0_as_often_as_it_likes():
     nodes = ManagedNodes(POLICY)
     change(nodes, "first", described("/a", respawn=True, respawn_delay=2.0), ["/a"])
@@ -194,8 +268,9 @@ def test_end_of_a_required_node_fails_its_configuration_at_once(status):
     assert ending.text.endswith("; it is required: first is stopped")
 
 
-def test_node_is_inspected_once_when_it_has_had_time_to_advertise(nodes):
-    nodes.started("/a", 5.0)
+def test_node_is_inspected_once_when_it_has_had_time_to_advertise():
+    nodes = ManagedNodes(POLICY)
+    change(nodes, "first", described("/a"), ["/a"], now=5.0)
     assert nodes.to_inspect(5.5) == []
     assert nodes.to_inspect(6.5) == ["/a"]
     nodes.inspected("/a", ())

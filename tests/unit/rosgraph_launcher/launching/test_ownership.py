@@ -45,6 +45,30 @@ def test_process_that_nobody_launched_is_named_with_the_remedy():
     assert len(line) < 300
 
 
+def test_whoever_answers_for_a_node_that_has_ended_is_somebody_else():
+    elsewhere = Answer(True, address="http://arm-pc:41000/")
+    assert elsewhere.successor(MARK) == (
+        "its name is taken by the node at http://arm-pc:41000/: end that node, or give it another name"
+    )
+    assert Answer(True, True, (FOREIGN, INIT)).successor(MARK) == Answer(True, True, (FOREIGN, INIT)).conflict(MARK)
+    assert Answer(True, True, (OURS, INIT)).successor(MARK) == Answer().successor(MARK) == ""
+
+
+@pytest.mark.parametrize(
+    ("answer", "is_own"),
+    [
+        (Answer(True, True, (OURS, INIT), "http://robot:41001/"), True),
+        (Answer(True, True, (FOREIGN, INIT), "http://robot:41001/"), False),
+        (Answer(), False),
+        (Answer(True, address="http://arm-pc:41002/"), False),  # it was started again, and has another port
+        (Answer(True, address="http://172.17.0.2:41003/"), True),  # in a container of the launcher
+    ],
+)
+def test_contested_name_is_ones_own_again_unless_the_other_host_answers(answer, is_own):
+    conflict = Answer(True, address="http://arm-pc:41000/").successor(MARK)
+    assert answer.is_own(MARK, conflict) is is_own
+
+
 @pytest.mark.parametrize(
     ("script", "is_at_work"),
     [

@@ -18,10 +18,11 @@ from rosgraph_launcher.io.node_processes import NodeProcesses
 from rosgraph_launcher.io.ownership import look_up
 from rosgraph_launcher.io.processes import Command, Process, StartError
 from rosgraph_launcher.io.scripts import script_is_at_work
-from rosgraph_launcher.launching.managed_nodes import Ending, ManagedNodes, Verdict
+from rosgraph_launcher.launching.managed_nodes import ManagedNodes
 from rosgraph_launcher.launching.nodelets import unloading
 from rosgraph_launcher.launching.options import LauncherOptions
 from rosgraph_launcher.launching.report import LauncherReport
+from rosgraph_launcher.launching.restarts import Ending, Verdict
 
 UNLOAD_TIMEOUT = 2.0  # s, for a nodelet's manager to answer; it takes about 0.1
 STANDBY_PERIOD = 1.0  # s, from one warm process to the next one, so that their imports take no more than one core
@@ -113,6 +114,8 @@ class Launcher:
             self._release(function)
             return {"stop": time.monotonic() - began}
         commands = self._look_up(nodes, start)
+        idle = [name for name in start if not self._nodes.runs(name)]
+        taken = {name: look_up(name).successor(self._options.mark) for name in idle}
         leaving = self._nodes.begin_change(function, stop, start)
         self._report()
         self._processes.ask_to_end(leaving)
@@ -125,7 +128,7 @@ class Launcher:
             prepared_at = time.monotonic()
             self._end(leaving, forget=[name for name in leaving if name not in start])
             stopped_at = time.monotonic()
-            self._nodes.adopt(function, configuration, nodes, stop, start)
+            self._nodes.adopt(function, configuration, nodes, stop, start, stopped_at, taken)
             self._report()
             for name, command in commands.items():
                 self._nodes.started(name, self._processes.begin(name, command, prepared.pop(name, None)))
@@ -173,11 +176,13 @@ class Launcher:
         stopped: set[str] = set()
         for name, status in self._processes.take_ended().items():
             if name not in stopped:
-                conflict = look_up(name).conflict(self._options.mark)
+                conflict = look_up(name).successor(self._options.mark)
                 stopped.update(self._follow(self._nodes.ended(name, status, now, conflict)))
         for name in self._nodes.to_restart(now):
             if name not in stopped:
                 stopped.update(self._restart(name))
+        for name, conflict in self._nodes.contested.items():
+            self._nodes.seen(name, look_up(name).is_own(self._options.mark, conflict), now)
         if self._nodes.recovered():
             self._report()
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import rosgraph
-from node_kit.io.xml_rpc import CallError, Client, SilentError
+from node_kit.io.xml_rpc import CallError, Client, GarbageError, SilentError
 
 CALL_TIMEOUT = 1.0  # s, wall
 CALLER = "/rosgraph_launcher"
@@ -45,10 +45,25 @@ class NodeApi:
     def pid(cls, uri: str) -> int | None:
         """Return the process id that the node at an address says; None: it does not answer."""
         try:
-            with Client(uri, CALLER, CALL_TIMEOUT, peer="node") as node:
-                return int(node.call("getPid"))
-        except (CallError, TypeError, ValueError):
+            return cls.ask_pid(uri)
+        except CallError:
             return None
+
+    @classmethod
+    def ask_pid(cls, uri: str) -> int:
+        """Return the process id that the node at an address says.
+
+        Raises:
+            GoneError: nobody listens there.
+            SilentError: it does not answer within CALL_TIMEOUT.
+            CallError: its answer makes no sense.
+        """
+        with Client(uri, CALLER, CALL_TIMEOUT, peer="node") as node:
+            answer = node.call("getPid")
+        try:
+            return int(answer)
+        except (TypeError, ValueError) as error:
+            raise GarbageError(f"node {uri}: its process id is {answer!r}") from error
 
     @classmethod
     def is_answering(cls, name: str) -> bool:

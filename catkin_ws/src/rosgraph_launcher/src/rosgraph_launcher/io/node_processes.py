@@ -7,20 +7,23 @@ from __future__ import annotations
 
 import signal
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from node_kit.io.xml_rpc import CallError
+from node_kit.io.xml_rpc import CallError, SilentError
 
 from rosgraph_launcher.io import processes
-from rosgraph_launcher.io.master import NodeApi, forget_node
+from rosgraph_launcher.io.master import CALL_TIMEOUT, NodeApi, forget_node
 from rosgraph_launcher.io.ownership import look_up
 from rosgraph_launcher.io.processes import Command, Process, StartError
 from rosgraph_launcher.launching.options import LauncherOptions
 
 ASK_THREADS = 8  # nodes are asked to end side by side
 REASON = "replaced by another configuration"
+HANG_TIMEOUT = CALL_TIMEOUT + 0.5
+"""s, wall, after which a node is killed that does not answer the request: 0.5 s after it got SIGINT. Nothing runs in it
+that could end it in a good way, and the robot waits."""
 MOST_LOST_WARM = 3  # after so many warm processes of one kind that ended by themselves, no further one is started
 
 
@@ -38,6 +41,7 @@ class NodeProcesses:
         self._log = log
         self._running: dict[str, Process] = {}
         self._commands: dict[str, Command] = {}  # by which each node was begun last
+        self._hanging: set[str] = set()  # nodes that do not answer the request to end
         self._warm: dict[tuple[Any, ...], Process] = {}
         self._lost_warm: Counter[tuple[Any, ...]] = Counter()
         for pid in processes.kill_marked(options.mark):
@@ -81,6 +85,7 @@ class NodeProcesses:
         if process is None:
             process = processes.start(command)
         self._running[name] = process
+        self._hanging.discard(name)
         self._commands[name] = command
         return process.started
 
@@ -109,11 +114,13 @@ class NodeProcesses:
             return
         pool = ThreadPoolExecutor(ASK_THREADS, thread_name_prefix="ask to end")
         for name, process in asked.items():
-            pool.submit(_ask_to_end, name, process, self._options.mark)
+            pool.submit(self._ask_to_end, name, process)
         pool.shutdown(wait=False)
 
     def end(self, names: Iterable[str], forget: Collection[str] = (), patience: bool = True) -> None:
         """Wait until nodes that were asked to end are gone. Send SIGINT, then SIGKILL, to those that stay.
+
+        Nodes that hang have less time: those that are stopped none, those that do not answer HANG_TIMEOUT.
 
         Args:
             names: the nodes.
@@ -121,12 +128,17 @@ class NodeProcesses:
             patience: whether to wait before SIGINT.
         """
         leaving = {name: self._running.pop(name) for name in list(names) if name in self._running}
+        self._kill({name: process for name, process in leaving.items() if process.is_stopped}, "is stopped")
         alive = list(leaving.values())
-        if not processes.wait_for_ends(alive, self._options.shutdown_timeout if patience else 0.0):
-            for process in alive:
-                if process.status is None:
-                    process.signal(signal.SIGINT)
-            processes.wait_for_ends(alive, self._options.sigint_timeout)
+        timeout = self._options.shutdown_timeout if patience else 0.0
+        first = min(timeout, HANG_TIMEOUT)
+        if not processes.wait_for_ends(alive, first):
+            self._kill({name: process for name, process in leaving.items() if name in self._hanging}, "does not answer")
+            if not processes.wait_for_ends(alive, timeout - first):
+                for process in alive:
+                    if process.status is None:
+                        process.signal(signal.SIGINT)
+                processes.wait_for_ends(alive, self._options.sigint_timeout)
         for name, process in leaving.items():
             if process.status is None:
                 self._log(f"node {name} (process {process.pid}) does not end by itself: killing it")
@@ -136,6 +148,27 @@ class NodeProcesses:
                 forget_node(name)
             except CallError as error:
                 self._log(f"node {name} may still be listed: {error}")
+
+    def _ask_to_end(self, name: str, process: Process) -> None:
+        """Ask a node to end over its API; by a signal where it does not listen, or somebody else has taken its name."""
+        uri = NodeApi.address(name)
+        try:
+            pid = NodeApi.ask_pid(uri) if uri else None
+        except SilentError:
+            pid = None
+            self._hanging.add(name)
+        except CallError:
+            pid = None
+        is_other = pid is None or (pid != process.pid and not look_up(name).is_up(self._options.mark))
+        if (is_other or not NodeApi.request_shutdown(name, REASON)) and process.status is None:
+            process.signal(signal.SIGINT)
+
+    def _kill(self, hanging: Mapping[str, Process], why: str) -> None:
+        """Kill nodes that hang, if they have not ended."""
+        for name, process in hanging.items():
+            if process.status is None:
+                self._log(f"node {name} (process {process.pid}) {why}: killing it")
+                process.signal(signal.SIGKILL)
 
     # -- standby --------------------------------------------------------------------------------------------------
 
@@ -185,14 +218,6 @@ class NodeProcesses:
             process.close()
             return None
         return process
-
-
-def _ask_to_end(name: str, process: Process, mark: str) -> None:
-    """Ask a node to end over its API, or by a signal where it does not listen, or somebody else has taken its name."""
-    answer = NodeApi.answer(name)
-    is_other = answer is None or (answer[1] != process.pid and not look_up(name).is_up(mark))
-    if (is_other or not NodeApi.request_shutdown(name, REASON)) and process.status is None:
-        process.signal(signal.SIGINT)
 
 
 def _kind(command: Command) -> tuple[Any, ...]:

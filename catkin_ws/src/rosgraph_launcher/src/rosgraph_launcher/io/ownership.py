@@ -23,13 +23,13 @@ def look_up(node: str) -> Answer:
     address, pid = found
     parts = urlsplit(address)
     if not is_this_host(parts.hostname or ""):
-        return Answer(answers=True)
+        return Answer(answers=True, address=address)
     try:
         process = psutil.Process(pid)
         lineage = _lineage(process)
     except psutil.Error:  # it has ended, or it has another number here than in its container
-        return Answer(answers=True)
-    return Answer(True, bool(lineage[-1].mark) or _may_serve(process, parts.port), lineage)
+        return Answer(answers=True, address=address)
+    return Answer(True, bool(lineage[-1].mark) or _may_serve(process, parts.port), lineage, address)
 
 
 def launcher_mark(name: str) -> str:

@@ -105,6 +105,13 @@ class Process:
         """Exit status, negative for a signal; None while it runs."""
         return self.popen.poll()
 
+    @property
+    def is_stopped(self) -> bool:
+        """Whether a signal has stopped it (SIGSTOP, SIGTSTP), so that it heeds nothing but SIGCONT and SIGKILL."""
+        with contextlib.suppress(psutil.Error):
+            return psutil.Process(self.pid).status() == psutil.STATUS_STOPPED
+        return False
+
     def begin(self) -> None:
         """Let a prepared process begin.
 

@@ -5,41 +5,17 @@ A node runs once, however many functions share it. Times are arguments, in secon
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from rosgraph_launcher.description import NodeDescription
+from rosgraph_launcher.launching.contested import ContestedNames
 from rosgraph_launcher.launching.nodelets import loaders
 from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
-from rosgraph_launcher.launching.restarts import DeathCounter, Meaning, RestartPolicy, meaning_of_end
+from rosgraph_launcher.launching.restarts import DeathCounter, Ending, Meaning, RestartPolicy, Verdict, meaning_of_end
 
 OFFER_AGE = 1.0  # s after a node's start: by then it has advertised its topics and services
 STANDBY_DELAY = 0.5  # s after a change: the imports of a warm process must not slow the new nodes down
-
-
-class Verdict(enum.Enum):
-    """What follows from the end of a node."""
-
-    FINISHED = "finished"  # it has done its work
-    RESTART = "restart"  # it is started again after a delay
-    GIVE_UP = "give up"  # at least one function is stopped
-
-
-@dataclass(frozen=True)
-class Ending:
-    """The end of a node.
-
-    Attributes:
-        verdict: what follows.
-        text: a line for the operator.
-        stopped: the nodes to end: a function that needs them is given up and no other one does, or they are started
-            again together with the node that ended.
-    """
-
-    verdict: Verdict
-    text: str
-    stopped: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -98,6 +74,7 @@ class ManagedNodes:
         self._policy = policy
         self._nodes: dict[str, _Node] = {}
         self._functions: dict[str, _Function] = {}
+        self._contested = ContestedNames()
         self._changes = 0
 
     # -- what runs ------------------------------------------------------------------------------------------------
@@ -111,6 +88,10 @@ class ManagedNodes:
     def names(self) -> tuple[str, ...]:
         """All nodes of all functions, also those that have done their work."""
         return tuple(self._nodes)
+
+    def runs(self, name: str) -> bool:
+        """Tell whether a node has a process."""
+        return name in self._nodes and self._nodes[name].started is not None
 
     @property
     def needed(self) -> tuple[str, ...]:
@@ -184,11 +165,14 @@ class ManagedNodes:
         nodes: Mapping[str, NodeDescription],
         stop: Collection[str],
         start: Collection[str],
+        now: float = 0.0,
+        taken: Mapping[str, str] | None = None,
     ) -> None:
         """Note that a function has the nodes of a configuration.
 
         Those are the ones in `start`, and those that ran before and are kept. A node that the configuration lacks and
-        that is not in `stop` stays until a later change stops it, unless it has done its work.
+        that is not in `stop` stays until a later change stops it, unless it has done its work. In `taken` are the nodes
+        whose names somebody else had when the change began, with who that was.
         """
         function = self._functions[name]
         if configuration != function.configuration:
@@ -196,7 +180,8 @@ class ManagedNodes:
         left = [n for n in function.nodes if n not in nodes and n not in stop and not self._nodes[n].finished]
         kept = [node for node in nodes if node not in start and node in self._nodes]
         for node in start:
-            self._nodes[node] = _Node(nodes[node])
+            self._contested.begin(node, (taken or {}).get(node, ""), now)
+            self._nodes[node] = _Node(nodes[node], serves=self._has_served(nodes[node]))
         for node in kept:
             self._nodes[node] = replace(self._nodes[node], description=nodes[node])
         names = tuple([node for node in nodes if node in start or node in kept] + left)
@@ -227,7 +212,8 @@ class ManagedNodes:
 
     def started(self, name: str, now: float) -> None:
         """Note that the process of a node has begun."""
-        self._nodes[name] = _Node(self._nodes[name].description, started=now)
+        node = self._nodes[name]
+        self._nodes[name] = _Node(node.description, started=now, serves=node.serves or None)
 
     def stopped(self, name: str) -> None:
         """Note that the process of a node has been ended on purpose."""
@@ -260,8 +246,12 @@ class ManagedNodes:
             name: of the node.
             status: exit status, negative for a signal.
             now: the time.
-            conflict: who has taken the node's name, with the remedy; empty: nobody has.
+            conflict: who has taken the node's name, with the remedy; empty: nobody is known to have.
         """
+        if status == 0:  # who takes a name again and again may be busy to end or to start
+            conflict = conflict or self._contested.conflict(name)
+        if conflict:
+            self._contested.taken(name, conflict, now)
         node = self._nodes[name]
         age = now - node.started if node.started is not None else 0.0
         node = self._nodes[name] = replace(node, started=None, has_died=True)
@@ -320,6 +310,7 @@ class ManagedNodes:
         for owner in given_up:
             stopped += [n for n in self._functions[owner].nodes if n not in stopped and not self._needing(n)]
         for node in stopped:
+            self._contested.forget(node)
             self._nodes[node] = replace(self._nodes[node], restart_at=None)
         names = " and ".join(self._functions[owner].configuration for owner in given_up)
         return Ending(Verdict.GIVE_UP, f"{message}; {reason}: {names} is stopped", tuple(stopped))
@@ -332,9 +323,20 @@ class ManagedNodes:
         """Return the nodes whose restart is due."""
         return [name for name, node in self._nodes.items() if node.restart_at is not None and node.restart_at <= now]
 
+    @property
+    def contested(self) -> dict[str, str]:
+        """The nodes that run, and whose names somebody else had taken a short while ago, with who that was."""
+        return {name: self._contested.conflict(name) for name in self._contested.names if self.runs(name)}
+
+    def seen(self, name: str, is_own: bool, now: float) -> None:
+        """Note whether the launcher's own process answers under a contested name."""
+        self._contested.seen(name, is_own, now)
+
     def recovered(self) -> bool:
-        """Make each function STABLE whose nodes all run again; return whether there is one."""
-        names = [name for name, f in self._functions.items() if f.state == RECOVERING and not self.report(name).dead]
+        """Make each function STABLE whose nodes all run again under their own names; return whether there is one."""
+        contested = set(self._contested.names)
+        recovering = [name for name, function in self._functions.items() if function.state == RECOVERING]
+        names = [n for n in recovering if not self.report(n).dead and contested.isdisjoint(self._functions[n].nodes)]
         for name in names:
             self._set(name, state=STABLE)
         return bool(names)
@@ -365,5 +367,12 @@ class ManagedNodes:
         """Return the functions other than `name` that need a node."""
         return [other for other in self._needing(node) if other != name]
 
+    def _has_served(self, description: NodeDescription) -> bool | None:
+        """Return whether a node that is started anew had topics or services before; None: nobody knows."""
+        before = self._nodes.get(description.name)
+        same = before and (before.description.executable, before.description.args)
+        return True if before and before.serves and same == (description.executable, description.args) else None
+
     def _drop_unowned(self) -> None:
         self._nodes = {name: node for name, node in self._nodes.items() if self._owners(name)}
+        self._contested.keep(self._nodes)

@@ -46,11 +46,13 @@ class Answer:
         answers: whether anybody does.
         is_comparable: whether it is a process of this host, with the id that it says.
         lineage: that process, its parent, and so on, at least up to the first one with a mark.
+        address: of the node that answers, as the master knows it.
     """
 
     answers: bool = False
     is_comparable: bool = False
     lineage: tuple[ProcessFacts, ...] = ()
+    address: str = ""
 
     def owner(self, mark: str) -> Owner:
         """Return whose process it is.
@@ -73,15 +75,39 @@ class Answer:
         """Return who has taken the node's name, with the remedy, in one line; empty where nobody has."""
         if self.owner(mark) is not Owner.FOREIGN:
             return ""
-        process, *parents = self.lineage
+        process, starter = self.lineage[0], self.starter
         line = f"its name is taken by process {process.pid} ({_short(process.command)})"
-        for parent in parents:
-            if "roslaunch" in parent.command:
-                return (
-                    f"{line}, which process {parent.pid} ({_short(parent.command)}) starts, too: remove the node from "
-                    'that launch file, or its respawn="true"'
-                )
+        if starter:
+            return (
+                f"{line}, which process {starter.pid} ({_short(starter.command)}) starts, too: remove the node from "
+                'that launch file, or its respawn="true"'
+            )
         return f"{line}: end that process, and remove the node from what starts it"
+
+    @property
+    def starter(self) -> ProcessFacts | None:
+        """The roslaunch that starts it, maybe again and again; None: there is none, as far as is known."""
+        return next((parent for parent in self.lineage[1:] if "roslaunch" in parent.command), None)
+
+    def successor(self, mark: str) -> str:
+        """Return who has taken the name of a node whose own process has ended; empty where nobody has.
+
+        Whoever answers under it is somebody else, also one that can't be compared.
+        """
+        if self.owner(mark) is Owner.UNKNOWN:
+            return f"its name is taken by the node at {self.address}: end that node, or give it another name"
+        return self.conflict(mark)
+
+    def is_own(self, mark: str, conflict: str) -> bool:
+        """Tell whether the launcher's node answers under its name again, although somebody else had taken it.
+
+        Args:
+            mark: of the launcher.
+            conflict: who had taken it.
+        """
+        host = urlsplit(self.address).hostname or ""
+        is_same_host = f"//{host}:" in conflict
+        return self.owner(mark) is Owner.LAUNCHER or (self.owner(mark) is Owner.UNKNOWN and not is_same_host)
 
 
 @dataclass(frozen=True)

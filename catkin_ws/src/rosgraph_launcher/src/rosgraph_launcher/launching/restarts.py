@@ -18,6 +18,30 @@ class Meaning(enum.Enum):
     FAILURE = "failure"  # its configuration is nothing without it
 
 
+class Verdict(enum.Enum):
+    """What follows from the end of a node."""
+
+    FINISHED = "finished"  # it has done its work
+    RESTART = "restart"  # it is started again after a delay
+    GIVE_UP = "give up"  # at least one function is stopped
+
+
+@dataclass(frozen=True)
+class Ending:
+    """The end of a node.
+
+    Attributes:
+        verdict: what follows.
+        text: a line for the operator.
+        stopped: the nodes to end: a function that needs them is given up and no other one does, or they are started
+            again together with the node that ended.
+    """
+
+    verdict: Verdict
+    text: str
+    stopped: tuple[str, ...] = ()
+
+
 def meaning_of_end(node: NodeDescription, status: int | None, serves: bool, replaced: bool) -> Meaning:
     """Return what the end of a node means.
 
