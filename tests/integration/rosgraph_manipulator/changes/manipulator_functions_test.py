@@ -131,6 +131,7 @@ class FunctionsTest(PairTest):
         self.assertEqual(self.change("f_look").result, 1)
         self.wait_for_functions(f_pick="pick_softly", f_sort="sort_slowly")
         self.assertIsNone(pid_of(VIEWER))
+        self.assertIn(f"run on: {CAMERA}", self.states[-1].message)
         self.assertFalse(rospy.has_param(f"{VIEWER}/controller_frequency"))
         self.assert_same(CAMERA, GRIPPER, SORTER)
         self.send_goal()

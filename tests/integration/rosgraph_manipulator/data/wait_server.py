@@ -2,6 +2,7 @@
 """An actionlib server: a goal of 0 is pending until cancelled, any other succeeds at once.
 
 Arguments make it misbehave: --exit-at-once, --hang, --stubborn, --die-after SECONDS, --port NUMBER.
+With --passes-on ACTION it sends that action, its own one mostly, a goal of 0 for each message on `simple_goal`.
 """
 
 import argparse
@@ -14,8 +15,9 @@ import time
 
 import actionlib
 import rospy
-from actionlib.msg import TestAction, TestResult
+from actionlib.msg import TestAction, TestGoal, TestResult
 from node_kit.ros.action_server import EndsQuietly
+from std_msgs.msg import Empty
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--exit-at-once", action="store_true")
@@ -23,6 +25,7 @@ parser.add_argument("--hang", action="store_true")
 parser.add_argument("--stubborn", action="store_true")
 parser.add_argument("--die-after", type=float)
 parser.add_argument("--port", type=int)
+parser.add_argument("--passes-on")
 options = parser.parse_args(rospy.myargv()[1:])
 
 if options.exit_at_once:
@@ -51,6 +54,13 @@ def accept(handle):
 
 server = Server("wait", TestAction, accept, lambda handle: handle.set_canceled(), auto_start=False)
 server.start()
+if options.passes_on:
+    client = actionlib.SimpleActionClient(options.passes_on, TestAction)
+    client.wait_for_server()
+    heard_by = client.action_client.pub_goal.impl.has_connection
+    while not (heard_by("/rosgraph_manipulator") or heard_by("/action_relay")):  # who keeps the goal
+        rospy.sleep(0.01)
+    rospy.Subscriber("simple_goal", Empty, lambda _: client.send_goal(TestGoal(0)))
 if options.die_after:
     threading.Timer(options.die_after, os._exit, [3]).start()
 while options.stubborn:

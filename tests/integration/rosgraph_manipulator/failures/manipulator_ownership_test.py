@@ -8,7 +8,7 @@ from pathlib import Path
 
 import rostest
 from helpers.waiting import DEADLINE_S, wait_for
-from integration.rosgraph_manipulator.manipulator_harness import HERE, PairTest, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import HERE, Node, PairTest, pid_of
 from rosgraph_launcher.io.ownership import launcher_mark, look_up
 from rosgraph_launcher.launching.ownership import Owner
 
@@ -39,7 +39,7 @@ class OwnershipTest(PairTest):
 
     def test_node_that_another_launch_file_respawns_fails_with_the_remedy(self):
         self.assertIs(self.owner(), Owner.LAUNCHER)
-        ours = pid_of("/wait_server")
+        ours, before = pid_of("/wait_server"), len(self.states)
         end_foreign = self.start_foreign()
         wait_for(lambda: self.launcher_state.state == "FAILED", lambda: f"FAILED, not {self.launcher_state}")
         failed = self.launcher_state.message
@@ -49,15 +49,31 @@ class OwnershipTest(PairTest):
         self.assertNotEqual(pid_of("/wait_server"), ours)
 
         wait_for(lambda: self.state.state == "FAILED", "the configuration has failed")
+        self.assertEqual(self.stable_since(before), [], "never stable while the other one takes the name")
         wait_for(lambda: self.owner() is Owner.FOREIGN, "the other node runs alone")
-        self.request("fast")  # the name is free for the moment in which the other node is replaced
-        wait_for(lambda: self.state.state == "FAILED", lambda: f"it has failed, too: {self.state}")
+        before = len(self.states)
+        self.assertEqual(self.request("fast"), -2, "the name is free only while the other node is replaced")
+        self.assertIn("its name is taken by process", self.text)
+        self.assertEqual((self.state.state, self.stable_since(before)), ("FAILED", []))
         wait_for(lambda: self.owner() is Owner.FOREIGN, "the other node runs alone again")
-        self.assertIn("its name is taken by process", self.launcher_state.message or self.text)
 
         end_foreign()
         self.assertEqual(self.request("fast"), 1, self.text)
         self.assertIs(self.owner(), Owner.LAUNCHER)
+
+    def test_node_that_somebody_starts_once_under_the_name_is_replaced(self):
+        before = len(self.states)
+        foreign = Node("metacontrol_tests", "tunable.py", "__name:=wait_server")
+        self.addCleanup(foreign.end, signal.SIGKILL)
+        wait_for(lambda: [s for s in self.states[before:] if s.functions[0].state == "RECOVERING"], "it is noticed")
+        (line,) = {s.message for s in self.states[before:] if s.functions[0].state == "RECOVERING"}
+        self.assertIn("its name is taken by process", line)
+        wait_for(lambda: self.stable_since(before), "it recovers")
+        self.assertIs(self.owner(), Owner.LAUNCHER)
+
+    def stable_since(self, number):
+        """What was told of a stable configuration since there were so many messages."""
+        return [message for message in self.states[number:] if message.functions[0].state == "STABLE"]
 
 
 if __name__ == "__main__":

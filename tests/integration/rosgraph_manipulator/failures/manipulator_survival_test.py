@@ -17,7 +17,7 @@ import rostest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist
 from helpers.cases import case
-from helpers.ports import reserved_port
+from helpers.ports import QUIET_HOST, reserved_port
 from helpers.waiting import DEADLINE_S, wait_for
 from integration.rosgraph_manipulator.manipulator_harness import Node, PairTest, is_alive, later, pid_of
 from metacontrol_msgs.msg import MvpReconfigurationGoal
@@ -185,12 +185,14 @@ class SurvivalTest(PairTest):
     def test_launcher_that_dies_just_when_it_is_asked_is_waited_for(self):
         """The kernel closes a dying launcher's sockets one by one: it may be found, and then refuse the request."""
         self.launcher.end(signal.SIGKILL)
-        dying = socket.create_server(("localhost", 0))
+        dying = socket.create_server((QUIET_HOST, 0))
         found = threading.Thread(target=accept_one, args=(dying,), daemon=True)
         found.start()
         port = dying.getsockname()[1]
         service = rospy.resolve_name("rosgraph_launcher/change")
-        rosgraph.Master("/dying_launcher").registerService(service, f"rosrpc://localhost:{port}", "http://localhost:1")
+        rosgraph.Master("/dying_launcher").registerService(
+            service, f"rosrpc://{QUIET_HOST}:{port}", "http://localhost:1"
+        )
         self.client.send_goal(MvpReconfigurationGoal("fast"))
         found.join(DEADLINE_S)
         self.assertFalse(found.is_alive(), self.manipulator.said())

@@ -13,6 +13,7 @@ from actionlib.msg import TestAction
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from helpers.waiting import DEADLINE_S, wait_for
 from integration.rosgraph_manipulator.manipulator_harness import HERE, PairTest, pid_of
+from std_msgs.msg import Empty
 
 GRIPPER, ACTION = "/cell/arm/gripper", "/cell/arm/wait"
 SCRIPT = """
@@ -30,12 +31,19 @@ rospy.spin()
 """
 
 
-def pick(force):
-    return {"function": "f_pick", "launch": str(HERE / "cell_pick.launch"), "args": [f"force:={force}"]}
+def pick(force, *args):
+    return {"function": "f_pick", "launch": str(HERE / "cell_pick.launch"), "args": [f"force:={force}", *args]}
 
 
 class ClientsTest(PairTest):
-    configurations = {"softly": pick(1), "hard": pick(9)}
+    configurations = {
+        "softly": pick(1),
+        "hard": pick(9),
+        "softly_on_its_own": pick(1, "args:=--passes-on wait"),
+        "hard_on_its_own": pick(9, "args:=--passes-on wait"),
+        "softly_with_foreman": pick(1, "foreman:=true"),
+        "hard_with_foreman": pick(9, "foreman:=true"),
+    }
     manipulator_parameters = {
         "save_action": "",
         "goal_msg_type": "",
@@ -75,6 +83,17 @@ class ClientsTest(PairTest):
     def newest(self, before):
         active = (goal for goal, state in self.server_goals.items() if state == GoalStatus.ACTIVE)
         return next((goal for goal in active if goal not in before), None)
+
+    def ask_on(self, topic):
+        """Send a message that a node of the cell makes a goal of; return its id as soon as it is kept."""
+        before = set(self.server_goals)
+        publisher = rospy.Publisher(topic, Empty, queue_size=1)
+        self.addCleanup(publisher.unregister)
+        wait_for(publisher.get_num_connections, f"somebody listens on {topic}")
+        publisher.publish(Empty())
+        goal_id = wait_for(lambda: self.newest(before), "its goal is at work")
+        wait_for(lambda: rospy.has_param(f"{ACTION}/resume_goal"), "its goal is kept")
+        return goal_id
 
     def kill_server(self):
         """Kill the gripper, and wait until another one is in its place."""
@@ -129,6 +148,21 @@ class ClientsTest(PairTest):
             wait_for(lambda: goal_id in self.server_goals, "the next server has the goal")
         self.kill_server()
         self.assert_dropped(goal_id, "its server has died 4 times")
+
+    def test_goal_that_the_server_sends_itself_goes_on_at_the_next_server(self):
+        self.assertEqual(self.request("softly_on_its_own"), 1, self.text)
+        goal_id = self.ask_on("/cell/arm/simple_goal")
+        self.assertIn(f"{GRIPPER}-", goal_id)  # it is by the server's own client
+        self.assertEqual(self.request("hard_on_its_own"), 1, self.text)
+        wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the next server has the goal")
+        self.kill_server()
+        wait_for(lambda: self.server_goals.get(goal_id) == GoalStatus.ACTIVE, "the one after a death has it, too")
+
+    def test_goal_of_a_node_that_the_change_stops_too_ends_with_the_server(self):
+        self.assertEqual(self.request("softly_with_foreman"), 1, self.text)
+        goal_id = self.ask_on("/cell/ask")
+        self.assertEqual(self.request("hard_with_foreman"), 1, self.text)
+        self.assert_dropped(goal_id, "its client /cell/foreman ends, too")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,8 @@ import rostest
 from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from helpers.waiting import DEADLINE_S, wait_for
-from integration.rosgraph_manipulator.manipulator_harness import PairTest, pid_of
+from integration.rosgraph_manipulator.manipulator_harness import CONFIGURATIONS, PairTest, configuration, pid_of
+from std_msgs.msg import Empty
 
 SCRIPT = """
 import actionlib, rospy
@@ -24,6 +25,11 @@ rospy.spin()
 
 
 class RelayTest(PairTest):
+    configurations = {
+        **CONFIGURATIONS,
+        "asks_slow": configuration(period="slow", args="--passes-on asked"),
+        "asks_fast": configuration(period="fast", args="--passes-on asked"),
+    }
     manipulator_parameters = {"save_action": "", "settle_time": 0.2, "probation": 0.0}
 
     @classmethod
@@ -63,7 +69,10 @@ class RelayTest(PairTest):
         self.addCleanup(script.kill)
         self.addCleanup(script.wait, DEADLINE_S)
         wait_for(lambda: len(self.at_work()) == 1, "the server has the goal")
-        goals = {goal for goal, state in self.seen if goal.startswith("/script") and state == GoalStatus.ACTIVE}
+        active = GoalStatus.ACTIVE
+        goals = wait_for(
+            lambda: {g for g, state in self.seen if g.startswith("/script") and state == active}, "its goal"
+        )
         script.kill()
         script.wait(DEADLINE_S)
         server = self.server
@@ -71,6 +80,19 @@ class RelayTest(PairTest):
         wait_for(lambda: {(goal, GoalStatus.PREEMPTED) for goal in goals} & set(self.seen), "its goal has ended")
         wait_for(lambda: self.server is not server, "the next server is there")
         self.assertEqual(self.at_work(), [])
+
+    def test_goal_that_the_server_sends_through_the_relay_to_itself_goes_on(self):
+        self.assertEqual(self.request("asks_slow"), 1, self.text)
+        publisher = rospy.Publisher("simple_goal", Empty, queue_size=1)
+        wait_for(publisher.get_num_connections, "the server takes goals in another way")
+        publisher.publish(Empty())
+        wait_for(lambda: len(self.at_work()) == 1, "the server has the goal")
+        own = wait_for(lambda: next((g for g, _ in self.seen if g.startswith("/wait_server")), None), "it is its own")
+        server = self.server
+        self.assertEqual(self.request("asks_fast"), 1, self.text)
+        wait_for(lambda: self.server is not server and len(self.at_work()) == 1, "the next server has the goal")
+        self.outer.cancel_all_goals()
+        wait_for(lambda: (own, GoalStatus.PREEMPTED) in self.seen, "the goal is taken back")
 
     def test_results_are_passed_on(self):
         client = actionlib.SimpleActionClient("asked", TestAction)

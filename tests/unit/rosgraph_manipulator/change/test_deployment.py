@@ -26,6 +26,7 @@ class Recorder:
 
     def __init__(self, **failures):
         self.calls = []
+        self.staying = ()
         self._failures = failures
 
     def _call(self, name, text=""):
@@ -53,6 +54,7 @@ class Recorder:
 
     def release(self, function):
         self._call("release", function)
+        return self.staying
 
 
 def run(executor, plans, last_good=OLD):
@@ -173,6 +175,14 @@ def test_released_function_runs_nothing(running, told):
     assert (outcome.result, outcome.running) == (Result.OK, None)
     assert told in outcome.message
     assert executor.calls == ["release f"]
+
+
+def test_nodes_that_other_functions_need_are_not_told_to_be_stopped():
+    executor = Recorder()
+    executor.staying = {"/cell/arm", "/cell/camera"}
+    outcome = release(executor, "f", OLD, Stopwatch(itertools.count().__next__))
+    told = "f is released: old is given up, and for other functions these of its nodes run on: /cell/arm, /cell/camera"
+    assert outcome.message == told
 
 
 def test_release_that_fails_is_told():

@@ -3,6 +3,8 @@
 import socket
 
 import pytest
+from helpers.ports import QUIET_HOST
+from metacontrol_msgs.msg import LaunchedFunction
 from rosgraph_manipulator.cli import plan, request, status
 
 NODE = '<node name="{}" pkg="move_base" type="move_base"/>'
@@ -10,9 +12,9 @@ NODE = '<node name="{}" pkg="move_base" type="move_base"/>'
 
 @pytest.fixture(autouse=True)
 def _no_master(monkeypatch):
-    with socket.create_server(("127.0.0.1", 0)) as server:
+    with socket.create_server((QUIET_HOST, 0)) as server:
         port = server.getsockname()[1]
-    monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{port}")
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://{QUIET_HOST}:{port}")
 
 
 @pytest.fixture
@@ -49,6 +51,15 @@ def test_plan_names_the_hosts_that_need_a_launcher(run, launch_files, tmp_path):
     assert "node /n is for host 192.0.2.7: a rosgraph_launcher must run there" in output.splitlines()
 
 
+def test_status_leaves_out_a_function_that_was_released():
+    released = LaunchedFunction(function="f_go", state="STABLE")
+    picks = LaunchedFunction(
+        function="f_pick", configuration="softly", state="RECOVERING", nodes=["/arm"], dead=["/arm"], message="it died"
+    )
+    assert status.process_lines([released]) == []
+    assert status.process_lines([released, picks]) == ["  f_pick: softly RECOVERING", "    /arm (dead)", "    it died"]
+
+
 @pytest.mark.parametrize("remapping", ["__ns:=/robot", "__name:=x", "a:=b", "_rate:=1"])
 def test_remapping_arguments_are_left_to_ros(run, launch_files, remapping):
     assert run(plan, remapping, *launch_files)[0] == 0
@@ -83,8 +94,8 @@ def test_configuration_without_its_package_refuses_no_plan_of_the_others(run, la
     [
         (plan, ("a", "b"), "a: no ROS master knows the configurations: start the manipulator or give --config\n"),
         (plan, ("/no/such.launch", ""), "/no/such.launch"),
-        (request, ("a",), "no ROS master at http://127.0.0.1:"),
-        (status, (), "no ROS master at http://127.0.0.1:"),
+        (request, ("a",), f"no ROS master at http://{QUIET_HOST}:"),
+        (status, (), f"no ROS master at http://{QUIET_HOST}:"),
     ],
 )
 def test_refusal_is_one_line_and_status_2(run, command, words, told):

@@ -140,6 +140,15 @@ def test_adopted_goal_is_kept_while_its_server_is_replaced():
     assert not keeper.is_at_work
 
 
+def test_adopted_goal_is_kept_until_the_new_server_has_it():
+    keeper = GoalKeeper()
+    keeper.server_changes(True)
+    keeper.adopt(goal("a"))
+    keeper.server_changes(False)
+    keeper.on_status(GoalStatusArray())  # the new server's, before the goal was sent to it
+    assert keeper.to_send(0.0).goal_id.id == "a"
+
+
 def test_goal_at_work_that_is_not_pending_is_a_stray():
     keeper = GoalKeeper()
     keeper.on_goal(goal("new"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -50,8 +50,12 @@ class ChangeExecutor(StepExecutor, Protocol):
     def restore(self, configuration: Configuration) -> None:
         """Stop all nodes that run for a configuration's function, and start all nodes of the configuration."""
 
-    def release(self, function: str) -> None:
-        """Stop all nodes that only this function needs, and the robot if none of the others drives it."""
+    def release(self, function: str) -> Collection[str]:
+        """Stop all nodes that only this function needs, and the robot if none of the others drives it.
+
+        Returns:
+            The nodes that stay, because other functions need them.
+        """
 
 
 @dataclass(frozen=True)
@@ -154,12 +158,15 @@ def release(executor: ChangeExecutor, function: str, running: Configuration | No
     """
     try:
         with watch.phase("stop"):
-            executor.release(function)
+            staying = executor.release(function)
     except CancelledError as error:
         return Outcome(Result.FAILED, running, f"{function}: {error}", cancelled=True)
     except DeploymentError as error:
         return Outcome(Result.GENERAL_ERROR, None, f"{function} could not be released: {error}")
     what = f"{running.name} is stopped" if running else "nothing ran for it"
+    if running and staying:
+        what = f"{running.name} is given up, and for other functions these of its nodes run on: "
+        what += ", ".join(sorted(staying))
     return Outcome(Result.OK, None, f"{function} is released: {what}", "release")
 
 

@@ -67,6 +67,17 @@ class ChangeProgress:
         """The nodes that the launcher should run for all functions."""
         return tuple(dict.fromkeys(node for report in (self._reports or {}).values() for node in report.nodes))
 
+    @property
+    def at_work(self) -> frozenset[str]:
+        """The nodes that the launcher runs."""
+        return frozenset(
+            node
+            for report in (self._reports or {}).values()
+            if report.state != FAILED
+            for node in report.nodes
+            if node not in report.dead
+        )
+
     def launched_for(self, function: str) -> tuple[str, ...]:
         """Return the nodes that the launcher should run for a function."""
         report = self.report(function)
@@ -137,6 +148,11 @@ class ChangeProgress:
     def start(self, nodes: tuple[str, ...]) -> None:
         """Note which nodes a step of the change starts."""
         self._started = tuple(dict.fromkeys((*self._started, *nodes)))
+
+    @property
+    def started(self) -> tuple[str, ...]:
+        """The nodes that the change has started."""
+        return self._started
 
     def leave(self, leaving: Collection[str], drivers: Collection[str], servers: Collection[str] | None) -> bool:
         """Note which nodes end or are started anew; return whether the kept action gets a new server.

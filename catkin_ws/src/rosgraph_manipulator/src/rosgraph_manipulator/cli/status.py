@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import click
+from metacontrol_msgs.msg import LaunchedFunction
 
 from rosgraph_manipulator.cli.invocation import HELP, print_last_change, run
 from rosgraph_manipulator.ros import client
@@ -21,13 +24,20 @@ def status() -> None:
         print_last_change(active)
     for name, launcher in launchers.items():
         of = "" if len(launchers) == 1 else f" of {name}"
-        click.echo(f"processes{of}: {'' if launcher.functions else 'none'}".rstrip())
-        for function in launcher.functions:
-            click.echo(f"  {function.function}: {function.configuration or 'none'} {function.state}")
-            for node in function.nodes:
-                click.echo(f"    {node}{' (dead)' if node in function.dead else ''}")
-            if function.message:
-                click.echo(f"    {function.message}")
+        lines = process_lines(launcher.functions)
+        click.echo("\n".join([f"processes{of}:{'' if lines else ' none'}", *lines]))
+
+
+def process_lines(functions: Iterable[LaunchedFunction]) -> list[str]:
+    """Return what a launcher runs, in lines; a function that was released runs nothing."""
+    lines = []
+    for function in functions:
+        if not (function.configuration or function.nodes):
+            continue
+        lines.append(f"  {function.function}: {function.configuration or 'none'} {function.state}")
+        lines += [f"    {node}{' (dead)' if node in function.dead else ''}" for node in function.nodes]
+        lines += [f"    {function.message}"] if function.message else []
+    return lines
 
 
 def main() -> None:

@@ -107,8 +107,12 @@ class GoalKeeper:
         return ""
 
     def server_changes(self, changing: bool) -> None:
-        """Note whether the server is being replaced. A goal that it drops meanwhile stays pending."""
+        """Note whether the server is being replaced. A goal that it drops meanwhile stays pending.
+
+        The next server confirms nothing: it lacks the goal until it gets it.
+        """
         self._changing, self._cancelled, self._sent_at = changing, None, float("-inf")
+        self._doubted = self._doubted and changing
 
     @property
     def is_delivered(self) -> bool:

@@ -6,16 +6,14 @@ import contextlib
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import rospy
 from geometry_msgs.msg import Twist
 from node_kit.io.xml_rpc import CallError
-from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io.master import NodeApi, advertised
-from rosgraph_launcher.io.ownership import look_up
-from rosgraph_launcher.io.scripts import script_is_at_work
+from rosgraph_launcher.launching.contested import HOLD
 from rosgraph_launcher.launching.report import LauncherReport
 
 from rosgraph_manipulator.change.deployment import DeploymentError
@@ -28,24 +26,15 @@ from rosgraph_manipulator.io.launch_files import LaunchFile
 from rosgraph_manipulator.io.master import get_parameters, publishers, set_parameters
 from rosgraph_manipulator.ros.goal import PendingGoal
 from rosgraph_manipulator.ros.launchers import Launchers
+from rosgraph_manipulator.ros.node_names import NodeNames
 from rosgraph_manipulator.ros.running_system import RunningSystem
+from rosgraph_manipulator.ros.waiting import POLL_PERIOD, wait_until
 
-POLL_PERIOD = 0.01  # s, wall
 LOOK_PERIOD = 0.03  # s, wall, where a look calls the master and nodes: new nodes need the processor, and the master
 STATE_TIMEOUT = 2.0  # s, wall, for the launcher's state to follow its answer
 DELIVERY_TIMEOUT = 5.0  # s, wall, for the new server to have the pending goal
 COMMAND_TIMEOUT = 5.0  # s, wall, for a `rosparam` call of a launch file
 ASK_THREADS = 8  # nodes are asked side by side whether they hang
-
-
-def wait_until(condition: Callable[[], bool], timeout: float) -> bool:
-    """Wait for a condition; return whether it became true within `timeout` (s, wall)."""
-    deadline = time.monotonic() + timeout
-    while not condition():
-        if time.monotonic() > deadline or rospy.is_shutdown():
-            return False
-        time.sleep(POLL_PERIOD)
-    return True
 
 
 class RosExecutor:
@@ -82,6 +71,7 @@ class RosExecutor:
         self._progress = ChangeProgress()
         self._launchers = launchers
         self.system = RunningSystem(options, self._progress, launchers.is_here)
+        self._names = NodeNames(self.system, self._progress, launchers)
         self._servers_died: dict[str, bool] = {}  # by function: whether the kept action's server died
         self._news = threading.Condition()
         self._follows = False  # whether the reports of the launcher that made the last change arrive
@@ -124,6 +114,7 @@ class RosExecutor:
         """Begin the change to a configuration by a plan; nothing is touched yet."""
         self.check()
         self._follows = False
+        self._names.begin()
         rospy.loginfo("%s: %s", wanted.name, " ".join(str(plan).split()))
         self._progress.begin(wanted.function, wanted, time.monotonic())
 
@@ -140,6 +131,7 @@ class RosExecutor:
         launch = self.system.launch_file(wanted)
         leaving = {*stop, *start} - (self._progress.shared(wanted.function) - set(start))
         self._progress.start(start)
+        self._names.see_takers(set(start) - self._progress.at_work)
         if leaving:
             self._end_foreign_nodes(wanted.function)
             self._see_who_leaves(wanted.function, leaving)
@@ -155,7 +147,7 @@ class RosExecutor:
         awaited = self._progress.awaited(goal is not None and goal.is_between_servers)
         for node in awaited.nodes:
             what = f"node {node} is not up"
-            self._wait(lambda: self._is_up(node), what, lambda: self._conflict(node), LOOK_PERIOD)  # noqa: B023
+            self._wait(lambda: self._names.is_up(node), what, lambda: self._names.conflict(node), LOOK_PERIOD)  # noqa: B023
         topics = {rospy.resolve_name(topic) for topic in awaited.topics}
         if topics:
             missing = set(topics)
@@ -179,12 +171,14 @@ class RosExecutor:
         while time.monotonic() < end:
             self._raise_if_broken()
             time.sleep(POLL_PERIOD)
+        self._see_names_held(self._progress.started)
 
     def restore(self, configuration: Configuration) -> None:
         """Stop what runs for a function alone, and start all nodes of a configuration; this is not interrupted."""
         check, self.check = self.check, lambda: None
         try:
             function = configuration.function
+            self._names.begin()
             self._progress.begin(function, configuration, time.monotonic())
             system = self.system.describe(configuration)
             # Where the launcher has died, nothing runs for the other functions either.
@@ -192,13 +186,19 @@ class RosExecutor:
             stop = tuple(node for node in self._progress.launched_for(function) if node not in shared)
             self.change_processes(stop, tuple(node for node in system.nodes if node not in shared))
             self.wait_until_ready()
+            self._see_names_held(())
         finally:
             self.check = check
 
-    def release(self, function: str) -> None:
-        """Stop all nodes that only this function needs, and the robot if none of the others drives it."""
+    def release(self, function: str) -> frozenset[str]:
+        """Stop all nodes that only this function needs, and the robot if none of the others drives it.
+
+        Returns:
+            The nodes that stay, because other functions need them.
+        """
         self._progress.begin(function, None, time.monotonic())
-        leaving = set(self._progress.launched_for(function)) - self._progress.shared(function)
+        staying = self._progress.shared(function).intersection(self._progress.launched_for(function))
+        leaving = set(self._progress.launched_for(function)) - staying
         try:
             if leaving:
                 self._see_who_leaves(function, leaving)
@@ -207,6 +207,7 @@ class RosExecutor:
             self._store_parameters(function, None)
         finally:
             self.stop_robot(function)
+        return staying
 
     def forget_goal(self, function: str) -> None:
         """Drop the pending goal of a function that is needed no longer."""
@@ -322,7 +323,7 @@ class RosExecutor:
         """End nodes of the same function that somebody else started."""
         for node in self._options.of(function).kill_nodes:
             name = rospy.resolve_name(node)
-            ours = name in self._progress.launched
+            ours = name in self._progress.at_work
             if not ours and NodeApi.request_shutdown(name, "replaced by another configuration"):
                 gone = wait_until(lambda: not NodeApi.is_answering(name), self._ready_timeout)  # noqa: B023
                 if not gone:
@@ -337,7 +338,7 @@ class RosExecutor:
         except CallError as error:
             raise DeploymentError(str(error)) from error
         if self._progress.leave(leaving, drivers, servers) and goal is not None:
-            goal.server_stops()
+            goal.server_stops(leaving)
 
     def _follow(self) -> None:
         with self._news:
@@ -345,30 +346,6 @@ class RosExecutor:
                 self._cmd_vel.publish(Twist())
             self._news.notify_all()
         self._on_report()
-
-    def _is_up(self, node: str) -> bool:
-        description = self._description(node)
-        if description and not self._launchers.is_here(description):
-            return self._launchers.check(description)[0] or self._progress.has_finished(node)
-        mark = self._launchers.mark(description)
-        return (
-            look_up(node).is_up(mark)
-            or self._progress.has_finished(node)
-            or (description is not None and script_is_at_work(description, mark))
-        )
-
-    def _description(self, node: str) -> NodeDescription | None:
-        wanted = self._progress.wanted
-        return self.system.launch_file(wanted).system.nodes.get(node) if wanted else None
-
-    def _conflict(self, node: str) -> str:
-        """Return who has taken a node's name, for the end of a line; empty where nobody has."""
-        description = self._description(node)
-        if description and not self._launchers.is_here(description):
-            conflict = self._launchers.check(description)[1]
-        else:
-            conflict = look_up(node).conflict(self._launchers.mark(description))
-        return conflict and f" ({conflict})"
 
     def _wait(
         self, condition: Callable[[], bool], what: str, why: Callable[[], str] = str, period: float = POLL_PERIOD
@@ -384,6 +361,22 @@ class RosExecutor:
             if time.monotonic() > deadline:
                 raise DeploymentError(f"{what} within {self._ready_timeout:g} s{why()}; see the nodes' logs")
             time.sleep(period)
+
+    def _see_names_held(self, nodes: Collection[str]) -> None:
+        """See that nobody has taken the names of nodes, nor takes back those that somebody else had, for a while.
+
+        Raises:
+            DeploymentError: somebody has.
+        """
+        until = time.monotonic() + (HOLD if self._names.contested else 0.0)
+        while True:
+            self._raise_if_broken()
+            for node in {*nodes, *self._names.contested}:
+                if conflict := self._names.conflict(node):
+                    raise DeploymentError(f"node {node} has lost its name{conflict}")
+            if time.monotonic() >= until:
+                return
+            time.sleep(LOOK_PERIOD)
 
     def _raise_if_broken(self) -> None:
         self.check()

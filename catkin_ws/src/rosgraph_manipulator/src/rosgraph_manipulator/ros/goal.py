@@ -12,7 +12,7 @@ import contextlib
 import io
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import genpy
@@ -24,8 +24,10 @@ from rosgraph_manipulator.configuration.configurations import ConfigurationError
 from rosgraph_manipulator.goals.clients import Client
 from rosgraph_manipulator.goals.goal_keeper import GoalKeeper
 from rosgraph_manipulator.ros.goal_clients import GoalClients
+from rosgraph_manipulator.ros.waiting import wait_until
 
 QUEUE = 10
+STATUS_TIMEOUT = 1.0  # s, wall, for a status of the server: actionlib's have one every 0.2 s
 
 
 class PendingGoal:
@@ -70,14 +72,19 @@ class PendingGoal:
         """Full name of the server's status topic."""
         return str(rospy.resolve_name(f"{self._action}/status"))
 
-    def server_stops(self, died: bool = False, is_back: bool = False) -> None:
+    def server_stops(self, leaving: Collection[str] = (), died: bool = False, is_back: bool = False) -> None:
         """Note that the server will be stopped now, or has died; drop the goal where nobody waits for it any more.
 
         Args:
+            leaving: the nodes that will be stopped together with it.
             died: whether it has died.
             is_back: whether it was started again, so that the last status may be that of the new one.
         """
-        why_gone = self._clients.why_gone(self._keeper.client)
+        if not died:
+            # A goal that has ended while there was no manipulator is dropped by the first status of the server, and no
+            # later one of this server can be taken for one of the next.
+            wait_until(lambda: self._server is not None, STATUS_TIMEOUT)
+        why_gone = self._clients.why_gone(self._keeper.client, leaving)
         for goal_id in self._keeper.missed:
             missed = f"its client sent it before {rospy.get_name()} was connected to it: use action_relay"
             rospy.logwarn("%s: goal %s is not kept: %s", self._action, goal_id, missed)

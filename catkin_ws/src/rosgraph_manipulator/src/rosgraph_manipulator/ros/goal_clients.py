@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import rospy
@@ -10,7 +11,7 @@ from node_kit.io.xml_rpc import Client as Api
 from rosgraph_launcher.io.master import master
 
 from rosgraph_manipulator.goals.clients import Client, client_of
-from rosgraph_manipulator.io.master import CALLER, subscribers
+from rosgraph_manipulator.io.master import CALLER, publishers, subscribers
 
 _TIMEOUT = 0.5  # s, wall, for a node to answer: one that has died refuses at once
 
@@ -18,9 +19,10 @@ _TIMEOUT = 0.5  # s, wall, for a node to answer: one that has died refuses at on
 class GoalClients:
     """The clients of one action, by the master and by their own APIs."""
 
-    def __init__(self, action: str) -> None:
-        """Take the action's name."""
+    def __init__(self, action: str, server: str = "") -> None:
+        """Take the names of the action, and of the one behind it whose server pursues its goals, if there is one."""
         self._result = rospy.resolve_name(f"{action}/result")
+        self._status = rospy.resolve_name(f"{server or action}/status")
 
     def of(self, goal: Any) -> Client | None:
         """Return who waits for a goal that has just come as a message; None: nobody who is known."""
@@ -28,17 +30,23 @@ class GoalClients:
         if not sender or sender == rospy.get_name():  # a goal that this node repeats
             return None
         try:
-            return client_of(sender, _address(sender), subscribers(self._result))
+            return client_of(sender, _address(sender), subscribers(self._result), publishers(self._status))
         except CallError:
             return None
 
-    def why_gone(self, client: Client | None) -> str:
-        """Return why nobody waits any more; empty where the client does, as far as is known, or there is none."""
+    def why_gone(self, client: Client | None, leaving: Collection[str] = ()) -> str:
+        """Return why nobody waits any more; empty where the client does, as far as is known, or there is none.
+
+        Args:
+            client: who waited.
+            leaving: the nodes that are about to end together with the server.
+        """
         if client is None:
             return ""
         try:
             address = _address(client.node)
-            return client.why_gone(address, subscribers(self._result), bool(address) and _refuses(address))
+            refuses = bool(address) and _refuses(address)
+            return client.why_gone(address, subscribers(self._result), refuses, leaving)
         except CallError:  # the master is slow
             return ""
 

@@ -42,7 +42,7 @@ class Relay:
         self._client = actionlib.ActionClient(server, kind)
         self._server = ActionServer(action, kind, self._on_goal, self._on_cancel, auto_start=False)
         rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)
-        self._waits = GoalClients(action)
+        self._waits = GoalClients(action, server)
         self._waiting: dict[str, Client | None] = {}  # who waits for each goal
         self._subscriber = rospy.Subscriber(f"{action}/goal", type(kind().action_goal), self._on_goal_message)
         self._server.start()
