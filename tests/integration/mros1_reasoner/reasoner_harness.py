@@ -1,7 +1,9 @@
 """What the tests of the node reasoner share: reasoners started as processes, and what they say."""
 
+import os
 import subprocess
 import sys
+import tempfile
 import xmlrpc.client
 from pathlib import Path
 
@@ -40,6 +42,18 @@ def node_api(node):
 def node_pid(node):
     """Return the process id of a node."""
     return node_api(node).getPid("/test")[2]
+
+
+def start_node(output, *arguments):
+    """Start a reasoner whose standard output is appended to a file; return its process."""
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}  # what it says is read at once
+    with open(output.name, "a") as file:
+        return subprocess.Popen([sys.executable, str(NODE), *arguments], stdout=file, env=environment)
+
+
+def wait_until_printed(output, text):
+    """Wait until a node has printed a text to its output file."""
+    wait_for(lambda: text in Path(output.name).read_text(), lambda: f"{text}: {Path(output.name).read_text()}")
 
 
 class Listener:
@@ -94,6 +108,7 @@ class Reasoner:
         self._parameters, self._remappings = {**PARAMETERS, **parameters}, remappings
         self.listener = Listener(namespace)
         self._process = None
+        self._output = tempfile.NamedTemporaryFile("w")  # noqa: SIM115, it lives as long as the reasoner
 
     def __enter__(self):
         self.start()
@@ -104,16 +119,17 @@ class Reasoner:
 
     def start(self):
         """Start it and wait until it is ready."""
-        before = len(self.listener.log)
         self._diagnostics.robot = self.namespace
         arguments = [f"_{name}:={value}" for name, value in self._parameters.items()]
-        self._process = subprocess.Popen(
-            [sys.executable, str(NODE), f"__ns:={self.namespace}", *self._remappings, *arguments],
-            stdout=subprocess.DEVNULL,
-        )
-        self.listener.logged("Reasoner Initialization Ok", before)
+        self._output.truncate(0)
+        self._process = start_node(self._output, f"__ns:={self.namespace}", *self._remappings, *arguments)
+        self.printed("Reasoner Initialization Ok")
         wait_for(lambda: self.listener.is_connected, "the reasoner is heard")
         wait_for(lambda: self._diagnostics.reaches(self.node), "the reasoner hears diagnostics")
+
+    def printed(self, text):
+        """Wait until it has printed a text. What it logs before its log is connected is heard by nobody else."""
+        wait_until_printed(self._output, text)
 
     def kill(self):
         """End it without a word, and wait until it is gone."""

@@ -197,6 +197,12 @@ class OperatorTest(unittest.TestCase):
     def test_published_tools_find_their_lines(self):
         _, reasoner = self.system("/published")
         with reasoner:
+            for text in (
+                f"Loaded ontology: {MODEL}",
+                "[RosReasoner] -- Reasoner Initialization Ok",
+                "Objective created and set to ungrounded",
+            ):
+                reasoner.printed(text)
             self.diagnostics.component("laser", "FALSE")
             reasoner.listener.decided("EXECUTED")
             self.diagnostics.tell(
@@ -204,9 +210,6 @@ class OperatorTest(unittest.TestCase):
                 status("QA status", ("energy", "0.20"), name="fg_print"),
             )
             for level, text in (
-                (Log.INFO, f"Loaded ontology: {MODEL}"),
-                (Log.INFO, "[RosReasoner] -- Reasoner Initialization Ok"),
-                (Log.INFO, "Objective created and set to ungrounded"),
                 (Log.INFO, "Exited timer_cb after successful reconfiguration"),
                 (Log.INFO, "QA value received!\tTYPE: energy\tVALUE: 0.20"),
                 (Log.WARN, "Unsupported QA TYPE received: not_a_qa"),

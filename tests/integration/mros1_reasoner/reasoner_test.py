@@ -13,7 +13,7 @@ import rospy
 import rostest
 from helpers.robot_side import Diagnostics, Manipulator, status
 from helpers.waiting import DEADLINE_S, wait_for
-from reasoner_harness import MODEL, NODE, Listener, node_pid
+from reasoner_harness import MODEL, NODE, Listener, node_pid, start_node, wait_until_printed
 
 PACKAGE = "metacontrol_tests"
 
@@ -144,9 +144,8 @@ class ReasonerTest(unittest.TestCase):
     def test_without_a_manipulator_it_grounds_what_it_decides(self):
         arguments = ["__name:=reasoner_second", "rosgraph_manipulator/active_configuration:=second/active"]
         arguments += [f"_model_file:={MODEL}", "_use_reconfigure_srv:=false", "_nfr_safety:=0.25"]
-        second = Listener()
-        second.node = "/reasoner_second"
-        process = subprocess.Popen([sys.executable, str(NODE), *arguments], stdout=subprocess.DEVNULL)
+        output = self.enterContext(tempfile.NamedTemporaryFile("w"))
+        process = start_node(output, *arguments)
         try:
             for text in (
                 "o_moveA needs f_move with safety 0.25",
@@ -154,7 +153,7 @@ class ReasonerTest(unittest.TestCase):
                 "o_moveA: no configuration runs: nothing -> scan_slower",
                 "Exited timer_cb after successful reconfiguration",
             ):
-                second.logged(text)
+                wait_until_printed(output, text)
         finally:
             process.terminate()
             process.wait(DEADLINE_S)

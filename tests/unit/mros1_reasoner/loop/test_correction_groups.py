@@ -4,7 +4,8 @@ import pytest
 from metacontrol_bags.decision import DECIDED
 from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.knowledge.model import Objective
-from mros1_reasoner.loop.levels import Levels
+from mros1_reasoner.knowledge.scale import Correction
+from mros1_reasoner.loop.levels import Expectation, Judging, Levels
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
 from ros_model.cli.rosmodel import main
@@ -97,18 +98,19 @@ def test_correction_holds_for_designs_with_the_same_parameter(knowledge_base, pe
     decision, core = dark(kb, pellet)
     assert (decision.to_configuration, decision.degraded) == ("careful", False)
     refused = {c.name: c.refused_because for c in decision.candidates}
-    assert refused["quicker"].startswith("hits 0.35 (expected, times 0.5) < 0.6")
+    assert refused["quicker"].startswith("hits 0.35 (0.5 times what was expected) < 0.6")
     assert decision.corrections[0].startswith("hits was 0.5 times what was expected of designs with ")
-    assert "detector.network: fast: 0.5 times (at most 2.5) is expected of these" in decision.corrections[0]
+    assert "detector.network: fast: 0.5 times that (at most 2.5 times) is expected of these" in decision.corrections[0]
     # Nobody observes the fast network now: what was learnt of it fades.
     core.report(8.0, decision.id, True)
     core.observe_level(9.0, "hits", 0.95)
     group = groups["quick"]
-    factors = [core._deliberation.factors("o_detect", now)["hits", group] for now in (9.0, 40.0, 300.0)]
+    factors = [core._deliberation.corrections("o_detect", now)["hits", group].factor for now in (9.0, 40.0, 300.0)]
     assert factors == sorted(factors)
     assert factors[0] < 0.6
     assert factors[-1] > 0.99
-    assert core._deliberation.factors("o_detect", 9.0)["hits", groups["careful"]] == pytest.approx(1.0)
+    careful = core._deliberation.corrections("o_detect", 9.0).get(("hits", groups["careful"]), Correction())
+    assert careful.factor == pytest.approx(1.0)
 
 
 def test_groups_are_saved_with_the_knowledge_base(knowledge_base, tmp_path):
@@ -136,14 +138,14 @@ def test_wrong_limits_of_a_correction_are_named_by_check(models, capsys, correct
 
 
 def test_levels_of_one_group_say_nothing_of_another():
-    levels = Levels(window=2.0, timeout=5.0, memory=10.0)
+    levels = Levels(Judging(memory=10.0))
     for second in range(60):
-        levels.observe(second, ("o", "q"), 0.4, passed=False, stamp=0.0, expected=0.8, group="dark")
+        levels.observe(second, ("o", "q"), 0.4, Expectation(expected=0.8, group="dark"))
     assert levels.groups(("o", "q")) == ["dark"]
-    assert levels.ratio(60.0, ("o", "q"), "dark") == pytest.approx(0.5, abs=0.01)
-    assert levels.ratio(60.0, ("o", "q"), "light") is None
-    levels.forget("o", now=60.0)
-    assert levels.ratio(60.0, ("o", "q"), "dark") == pytest.approx(0.5, abs=0.01)
+    assert levels.strain(60.0, ("o", "q"), "dark").factor == pytest.approx(0.5)
+    assert levels.strain(60.0, ("o", "q"), "light") is None
+    levels.forget("o")
+    assert levels.strain(60.0, ("o", "q"), "dark").factor == pytest.approx(0.5)
     levels.drop("o")
     assert levels.groups(("o", "q")) == []
 
@@ -154,4 +156,4 @@ def test_objective_without_limits_is_not_corrected(knowledge_base, pellet):
     core = Mape(kb, pellet, [Objective("o_detect", "f_detect")], Settings(start_grace=0.0))
     core.observe_active(0.0, "f_detect", "quick", "STABLE")
     core.observe_level(1.0, "hits", 0.1)
-    assert core._deliberation.factors("o_detect", 1.0) == {}
+    assert core._deliberation.corrections("o_detect", 1.0) == {}

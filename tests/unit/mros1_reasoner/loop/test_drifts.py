@@ -109,6 +109,23 @@ def test_parameters_that_were_left_are_put_back_again_after_they_were_right(cell
     assert cell.run(30.0) == [AGAIN]
 
 
+def test_parameters_that_drift_now_and_then_are_put_back_each_time(cell):
+    for _ in range(5):
+        cell.drifted = {GRIPPER: "force"}
+        assert cell.run(65.0) == [AGAIN]
+
+
+def test_repairs_of_long_ago_are_forgotten_but_those_of_the_last_minute_count(cell):
+    cell.drifted = {GRIPPER: "force"}
+    assert cell.run(40.0) == [AGAIN]
+    cell.drifted = {GRIPPER: "force"}
+    assert cell.run(25.0) == [AGAIN]  # the first one is then more than a minute ago
+    cell.drifted = {GRIPPER: "force"}
+    assert cell.run(10.0) == [AGAIN]
+    cell.drifted = {GRIPPER: "force"}
+    assert cell.run(10.0) == [LEFT]
+
+
 def test_other_nodes_are_put_back_while_those_of_one_are_left(cell):
     cell.drifted, cell.disturbed = {GRIPPER: "force"}, {GRIPPER}
     assert cell.run(30.0) == [AGAIN, AGAIN, LEFT]

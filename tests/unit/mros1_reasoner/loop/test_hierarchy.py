@@ -290,7 +290,7 @@ def test_locked_requirement_keeps_the_root_as_it_is(one_arm):
 
 
 def test_violated_limit_of_a_root_is_not_blamed_on_its_requirements(make):
-    robot = make([Objective("o_build", "F0", {"error": 0.5})], desired="FD1")
+    robot = make([Objective("o_build", "F0", {"error": 0.5})], desired="FD1", cool_down=5.0)
     robot.run()
     done = []
     for now in (10.0, 11.0, 12.0):

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import pytest
 from mros1_reasoner.knowledge.model import Design, Direction, Objective, Quality
+from mros1_reasoner.knowledge.scale import Correction
 from mros1_reasoner.planning.planner import Situation, difference, plan
 from mros1_reasoner.planning.utility import quality as expected_level
 
@@ -35,6 +36,12 @@ def test_every_limit_counts(quality):
     result = choose(design("good"), design("bad", use=1.0, **{quality: 0.7}))
     assert result.choice == "good"
     assert reasons(result)["bad"] == f"{quality} 0.7 > {OBJECTIVE.limits[quality]:g}"
+
+
+def test_where_nothing_can_be_deployed_only_what_these_designs_lack_is_told():
+    unrealisable = {"weld": ["gas"], "glue": ["pump"], "drive": ["wheel"]}  # of which drive is of another function
+    result = choose(design("weld"), design("glue"), unrealisable=unrealisable, unfulfilled={"glue": ["f_look"]})
+    assert result.reason == "no design can be deployed without gas, pump or f_look"
 
 
 def test_level_at_the_limit_keeps_it():
@@ -172,3 +179,74 @@ def test_utility_where_lower_is_better():
 
 def test_difference_of_a_design_to_itself_is_nothing():
     assert difference(design("a"), replace(design("a"), name="b")) == 0
+
+
+def test_of_designs_that_are_as_useful_the_one_that_keeps_limits_best_is_taken_where_that_is_wanted():
+    designs = [
+        Design(name, "f", {"heat": heat, "speed": speed})
+        for name, heat, speed in (
+            ("hot", 0.58, 0.70),
+            ("cool", 0.40, 0.66),
+            ("slow", 0.10, 0.40),
+        )
+    ]
+    objective = Objective("o", "f", {"heat": 0.6})
+
+    def choose(indifference):
+        situation = Situation(indifference=indifference)
+        return plan(objective, designs, situation, lambda design: design.expected["speed"], difference)
+
+    assert choose(0.0).choice == "hot"
+    assert choose(0.05).choice == "cool"
+    assert choose(0.5).choice == "slow"
+    assert "keeps them best of the 2 within 0.05" in choose(0.05).reason
+    lost = {c.name: c.lost_because for c in choose(0.05).candidates}
+    assert lost["hot"] == "as useful as the choice, but nearer to a limit"
+
+
+def test_design_that_keeps_a_violated_limit_barely_is_taken_only_where_no_other_brings_relief():
+    designs = [Design("now", "f", {"heat": 0.5, "speed": 0.9}), Design("near", "f", {"heat": 0.55, "speed": 0.8})]
+    far = Design("far", "f", {"heat": 0.3, "speed": 0.1})
+    situation = Situation(current="now", observed={"heat": 0.7}, relief={"heat": 0.1})
+    objective = Objective("o", "f", {"heat": 0.6})
+
+    def choose(candidates):
+        return plan(objective, candidates, situation, lambda design: design.expected["speed"], difference)
+
+    assert choose([*designs, far]).choice == "far"
+    assert choose(designs).choice == "near"
+    lost = {c.name: c.lost_because for c in choose([*designs, far]).candidates}
+    assert lost["near"] == "it would keep the violated limit barely"
+
+
+def test_design_that_is_hardly_better_in_the_violated_quality_is_not_worth_a_change():
+    designs = [Design("now", "f", {"heat": 0.5, "speed": 0.9}), Design("near", "f", {"heat": 0.49, "speed": 0.9})]
+    situation = Situation(
+        current="now",
+        observed={"heat": 0.61},
+        corrections={("heat", ""): Correction(factor=1.22)},
+        relief={"heat": 0.0},
+        worth=0.1,
+    )
+    result = plan(Objective("o", "f", {"heat": 0.6}), designs, situation, lambda _: 0.0, difference)
+    assert result.choice == "now"
+    lost = {c.name: c.lost_because for c in result.candidates}
+    assert lost["near"].startswith("heat 0.5978 is hardly better than the present 0.61")
+
+
+def test_of_designs_as_useful_the_one_wins_that_keeps_all_limits_best_with_the_fewest_changes():
+    def made(name, heat, noise, speed, *components):
+        expected = {"heat": heat, "noise": noise, "speed": speed}
+        return Design(name, "f", expected, components=frozenset(components))
+
+    now = made("now", 0.5, 0.58, 0.9, "camera")
+    loud = made("loud", 0.51, 0.5, 0.92, "camera")
+    calm = made("calm", 0.52, 0.3, 0.88, "camera")
+    other = made("other", 0.52, 0.3, 0.89, "laser")
+    objective = Objective("o", "f", {"heat": 0.6, "noise": 0.6})
+    situation = Situation(current="now", indifference=0.05, worth=0.1)
+    result = plan(objective, [now, loud, calm, other], situation, lambda design: design.expected["speed"], difference)
+    assert result.choice == "calm"
+    lost = {c.name: c.lost_because for c in result.candidates}
+    assert lost["loud"] == "as useful as the choice, but nearer to a limit"
+    assert lost["other"] == "as useful as the choice, but a bigger change"

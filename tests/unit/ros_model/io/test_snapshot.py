@@ -7,6 +7,7 @@ import threading
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
+from helpers.ports import QUIET_HOST
 from node_kit.io.xml_rpc import CallError, GoneError
 from ros_model.graph.snapshot import build_snapshot
 from ros_model.io.master import MasterClient, take_snapshot
@@ -39,7 +40,7 @@ PARAMETERS = {"move": {"speed": 0.5, "layers": {"scan": {"topic": "scan"}}}}
 @contextlib.contextmanager
 def master(**methods):
     server = SimpleXMLRPCServer(
-        ("127.0.0.1", 0), requestHandler=SimpleXMLRPCRequestHandler, logRequests=False, allow_none=True
+        (QUIET_HOST, 0), requestHandler=SimpleXMLRPCRequestHandler, logRequests=False, allow_none=True
     )
     for name, function in methods.items():
         server.register_function(function, name)
@@ -47,7 +48,7 @@ def master(**methods):
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
     thread.start()
     try:
-        yield f"http://127.0.0.1:{server.server_address[1]}"
+        yield f"http://{QUIET_HOST}:{server.server_address[1]}"
     finally:
         server.shutdown()
         server.server_close()
@@ -145,15 +146,15 @@ def test_empty_graph():
 
 def test_master_that_is_gone_is_named():
     with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        uri = f"http://127.0.0.1:{free.getsockname()[1]}"
+        free.bind((QUIET_HOST, 0))
+        uri = f"http://{QUIET_HOST}:{free.getsockname()[1]}"
         with pytest.raises(GoneError, match=uri):
             take_snapshot(uri)
 
 
 def test_silent_master_times_out():
-    with socket.create_server(("127.0.0.1", 0)) as silent:
-        uri = f"http://127.0.0.1:{silent.getsockname()[1]}"
+    with socket.create_server((QUIET_HOST, 0)) as silent:
+        uri = f"http://{QUIET_HOST}:{silent.getsockname()[1]}"
         with pytest.raises(CallError, match="does not answer getSystemState"):
             take_snapshot(uri, timeout=0.1)
 
@@ -178,7 +179,7 @@ def test_address_that_is_no_address():
 
 def test_master_that_answers_by_drops_times_out():
     ended = threading.Event()
-    with socket.create_server(("127.0.0.1", 0)) as server:
+    with socket.create_server((QUIET_HOST, 0)) as server:
 
         def drip():
             connection, _ = server.accept()
@@ -191,7 +192,7 @@ def test_master_that_answers_by_drops_times_out():
         thread.start()
         try:
             with pytest.raises(CallError, match="does not answer getSystemState"):
-                take_snapshot(f"http://127.0.0.1:{server.getsockname()[1]}", timeout=0.3)
+                take_snapshot(f"http://{QUIET_HOST}:{server.getsockname()[1]}", timeout=0.3)
         finally:
             ended.set()
             thread.join()

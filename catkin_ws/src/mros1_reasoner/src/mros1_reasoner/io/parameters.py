@@ -15,6 +15,7 @@ from ros_model.io.files import resolve
 from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Direction, Objective
+from mros1_reasoner.loop.estimate import MOST
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.planning.utility import UtilityError, make_utility
 
@@ -153,6 +154,8 @@ class Parameters:
                 others[item.name] = self._tree.flag(item.name, default)
             elif isinstance(default, float):
                 others[item.name] = self._tree.number(item.name, default, low=0.0)
+        others["history"] = self._tree.number("history", defaults.history, low=1.0, high=MOST)
+        others["confidence"] = self._tree.number("confidence", defaults.confidence, low=0.5, high=0.9999)
         grace = self._tree.number("start_grace", defaults.start_grace, low=0.0)
         return Settings(**others, start_grace=grace if self.asks else 0.0, utility=utility, desired=desired)
 

@@ -60,7 +60,8 @@ def application_model(project: Project, iri: str) -> str:
         if "range" in entry:
             numbers["qa_min"], numbers["qa_max"] = entry["range"]
         reaching = {"qa_reaching_violates": True} if entry.get("reaching_violates") else {}
-        parts.append(_individual("QualityAttributeType", quality, {}, numbers, reaching))
+        typical = {"qa_typical": entry["typical"]} if "typical" in entry else {}
+        parts.append(_individual("QualityAttributeType", quality, {}, numbers, reaching, typical))
     nodes = _own_nodes(project)
     required = {name: names - nodes[name] for name, names in project.required_components().items()}
     components = {name for names in (*required.values(), *nodes.values()) for name in names}

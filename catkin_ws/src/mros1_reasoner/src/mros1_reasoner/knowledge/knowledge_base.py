@@ -14,6 +14,7 @@ from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Analysis, Design, Facts, ObjectiveAnalysis
 from mros1_reasoner.knowledge.model_reader import ApplicationModel, KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Assertion, Reasoner
+from mros1_reasoner.knowledge.scale import Scale
 from mros1_reasoner.knowledge.triples import assertion_triple, local_name, write_ntriples
 
 _DECIMAL = v.XSD + "decimal"
@@ -49,6 +50,15 @@ class KnowledgeBase:
         self.component_statuses = model.component_statuses
         self.files = tuple(files)
         self.ontology = model.ontology
+        self._scales: dict[str, Scale] = {}
+
+    def scale(self, quality: str) -> Scale:
+        """Return how levels of a quality are compared: by all that are expected of designs."""
+        if quality not in self._scales:
+            expected = [design.expected[quality] for design in self.designs.values() if quality in design.expected]
+            kind = self.qualities[quality]
+            self._scales[quality] = Scale.of(kind.direction, expected, kind.low)
+        return self._scales[quality]
 
     def solving(self, function: str) -> tuple[Design, ...]:
         """Return the designs that solve a function, by name."""

@@ -25,9 +25,9 @@ class Direction(enum.Enum):
         """Return by how much a level violates a limit; zero or less if it keeps the limit."""
         return self.sign * (level - limit)
 
-    def better(self, first: float, second: float) -> float:
-        """Return the better one of two levels."""
-        return min(first, second) if self is Direction.LOWER_IS_BETTER else max(first, second)
+    def better(self, *levels: float) -> float:
+        """Return the best one of levels, at least one."""
+        return min(levels) if self is Direction.LOWER_IS_BETTER else max(levels)
 
     @property
     def passes(self) -> str:
@@ -44,12 +44,14 @@ class Quality:
         reaching_violates: whether a level that equals the limit violates it.
         low: the least possible level; None where it is not known.
         high: the greatest possible level; None where it is not known.
+        typical: quality whose expected level is the usual one, where that of this quality is a high quantile.
     """
 
     direction: Direction = Direction.LOWER_IS_BETTER
     reaching_violates: bool = False
     low: float | None = None
     high: float | None = None
+    typical: str = ""
 
     @classmethod
     def compared_by(cls, operator: str, low: float | None = None, high: float | None = None) -> Quality:

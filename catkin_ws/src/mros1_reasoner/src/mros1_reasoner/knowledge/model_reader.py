@@ -168,7 +168,16 @@ class _Reader:
         direction = Direction.HIGHER_IS_BETTER if signs == {-1.0} else Direction.LOWER_IS_BETTER
         reaching = quality.reaching_violates or "true" in self._graph.literals_of(iri, v.QA_REACHING_VIOLATES)
         direction = self._directions.get(name, direction if signs else quality.direction)
-        return replace(quality, direction=direction, reaching_violates=reaching)
+        typical = self._typical(name, iri)
+        return replace(quality, direction=direction, reaching_violates=reaching, typical=typical)
+
+    def _typical(self, name: str, iri: str) -> str:
+        """Return the quality whose expected level is the usual one of a quality; empty: there is none."""
+        for other in self._graph.literals_of(iri, v.QA_TYPICAL)[:1]:
+            if other not in self._quality_types:
+                raise KnowledgeBaseError(f"{self._where}: qa_typical of {name} is {other!r}: no QualityAttributeType")
+            return other
+        return ""
 
     def _bound(self, quality: str, predicate: str) -> float | None:
         numbers = [_number(text) for text in self._graph.literals_of(quality, predicate)]

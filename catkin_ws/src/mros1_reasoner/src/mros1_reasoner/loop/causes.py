@@ -14,6 +14,9 @@ from mros1_reasoner.loop.readable_state import Running, View
 RECOVERY = "compRecov"
 """The rule by which the return of a component is a cause."""
 
+RELIEF = "relief"
+"""The rule by which the end of a violation's cause is a cause."""
+
 OPERATOR = "operator"
 """Trigger of a cause that an operator gave."""
 
@@ -22,7 +25,12 @@ _PARAMETER = "parameter:"
 
 def is_chance(cause: Cause) -> bool:
     """Return whether nothing is wrong, but a better design may have become available."""
-    return cause.rules == RECOVERY or cause.trigger == OPERATOR
+    return cause.rules in (RECOVERY, RELIEF) or cause.trigger == OPERATOR
+
+
+def is_relief(cause: Cause) -> bool:
+    """Return whether the cause of a violation is gone."""
+    return cause.rules == RELIEF
 
 
 def errors(view: View, name: str, now: float) -> list[Cause]:
@@ -33,8 +41,8 @@ def errors(view: View, name: str, now: float) -> list[Cause]:
     found: list[Cause] = []
     if result and v.IN_ERROR_COMPONENT in result.causes:
         found += _component_errors(view, name, now)
-    if result and v.IN_ERROR_NFR in result.causes:
-        found += [_violation(view, view.objectives[name], quality, now) for quality in result.violated]
+    violated = sorted(quality for objective, quality in view.violations(now) if objective == name)
+    found += [_violation(view, view.objectives[name], quality, now) for quality in violated]
     found += [_drift(node, running) for node in running.drifts]
     if running.task_failure:
         stamp, why = running.task_failure
@@ -66,6 +74,11 @@ def chances(view: View, name: str, now: float) -> list[Cause]:
         Cause(min(stamp, now), trigger, words, "" if trigger == OPERATOR else RECOVERY)
         for trigger, (stamp, words) in view.running[name].chances.items()
     ]
+    if view.is_relieved(name, now):
+        qualities = view.levels.blamed(name)
+        since = view.levels.gone_since(now, name) or now
+        words = f"what made {' and '.join(qualities)} violate the limit has been gone for {now - since:.1f} s"
+        found.append(Cause(since, f"qa:{qualities[0]}", words, RELIEF, quality=qualities[0]))
     return sorted(found, key=_by_time)
 
 
@@ -111,15 +124,18 @@ def _violation(view: View, objective: Objective, quality: str, now: float) -> Ca
     level, limit = view.levels[objective.name, quality], objective.limits[quality]
     since = level.passed_since if level.passed_since is not None else now
     kind = view.kb.qualities[quality]
+    words = f"{quality} {level.value:.3g} {kind.operator} {limit:g} for {now - since:.1f} s"
+    if not kind.violates(level.value, limit):
+        words = f"{quality} {level.value:.3g}, of which {level.high:.3g} {kind.operator} {limit:g} follows"
     return Cause(
         stamp=since,
         trigger=f"qa:{quality}",
-        text=f"{quality} {level.value:.3g} {kind.operator} {limit:g} for {now - since:.1f} s",
+        text=words,
         rules="QA, S9",
         quality=quality,
         level=level.value,
         limit=limit,
-        excess=kind.excess(level.value, limit) / (abs(limit) or 1.0),
+        excess=kind.excess(level.high, limit) / (abs(limit) or 1.0),
     )
 
 

@@ -9,10 +9,12 @@ from dataclasses import dataclass, replace
 from metacontrol_bags.decision import ADVISED, DECIDED, FAILED, Cause, Decision
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.model import Design, Direction, Objective
-from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance, is_drift
+from mros1_reasoner.knowledge.model import Design, Objective
+from mros1_reasoner.knowledge.scale import Correction
+from mros1_reasoner.loop import lasting
+from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance, is_drift, is_relief
 from mros1_reasoner.loop.readable_state import Running
-from mros1_reasoner.loop.state import State
+from mros1_reasoner.loop.state import VIOLATED, State
 from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan, without_makeshift
 
 
@@ -69,6 +71,8 @@ class Deliberation:
         level, outcome = self._choose(name, timing.now, climbs=not improves_only)
         stays = not self._is_change(level, outcome)
         is_enough = not improves_only or (not stays and self._improves(running, outcome))
+        if not is_enough:
+            self._state.rest(name)
         if self._state.waits(level, timing.now) or not is_enough:
             return None
         if not stays:
@@ -114,6 +118,9 @@ class Deliberation:
         self._state.want({o: plan.choice for o, plan in steps if plan.choice})
         if any(self._state.waits(o, timing.now) for o, _ in steps if o in self._state.running):
             return None
+        early = next((step for step in steps if self._state.retries_later(step[0], step[1].choice, timing.now)), None)
+        if early:
+            return self._postpone(name, *early, causes, timing, self._wall() - began)
         running = self._state.running.get(objective)
         if self._state.settings.dry_run and not self._state.is_news(name, _gist(causes, outcome)):
             return None
@@ -129,11 +136,15 @@ class Deliberation:
         if objective != level:
             words += f", which {outcome.choice} of {level} requires: {first.reason}"
         words += f": {outcome.reason}"
+        if running and running.brief and self._state.why_failed(objective, first.choice):
+            words += f"; {lasting.words(running, self._state.why_failed(objective, first.choice))}"
         self._state.match_requirements()
         releases = set(self._state.objectives) - set(
             self._state.needed({**self._state.deployments(), **self._state.wanted})
         )
         decision = self._decision(objective, causes, first, timing, words, self._wall() - began)
+        if not self._state.settings.dry_run:
+            self._state.note_blame(timing.now, name, causes)
         return replace(
             decision,
             state=ADVISED if self._state.settings.dry_run else DECIDED,
@@ -151,6 +162,18 @@ class Deliberation:
         text = "; ".join(cause.text for cause in causes)
         words = f"{name}: {text}: stays with {running.design or 'nothing'}: {outcome.reason}"
         return self._decision(name, causes, outcome, timing, words, plan_wall)
+
+    def _postpone(
+        self, name: str, objective: str, step: Plan, causes: list[Cause], timing: Timing, plan_wall: float
+    ) -> Decision | None:
+        """Return the decision to try a design again later that did not last; None if the last decision was the same."""
+        running = self._state.running[objective]
+        if not self._state.is_news(name, (*_gist(causes, step), running.brief)):
+            return None
+        why = lasting.words(running, self._state.why_failed(objective, step.choice))
+        wait = f"{step.choice} is tried again in {running.retry_from - timing.now:.1f} s: {why}"
+        words = f"{name}: {'; '.join(cause.text for cause in causes)}: {wait}"
+        return self._decision(name, causes, step, timing, words, plan_wall)
 
     def _leave(self, name: str, causes: list[Cause], timing: Timing) -> Decision | None:
         """Return the decision to leave drifted parameters as they are; None if the last decision was the same."""
@@ -206,17 +229,25 @@ class Deliberation:
     def _note_failure(self, name: str, now: float) -> None:
         """Put the running design into the error log if it has failed."""
         running = self._state.running[name]
-        if (running.design or "", name) in self._state.analysis.tried:
-            reason = "did not keep a limit while deployed"
-            if running.task_failure:
-                reason = f"its task failed while it was deployed ({running.task_failure[1] or 'no reason given'})"
-            self._state.note_in_vain(now, running.design or "", name, reason)
+        if running.design and running.task_failure:
+            reason = f"its task failed while it was deployed ({running.task_failure[1] or 'no reason given'})"
+            self._state.note_in_vain(now, running.design, name, reason)
+        elif running.design and self._keeps_not(name, now):
+            self._state.note_in_vain(now, running.design, name, VIOLATED)
         if running.is_broken and running.design:
-            self._state.note_in_vain(now, running.design, name, "did not run")
+            self._state.note_in_vain(now, running.design, name, running.ending or "did not run")
         restarts = [moment for moment in running.restarts if now - moment < self._state.settings.error_log_expiry]
         if running.failed_nodes and running.design and len(restarts) >= self._state.settings.restart_limit:
             reason = f"{', '.join(running.failed_nodes)} failed again after {len(restarts)} restarts"
             self._state.note_in_vain(now, running.design, name, reason)
+
+    def _keeps_not(self, name: str, now: float) -> bool:
+        """Return whether the running design does not keep a limit so that it counts, or a rule of the model says so."""
+        if any(objective == name for objective, _ in self._state.violations(now)):
+            return True
+        result = self._state.analysis.objectives.get(name)
+        is_tried = (self._state.running[name].design or "", name) in self._state.analysis.tried
+        return is_tried and not (result and result.violated)
 
     def _causes(self, name: str, now: float) -> list[Cause]:
         """Return all causes for an adaptation of an objective itself: errors first, then chances."""
@@ -228,6 +259,8 @@ class Deliberation:
         if heeds and not found and now < running.calm_until:
             return []
         better = chances(self._state, name, now)
+        if heeds and any(is_relief(cause) for cause in better):
+            self._state.forgive(name)
         self._state.use_chances(name)
         return [*found, *better] if heeds or found else []
 
@@ -263,9 +296,11 @@ class Deliberation:
                 if tried_for == name
             },
             current=None if running.is_broken or (running.failed_nodes and is_tried) else running.design,
-            observed=self._state.levels.latest(name),
-            factors=self.factors(name, now),
+            observed=self._state.levels.high(now, name),
+            corrections=self.corrections(name, now),
             worth=self._state.settings.worth,
+            relief=self._relief(name, now),
+            indifference=self._state.settings.indifference,
         )
         is_lame = running.failed_nodes or running.to_put_back
         if is_lame and not is_tried and self._needs_only_a_restart(name, situation):
@@ -288,10 +323,23 @@ class Deliberation:
         is_in_error = running.is_broken or running.task_failure or (result and v.IN_ERROR_NFR in result.causes)
         return not is_in_error and situation.can_deploy(running.design or "")
 
-    def factors(self, name: str, now: float) -> dict[tuple[str, str], float]:
-        """Return the factors for the expected levels of qualities, by quality and group of designs.
+    def _relief(self, name: str, now: float) -> dict[str, float]:
+        """Return by which distance another design should keep a limit that is violated, by quality.
 
-        A factor never makes a level look better.
+        Where usual levels tell a lasting change, what is expected of other designs is sure enough: none.
+        """
+        objective = self._state.objectives.get(name)
+        violated = [quality for other, quality in self._state.violations(now) if other == name]
+        if objective is None or not self._state.settings.correct_expected:
+            return {}
+        share, limits = self._state.settings.relief, objective.limits
+        shares = {q: 0.0 if self._state.kb.qualities[q].typical else share for q in violated}
+        return {q: self._state.scale(q, limits[q]).margin(limits[q], found) for q, found in shares.items()}
+
+    def corrections(self, name: str, now: float) -> dict[tuple[str, str], Correction]:
+        """Return the corrections of the expected levels of qualities, by quality and group of designs.
+
+        A correction never makes a level look better.
         """
         objective = self._state.objectives.get(name)
         if not self._state.settings.correct_expected or objective is None:
@@ -300,28 +348,27 @@ class Deliberation:
         found = {}
         for quality in objective.limits:
             for group in self._state.levels.groups((name, quality)):
-                ratio = self._ratio(now, name, quality, group)
-                if ratio is not None and quality in self._state.kb.qualities:
-                    lower_is_better = self._state.kb.qualities[quality].direction is Direction.LOWER_IS_BETTER
-                    factor = min(max(1.0, ratio), most) if lower_is_better else max(min(1.0, ratio), 1.0 / most)
-                    found[quality, group] = factor
+                strain = self._strain(now, name, quality, group)
+                if strain is not None and quality in self._state.kb.qualities:
+                    scale = self._state.scale(quality, objective.limits[quality])
+                    found[quality, group] = scale.bounded(strain, most)
         return found
 
-    def _ratio(self, now: float, name: str, quality: str, group: str) -> float | None:
+    def _strain(self, now: float, name: str, quality: str, group: str) -> Correction | None:
         design = self._state.running[name].design
         is_observed = design is not None and self._state.kb.designs[design].group(quality) == group
         # A correction that holds for all designs is observed again whatever runs.
-        return self._state.levels.ratio(now, (name, quality), group, fades=bool(group) and not is_observed)
+        return self._state.levels.strain(now, (name, quality), group, fades=bool(group) and not is_observed)
 
     def _corrections(self, name: str, now: float) -> tuple[str, ...]:
         limit = self._state.settings.correction_limit
         design = self._state.running[name].design if name in self._state.running else None
         return tuple(
-            f"{quality} was {self._ratio(now, name, quality, group) or 1.0:.3g} times what was expected of "
-            f"{f'designs with {group}' if group else design}: {factor:.3g} times (at most {limit:g}) is expected "
-            f"of {'these' if group else 'the others'}"
-            for (quality, group), factor in self.factors(name, now).items()
-            if round(factor, 2) != 1.0
+            f"{quality} was {self._strain(now, name, quality, group)} what was expected of "
+            f"{f'designs with {group}' if group else design}: {found} that (at most {limit:g} times) is expected of "
+            f"{'these' if group else 'the others'}"
+            for (quality, group), found in self.corrections(name, now).items()
+            if found.tells
         )
 
 

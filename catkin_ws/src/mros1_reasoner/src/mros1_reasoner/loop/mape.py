@@ -65,8 +65,8 @@ class Mape:
         settings = settings or Settings()
         self._kb, self._reasoner = knowledge_base, reasoner
         self._wall, self._clock = wall, clock
-        self._state = State(knowledge_base, objectives, settings)
         self._utility = utility or make_utility(settings.utility, knowledge_base.qualities)
+        self._state = State(knowledge_base, objectives, settings, self._utility)
         self._deliberation = Deliberation(self._state, self._utility, distance, wall, self._stamp, name)
         self.operator = Operator(self._state, wall)
 

@@ -15,6 +15,7 @@ from metacontrol_msgs.msg import FunctionGrounding
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
+from mros1_reasoner.knowledge.scale import Scale
 from mros1_reasoner.loop.levels import Levels
 from mros1_reasoner.loop.settings import Settings
 
@@ -70,9 +71,15 @@ class Running:
         calm_until: no limit counts before.
         not_before: no request is made before.
         attempts: failed requests in a row.
+        replaced: the design in whose place the deployed one was requested.
+        brief: deployments in a row that did not last.
+        retry_from: a design that has failed is not tried again before.
+        ending: how the design has ended soon after it was deployed; empty: it has not.
         degraded: whether the design was taken although it does not keep every limit.
         refusal: the last refusal, so that it is told once.
         chances: why a better design may have become available: trigger -> when, and in words.
+        returned_at: when a better design was taken again because the cause of a violation was gone.
+        relapses: how often in a row a limit was violated again soon after that.
     """
 
     design: str | None = None
@@ -90,9 +97,15 @@ class Running:
     calm_until: float = -math.inf
     not_before: float = -math.inf
     attempts: int = 0
+    replaced: str | None = None
+    brief: int = 0
+    retry_from: float = -math.inf
+    ending: str = ""
     degraded: bool = False
     refusal: tuple[object, ...] = ()
     chances: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    returned_at: float = -math.inf
+    relapses: int = 0
 
     @property
     def is_broken(self) -> bool:
@@ -242,13 +255,21 @@ class View:
         running = self.running[name]
         return self.is_busy(running, now) or now < running.not_before
 
+    def why_failed(self, name: str, design: str | None) -> str:
+        """Return why a design has failed for an objective a short while ago; empty where it has not."""
+        return self.error_log.get((design or "", name), (0.0, ""))[1]
+
+    def retries_later(self, name: str, design: str | None, now: float) -> bool:
+        """Return whether a design can't be tried yet, because it has failed and the last deployments did not last."""
+        return name in self.running and now < self.running[name].retry_from and bool(self.why_failed(name, design))
+
     def facts_at(self, now: float) -> Facts:
         """Return the present facts, for an analysis."""
         grounded = {name: running for name, running in self.running.items() if running.design}
         return Facts(
             objectives=tuple(self.objectives.values()),
             groundings={name: running.design or "" for name, running in grounded.items()},
-            levels=self.levels.counting(now, {name: running.calm_until for name, running in self.running.items()}),
+            levels=self.levels.present(now),
             components={
                 name: component.status for name, component in self.components.items() if name not in self.kb.own_nodes
             },
@@ -265,12 +286,14 @@ class View:
             if quality in self.objectives[name].limits
             and self.kb.qualities[quality].violates(level, self.objectives[name].limits[quality])
         )
-        waits = tuple((self.is_busy(r, now), now < r.not_before) for r in self.running.values())
+        waits = tuple((self.is_busy(r, now), now < r.not_before, now < r.retry_from) for r in self.running.values())
         improves = tuple((tuple(r.chances), now < r.calm_until) for r in self.running.values() if r.chances)
         return (
             replace(facts, levels={}),
             frozenset(facts.levels),
             passed,
+            self.violations(now),
+            frozenset(name for name in self.running if self.is_relieved(name, now)),
             tuple(running.failed_nodes for running in self.running.values()),
             tuple((n, d.parameters, d.is_left) for r in self.running.values() for n, d in r.drifts.items()),
             waits,
@@ -278,6 +301,27 @@ class View:
             self.has_waited(now),
             frozenset(self.error_log),
         )
+
+    def scale(self, quality: str, limit: float | None = None) -> Scale:
+        """Return how levels of a quality are compared."""
+        found = self.kb.scale(quality)
+        return found if limit is None or limit > 0.0 else replace(found, is_ratio=False)
+
+    def violations(self, now: float) -> frozenset[tuple[str, str]]:
+        """Return the objectives and qualities whose limits are violated so that it counts."""
+        return self.levels.violations(now, self._calm_until())
+
+    def is_relieved(self, name: str, now: float) -> bool:
+        """Return whether the causes for which designs of an objective were left have been gone for long enough."""
+        gone = self.levels.gone_since(now, name)
+        return gone is not None and now - gone >= self.calm(name)
+
+    def calm(self, name: str) -> float:
+        """Return how long those causes must be gone, s."""
+        return self.settings.calm_after(self.running[name].relapses)
+
+    def _calm_until(self) -> dict[str, float]:
+        return {name: running.calm_until for name, running in self.running.items()}
 
     def has_waited(self, now: float) -> bool:
         """Return whether the loop has waited long enough for a running configuration."""
@@ -296,9 +340,12 @@ class View:
     def due(self, now: float) -> float | None:
         """Return when the next step is needed even without a new fact; None where none is."""
         times = [self.started + self.settings.start_grace] if self.started is not None else []
-        times += self.levels.due({name: running.calm_until for name, running in self.running.items()})
-        for running in self.running.values():
-            times.append(running.not_before)
+        times += self.levels.due(self._calm_until())
+        for name, running in self.running.items():
+            gone = self.levels.gone_since(now, name)
+            if gone is not None:
+                times.append(gone + self.calm(name))
+            times += [running.not_before, running.retry_from]
             if running.chances:
                 times.append(running.calm_until)
             if running.busy_since is not None:

@@ -7,27 +7,34 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from metacontrol_bags.decision import Decision
+from metacontrol_bags.decision import Cause, Decision
 from metacontrol_msgs.msg import FunctionGrounding
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
-from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
-from mros1_reasoner.loop import drifts
-from mros1_reasoner.loop.causes import OPERATOR, drifted_nodes, is_drift
-from mros1_reasoner.loop.levels import Levels
+from mros1_reasoner.knowledge.model import Analysis, Design, Facts, Objective
+from mros1_reasoner.loop import drifts, lasting
+from mros1_reasoner.loop.causes import OPERATOR, drifted_nodes, is_chance, is_drift, is_relief
+from mros1_reasoner.loop.levels import Expectation, Judging, Levels
 from mros1_reasoner.loop.readable_state import BUSY, Component, Running, View
 from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.planning.planner import Utility
 
-_MOST_DOUBLINGS = 30  # of a wait; a float holds more, but no robot waits as long
+_RELAPSE = 5.0  # times the calm after which a better design was taken again: a violation then is a new one
+
+VIOLATED = "did not keep a limit while deployed"
+"""Why a design is not tried again that was left because of a quality."""
 
 
 class State(View):
     """What is known and asked for at this moment; the attributes are those of View."""
 
-    def __init__(self, knowledge_base: KnowledgeBase, objectives: Iterable[Objective], settings: Settings) -> None:
+    def __init__(
+        self, knowledge_base: KnowledgeBase, objectives: Iterable[Objective], settings: Settings, utility: Utility
+    ) -> None:
         """Know the objectives, and that nothing runs."""
-        self.kb, self.settings = knowledge_base, settings
+        self.kb, self.settings, self._utility = knowledge_base, settings, utility
+        self._better: dict[tuple[str, str], float | None] = {}
         self.objectives: dict[str, Objective] = {objective.name: objective for objective in objectives}
         self.roots: dict[str, None] = dict.fromkeys(self.objectives)
         self.running: dict[str, Running] = {objective: Running() for objective in self.objectives}
@@ -37,7 +44,17 @@ class State(View):
         self.components: dict[str, Component] = {
             c: Component(status, 0.0) for c, status in knowledge_base.component_statuses.items()
         }
-        self.levels = Levels(settings.violation_window, settings.level_timeout, settings.correction_memory)
+        self.levels = Levels(
+            Judging(
+                history=int(settings.history),
+                confidence=settings.confidence,
+                horizon=settings.horizon,
+                window=settings.violation_window,
+                timeout=settings.level_timeout,
+                memory=settings.correction_memory,
+                relief=settings.relief,
+            )
+        )
         self.error_log: dict[tuple[str, str], tuple[float, str]] = {}
         self.locked: set[str] = set()
         self.paused = False
@@ -55,10 +72,32 @@ class State(View):
     def note_level(self, now: float, name: str, quality: str, level: float, stamp: float) -> None:
         """Note an observed level of an objective, with the stamp of the diagnostic."""
         limit = self.objectives[name].limits.get(quality)
-        passed = limit is not None and self.kb.qualities[quality].violates(level, limit)
+        kind = self.kb.qualities[quality]
         design = self.kb.designs[self.running[name].design or ""]
-        expected, group = design.expected.get(quality), design.group(quality)
-        self.levels.observe(now, (name, quality), level, passed=passed, stamp=stamp, expected=expected, group=group)
+        scale = self.scale(quality, limit)
+        typical = design.expected.get(kind.typical) if self.settings.correct_expected else None
+        against = Expectation(
+            scale=scale,
+            limit=limit,
+            reaching_violates=kind.reaching_violates,
+            expected=design.expected.get(quality),
+            typical=typical if typical is not None and scale.can_compare_with(typical) else None,
+            better=self._best_of_more_useful(design, quality),
+            group=design.group(quality),
+            low=-math.inf if kind.low is None else kind.low,
+            high=math.inf if kind.high is None else kind.high,
+        )
+        self.levels.observe(now, (name, quality), level, against, stamp=stamp)
+
+    def _best_of_more_useful(self, design: Design, quality: str) -> float | None:
+        """Return the best level of a quality that is expected of any design that is more useful than the given one."""
+        if (design.name, quality) not in self._better:
+            least = self._utility(design) + self.settings.improvement
+            others = (d for d in self.kb.solving(design.function) if self._utility(d) >= least)
+            levels = [d.expected[quality] for d in others if quality in d.expected]
+            best = self.kb.qualities[quality].direction.better(*levels) if levels else None
+            self._better[design.name, quality] = best
+        return self._better[design.name, quality]
 
     def forget_levels(self, quality: str) -> None:
         """Forget the levels of a quality."""
@@ -76,6 +115,8 @@ class State(View):
     def note_binding(self, now: float, name: str, in_error: bool) -> None:
         """Note whether a binding of what runs for an objective is in error."""
         running = self.running[name]
+        if in_error and not running.is_broken:
+            self._end_of(name, now)
         self._run(name, failed_stamp=running.failed_stamp if running.binding_error else now, binding_error=in_error)
 
     def note_task_failure(self, name: str, failure: tuple[float, str] | None) -> None:
@@ -88,7 +129,7 @@ class State(View):
         self.released.pop(function, None)
         for name, running in self.running.items():
             if self.objectives[name].function == function and running.design is not None:
-                self.levels.forget(name, now=now)
+                self.levels.forget(name)
                 self.wanted.setdefault(name, running.design)  # what it requires is still needed
                 self._run(name, design=None, state="", busy_since=None, binding_error=False, task_failure=None)
                 self._run(name, drifts={})
@@ -115,9 +156,17 @@ class State(View):
             self._run(name, drifts_from=now + self.settings.restart_grace)
         if state != running.state and state == FunctionGrounding.FAILED:
             self._run(name, failed_stamp=max(now, 0.0))  # 0: before anything was asked for
+            if running.design == configuration and not running.is_broken:
+                self._end_of(name, now)
+        # While it reconfigures, it may be the old or the new one.
+        is_another = state != FunctionGrounding.RECONFIGURING and running.design != configuration
+        is_asked_for = self.pending is not None and self.pending.objective == name
+        if is_another and not is_asked_for and lasting.is_taken_back(running, configuration, self.settings, now):
+            self._end_of(name, now, "was taken back")
+            self.note_in_vain(now, running.design or "", name, self.running[name].ending)
         self._run(name, state=state)
-        if state != FunctionGrounding.RECONFIGURING and running.design != configuration:
-            self._deploy(name, configuration, now)  # while it reconfigures, it may be the old or the new one
+        if is_another:
+            self._deploy(name, configuration, now)
 
     def _deploy(self, name: str, design: str, now: float) -> None:
         """Note that a design runs, and forget what was observed of the design before it."""
@@ -126,11 +175,14 @@ class State(View):
             self._run(name, calm_until=max(running.calm_until, now + self.settings.cool_down))
         if running.design != design:
             self._run(name, restarts=(), put_back={})
+        if lasting.has_lasted(running, self.settings, now):
+            self._run(name, brief=0)
         self._run(name, design=design, degraded=False, binding_error=False, task_failure=None, refusal=())
+        self._run(name, replaced=None, ending="")
         self._run(name, deployed_at=now, failed_nodes=(), drifts={}, drifts_from=now + self.settings.restart_grace)
         if self.wanted.get(name) == design:
             del self.wanted[name]
-        self.levels.forget(name, now=now)
+        self.levels.forget(name)
 
     # Objectives
 
@@ -280,6 +332,25 @@ class State(View):
         """Put a design that failed for an objective into the error log."""
         self.error_log[design, objective] = now + self.settings.error_log_expiry, reason
 
+    def forgive(self, name: str) -> None:
+        """Let designs of an objective be tried again that did not keep a limit: its cause is gone."""
+        self.error_log = {key: entry for key, entry in self.error_log.items() if key[1] != name or entry[1] != VIOLATED}
+
+    def note_blame(self, now: float, name: str, causes: Iterable[Cause]) -> None:
+        """Note for which qualities the design of an objective is left, or that it is left for a better one."""
+        running, causes = self.running.get(name), tuple(causes)
+        if running is None:
+            return
+        violated = [cause.quality for cause in causes if cause.quality and not is_chance(cause)]
+        for quality in violated:
+            self.levels.blame(now, (name, quality))
+        if any(is_relief(cause) for cause in causes) and not violated:
+            self.levels.acquit(name)
+            self._run(name, returned_at=now)
+        elif violated:
+            is_relapse = now - running.returned_at <= _RELAPSE * self.calm(name)
+            self._run(name, relapses=running.relapses + 1 if is_relapse else 0, returned_at=-math.inf)
+
     def propose(self, decision: Decision | None) -> None:
         """Have a decision wait for approval; None: have none wait."""
         self.proposal = decision
@@ -296,12 +367,14 @@ class State(View):
         before = self.running[name]
         if before.state in (*BUSY, FunctionGrounding.FAILED):
             self._run(name, state=FunctionGrounding.STABLE, busy_since=None)
+        restarts = () if lasting.has_lasted(before, self.settings, now) else before.restarts
         self._deploy(name, design, now)
+        self._run(name, replaced=decision.from_configuration if decision.from_configuration != design else None)
         self.active[self.objectives[name].function] = design, FunctionGrounding.STABLE
         self._run(name, calm_until=now + self.settings.cool_down, attempts=0, degraded=decision.degraded)
         if before.failed_nodes and before.design == design:
-            self._run(name, restarts=(*before.restarts, now), degraded=decision.degraded or before.degraded)
-            self._run(name, not_before=now + self._wait_after(len(before.restarts)))
+            self._run(name, restarts=(*restarts, now), degraded=decision.degraded or before.degraded)
+            self._run(name, not_before=now + self.settings.wait_after(len(restarts)))
         if before.design == design:
             self._note_put_back(now, name, drifted_nodes(decision.reasons))
         for node in self.failed_nodes_of(design):
@@ -321,17 +394,18 @@ class State(View):
             self._note_put_back(now, decision.objective, drifted_nodes(decision.reasons))
         elif why is not None:
             self.note_in_vain(now, decision.to_configuration, decision.objective, why)
-        wait = self._wait_after(running.attempts)
+        wait = self.settings.wait_after(running.attempts)
         self._run(decision.objective, not_before=now + wait, attempts=running.attempts + 1)
-
-    def _wait_after(self, attempts: int) -> float:
-        return float(min(self.settings.backoff * 2 ** min(attempts, _MOST_DOUBLINGS), self.settings.backoff_limit))
 
     def note_released(self, function: str) -> None:
         """Note that a function has been released."""
         if function in self.released:
             del self.released[function]
             self.active.pop(function, None)
+
+    def _end_of(self, name: str, now: float, how: str = "ended") -> None:
+        """Note that the deployed design of an objective has ended."""
+        self.running[name] = lasting.ended(self.running[name], self.settings, now, how)
 
     def _end(self) -> Decision:
         assert self.pending is not None  # noqa: S101 - who reports has asked

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from metacontrol_bags.decision import Candidate
 
 from mros1_reasoner.knowledge.model import Design, Objective, Quality
+from mros1_reasoner.knowledge.scale import Correction
+
+_AS_EXPECTED = Correction()
+_AS_GOOD = 0.05  # designs are as far from the nearest limit if they differ by less, as a share of a limit
 
 Utility = Callable[[Design], float]
 Distance = Callable[[Design, Design], float]
@@ -50,8 +54,12 @@ class Situation:
         tried: why a design failed a short while ago, by its name.
         current: name of the deployed design.
         observed: levels that were observed with the deployed design; they replace its expected levels.
-        factors: by how much the expected levels of a quality are to be multiplied, for a group of designs.
-        worth: by how much less another design must violate limits, as a share of a limit, when none keeps them all.
+        corrections: of the expected levels of a quality, for a group of designs.
+        worth: by how much better another design must keep a limit, or less violate limits, as a share of a limit; less
+            is no difference.
+        relief: distance by which another design is to keep the limit of a quality, if one does: the limit is violated,
+            and another design must be better by `worth`.
+        indifference: by how much less useful than the most useful one a design may be to count as being as useful.
     """
 
     qualities: Mapping[str, Quality] = field(default_factory=dict)
@@ -61,12 +69,14 @@ class Situation:
     tried: Mapping[str, str] = field(default_factory=dict)
     current: str | None = None
     observed: Mapping[str, float] = field(default_factory=dict)
-    factors: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    corrections: Mapping[tuple[str, str], Correction] = field(default_factory=dict)
     worth: float = 0.0
+    relief: Mapping[str, float] = field(default_factory=dict)
+    indifference: float = 0.0
 
-    def factor(self, design: Design, quality: str) -> float | None:
-        """Return by how much the level of a quality that is expected of a design is to be multiplied."""
-        return self.factors.get((quality, design.group(quality)))
+    def correction(self, design: Design, quality: str) -> Correction | None:
+        """Return how the level of a quality that is expected of a design is to be corrected."""
+        return self.corrections.get((quality, design.group(quality)))
 
     def can_deploy(self, design: str) -> bool:
         """Return whether a design can be deployed, whatever its levels are."""
@@ -82,9 +92,11 @@ def plan(
 ) -> Plan:
     """Choose a design that can be deployed, has not failed recently and keeps every limit.
 
-    The highest utility wins; of equally useful designs, the smaller change wins. When no design keeps every limit, the
-    least violating one is taken; the deployed design stays unless another one is worth the change. When all have
-    failed, they are tried again.
+    Where a limit is violated, designs that keep it by the relief come before others that keep it barely. Then the
+    highest utility wins; of equally useful designs, the smaller change wins. With an indifference, of the designs that
+    are as useful within it, those count that keep the nearest limit best, then all limits; then components and utility
+    decide. When no design keeps every limit, the least violating one is taken; the deployed design stays unless another
+    one is worth the change. When all have failed, they are tried again.
     """
     running = next((design for design in designs if design.name == situation.current), None)
     candidates = [_judge(objective, design, situation, utility) for design in designs]
@@ -98,14 +110,27 @@ def plan(
     def by_violation(judged: _Judged) -> tuple[float, float, float, str]:
         return judged.violation, *by_use(judged)
 
-    fit = sorted((c for c in candidates if not c.refused_because), key=by_use)
+    fit = sorted((c for c in candidates if not c.refused_because), key=lambda c: (not c.relieves, *by_use(c)))
     deployable = [c for c in candidates if situation.can_deploy(c.design.name)]
+    kept: list[_Judged] = []
     fresh = [c for c in deployable if c.design.name not in situation.tried or c.design.name == situation.current]
     if fit:
-        best = fit[0]
+        fit = [c for c in fit if c.relieves == fit[0].relieves]
+        useful = [c for c in fit if c.utility >= fit[0].utility - situation.indifference]
+        if situation.indifference > 0.0:
+            kept = _least_strained(useful, situation.worth)
+            best = min(kept, key=lambda c: (math.floor(change(c)), *by_use(c)))
+        else:
+            best = fit[0]
         reason = f"{best.design.name} has the highest utility ({best.utility:g}) of the {len(fit)} (out of "
         reason += f"{len(candidates)}) designs that can be deployed and keep every limit"
-        if len(fit) > 1 and fit[1].utility == best.utility and running:
+        reason += " clearly" if situation.relief and best.relieves else ""
+        if best is not fit[0]:
+            reason = reason.replace("has the highest utility", "is as useful as any")
+            reason += (
+                f", and keeps them best of the {len(useful)} within {situation.indifference:g} of the highest utility"
+            )
+        elif len(fit) > 1 and fit[1].utility == best.utility and running:
             reason += f", and is a smaller change than {fit[1].design.name}, which is as useful"
     elif deployable:
         best = min(fresh or deployable, key=by_violation)
@@ -124,10 +149,10 @@ def plan(
             reason += f"it is the least violating{'' if fresh else ', and all were tried before'}"
     else:
         ranked = sorted(candidates, key=by_violation)
-        return Plan(None, False, tuple(c.lost(c.refused_because) for c in ranked), _nothing(situation))
+        return Plan(None, False, tuple(c.lost(c.refused_because) for c in ranked), _nothing(designs, situation))
     others = sorted((c for c in candidates if c is not best), key=lambda c: (bool(c.refused_because), *by_use(c)))
     degraded = not best.keeps_limits
-    lost = (c.lost(_loss(c, best, degraded)) for c in others)
+    lost = (c.lost(_loss(c, best, degraded, keeps_as_well=c in kept)) for c in others)
     return Plan(best.design.name, degraded, (best.chosen(), *lost), reason, is_retry=not fit and not degraded)
 
 
@@ -165,10 +190,15 @@ def feasible_designs(
 
 
 def difference(first: Design, second: Design) -> float:
-    """Return the size of the change from one design to another: components first, then expected levels."""
+    """Return the size of the change from one design to another.
+
+    Its whole part is the number of components that only one of them has, its fraction tells by how much the expected
+    levels differ.
+    """
     components = len(first.components ^ second.components)
     shared = sorted(set(first.expected) & set(second.expected))
-    return components + math.dist([first.expected[q] for q in shared], [second.expected[q] for q in shared])
+    levels = math.dist([first.expected[q] for q in shared], [second.expected[q] for q in shared])
+    return components + levels / (1.0 + levels)
 
 
 @dataclass(frozen=True)
@@ -181,6 +211,8 @@ class _Judged:
         violation: by how much its levels pass the objective's limits, as a sum of shares of the limits.
         refused_because: why it can't be taken; empty where it can.
         keeps_limits: whether it provides its function in full, and no level passes a limit.
+        relieves: whether it keeps limits that are violated now by the relief.
+        excesses: by how much its levels pass limits, as shares of the limits; negative where they keep them.
         levels: the levels that were compared with the limits.
     """
 
@@ -189,6 +221,8 @@ class _Judged:
     violation: float
     refused_because: str
     keeps_limits: bool
+    relieves: bool
+    excesses: Sequence[float]
     levels: Mapping[str, float]
 
     def chosen(self) -> Candidate:
@@ -209,11 +243,11 @@ class _Judged:
 
 def _judge(objective: Objective, design: Design, situation: Situation, utility: Utility) -> _Judged:
     name = design.name
-    factors = {q: found for q in design.expected if (found := situation.factor(design, q)) is not None}
-    expected = {q: level * factors.get(q, 1.0) for q, level in design.expected.items()}
+    corrections = {q: found for q in design.expected if (found := situation.correction(design, q)) is not None}
+    expected = {q: corrections.get(q, _AS_EXPECTED).apply(level) for q, level in design.expected.items()}
     is_current = name == situation.current
     levels = {**expected, **situation.observed} if is_current else expected
-    reasons, violation = [], 0.0
+    reasons, violation, relieves, excesses = [], 0.0, True, []
     for parts, words in (
         (situation.unrealisable, "which does not work"),
         (situation.unfulfilled, "which no design can provide now"),
@@ -232,32 +266,57 @@ def _judge(objective: Objective, design: Design, situation: Situation, utility: 
             violation = math.inf
             continue
         if kind.violates(level, limit):
-            factor = "" if is_current else _factor(factors.get(quality, 1.0))
-            reasons.append(f"{quality} {level:.4g}{factor} {kind.operator} {limit:g}")
+            corrected = "" if is_current else _corrected(corrections.get(quality, _AS_EXPECTED))
+            reasons.append(f"{quality} {level:.4g}{corrected} {kind.operator} {limit:g}")
+        elif quality in situation.relief and quality in situation.observed and not is_current:
+            gain = kind.excess(situation.observed[quality], limit) - kind.excess(level, limit)
+            if gain < situation.worth * (abs(limit) or 1.0):
+                reasons.append(
+                    f"{quality} {level:.4g} is hardly better than the present {situation.observed[quality]:.4g}"
+                )
+        excesses.append(kind.excess(level, limit) / (abs(limit) or 1.0))
+        relieves &= kind.excess(level, limit) <= -situation.relief.get(quality, -math.inf)
         # A lucky or unlucky moment of the deployed design must not weigh more than what is expected of the others.
-        lasting = kind.direction.better(level, expected.get(quality, level)) if quality in factors else level
+        lasting = kind.direction.better(level, expected.get(quality, level)) if quality in corrections else level
         violation += max(0.0, kind.excess(lasting, limit)) / (abs(limit) or 1.0)
     keeps_limits = len(reasons) == int(name in situation.tried)
-    return _Judged(design, utility(design), violation, "; ".join(reasons), keeps_limits, levels)
+    return _Judged(design, utility(design), violation, "; ".join(reasons), keeps_limits, relieves, excesses, levels)
 
 
-def _factor(factor: float) -> str:
-    return "" if factor == 1.0 else f" (expected, times {factor:.3g})"
+def _least_strained(designs: Collection[_Judged], worth: float) -> list[_Judged]:
+    """Return those that keep the nearest limit best, and of these those that keep all limits best."""
+
+    def nearest(judged: _Judged) -> float:
+        return max(judged.excesses, default=0.0)
+
+    least = min(map(nearest, designs))
+    far = [judged for judged in designs if nearest(judged) <= least + _AS_GOOD]
+    lowest = min(sum(judged.excesses) for judged in far)
+    return [judged for judged in far if sum(judged.excesses) <= lowest + worth]
 
 
-def _loss(candidate: _Judged, best: _Judged, degraded: bool) -> str:
+def _corrected(correction: Correction) -> str:
+    return "" if correction == _AS_EXPECTED else f" ({correction} what was expected)"
+
+
+def _loss(candidate: _Judged, best: _Judged, degraded: bool, *, keeps_as_well: bool) -> str:
     """Return why a candidate was rejected."""
     if candidate.refused_because:
         worse = f"; violates limits by {candidate.violation:.2g}, the choice by {best.violation:.2g}"
         tells = degraded and math.isfinite(candidate.violation) and candidate.violation > 0.0
         return candidate.refused_because + (worse if tells else "")
+    if best.relieves and not candidate.relieves:
+        return "it would keep the violated limit barely"
     if candidate.utility < best.utility:
         return f"utility {candidate.utility:.4g} is less than {best.utility:.4g}"
+    if candidate.utility > best.utility and not keeps_as_well:
+        return "as useful as the choice, but nearer to a limit"
     return "as useful as the choice, but a bigger change"
 
 
-def _nothing(situation: Situation) -> str:
-    missing = sorted({c for components in situation.unrealisable.values() for c in components})
-    functions = sorted({f for names in situation.unfulfilled.values() for f in names})
-    without = " or ".join(", ".join(names) for names in (missing, functions) if names)
+def _nothing(designs: Collection[Design], situation: Situation) -> str:
+    names = [design.name for design in designs]  # other functions may lack something else
+    missing = sorted({component for name in names for component in situation.unrealisable.get(name, ())})
+    functions = sorted({function for name in names for function in situation.unfulfilled.get(name, ())})
+    without = " or ".join(", ".join(lacking) for lacking in (missing, functions) if lacking)
     return f"no design can be deployed without {without}" if without else "no design is known"

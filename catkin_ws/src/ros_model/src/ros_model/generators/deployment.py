@@ -108,6 +108,7 @@ def reasoner(project: Project) -> dict[str, Any]:
         "utility": settings["utility"],
         "qa_direction": {qa: entry["direction"] for qa, entry in settings["quality_attributes"].items()},
         "components": project.components,
+        **settings.get("reasoner", {}),
     }
 
 

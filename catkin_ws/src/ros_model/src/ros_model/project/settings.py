@@ -156,6 +156,8 @@ def _unclear_functions(settings: Settings) -> Iterator[ModelError]:
 def _unknown_qas(settings: Settings) -> Iterator[ModelError]:
     content = settings.content
     used: list[tuple[str, Keys]] = [(content["utility"], ("utility",))]
+    qualities = content["quality_attributes"]
+    used += [(e["typical"], ("quality_attributes", q, "typical")) for q, e in qualities.items() if "typical" in e]
     for name, objective in content["objectives"].items():
         used += [(qa, ("objectives", name, "nfrs", qa)) for qa in objective.get("nfrs", {})]
     for number, entry in enumerate(content["observers"]):
