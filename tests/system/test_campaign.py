@@ -103,6 +103,10 @@ def test_campaign_that_is_killed_goes_on_without_driving_a_run_again(ended, tmp_
     check_complete(tmp_path)
     third = campaign(ended, tmp_path, "--jobs", "2")
     assert third.wait(150) == 0 and results(tmp_path) == after
+    elsewhere = campaign(ended, tmp_path, "--from", "out/results.parquet", "--output", "elsewhere")
+    assert elsewhere.wait(150) == 0 and not (tmp_path / "elsewhere" / "runs").exists()
+    first, copy = (parquet.read_table(tmp_path / name / "results.parquet").to_pylist() for name in ("out", "elsewhere"))
+    assert first == copy
 
 
 def test_campaign_that_is_interrupted_leaves_a_table_and_no_process(ended, tmp_path):

@@ -76,7 +76,7 @@ def test_both_engines_tell_the_same_story_over_seeds(tmp_path):
     for one, other in zip(ros, lockstep, strict=True):
         for summary in (one, other):
             assert summary["goal_reached"] and summary["collisions"] == 0
-            assert summary["reconfigurations"][0]["trigger"] == "component:front_laser"
+            assert "component:front_laser" in [change["trigger"] for change in summary["reconfigurations"]]
             assert summary["final_configuration"].endswith("_k")
         assert placed(one) == placed(other)
         assert one["contingency"] == other["contingency"]

@@ -23,6 +23,7 @@ def a_run(variant="f1_v1_r1", route="r1", seed=1, **changes):
     rest = {
         "safety_mean": 0.1,
         "safety_above": 0.0,
+        "energy_median": 0.2,
         "energy_above": 0.0,
         "ground": "",
         "definition": DEFINITION.describe(OBSERVED),
@@ -47,6 +48,16 @@ def a_family():
         for route in ("r1", "r2")
         for seed in (1, 2, 3)
     ]
+
+
+def test_variants_meet_the_same_world_and_routes_another_one():
+    first, other = Job("f1_v1_r1", "r1", 1), Job("f3_v2_r1", "r1", 1)
+    assert first.world_seed == other.world_seed
+    worlds = {
+        Job("f1_v1_r1", route, seed).world_seed for route in ("r1", "r2", "r3", "r4", "r5", "r6") for seed in (1, 2)
+    }
+    assert len(worlds) == 12
+    assert max(worlds) < 2**20, "campaigns have theirs from there on"
 
 
 def test_file_of_runs_is_resumed_where_it_was_cut_off(tmp_path):
@@ -143,6 +154,7 @@ def test_command_drives_once_and_writes_levels_only_when_all_variants_are_measur
     rows = list(csv.DictReader((tmp_path / "qa.csv").open()))
     assert len(rows) == 30
     first = {"name": "f1_v1_r1", "safety": "0.300", "energy": "0.400", "performance": "1.000", "source": "measured"}
+    first["energy_median"] = "0.200"
     assert rows[0] == first | {f"{name}_spread": "0.000" for name in calibration.QUALITIES} | {
         "missions": "1",
         "seeds": "1-1",
@@ -154,7 +166,7 @@ def test_levels_by_different_definitions_do_not_mix(tmp_path):
     options = ["calibrate", "--route", "r1", "--runs", str(tmp_path / "runs.csv"), "--quantile", "energy=0.9"]
     refused = CliRunner().invoke(metacontrol, options)
     assert refused.exit_code == 2
-    assert "holds levels by energy:0.95 safety:0.95, not by energy:0.9 safety:0.95: name another" in refused.output
+    assert "holds levels by energy:0.975 safety:0.95, not by energy:0.9 safety:0.95: name another" in refused.output
 
 
 def test_command_refuses_what_is_not_there(tmp_path):

@@ -1,5 +1,6 @@
 """Which missions a campaign has, and what is said of a file that makes no sense."""
 
+import itertools
 from collections import Counter
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from metacontrol_experiments.campaign.matrix import (
 
 FILES = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_experiments/campaigns"
 VARIANTS = [f"f{f}_v{v}_r{r}" for f in (1, 2, 3) for v in (1, 2, 3) for r in (1, 2, 3)]
-MANAGERS = ["none", "mros", "random", "rules", "respawn"]
+MANAGERS = ["none", "mros", "as_published", "random", "rules", "respawn"]
 KNOWN = Known(["r1", "r2", "r3", "r4", "r5", "r6"], VARIANTS, MANAGERS, ["front_laser", "camera"])
 SMALL = {
     "seed": 3,
@@ -80,7 +81,17 @@ def test_what_goes_wrong_is_clutter_power_and_the_failure():
     run = next(run for run in campaign().runs if (run.clutter, run.power, run.failure) == (7, 1.6, "killed"))
     assert run.contingencies == ("clutter:7@time:0", "power:1.6@share:0.6", "kill:front_laser@share:0.4")
     assert [str(entry) for entry in contingencies_of(run)] == list(run.contingencies)
-    assert next(run for run in campaign().runs if run.failure == "none").contingencies == ()
+    calm = [run for run in campaign().runs if (run.clutter, run.power, run.failure) == (0, 1.0, "none")]
+    assert calm and {run.contingencies for run in calm} == {()}
+
+
+def test_first_part_is_a_sample_of_the_whole_with_all_managers_of_a_cell():
+    runs = [run for run in read("paper.yaml").runs if run.repeat == 1]
+    first = runs[:600]
+    assert {run.route for run in first} == {run.route for run in runs}
+    assert {run.part for run in first} == {"disturbances", "component_failure"}
+    cells = [list(cell) for _, cell in itertools.groupby(first, key=lambda run: run.seed)]
+    assert {len(cell) for cell in cells[:-1]} == {6}
 
 
 def test_paper_has_the_matrix_of_the_paper():
@@ -90,7 +101,7 @@ def test_paper_has_the_matrix_of_the_paper():
     assert len(cells) == 864
     per_manager = Counter(run.manager for run in matrix)
     assert per_manager["none"] + per_manager["mros"] >= 6727
-    assert {per_manager[manager] for manager in ("random", "rules", "respawn")} == {864}
+    assert {per_manager[manager] for manager in ("as_published", "random", "rules", "respawn")} == {864}
     assert {run.failure for run in runs} == {"none", "killed", "unplugged"}
 
 

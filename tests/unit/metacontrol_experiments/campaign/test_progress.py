@@ -8,7 +8,9 @@ from metacontrol_experiments.campaign.progress import (
     Attempt,
     Result,
     Status,
+    check_same,
     from_json,
+    from_row,
     is_final,
     remaining,
     row,
@@ -29,13 +31,13 @@ def test_run_is_tried_once_more_unless_it_is_done():
 def test_what_has_a_result_is_not_driven_again_however_it_ended():
     runs = [replace(RUN, repeat=number) for number in (1, 2, 3)]
     results = {runs[0].name: Result(runs[0], (DONE,)), runs[2].name: Result(runs[2], (CRASHED, HUNG))}
-    assert remaining(runs, results, "out") == [runs[1]]
+    assert remaining(runs, results) == [runs[1]]
 
 
 def test_folder_of_another_campaign_is_refused():
     held = {RUN.name: Result(replace(RUN, seed=6, timeout=5.0), (DONE,))}
-    with pytest.raises(CampaignError, match=r"out/p/.*rules-1: holds another mission \(seed, timeout\): name another"):
-        remaining([RUN], held, "out")
+    with pytest.raises(CampaignError, match=r"out/p/.*rules-1: is another mission \(seed, timeout\): delete it"):
+        check_same([RUN], held, "out", "delete it")
 
 
 def test_result_survives_its_file_but_for_the_logs():
@@ -56,6 +58,20 @@ def test_row_has_run_figures_and_provenance():
     assert (told["manager"], told["seed"], told["status"], told["attempts"]) == ("rules", 5, "done", 2)
     assert (told["outcome"], told["above_safety"], told["above_energy"]) == ("reached", 0.01, None)
     assert (told["reconfigurations"], told["wall_s"], told["host"]) == (1, 3.5, "a")
+
+
+@pytest.mark.parametrize("attempts", [(DONE,), (CRASHED, DONE), (CRASHED, HUNG)])
+def test_row_tells_the_result_again_but_for_attempts_before_the_last(attempts):
+    summary = SUMMARY if attempts[-1] is DONE else None
+    told = row(Result(RUN, attempts, summary, {"host": "a", "commit": "c", "ended": "e", "versions": "v"}))
+    assert row(from_row(told, "x.parquet: row 1")) == told
+
+
+@pytest.mark.parametrize("change", [{"summary": "{"}, {"status": "gone"}, {"attempts": None}, {"contingencies": 3}])
+def test_row_that_is_no_result_is_refused(change):
+    told = {**row(Result(RUN, (DONE,), SUMMARY)), **change}
+    with pytest.raises(CampaignError, match=r"^x\.parquet: row 1: is no result of a run .*name a table"):
+        from_row(told, "x.parquet: row 1")
 
 
 def test_run_that_failed_has_a_row_with_the_same_columns():

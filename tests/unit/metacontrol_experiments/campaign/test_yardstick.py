@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from metacontrol_experiments.campaign.definition import QUANTILES
 from metacontrol_experiments.campaign.yardstick import SAMPLES, Trace, Vibration, fit, levels, loss, targets
 from robot_formulas.power import energy_level, power_load
 
@@ -45,7 +46,7 @@ def baseline_of(traces, vibration):
     names = {"safety": ["clutter 0"], "energy": ["power 1", "power 1.4"], "success": ["clutter 0", "power 1.4"]}
     blank = {table: dict.fromkeys(rows, 0.0) for table, rows in names.items()}
     expected = {trace.variant: (0.0, 0.0) for trace in traces}
-    found = targets(traces, vibration, blank, expected, LIMITS, 0.95)
+    found = targets(traces, vibration, blank, expected, LIMITS, QUANTILES)
     groups = {"safety": "time above the safety", "energy": "time above the energy", "success": "success"}
     own = {
         table: {one.name: one.ours for one in found if one.group.startswith(group)} for table, group in groups.items()
@@ -62,8 +63,8 @@ def test_fit_finds_the_vibration_that_was_published():
     true = Vibration(1.0, 8.0, 24.0)
     baseline, expected = baseline_of(traces, true)
     start = Vibration(1.0, 14.0, 16.0)
-    found = fit(traces, 1.0, start, baseline, expected, LIMITS, 0.95)
-    before, after = (loss(targets(traces, one, baseline, expected, LIMITS, 0.95)) for one in (start, found))
+    found = fit(traces, 1.0, start, baseline, expected, LIMITS, QUANTILES)
+    before, after = (loss(targets(traces, one, baseline, expected, LIMITS, QUANTILES)) for one in (start, found))
     assert after < 0.3 * before
     assert found.spacing == pytest.approx(true.spacing, rel=0.2)
     assert found.jolt == pytest.approx(true.jolt, rel=0.2)
@@ -72,7 +73,7 @@ def test_fit_finds_the_vibration_that_was_published():
 def test_success_needs_all_four_conditions():
     def rate(**changes):
         blank = {"safety": {}, "energy": {}, "success": {"clutter 0": 0.0}}
-        found = targets([a_trace(**changes)], STILL, blank, {}, LIMITS, 0.95)
+        found = targets([a_trace(**changes)], STILL, blank, {}, LIMITS, QUANTILES)
         return next(one.ours for one in found if one.group == "success, %")
 
     calm = np.full(400, 0.2)

@@ -130,7 +130,7 @@ def test_quantile_that_makes_no_sense_is_refused(plant, tmp_path, text):
 def test_same_definition_serves_bags_and_simulation():
     levels, durations = np.arange(100.0), np.ones(100)
     assert Definition().level("safety", levels, durations) == 94.0
-    assert Definition().level("energy", levels, durations) == 94.0
+    assert Definition().level("energy", levels, durations) == 97.0
     assert Definition().level("noise", levels, durations) == 49.5
     assert Definition({"flow": 0.95}).level("flow", levels, durations, higher_is_better=True) == 5.0
     assert Definition().level("safety", levels[:0], durations[:0]) is None

@@ -95,7 +95,7 @@ def test_campaign_names_world_and_routes_relative_to_its_file(office, tmp_path):
     assert {row["ground"] for row in table} == {read_ground(*office).mark}
     (tmp_path / "maps/tours.yaml").write_text((tmp_path / "maps/tours.yaml").read_text() + "\n")
     refused = command("campaign", path, "--output", tmp_path / "out")
-    assert refused.exit_code == 2 and "holds another mission (ground)" in refused.output
+    assert refused.exit_code == 2 and "is another mission (ground)" in refused.output
 
 
 def test_options_take_the_place_of_the_files_that_a_campaign_names(office, tmp_path):

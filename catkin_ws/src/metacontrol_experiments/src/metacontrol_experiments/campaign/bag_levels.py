@@ -60,7 +60,12 @@ class Measured:
 
 
 def levels_of_bag(
-    record: MissionRecord, bag: str, definition: Definition, higher_is_better: Mapping[str, bool], initial: str = ""
+    record: MissionRecord,
+    bag: str,
+    definition: Definition,
+    higher_is_better: Mapping[str, bool],
+    initial: str = "",
+    observed_as: Mapping[str, str] | None = None,
 ) -> list[BagLevels]:
     """Return what a bag tells of each configuration that ran in it.
 
@@ -70,6 +75,7 @@ def levels_of_bag(
         definition: of a level.
         higher_is_better: quality -> whether its higher levels are the better ones; other qualities are left out.
         initial: configuration that ran all the time where the bag tells of none.
+        observed_as: quality -> the one whose reports tell its level, where that is another one.
 
     Raises:
         CalibrationError: it tells of no configuration, or of no level; the message has the remedy.
@@ -88,7 +94,8 @@ def levels_of_bag(
             f"{bag}: tells of no configuration: record rosgraph_manipulator/active_configuration, or name the one that "
             "ran by --initial"
         )
-    pieces = {name: _pieces([r for r in known if r.name == name], end) for name in higher_is_better}
+    sources = {name: (observed_as or {}).get(name, name) for name in higher_is_better}
+    pieces = {name: _pieces([r for r in known if r.name == source], end) for name, source in sources.items()}
     found = []
     for configuration in dict.fromkeys(name for name, _, _ in times):
         spans = [(max(began, start), min(ended, end)) for name, began, ended in times if name == configuration]

@@ -3,18 +3,19 @@
 Every variant drives routes with several seeds, in lockstep and without contingency.
 
 The measured level of safety and energy of a variant is the mean over all its missions of what `definition` makes of
-one. That of performance is the mean of the shortest time that any variant took on the route by the time taken, 0 for a
-goal missed.
+one. The usual level of energy, beside it, is the median over a mission's time. The level of performance is the mean of
+the shortest time that any variant took on the route by the time taken, 0 for a goal missed.
 """
 
 from __future__ import annotations
 
 import itertools
+import zlib
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from metacontrol_bags.metrics import summarise
-from metacontrol_bags.series import held, share_above
+from metacontrol_bags.series import held, quantile_of, share_above
 
 from metacontrol_experiments.campaign.definition import over_runs
 
@@ -26,8 +27,15 @@ if TYPE_CHECKING:
     from metacontrol_experiments.campaign.definition import Definition, Level
 
 OBSERVED = ("safety", "energy")
-QUALITIES = (*OBSERVED, "performance")
-"""Qualities that have levels during a mission, and all."""
+TYPICAL = {"energy": "energy_median"}
+QUALITIES = (*OBSERVED, "performance", *TYPICAL.values())
+"""Qualities that have levels during a mission; quality -> the one that is its usual level; and all.
+
+Only energy has a usual level: it belongs to the variant, while the risk belongs to the place.
+"""
+
+
+_ROUTES = 1000  # seeds that are kept apart for the routes of one seed
 
 
 class CalibrationError(RuntimeError):
@@ -41,6 +49,14 @@ class Job:
     variant: str
     route: str
     seed: int
+
+    @property
+    def world_seed(self) -> int:
+        """The seed of everything random: all variants meet the same, but not on another route.
+
+        The floor's jolts are rare. With the same ones on all routes, a few seeds would be a few samples of them.
+        """
+        return _ROUTES * self.seed + zlib.crc32(self.route.encode()) % _ROUTES
 
     def __str__(self) -> str:
         return f"{self.variant} on {self.route} with seed {self.seed}"
@@ -62,6 +78,7 @@ class Run:
         safety_mean: mean risk.
         safety_above: share of time above the threshold of safety.
         energy: its level, likewise.
+        energy_median: its median over time.
         energy_above: share of time above the threshold of energy.
         ground: what tells the ground from others; empty for the factory.
         definition: of the levels, in words.
@@ -79,6 +96,7 @@ class Run:
     safety_mean: float
     safety_above: float
     energy: float
+    energy_median: float
     energy_above: float
     ground: str
     definition: str
@@ -127,6 +145,7 @@ def run_of(
         safety_mean=summary["mean_qa"]["safety"],
         safety_above=round(share_above(risk, thresholds["safety"], start, end) or 0.0, 4),
         energy=round(levels["energy"] or 0.0, 4),
+        energy_median=round(quantile_of(*held(load, start, end), 0.5) or 0.0, 4),
         energy_above=round(share_above(load, thresholds["energy"], start, end) or 0.0, 4),
         ground=ground,
         definition=definition.describe(OBSERVED),
@@ -177,6 +196,7 @@ def measure(runs: Sequence[Run]) -> dict[str, dict[str, Level]]:
         levels[variant] = {
             "safety": over_runs([run.safety for run in own]),
             "energy": over_runs([run.energy for run in own]),
+            "energy_median": over_runs([run.energy_median for run in own]),
             "performance": over_runs([fastest[run.route] / run.duration_s if run.reached else 0.0 for run in own]),
         }
     return levels

@@ -131,7 +131,7 @@ class Campaign:
     """What a file asks for.
 
     Attributes:
-        runs: repeat by repeat, so that the first part is of use, too.
+        runs: repeat by repeat, cells in a random order that is always the same: any first part is a sample of all.
         deadline: wall s for a run.
         logs: whether each run leaves its log.
         ground: of all runs.
@@ -184,7 +184,7 @@ def parse_campaign(content: Any, known: Known, where: str) -> Campaign:
         for name, part in content["parts"].items()
         for run in _runs(name, part, known, f"{where}: parts.{name}", (seed, engine, timeout))
     ]
-    runs.sort(key=lambda run: run.repeat)  # stable
+    runs.sort(key=lambda run: (run.repeat, run.seed))  # stable: the managers of a cell stay together
     deadline, logs = float(content.get("deadline", DEADLINE_S)), bool(content.get("logs", False))
     return Campaign(tuple(runs), deadline, logs, known.ground)
 

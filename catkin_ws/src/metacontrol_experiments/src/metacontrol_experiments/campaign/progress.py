@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 MOST_ATTEMPTS = 2
 """A run that crashed or hung is tried once more."""
+PROVENANCE = ("commit", "host", "ended", "versions")
+"""What a result tells of where it comes from."""
 LONGEST_LOG = 200_000
 """Bytes of an attempt's log that are kept, the last ones."""
 
@@ -70,29 +72,28 @@ def is_final(attempts: Sequence[Attempt]) -> bool:
     return bool(attempts) and (attempts[-1].status is Status.DONE or len(attempts) >= MOST_ATTEMPTS)
 
 
-def remaining(runs: Iterable[Run], results: Mapping[str, Result], where: str) -> list[Run]:
-    """Return the runs without a result, in their order.
+def remaining(runs: Iterable[Run], results: Mapping[str, Result]) -> list[Run]:
+    """Return the runs without a result, in their order; the results are known by the run's name."""
+    return [run for run in runs if run.name not in results]
+
+
+def check_same(runs: Iterable[Run], results: Mapping[str, Result], where: str, remedy: str) -> None:
+    """Check that results are those of the runs.
 
     Args:
         runs: of the campaign.
         results: those that are there, by the run's name.
-        where: their folder, for messages.
+        where: their folder or table, for messages.
+        remedy: what to do where one is that of another mission.
 
     Raises:
         CampaignError: one is that of another mission.
     """
-    missing = []
     for run in runs:
         found = results.get(run.name)
-        if found is None:
-            missing.append(run)
-        elif found.run != run:
+        if found is not None and found.run != run:
             differing = [item.name for item in fields(Run) if getattr(run, item.name) != getattr(found.run, item.name)]
-            raise CampaignError(
-                f"{where}/{run.name}: holds another mission ({', '.join(differing)}): name another folder by "
-                "--output, or delete this one"
-            )
-    return missing
+            raise CampaignError(f"{where}/{run.name}: is another mission ({', '.join(differing)}): {remedy}")
 
 
 def to_json(result: Result) -> str:
@@ -121,6 +122,24 @@ def from_json(text: str, where: str) -> Result:
         raise CampaignError(f"{where}: is no result of a run ({error}): delete it to drive the run again") from error
 
 
+def from_row(content: Mapping[str, Any], where: str) -> Result:
+    """Return the result of a row of a table. Of attempts before the last one, it knows only that they were.
+
+    Raises:
+        CampaignError: it is none.
+    """
+    try:
+        values = {item.name: content[item.name] for item in fields(Run)}
+        run = Run(**{**values, "contingencies": tuple(content["contingencies"].split())})
+        before = int(content["attempts"]) - 1
+        last = Attempt(Status(content["status"]), content["wall_s"], content["problem"])
+        attempts = (*(Attempt(Status.CRASHED, 0.0) for _ in range(before)), last)
+        summary = json.loads(content["summary"]) if content["summary"] else None
+        return Result(run, attempts, summary, {name: content[name] for name in PROVENANCE})
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise CampaignError(f"{where}: is no result of a run ({error}): name a table of a campaign") from error
+
+
 def row(result: Result) -> dict[str, Any]:
     """Return a result as a row of the table: its run, its figures, the whole summary, and where it comes from."""
     run, summary = result.run, result.summary or {}
@@ -144,9 +163,6 @@ def row(result: Result) -> dict[str, Any]:
         "reconfigurations": len(summary["reconfigurations"]) if summary else None,
         "final_configuration": summary.get("final_configuration"),
         "wall_s": sum(attempt.wall_s for attempt in result.attempts),
-        "commit": result.provenance.get("commit"),
-        "host": result.provenance.get("host"),
-        "ended": result.provenance.get("ended"),
-        "versions": result.provenance.get("versions"),
+        **{name: result.provenance.get(name) for name in PROVENANCE},
         "summary": json.dumps(result.summary) if result.summary else None,
     }

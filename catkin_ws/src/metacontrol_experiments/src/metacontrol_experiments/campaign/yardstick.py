@@ -138,7 +138,7 @@ def targets(
     baseline: Mapping[str, Mapping[str, float]],
     expected: Mapping[str, tuple[float, float]],
     limits: Mapping[str, float],
-    quantile: float,
+    quantiles: Mapping[str, float],
 ) -> list[Target]:
     """Return the published facts beside what traces and constants give.
 
@@ -148,7 +148,7 @@ def targets(
         baseline: the baseline's published tables in per cent: safety, energy and success, each row -> figure.
         expected: variant -> published expected levels of safety (risk) and energy.
         limits: quality attribute -> level that must not be exceeded.
-        quantile: that an expected level is of a mission's levels.
+        quantiles: quality -> which quantile of a mission's levels its expected level is.
     """
     starts = [trace for trace in traces if "_v2_" in trace.variant]
     plain = [trace for trace in starts if not trace.clutter]
@@ -167,7 +167,7 @@ def targets(
         factors = (float(value),) if kind == "power" else (1.0, 1.2, 1.4, 1.6)
         rates = [_success(trace, vibration, factor, limits) for trace in group for factor in factors]
         found.append(Target("success, %", row, figure, 100.0 * _mean(rates), SUCCESS_WEIGHT))
-    found += _expected(traces, vibration, expected, quantile)
+    found += _expected(traces, vibration, expected, quantiles)
     single = [trace for trace in plain if trace.variant.startswith("f2")]
     energies = [levels(trace, vibration, 1.0) for trace in single]
     facts = {
@@ -194,13 +194,13 @@ def fit(
     baseline: Mapping[str, Mapping[str, float]],
     expected: Mapping[str, tuple[float, float]],
     limits: Mapping[str, float],
-    quantile: float,
+    quantiles: Mapping[str, float],
 ) -> Vibration:
     """Return the spacing and size of jolts that fit best, with a given bulk (`targets` has the other arguments)."""
 
     def at(point: NDArray[np.float64]) -> float:
         vibration = Vibration(bulk, math.exp(point[0]), math.exp(point[1]))
-        return loss(targets(traces, vibration, baseline, expected, limits, quantile))
+        return loss(targets(traces, vibration, baseline, expected, limits, quantiles))
 
     first = np.log([start.spacing, start.jolt])
     best = minimize(at, first, method="Nelder-Mead", options={"maxiter": 40, "xatol": 0.01, "fatol": 0.01})
@@ -208,14 +208,18 @@ def fit(
 
 
 def _expected(
-    traces: Sequence[Trace], vibration: Vibration, expected: Mapping[str, tuple[float, float]], quantile: float
+    traces: Sequence[Trace],
+    vibration: Vibration,
+    expected: Mapping[str, tuple[float, float]],
+    quantiles: Mapping[str, float],
 ) -> list[Target]:
     found = []
     for variant, (risk, energy) in expected.items():
         own = [trace for trace in traces if trace.variant == variant and not trace.clutter]
         if own:
-            risks = [float(np.quantile(trace.risk, quantile)) for trace in own]
-            energies = [float(np.quantile(levels(trace, vibration, 1.0), quantile, axis=1).mean()) for trace in own]
+            risks = [float(np.quantile(trace.risk, quantiles["safety"])) for trace in own]
+            share = quantiles["energy"]
+            energies = [float(np.quantile(levels(trace, vibration, 1.0), share, axis=1).mean()) for trace in own]
             found.append(Target("expected safety risk", variant, risk, _mean(risks), LEVEL_WEIGHT))
             found.append(Target("expected energy", variant, energy, _mean(energies), LEVEL_WEIGHT))
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,10 +58,12 @@ def calibrate_from_bags(
     models = load_project(project or simulation_package() / "models" / "metacontrol.yaml")
     qualities = models.settings["quality_attributes"]
     higher = {name: entry["direction"] == "higher_is_better" for name, entry in qualities.items()}
+    usual = {entry["typical"]: name for name, entry in qualities.items() if "typical" in entry}
+    definition = replace(definition, quantiles={**definition.quantiles, **dict.fromkeys(usual, 0.5)})
     expected = {variant.name: _levels_of(variant) for variant in models.variants}
     if initial and initial not in expected:
         raise CalibrationError(f"--initial: no variant {initial!r} in the project; there are {', '.join(expected)}")
-    found, unused = _read(bags, definition, higher, initial, namespace)
+    found, unused = _read(bags, definition, higher, initial, namespace, usual)
     foreign = sorted({entry.configuration for entry in found} - expected.keys())
     if foreign:
         tell(f"{_some(foreign)}: no variant of the project: left out", "yellow")
@@ -85,7 +88,12 @@ def _levels_of(variant: RosSystem) -> dict[str, float]:
 
 
 def _read(
-    bags: Sequence[Path], definition: Definition, higher: Mapping[str, bool], initial: str, namespace: str
+    bags: Sequence[Path],
+    definition: Definition,
+    higher: Mapping[str, bool],
+    initial: str,
+    namespace: str,
+    usual: Mapping[str, str],
 ) -> tuple[list[BagLevels], int]:
     """Return what bags tell, and how many of them tell nothing; a line says why."""
     found: list[BagLevels] = []
@@ -93,7 +101,7 @@ def _read(
     for bag in bags:
         try:
             salvaged = salvage(bag, _TOPICS, namespace)
-            found += levels_of_bag(salvaged.record, str(bag), definition, higher, initial)
+            found += levels_of_bag(salvaged.record, str(bag), definition, higher, initial, usual)
         except (BagError, CalibrationError, OSError) as error:
             tell(" ".join(str(error).split()), "yellow")
             unused += 1

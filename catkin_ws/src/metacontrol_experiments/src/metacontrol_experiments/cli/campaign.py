@@ -13,9 +13,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.text import Text
 
 from metacontrol_experiments.campaign.matrix import CampaignError, Known, ground_files, parse_campaign
-from metacontrol_experiments.campaign.progress import Status, remaining
+from metacontrol_experiments.campaign.progress import Status, check_same, remaining
 from metacontrol_experiments.cli.options import ground_options
-from metacontrol_experiments.io.campaign_folder import RUNS, read_results, write_result, write_table
+from metacontrol_experiments.io.campaign_folder import RUNS, read_results, results_of, write_result, write_table
 from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.display import CONSOLE, refusing, tell
 from metacontrol_experiments.io.ground_files import read_ground, read_routes, routes_file
@@ -41,10 +41,20 @@ _FAILED = 1
     type=click.Path(file_okay=False, path_type=Path),
     help="Folder of the runs and their table.  [default: results/campaign/ and the name of FILE]",
 )
+@click.option(
+    "--from",
+    "tables",
+    multiple=True,
+    metavar="TABLE",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="A results.parquet whose missions are not driven again, such as one of another machine. May be repeated.",
+)
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Worker processes on this machine.")
 @click.option("--scheduler", metavar="ADDRESS", help="Drive by the workers of this scheduler of Dask instead.")
 @ground_options
-def campaign(file: Path, output: Path | None, jobs: int, scheduler: str | None, **ground: Path | None) -> None:
+def campaign(
+    file: Path, output: Path | None, tables: tuple[Path, ...], jobs: int, scheduler: str | None, **ground: Path | None
+) -> None:
     """Drive the missions that a FILE asks for, and leave a table of their results.
 
     What is there already is not driven again: after an interruption, the same command goes on. --world and --routes
@@ -57,8 +67,8 @@ def campaign(file: Path, output: Path | None, jobs: int, scheduler: str | None, 
         folder = output or Path("results/campaign") / file.stem
         folder.mkdir(parents=True, exist_ok=True)
         with alone_in(folder), signals_as_interrupts():
-            results = read_results(folder, asked.runs)
-            missing = remaining(asked.runs, results, str(folder / RUNS))
+            results = _known(asked, folder, tables)
+            missing = remaining(asked.runs, results)
             try:
                 _drive(asked, missing, results, folder, jobs, scheduler)
             finally:
@@ -97,6 +107,23 @@ def _read(file: Path, given: dict[str, Path | None]) -> Campaign:
     asked = parse_campaign(content, known, str(file))
     read_routes(ground, dict.fromkeys(run.route for run in asked.runs))
     return asked
+
+
+def _known(asked: Campaign, folder: Path, tables: tuple[Path, ...]) -> dict[str, Result]:
+    """Return the results that are there, by the run's name: those of the folder, then those of other tables.
+
+    Raises:
+        CampaignError: one cannot be read, or is that of another mission.
+    """
+    wanted = {run.name for run in asked.runs}
+    found: dict[str, Result] = {}
+    for table in tables:
+        taken = {name: result for name, result in results_of(table).items() if name in wanted}
+        check_same(asked.runs, taken, str(table), "leave out --from")
+        found = {**taken, **found}
+    own = read_results(folder, asked.runs)
+    check_same(asked.runs, own, str(folder / RUNS), "name another folder by --output, or delete it")
+    return {**found, **own}
 
 
 def _drive(

@@ -76,20 +76,19 @@ def yardstick(seeds: int, jobs: int, fitting: bool, runs: Path, output: Path | N
         "",
     ]
     for share in TRIED_QUANTILES:
-        found = targets(traces, present, *facts, share)
-        residuals = [one.residual for one in found if one.group.startswith("expected")]
-        risks = [one.residual for one in found if one.group == "expected safety risk"]
+        found = targets(traces, present, *facts, dict.fromkeys(QUANTILES, share))
+        risks, energies = (_rms(found, group) for group in ("expected safety risk", "expected energy"))
         lines.append(
-            f"- Expected levels as the {share:.1%} quantile: root mean square residual {_rms(residuals):.3f}, "
-            f"of safety {_rms(risks):.3f}"
+            f"- Expected levels as the {share:.1%} quantile: root mean square residual of safety {risks:.3f}, "
+            f"of energy {energies:.3f}"
         )
-    found = targets(traces, present, *facts, QUANTILES["energy"])
+    found = targets(traces, present, *facts, QUANTILES)
     lines += ["", f"Loss with the constants in force ({present}): {loss(found):.2f}", "", *_table(found)]
     if fitting:
         lines += ["", "| bulk | spacing, m | jolt | loss |", "|---|---|---|---|"]
         for bulk in BULKS:
-            best = fit(traces, bulk, present, *facts, QUANTILES["energy"])
-            reached = loss(targets(traces, best, *facts, QUANTILES["energy"]))
+            best = fit(traces, bulk, present, *facts, QUANTILES)
+            reached = loss(targets(traces, best, *facts, QUANTILES))
             lines.append(f"| {bulk:g} | {best.spacing:.2f} | {best.jolt:.1f} | {reached:.2f} |")
     text = "\n".join(lines) + "\n"
     tell(text)
@@ -118,8 +117,8 @@ def _table(found: Sequence[Target]) -> list[str]:
     return lines
 
 
-def _rms(residuals: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(residuals))))
+def _rms(found: Sequence[Target], group: str) -> float:
+    return float(np.sqrt(np.mean([one.residual**2 for one in found if one.group == group])))
 
 
 def _duration(traces: Sequence[Any]) -> float:

@@ -66,7 +66,7 @@ def _drive(job: Job, ground: Ground, definition: Definition, commit: str) -> Run
         route=read_route(routes_file(ground), job.route),
         output=Path(),  # nothing is written
         manager=NONE,
-        seed=job.seed,
+        seed=job.world_seed,
         initial_configuration=job.variant,
         world=ground.world,
         commit=commit,

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING
 from node_kit.io.input_files import InputFileError, read_text
 
 from metacontrol_experiments.campaign.matrix import CampaignError
-from metacontrol_experiments.campaign.progress import Result, from_json, row, to_json
+from metacontrol_experiments.campaign.progress import Result, Status, from_json, from_row, row, to_json
 from metacontrol_experiments.mission.settings import LOG_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
+
+    import pyarrow
 
     from metacontrol_experiments.campaign.matrix import Run
 
@@ -38,6 +40,32 @@ def read_results(folder: Path, runs: Iterable[Run]) -> dict[str, Result]:
             except InputFileError as error:
                 raise CampaignError(str(error)) from error
     return found
+
+
+def read_table(path: Path) -> pyarrow.Table:
+    """Return a table of results as it is.
+
+    Raises:
+        CampaignError: it is none.
+    """
+    import pyarrow  # takes a while to import
+    from pyarrow import parquet
+
+    try:
+        return parquet.read_table(path)
+    except (pyarrow.ArrowException, OSError, ValueError) as error:
+        raise CampaignError(f"{path}: is no Parquet table ({error}); name the {TABLE} of a campaign") from error
+
+
+def results_of(path: Path) -> dict[str, Result]:
+    """Return the missions of a table that were driven to their end, by the run's name.
+
+    Raises:
+        CampaignError: it is no table of a campaign.
+    """
+    rows = read_table(path).to_pylist()
+    results = (from_row(content, f"{path}: row {number}") for number, content in enumerate(rows, start=1))
+    return {result.run.name: result for result in results if result.status is Status.DONE}
 
 
 def write_result(folder: Path, result: Result, log: str | None = None) -> None:

@@ -15,6 +15,8 @@ from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.world.grid import OCCUPIED
 from pybullet_simulator.world.world import WorldError, rasterise
 
+from metacontrol_experiments.campaign.matrix import CampaignError
+from metacontrol_experiments.io import campaign_folder
 from metacontrol_experiments.io.campaign_folder import RUNS, TABLE
 from metacontrol_experiments.io.input_files import PackageError, simulation_package
 from metacontrol_experiments.mission.settings import LOG_NAME
@@ -52,13 +54,10 @@ def read_table(path: Path) -> Table:
     Raises:
         ReportError: it is no table of a campaign, or it is empty.
     """
-    import pyarrow  # takes a while to import
-    from pyarrow import parquet
-
     try:
-        table = parquet.read_table(path)
-    except (pyarrow.ArrowException, OSError, ValueError) as error:
-        raise ReportError(f"{path}: is no Parquet table ({error}); name the {TABLE} of a campaign") from error
+        table = campaign_folder.read_table(path)
+    except CampaignError as error:
+        raise ReportError(str(error)) from error
     about = {key.decode(errors="replace"): value.decode(errors="replace") for key, value in _metadata(table)}
     campaign = about.get("campaign", "")
     try:

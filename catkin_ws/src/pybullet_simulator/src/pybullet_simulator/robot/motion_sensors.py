@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 VIBRATION = 2.0
 """Standard deviation of the IMU's forward acceleration between jolts, in m/s2 per m/s of speed, at 50 Hz."""
 
-JOLT_SPACING = 9.4
+JOLT_SPACING = 15.0
 """m between two jolts on average: joints and damaged places of the floor that a wheel runs over."""
 
-JOLT = 26.5
+JOLT = 38.0
 """Scale of the Rayleigh distribution of a jolt's acceleration, in m/s2 per m/s of speed."""
 
 SLIP_SIDEWAYS = 3.0
