@@ -3,6 +3,10 @@
 import socket
 from contextlib import contextmanager
 
+QUIET_HOST = "127.0.0.2"
+"""A loopback address that no node or master has. Clients in other tests try the port of a server that is gone again and
+again, and the system may give that port to the next test's server: at this address they do not find it."""
+
 
 @contextmanager
 def reserved_port():

@@ -17,7 +17,7 @@ import psutil
 import pytest
 import yaml
 from helpers.cases import case
-from helpers.ports import reserved_port
+from helpers.ports import QUIET_HOST, reserved_port
 from helpers.waiting import DEADLINE_S, wait_for
 
 HERE = Path(__file__).resolve().parent
@@ -63,8 +63,8 @@ class Gate:
         self._master_port, self._left = master_port, answers
         self._sockets = []
         self._lock = threading.Lock()
-        self._server = socket.create_server(("localhost", 0))
-        self.uri = f"http://localhost:{self._server.getsockname()[1]}"
+        self._server = socket.create_server((QUIET_HOST, 0))
+        self.uri = f"http://{QUIET_HOST}:{self._server.getsockname()[1]}"
         self.closed = threading.Event()
         threading.Thread(target=self._serve, daemon=True).start()
 
@@ -246,8 +246,8 @@ def test_signal_ends_them_while_their_master_hangs(world):
 
 def test_signal_ends_them_while_they_wait_for_the_first_answer(world):
     with contextlib.ExitStack() as stack:
-        silent = {node: stack.enter_context(socket.create_server(("localhost", 0))) for node in NODES}
-        processes = {node: world.start(node, f"http://localhost:{s.getsockname()[1]}") for node, s in silent.items()}
+        silent = {node: stack.enter_context(socket.create_server((QUIET_HOST, 0))) for node in NODES}
+        processes = {node: world.start(node, f"http://{QUIET_HOST}:{s.getsockname()[1]}") for node, s in silent.items()}
         for node, process in processes.items():
             stack.enter_context(silent[node].accept()[0])
             process.send_signal(signal.SIGTERM)

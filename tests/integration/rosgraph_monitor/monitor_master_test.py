@@ -12,7 +12,7 @@ import unittest
 import xmlrpc.client
 
 import rostest
-from helpers.ports import reserved_port
+from helpers.ports import QUIET_HOST, reserved_port
 from helpers.waiting import wait_for
 
 
@@ -34,8 +34,8 @@ class Proxy:
         self.passed = self.swallowed = 0
         self.master_port = master_port
         self._open = []
-        self._server = socket.create_server(("127.0.0.1", 0))
-        self.uri = f"http://127.0.0.1:{self._server.getsockname()[1]}"
+        self._server = socket.create_server((QUIET_HOST, 0))
+        self.uri = f"http://{QUIET_HOST}:{self._server.getsockname()[1]}"
         threading.Thread(target=self._serve, daemon=True).start()
 
     def _serve(self):
@@ -118,12 +118,19 @@ class MonitorMasterTest(unittest.TestCase):
         return monitor
 
     def expect_end(self, process, *words, status=0):
-        """Wait until it has ended, with one line on stderr that holds these words, or none where there are none."""
+        """Wait until it has ended, with one line on stderr that holds these words, or none where there are none.
+
+        A master on a busy machine falls silent for a while, too, which is told each time; those lines count once, or
+        not where another one is expected.
+        """
         _, stderr = process.communicate(timeout=150.0)
         self.assertEqual(process.returncode, status, stderr)
-        self.assertEqual(len(stderr.strip().splitlines()), bool(words), stderr)
+        lines = {line.partition(": ")[2] for line in stderr.strip().splitlines()}
+        borne = {line for line in lines if "it ends if that lasts" in line}
+        told = lines if len(lines) == 1 and words else lines - borne
+        self.assertEqual(len(told), bool(words), stderr)
         for word in words:
-            self.assertIn(word, stderr)
+            self.assertIn(word, "".join(told))
 
     def test_other_master_at_the_same_address_ends_the_monitor(self):
         self.start_master()

@@ -2,11 +2,15 @@
 """What stands around the monitor: the aggregator's groups, the live table, the snapshot on the command line."""
 
 import json
+import signal
+import subprocess
+import threading
 import unittest
 
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
+from helpers.waiting import DEADLINE_S
 from monitor_common import Diagnostics, end, run, start_node
 
 
@@ -38,6 +42,23 @@ class MonitorToolsTest(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         for expected in ("near", "Missing node", "cpu_load", "0.9", "rosgraph_monitor"):
             self.assertIn(expected, done.stdout)
+
+    def test_live_table_goes_through_a_pipe_too(self):
+        Diagnostics().wait_status("far", "Missing node")
+        words = ["/usr/bin/rosrun", "rosgraph_monitor", "watch"]
+        watch = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
+        self.addCleanup(watch.communicate)
+        self.addCleanup(watch.kill)
+        timer = threading.Timer(DEADLINE_S, watch.kill)
+        timer.start()
+        self.addCleanup(timer.cancel)
+        self.assertTrue(any("Missing node" in line for line in watch.stdout), "it says what is wrong while it runs")
+        watch.stdout.close()  # as `| head` does
+        watch.stdout = None
+        Diagnostics().wait_status("far", "Missing node")
+        watch.send_signal(signal.SIGINT)
+        self.assertEqual(watch.communicate(timeout=DEADLINE_S)[1], "")
+        self.assertEqual(watch.returncode, 0)
 
     def test_snapshot_as_json_and_as_text(self):
         Diagnostics().wait_status("laser", "Component status", "TRUE")

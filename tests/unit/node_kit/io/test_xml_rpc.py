@@ -6,6 +6,7 @@ import threading
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
+from helpers.ports import QUIET_HOST
 from node_kit.io.xml_rpc import CallError, Client, DeniedError, GarbageError, GoneError, SilentError
 
 
@@ -17,14 +18,14 @@ class KeepingHandler(SimpleXMLRPCRequestHandler):
 
 @contextlib.contextmanager
 def server(handler=SimpleXMLRPCRequestHandler, **methods):
-    made = SimpleXMLRPCServer(("127.0.0.1", 0), requestHandler=handler, logRequests=False, allow_none=True)
+    made = SimpleXMLRPCServer((QUIET_HOST, 0), requestHandler=handler, logRequests=False, allow_none=True)
     for name, function in methods.items():
         made.register_function(function, name)
     made.register_multicall_functions()
     thread = threading.Thread(target=made.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
     thread.start()
     try:
-        yield f"http://127.0.0.1:{made.server_address[1]}"
+        yield f"http://{QUIET_HOST}:{made.server_address[1]}"
     finally:
         made.shutdown()
         made.server_close()
@@ -37,8 +38,8 @@ def sized(caller, number):
 @pytest.fixture
 def silent():
     """The address of a server that takes connections and says nothing."""
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        yield f"http://127.0.0.1:{listening.getsockname()[1]}"
+    with socket.create_server((QUIET_HOST, 0)) as listening:
+        yield f"http://{QUIET_HOST}:{listening.getsockname()[1]}"
 
 
 def test_value_of_a_call():
@@ -76,7 +77,7 @@ def test_method_that_there_is_not_is_garbage():
 
 @pytest.mark.parametrize("text", [b"no HTTP at all\r\n\r\n", b"HTTP/1.1 200 OK\r\nContent-Length: 5\r\n\r\n<meth"])
 def test_what_is_no_xml_rpc_is_refused(text):
-    with socket.create_server(("127.0.0.1", 0)) as listening:
+    with socket.create_server((QUIET_HOST, 0)) as listening:
 
         def say():
             for _ in range(2):  # a call may be tried again
@@ -88,15 +89,15 @@ def test_what_is_no_xml_rpc_is_refused(text):
 
         thread = threading.Thread(target=say, daemon=True)
         thread.start()
-        uri = f"http://127.0.0.1:{listening.getsockname()[1]}"
+        uri = f"http://{QUIET_HOST}:{listening.getsockname()[1]}"
         with Client(uri, "/me") as client, pytest.raises((GarbageError, SilentError), match=uri):
             client.call("size")
 
 
 def test_nobody_at_the_address():
     with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        uri = f"http://127.0.0.1:{free.getsockname()[1]}"
+        free.bind((QUIET_HOST, 0))
+        uri = f"http://{QUIET_HOST}:{free.getsockname()[1]}"
         with Client(uri, "/me") as client, pytest.raises(GoneError, match=f"^ROS master {uri} is gone"):
             client.call("size")
 
@@ -168,7 +169,7 @@ def test_what_is_no_address(uri):
 
 def test_large_answer_that_comes_by_drops_ends_at_the_deadline():
     ended = threading.Event()
-    with socket.create_server(("127.0.0.1", 0)) as listening:
+    with socket.create_server((QUIET_HOST, 0)) as listening:
 
         def drip():
             connection, _ = listening.accept()
@@ -179,7 +180,7 @@ def test_large_answer_that_comes_by_drops_ends_at_the_deadline():
 
         thread = threading.Thread(target=drip, daemon=True)
         thread.start()
-        with Client(f"http://127.0.0.1:{listening.getsockname()[1]}", "/me") as client, pytest.raises(SilentError):
+        with Client(f"http://{QUIET_HOST}:{listening.getsockname()[1]}", "/me") as client, pytest.raises(SilentError):
             client.call("size", timeout=0.2)
         ended.set()
         thread.join()

@@ -11,7 +11,7 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 import rosgraph.network
-from helpers.ports import reserved_port
+from helpers.ports import QUIET_HOST, reserved_port
 from ros_model.cli.rosmodel import main
 from ros_model.graph.snapshot import GraphSnapshot, NodeState, ServiceState
 from ros_model_extraction.io.live_nodes import ask_nodes
@@ -23,14 +23,14 @@ IMPATIENCE_S = 0.5
 @contextmanager
 def xmlrpc_server(**methods):
     """Serves methods over XML-RPC; gives the address."""
-    with SimpleXMLRPCServer(("localhost", 0), logRequests=False) as server:
+    with SimpleXMLRPCServer((QUIET_HOST, 0), logRequests=False) as server:
         server.register_multicall_functions()
         for name, method in methods.items():
             server.register_function(method, name)
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
         thread.start()
         try:
-            yield f"http://localhost:{server.server_address[1]}"
+            yield f"http://{QUIET_HOST}:{server.server_address[1]}"
         finally:
             server.shutdown()
             thread.join()
@@ -39,7 +39,7 @@ def xmlrpc_server(**methods):
 @contextmanager
 def tcp_server(answer):
     """Answers each connection by a function of the socket; gives the port."""
-    with socket.create_server(("localhost", 0)) as server:
+    with socket.create_server((QUIET_HOST, 0)) as server:
 
         def serve():
             while True:
@@ -71,7 +71,7 @@ def graph(uri: str, *services: str) -> GraphSnapshot:
 
 def test_type_of_a_service_is_asked_of_its_node():
     with tcp_server(header) as port:
-        address = [1, "", f"rosrpc://localhost:{port}"]
+        address = [1, "", f"rosrpc://{QUIET_HOST}:{port}"]
         with xmlrpc_server(lookupService=lambda _caller, _name: address, getPid=lambda _: [1, "", 1]) as master:
             found = ask_nodes(graph(master, "/Empty", "/Trigger"), master, PATIENCE_S)
     assert found.service_types == {"/Empty": "std_srvs/Empty", "/Trigger": "std_srvs/Trigger"}
@@ -94,7 +94,7 @@ def closing(connection: socket.socket) -> None:
 @pytest.mark.parametrize("answer", [silent, garbage, closing])
 def test_service_that_does_not_answer_well_has_no_type(answer):
     with tcp_server(answer) as port:
-        address = [1, "", f"rosrpc://localhost:{port}"]
+        address = [1, "", f"rosrpc://{QUIET_HOST}:{port}"]
         with xmlrpc_server(lookupService=lambda _caller, _name: address, getPid=lambda _: [1, "", 1]) as master:
             assert ask_nodes(graph(master, "/Empty"), master, IMPATIENCE_S).service_types == {}
 
@@ -119,13 +119,13 @@ def test_node_that_answers_garbage_is_told(answer):
 
 def test_node_that_hangs_is_not_waited_for():
     with tcp_server(silent) as port:
-        uri = f"http://localhost:{port}"
+        uri = f"http://{QUIET_HOST}:{port}"
         assert ask_nodes(graph(uri), uri, IMPATIENCE_S).unknown == {"/a": "it does not answer"}
 
 
 def test_node_at_whose_address_nobody_listens_is_dead():
     with reserved_port() as port:
-        uri = f"http://localhost:{port}"
+        uri = f"http://{QUIET_HOST}:{port}"
         found = ask_nodes(graph(uri), uri, PATIENCE_S)
     assert found.dead == {"/a"} and found.unknown == {}
 

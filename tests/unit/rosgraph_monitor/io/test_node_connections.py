@@ -7,6 +7,7 @@ import time
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
+from helpers.ports import QUIET_HOST
 from helpers.waiting import DEADLINE_S, wait_for
 from rosgraph_monitor.health.liveness import Life, Timing
 from rosgraph_monitor.io.node_connections import NodeConnections
@@ -26,17 +27,17 @@ class CloseAfterAnswer(SimpleXMLRPCRequestHandler):
 @contextlib.contextmanager
 def black_hole():
     """An address at which no attempt to connect ever ends, as behind a router that drops what it gets."""
-    with socket.create_server(("127.0.0.1", 0), backlog=0) as server, contextlib.ExitStack() as stack:
+    with socket.create_server((QUIET_HOST, 0), backlog=0) as server, contextlib.ExitStack() as stack:
         for _ in range(8):  # more than its queue holds: from then on the kernel answers nobody
             filler = stack.enter_context(socket.socket())
             filler.setblocking(False)
             filler.connect_ex(server.getsockname())
-        yield f"http://127.0.0.1:{server.getsockname()[1]}/"
+        yield f"http://{QUIET_HOST}:{server.getsockname()[1]}/"
 
 
 @contextlib.contextmanager
 def node(handler=KeepAlive, pid=4711):
-    server = SimpleXMLRPCServer(("127.0.0.1", 0), requestHandler=handler, logRequests=False)
+    server = SimpleXMLRPCServer((QUIET_HOST, 0), requestHandler=handler, logRequests=False)
     server.register_function(lambda _caller: [1, "", pid], "getPid")
     server.timeout = 0.02
     ended = threading.Event()
@@ -67,7 +68,7 @@ def node(handler=KeepAlive, pid=4711):
         thread.join()
 
     try:
-        yield f"http://127.0.0.1:{server.server_address[1]}/", end
+        yield f"http://{QUIET_HOST}:{server.server_address[1]}/", end
     finally:
         if not ended.is_set():
             end()
@@ -129,8 +130,8 @@ def test_node_that_registered_a_senseless_address_ends_no_watch(watcher, odd):
 
 @hasty
 def test_silent_node_is_hung_until_it_answers(watcher):
-    with socket.create_server(("127.0.0.1", 0)) as silent:
-        hung = f"http://127.0.0.1:{silent.getsockname()[1]}/"
+    with socket.create_server((QUIET_HOST, 0)) as silent:
+        hung = f"http://{QUIET_HOST}:{silent.getsockname()[1]}/"
         watcher.watch({"/hung": hung})
         wait_for(
             lambda: watcher.lives().get(("/hung", hung)) is Life.HUNG,
@@ -146,9 +147,13 @@ def test_silent_node_is_hung_until_it_answers(watcher):
 
 
 def test_nodes_that_hang_or_cannot_be_reached_delay_no_other(watcher):
-    with socket.create_server(("127.0.0.1", 0)) as silent, node() as (uri, end), black_hole() as hole:
+    with socket.create_server((QUIET_HOST, 0)) as silent, node() as (uri, end), black_hole() as hole:
         bad = {f"/unroutable_{i}": hole for i in range(40)}
-        bad |= {"/hung": f"http://127.0.0.1:{silent.getsockname()[1]}/", "/odd": "nonsense", "/port": "http://h:99999/"}
+        bad |= {
+            "/hung": f"http://{QUIET_HOST}:{silent.getsockname()[1]}/",
+            "/odd": "nonsense",
+            "/port": "http://h:99999/",
+        }
         watcher.watch(bad | {"/n": uri})
         wait_for(
             lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE,

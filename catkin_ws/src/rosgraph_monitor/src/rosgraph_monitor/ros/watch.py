@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import threading
 import time
+from collections.abc import Callable
+from typing import NoReturn
 
 import click
 import rosgraph
@@ -13,14 +16,15 @@ from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_bags import ownership
 from node_kit.io.xml_rpc import CallError
 from node_kit.ros.lifetime import BAD_START, LONGEST_END, Lifetime
-from rich.console import Console, Group
+from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from ros_model.graph.snapshot import GraphSnapshot
 from ros_model.io.master import MasterClient
 
 from rosgraph_monitor.diagnostics.overview import Overview, of_robot
 
-_REFRESH = 0.5
+_REFRESH = 0.5  # s, wall
+_PRINT_PERIOD = 2.0  # s, wall, where the output is a file or a pipe, which keeps everything
 
 
 def main() -> None:
@@ -31,7 +35,7 @@ def main() -> None:
 @click.command()
 @click.option("--once", type=float, metavar="S", help="Listen for so many seconds, print once and end.")
 def command(once: float | None) -> None:
-    """Show a live table of what the monitor says, until Ctrl-C.
+    """Show a live table of what the monitor says, until Ctrl-C; into a pipe, print the table whenever it differs.
 
     For a robot in a namespace, set ROS_NAMESPACE.
 
@@ -66,12 +70,35 @@ def command(once: float | None) -> None:
             time.sleep(once)
             console.print(tables(graph))
             return
-        with Live(console=console, screen=console.is_terminal, auto_refresh=False) as live:
+        if not console.is_terminal:
+            _print_changes(lambda: tables(client.snapshot()))
+        with Live(console=console, screen=True, auto_refresh=False) as live:
             while True:
                 live.update(tables(graph), refresh=True)
                 time.sleep(_REFRESH)
                 graph = client.snapshot()
     except KeyboardInterrupt:
         return
+    except BrokenPipeError:  # nobody reads any more; what is left must not be written at the end either
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except CallError as error:
         life.say(str(error))
+
+
+def _print_changes(table: Callable[[], RenderableType]) -> NoReturn:
+    """Print a table whenever it differs from the last one.
+
+    Raises:
+        CallError: the master does not answer.
+        KeyboardInterrupt: the user has seen enough.
+        BrokenPipeError: nobody reads any more.
+    """
+    console, last = Console(), ""
+    while True:
+        with console.capture() as capture:
+            console.print(table())
+        if capture.get() != last:
+            last = capture.get()
+            sys.stdout.write(last)
+            sys.stdout.flush()
+        time.sleep(_PRINT_PERIOD)
