@@ -5,6 +5,7 @@ All nodes of a test start side by side at one master. Most of what a test costs 
 
 import contextlib
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -248,9 +249,13 @@ def test_signal_ends_them_while_they_wait_for_the_first_answer(world):
     with contextlib.ExitStack() as stack:
         silent = {node: stack.enter_context(socket.create_server((QUIET_HOST, 0))) for node in NODES}
         processes = {node: world.start(node, f"http://{QUIET_HOST}:{s.getsockname()[1]}") for node, s in silent.items()}
-        for node, process in processes.items():
-            stack.enter_context(silent[node].accept()[0])
-            process.send_signal(signal.SIGTERM)
+        waiting = {server.fileno(): node for node, server in silent.items()}
+        while waiting:  # each is told as soon as it waits: it does not wait for ever
+            connected, _, _ = select.select(waiting, [], [], DEADLINE_S)
+            assert connected, f"no connection of {', '.join(waiting.values())}"
+            for node in map(waiting.pop, connected):
+                stack.enter_context(silent[node].accept()[0])
+                processes[node].send_signal(signal.SIGTERM)
         for node, process in processes.items():
             with case(node):
                 world.expect_end(node, process)

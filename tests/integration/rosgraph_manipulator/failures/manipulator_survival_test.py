@@ -200,6 +200,14 @@ class SurvivalTest(PairTest):
         self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
         self.assertEqual(self.client.get_result().result, 1, self.text)
 
+    def test_launcher_that_ends_leaves_the_request_for_its_successor(self):
+        self.assertEqual(self.request("stubborn"), 1, self.text)  # the launcher waits for its end
+        os.kill(self.launcher.pid, signal.SIGINT)
+        self.client.send_goal(MvpReconfigurationGoal("fast"))
+        self.restart_launcher()
+        self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
+        self.assertEqual(self.client.get_result().result, 1, self.text)
+
     def test_lost_master_ends_the_pair_in_one_line_each_and_leaves_nothing(self):
         port = self.enterContext(reserved_port())
         folder = self.enterContext(tempfile.TemporaryDirectory())

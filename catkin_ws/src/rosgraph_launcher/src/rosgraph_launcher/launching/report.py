@@ -11,6 +11,9 @@ CHANGING: str = LauncherState.CHANGING
 RECOVERING: str = LauncherState.RECOVERING
 FAILED: str = LauncherState.FAILED
 
+ENDING = "the launcher is shutting down"
+"""What a launcher answers once it has begun to end. All its nodes end with it, so a successor may be asked the same."""
+
 
 @dataclass(frozen=True)
 class LauncherReport:

@@ -32,7 +32,7 @@ from rosgraph_launcher.io.processes import StartError, check_host
 from rosgraph_launcher.io.this_host import addresses
 from rosgraph_launcher.io.usage import read_sample
 from rosgraph_launcher.launching.options import LauncherOptions
-from rosgraph_launcher.launching.report import LauncherReport
+from rosgraph_launcher.launching.report import ENDING, LauncherReport
 from rosgraph_launcher.launching.restarts import RestartPolicy
 from rosgraph_launcher.ros.node_messages import from_message, report_message, usage_messages
 
@@ -67,7 +67,7 @@ class LauncherNode:
         """Tell the main thread to stop the nodes and then to end this node."""
         self._ends = self._ends or reason
         self._life.cut_off(self._longest_end)
-        self._inbox.close("the launcher is shutting down")
+        self._inbox.close(ENDING)
         self._wake()
 
     def _end_on_request(self) -> None:

@@ -15,7 +15,7 @@ from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, ChangeNodesRes
 from node_kit.io.background import in_background
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.hosts import no_launcher
-from rosgraph_launcher.launching.report import FAILED
+from rosgraph_launcher.launching.report import ENDING, FAILED
 from rosgraph_launcher.ros.node_messages import to_message
 from rospy.exceptions import TransportException, TransportInitError
 
@@ -181,7 +181,8 @@ class Launchers(LauncherReports):
 
         A launcher that is being killed may accept the connection by which `wait_for_service` finds it and refuse the
         next one, because the kernel closes its sockets one after the other. A request that reached no launcher is
-        repeated. One that did is not, because a part of it may be done.
+        repeated, and one that reached a launcher that ends is left for its successor. Any other is not repeated,
+        because a part of it may be done.
         """
         service = rospy.ServiceProxy(f"{name}/change", ChangeNodes)
         deadline = time.monotonic() + self._timeout
@@ -191,7 +192,8 @@ class Launchers(LauncherReports):
             try:
                 return service(request)
             except rospy.ServiceException as error:
-                if not isinstance(error.__context__, _NOT_REACHED) or time.monotonic() > deadline:
+                is_undone = isinstance(error.__context__, _NOT_REACHED) or ENDING in str(error)
+                if not is_undone or time.monotonic() > deadline:
                     raise
                 time.sleep(REPEAT_PERIOD)
 
