@@ -41,6 +41,7 @@ from metacontrol_experiments.managers.manager import ManagerError, Situation, ma
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Hashable, Sequence
+    from pathlib import Path
 
     from ros_model.language.metamodel import RosSystem
     from rosgraph_launcher.description import SystemDescription
@@ -100,7 +101,7 @@ def set_up(settings: Settings, library: Library | None = None) -> Lockstep:
     library = library or Library()
     with ExitStack() as failing:
         try:
-            system = describe_system(settings.launch_package, settings.launch_file, settings.launch_arguments)
+            system = describe_system(settings.launch_package, settings.launch_file, settings.launch_arguments, library)
             robot = _robot(settings, system.base, library)
             failing.callback(robot.simulation.close)
             cores = _cores(settings, system.launched, robot.drivers, library)
@@ -114,29 +115,32 @@ def set_up(settings: Settings, library: Library | None = None) -> Lockstep:
     return lockstep
 
 
-def describe_system(package: str, launch_file: str, arguments: Sequence[str] = ()) -> System:
+def describe_system(
+    package: str, launch_file: str, arguments: Sequence[str] = (), library: Library | None = None
+) -> System:
     """Return what the launch file of a whole system and the models that it names say.
 
     Args:
         package: has the file in its folder launch.
         launch_file: name of the file.
         arguments: of the file, each NAME:=VALUE.
+        library: of the missions of this process; without it, all is read anew.
 
     Raises:
         LockstepError: a file cannot be used.
     """
+    library = library or Library()
     try:
         launched = read_launch_file(resolve(f"package://{package}/launch/{launch_file}"), arguments).system
         manipulator = options_from(private_parameters(launched, *_MANIPULATOR))
         monitor = private_parameters(launched, *_MONITOR)
-        base = read_system(resolve(monitor["desired_rossystem"]))
+        base = _read_system(resolve(monitor["desired_rossystem"]), library)
         models = resolve(monitor["variants"])
     except KeyError as error:
         raise LockstepError(f"{'/'.join(_MONITOR)} has no parameter {error}: generate its configuration") from error
     except _UNUSABLE as error:
         raise LockstepError(str(error)) from error
 
-    @cache
     def describe(configuration: str) -> SystemDescription:
         known = manipulator.configurations.get(configuration)
         if known is None:
@@ -144,7 +148,8 @@ def describe_system(package: str, launch_file: str, arguments: Sequence[str] = (
                 f"no configuration {configuration!r}; there are {', '.join(manipulator.configurations)}"
             )
         try:
-            return read_launch_file(known.launch_file, known.args).system
+            key = ("configuration", known.launch_file, tuple(known.args))
+            return library.once(key, lambda: read_launch_file(known.launch_file, known.args).system)
         except LaunchFileError as error:
             raise LockstepError(str(error)) from error
 
@@ -153,8 +158,12 @@ def describe_system(package: str, launch_file: str, arguments: Sequence[str] = (
         manipulator.configurations,
         base,
         describe,
-        lambda configuration: read_system(models / f"{configuration}.rossystem"),
+        lambda configuration: _read_system(models / f"{configuration}.rossystem", library),
     )
+
+
+def _read_system(path: Path, library: Library) -> RosSystem:
+    return library.once(("model", path), lambda: read_system(path))
 
 
 def restarts_between(package: str, launch_file: str) -> Callable[[str, str], bool]:
