@@ -86,7 +86,7 @@ def test_decisions_tell_why_they_wait_and_that_they_have_waited(make):
 
 
 def test_other_designs_are_tried_at_once_before_one_is_tried_again(make):
-    plant = make({"laser_weld": 1.0, "spot_weld": 1.0, "glue": FOR_EVER})
+    plant = make({"laser_weld": 1.0, "spot_weld": 1.0, "glue": FOR_EVER}, always_improve=False)
     done = plant.run(100.0)
     assert [design for _, design in done] == ["laser_weld", "spot_weld", "glue"]
     assert waits(done, 1.0) == [0, 0]
@@ -106,7 +106,7 @@ def test_design_that_lasts_ends_the_waits(make):
 
 
 def test_lasting_design_that_is_replaced_ends_the_waits_too(make):
-    plant = make({"laser_weld": 1.0, "glue": FOR_EVER}, ["laser_weld", "glue"])
+    plant = make({"laser_weld": 1.0, "glue": FOR_EVER}, ["laser_weld", "glue"], always_improve=False)
     plant.run(100.0)
     assert plant.core._state.running["o_weld"].brief == 1
     plant.core.observe_active(plant.now, "f_weld", "laser_weld", "STABLE")  # somebody has asked for it
@@ -154,6 +154,30 @@ def test_late_success_of_a_request_is_not_taken_for_a_return_to_the_former_desig
     plant.core.observe_active(plant.now + 11.0, "f_weld", "laser_weld", "STABLE")
     plant.core.report(plant.now + 11.0, decision.id, True)
     assert not plant.core._state.why_failed("o_weld", "spot_weld")
+
+
+def test_better_design_that_failed_is_tried_again_in_place_of_a_working_one(make):
+    plant = make({"laser_weld": 1.0, "glue": FOR_EVER}, ["laser_weld", "glue"])
+    plant.run(50.0)
+    plant.lives["laser_weld"] = FOR_EVER
+    (again,) = plant.run(100.0)
+    assert 60.0 < again[0] < 70.0
+    assert plant.core.facts.groundings == {"o_weld": "laser_weld"}
+    (decision,) = (d for d in plant.told[2:] if d.state == DECIDED)
+    assert decision.trigger == "retry:laser_weld"
+    assert "may be tried again, which failed (ended 1.0 s after" in decision.explanation
+
+
+def test_better_design_that_always_fails_is_tried_again_ever_more_rarely(make):
+    plant = make({"laser_weld": 1.0, "glue": FOR_EVER}, ["laser_weld", "glue"])
+    tries = [moment for moment, design in plant.run(3000.0) if design == "laser_weld"]
+    gaps = [round(after - before, -1) for before, after in pairwise(tries)]
+    assert gaps == [60, 120, 240, 480, 600, 600, 600]
+
+
+def test_design_that_failed_and_is_hardly_better_is_not_tried_again(make):
+    plant = make({"laser_weld": 1.0, "glue": FOR_EVER}, ["laser_weld", "glue"], improvement=0.9)
+    assert [design for _, design in plant.run(200.0)] == ["laser_weld", "glue"]
 
 
 def test_requirement_that_never_lasts_is_tried_with_growing_waits_and_keeps_its_function(make):

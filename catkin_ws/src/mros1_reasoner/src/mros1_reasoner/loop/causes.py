@@ -20,12 +20,15 @@ RELIEF = "relief"
 OPERATOR = "operator"
 """Trigger of a cause that an operator gave."""
 
+RETRY = "retry:"
+"""Beginning of the trigger of a cause that lies in a design which failed, and may be tried again."""
+
 _PARAMETER = "parameter:"
 
 
 def is_chance(cause: Cause) -> bool:
     """Return whether nothing is wrong, but a better design may have become available."""
-    return cause.rules in (RECOVERY, RELIEF) or cause.trigger == OPERATOR
+    return cause.rules in (RECOVERY, RELIEF) or _has_no_rule(cause.trigger)
 
 
 def is_relief(cause: Cause) -> bool:
@@ -71,7 +74,7 @@ def heeds_chances(view: View, name: str) -> bool:
 def chances(view: View, name: str, now: float) -> list[Cause]:
     """Return the reasons why an objective may have a better design now, the earliest first."""
     found = [
-        Cause(min(stamp, now), trigger, words, "" if trigger == OPERATOR else RECOVERY)
+        Cause(min(stamp, now), trigger, words, "" if _has_no_rule(trigger) else RECOVERY)
         for trigger, (stamp, words) in view.running[name].chances.items()
     ]
     if view.is_relieved(name, now):
@@ -80,6 +83,10 @@ def chances(view: View, name: str, now: float) -> list[Cause]:
         words = f"what made {' and '.join(qualities)} violate the limit has been gone for {now - since:.1f} s"
         found.append(Cause(since, f"qa:{qualities[0]}", words, RELIEF, quality=qualities[0]))
     return sorted(found, key=_by_time)
+
+
+def _has_no_rule(trigger: str) -> bool:
+    return trigger == OPERATOR or trigger.startswith(RETRY)
 
 
 def _nothing_runs(view: View, name: str, now: float) -> list[Cause]:

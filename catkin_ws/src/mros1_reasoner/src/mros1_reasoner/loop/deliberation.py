@@ -63,6 +63,7 @@ class Deliberation:
             return None
         if self._state.waits(name, timing.now):
             return None
+        self._state.use_chances(name)
         if all(is_drift(cause) for cause in causes) and not running.to_put_back:
             return self._leave(name, causes, timing)
         improves_only = all(is_chance(cause) for cause in causes)
@@ -115,7 +116,7 @@ class Deliberation:
         if self._state.locked & {name, *(o for o, _ in steps)}:
             reason = f"locked by the operator; {outcome.choice} would be taken: {outcome.reason}"
             return self._refuse(name, replace(outcome, reason=reason), causes, timing, self._wall() - began)
-        self._state.want({o: plan.choice for o, plan in steps if plan.choice})
+        self._state.want({o: plan.choice for o, plan in steps if plan.choice}, name, causes)
         if any(self._state.waits(o, timing.now) for o, _ in steps if o in self._state.running):
             return None
         early = next((step for step in steps if self._state.retries_later(step[0], step[1].choice, timing.now)), None)
@@ -256,13 +257,15 @@ class Deliberation:
         if running.design is None:
             return found
         heeds = heeds_chances(self._state, name)
-        if heeds and not found and now < running.calm_until:
+        if heeds and not found and now < running.calm_until and not running.way:
             return []
         better = chances(self._state, name, now)
         if heeds and any(is_relief(cause) for cause in better):
             self._state.forgive(name)
-        self._state.use_chances(name)
-        return [*found, *better] if heeds or found else []
+        if not heeds and not found:
+            self._state.use_chances(name)
+            return []
+        return [*found, *(better or running.way)]
 
     def _improves(self, running: Running, outcome: Plan) -> bool:
         if running.degraded and not outcome.is_makeshift:

@@ -247,6 +247,7 @@ class Mape:
         if self._state.pending:
             return []
         self._state.forget_expired(now)
+        self._state.note_retries(now)
         self._state.match_requirements()
         self._state.note_failed_nodes(now)
         facts = self._state.facts_at(now)

@@ -9,7 +9,7 @@ import math
 from collections.abc import Collection, Mapping, Set
 from dataclasses import dataclass, field, replace
 
-from metacontrol_bags.decision import Decision
+from metacontrol_bags.decision import Cause, Decision
 from metacontrol_msgs.msg import FunctionGrounding
 
 from mros1_reasoner.knowledge import vocabulary as v
@@ -78,6 +78,7 @@ class Running:
         degraded: whether the design was taken although it does not keep every limit.
         refusal: the last refusal, so that it is told once.
         chances: why a better design may have become available: trigger -> when, and in words.
+        way: why a better design was chosen that waits for what it requires.
         returned_at: when a better design was taken again because the cause of a violation was gone.
         relapses: how often in a row a limit was violated again soon after that.
     """
@@ -104,6 +105,7 @@ class Running:
     degraded: bool = False
     refusal: tuple[object, ...] = ()
     chances: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    way: tuple[Cause, ...] = ()
     returned_at: float = -math.inf
     relapses: int = 0
 
@@ -133,6 +135,7 @@ class View:
         components: last status of components.
         levels: observed levels.
         error_log: until when a design is not tried again for an objective, and why.
+        retries: from when on a design that failed may replace a working one of an objective, and why it failed.
         locked: objectives that keep their configuration.
         paused: whether nothing is decided.
         proposal: decision that waits for approval.
@@ -156,6 +159,7 @@ class View:
     components: Mapping[str, Component]
     levels: Levels
     error_log: Mapping[tuple[str, str], tuple[float, str]]
+    retries: Mapping[tuple[str, str], tuple[float, str]]
     locked: Set[str]
     paused: bool
     proposal: Decision | None
@@ -353,5 +357,5 @@ class View:
             times += [drift.seen + self.settings.level_timeout for drift in running.drifts.values()]
             if self.failed_nodes_of(running.design):
                 times.append(running.deployed_at + self.settings.restart_grace)
-        times += [expiry for expiry, _ in self.error_log.values()]
+        times += [moment for entries in (self.error_log, self.retries) for moment, _ in entries.values()]
         return min((moment for moment in times if now < moment < math.inf), default=None)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 _MOST_DOUBLINGS = 30  # of a wait; a float holds more, but no robot waits as long
+_LONGEST_RETRY = 10.0  # times `error_log_expiry`
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,9 @@ class Settings:
         calm: how long that cause must be gone before a better design is taken again; doubled with each time that the
             same happens again soon after.
         always_improve: adapt also when a clearly better design becomes available, because a component works again,
-            the cause of a violation is gone, or the operator has changed a limit; the setting of an objective takes
-            precedence.
+            the cause of a violation is gone, a design that failed may be tried again, or the operator has changed a
+            limit; the setting of an objective takes precedence. A design that failed may be tried again in place of a
+            working one after `error_log_expiry`, after twice the time where it fails again, up to ten times as long.
         improvement: by how much the utility of such a design must be greater.
         indifference: designs whose utility is less than the greatest by at most this are as useful: of these, the one
             that keeps its limits best is taken.
@@ -85,6 +87,10 @@ class Settings:
     def wait_after(self, attempts: int) -> float:
         """Return the wait after an attempt that has failed, s, where so many before it have failed in a row."""
         return self._doubled(self.backoff, attempts)
+
+    def retry_after(self, failures: int) -> float:
+        """Return how long a failed design does not replace a working one, s, after so many failures in a row before."""
+        return self.error_log_expiry * min(2.0 ** min(failures, _MOST_DOUBLINGS), _LONGEST_RETRY)
 
     def calm_after(self, relapses: int) -> float:
         """Return how long the cause of a violation must be gone before a better design is taken again, s."""

@@ -14,7 +14,7 @@ from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Design, Facts, Objective
 from mros1_reasoner.loop import drifts, lasting
-from mros1_reasoner.loop.causes import OPERATOR, drifted_nodes, is_chance, is_drift, is_relief
+from mros1_reasoner.loop.causes import OPERATOR, RETRY, drifted_nodes, is_chance, is_drift, is_relief
 from mros1_reasoner.loop.levels import Expectation, Judging, Levels
 from mros1_reasoner.loop.readable_state import BUSY, Component, Running, View
 from mros1_reasoner.loop.settings import Settings
@@ -56,6 +56,8 @@ class State(View):
             )
         )
         self.error_log: dict[tuple[str, str], tuple[float, str]] = {}
+        self.retries: dict[tuple[str, str], tuple[float, str]] = {}
+        self._failures: dict[tuple[str, str], int] = {}  # in a row, by design and objective
         self.locked: set[str] = set()
         self.paused = False
         self.proposal: Decision | None = None
@@ -177,6 +179,8 @@ class State(View):
             self._run(name, restarts=(), put_back={})
         if lasting.has_lasted(running, self.settings, now):
             self._run(name, brief=0)
+            self._failures.pop((running.design or "", name), None)
+        self._run(name, way=() if self.wanted.get(name, design) == design else running.way)
         self._run(name, design=design, degraded=False, binding_error=False, task_failure=None, refusal=())
         self._run(name, replaced=None, ending="")
         self._run(name, deployed_at=now, failed_nodes=(), drifts={}, drifts_from=now + self.settings.restart_grace)
@@ -195,6 +199,8 @@ class State(View):
     def ask_no_longer(self, name: str) -> None:
         """Remove a root objective, and the objectives that only it required."""
         del self.roots[name]
+        self.error_log = {key: entry for key, entry in self.error_log.items() if key[1] != name}
+        self.retries = {key: entry for key, entry in self.retries.items() if key[1] != name}
         self._drop(name)
         self.match_requirements()
         self.reconsider()
@@ -249,7 +255,6 @@ class State(View):
             self.released[function] = None
         self.locked.discard(name)
         self.levels.drop(name)
-        self.error_log = {key: entry for key, entry in self.error_log.items() if key[1] != name}
 
     # Steps and analyses
 
@@ -263,6 +268,35 @@ class State(View):
         self.error_log = {key: entry for key, entry in self.error_log.items() if entry[0] > now}
         for name, running in self.running.items():
             self.running[name] = drifts.judged(running, self.settings, now)
+
+    def note_retries(self, now: float) -> None:
+        """Take designs that failed, and may be tried again now, for chances of a better design."""
+        for (design, name), (moment, reason) in list(self.retries.items()):
+            if moment > now:
+                continue
+            del self.retries[design, name]
+            chance = {f"{RETRY}{design}": (moment, f"{design} may be tried again, which failed ({reason})")}
+            for objective in self._improved_by(design, name):
+                self._run(objective, chances={**self.running[objective].chances, **chance})
+
+    def _improved_by(self, design: str, name: str) -> list[str]:
+        """Return the objectives for which a design that an objective has, or had, may lead to a better one."""
+        found = []
+        for objective, running in self.running.items():
+            others = [d for d in self.kb.solving(self.objectives[objective].function) if d.name != running.design]
+            is_own = objective == name and running.design != design
+            if running.design is not None and (is_own or any(self._builds_on(d, name) for d in others)):
+                found.append(objective)
+        return found
+
+    def _builds_on(self, design: Design, name: str, above: frozenset[str] = frozenset()) -> bool:
+        """Return whether a design requires an objective, be it by designs of what it requires."""
+        below = [function for function in design.requires if function not in above]
+        return any(self.provider(function) == name for function in below) or any(
+            self._builds_on(other, name, above | {function})
+            for function in below
+            for other in self.kb.solving(function)
+        )
 
     def note_analysis(self, facts: Facts, analysis: Analysis, seen: tuple[object, ...]) -> None:
         """Keep an analysis. A RECOVERED component is a chance for every objective once; then it counts as working."""
@@ -303,12 +337,15 @@ class State(View):
 
     def rest(self, name: str) -> None:
         """Forget refusals and wanted designs of an objective, because it needs no adaptation."""
-        self._run(name, refusal=())
+        self._run(name, refusal=(), way=())
         self.wanted.pop(name, None)
 
-    def want(self, designs: Mapping[str, str]) -> None:
-        """Want designs for objectives until they are deployed."""
+    def want(self, designs: Mapping[str, str], name: str, causes: Iterable[Cause]) -> None:
+        """Want designs for objectives until they are deployed; that of one objective for these causes."""
         self.wanted.update(designs)
+        causes = tuple(causes)
+        if all(map(is_chance, causes)) and not self.settings.dry_run:
+            self._run(name, way=causes)
 
     def is_news(self, name: str, outcome: tuple[object, ...]) -> bool:
         """Keep the outcome of a deliberation that leads to no adaptation; return whether it is a new one."""
@@ -330,7 +367,12 @@ class State(View):
 
     def note_in_vain(self, now: float, design: str, objective: str, reason: str) -> None:
         """Put a design that failed for an objective into the error log."""
-        self.error_log[design, objective] = now + self.settings.error_log_expiry, reason
+        key = design, objective
+        if reason != VIOLATED:  # that may be tried again when the cause is gone
+            # As long as an entry is there, it is the same failure.
+            failures = self._failures[key] = self._failures.get(key, 0) + (key not in self.error_log)
+            self.retries[key] = now + self.settings.retry_after(failures - 1), reason
+        self.error_log[key] = now + self.settings.error_log_expiry, reason
 
     def forgive(self, name: str) -> None:
         """Let designs of an objective be tried again that did not keep a limit: its cause is gone."""
