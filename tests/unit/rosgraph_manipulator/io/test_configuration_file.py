@@ -3,6 +3,7 @@
 import pytest
 from rosgraph_manipulator.configuration.configurations import ConfigurationError
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
+from rosgraph_manipulator.ros import manipulator
 
 
 @pytest.fixture
@@ -107,3 +108,15 @@ def test_topics_to_wait_for_are_names(launch_file):
     assert options_from({"configurations": {"a": entry}}).configurations["a"].topics == ("plan",)
     with pytest.raises(ConfigurationError, match="topics"):
         options_from({"configurations": {"a": {**entry, "topics": "plan"}}})
+
+
+def test_key_that_the_nodes_file_has_no_longer_is_removed(tmp_path, monkeypatch):
+    told = {}
+    monkeypatch.setattr(manipulator, "set_parameters", lambda values, delete: told.update(set=values, gone=delete))
+    monkeypatch.setattr(manipulator.rospy, "resolve_name", lambda name: f"/cell/{name}")
+    path = tmp_path / "c.yaml"
+    path.write_text("configurations: {a: {launch: x}}\nkill_nodes: []\n")
+    manipulator.read_parameters([str(path)])
+    assert told["set"] == {"/cell/configurations": {"a": {"launch": "x"}}, "/cell/kill_nodes": []}
+    assert {"/cell/functions", "/cell/save_action", "/cell/goal_msg_type"} < set(told["gone"])
+    assert not told["set"].keys() & set(told["gone"])

@@ -332,15 +332,18 @@ class Manipulator:
 def read_parameters(arguments: list[str]) -> dict[str, Any]:
     """Read the configuration from the file named by the first argument, else from parameters.
 
-    As published, a file's keys become parameters of the node's namespace too.
+    As published, a file's keys become parameters of the node's namespace too. Those of an earlier file are removed:
+    the commands read them.
 
     Raises:
         ConfigurationError: the file can't be read.
     """
     if arguments:
         content = read_file(arguments[0])
-        for key, value in content.items():
-            rospy.set_param(key, value)
+        set_parameters(
+            {rospy.resolve_name(key): value for key, value in content.items()},
+            delete=[rospy.resolve_name(key) for key in KEYS if key not in content],
+        )
         return content
     return {key: rospy.get_param(f"~{key}", rospy.get_param(key, None)) for key in KEYS}
 
