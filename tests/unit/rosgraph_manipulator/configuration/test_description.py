@@ -2,7 +2,7 @@
 
 import pytest
 from rosgraph_launcher.description import NodeDescription, SystemDescription
-from rosgraph_manipulator.configuration.difference import compare, same_value
+from rosgraph_manipulator.configuration.difference import compare, read_by_nodes, same_value
 
 
 def node(name, package="p", executable="x", **parameters):
@@ -47,6 +47,11 @@ def test_expected_quality_is_read_by_no_node():
     difference = compare(system(node("/a"), **{"/qa_energy": 0.1}), system(node("/a"), **{"/qa_energy": 0.2}))
     assert not difference.touches_nodes
     assert difference.shared == {"/qa_energy": 0.2}
+
+
+def test_expected_quality_is_no_parameter_of_a_node_whatever_the_nodes_own_are_called():
+    found = read_by_nodes(system(node("/a", qa_margin=3), **{"/qa_energy": 0.1, "/robot": "one"}))
+    assert found == {"/robot": "one", "/a/qa_margin": 3}
 
 
 def test_from_nothing_everything_starts():

@@ -38,11 +38,17 @@ def test_configuration_that_agrees_can_run_beside_others():
             "node /camera belongs to f_pick and f_look, which runs, and differs in args",
         ),
         (system("/camera", parameters={"/rate": 2}), "parameter /rate is 2 for f_pick and 1 for f_look, which runs"),
+        (
+            SystemDescription(
+                {"/camera": NodeDescription("/camera", "/", "cell", "driver", parameters={"qa_gain": 2})}
+            ),
+            "parameter /camera/qa_gain is 2 for f_pick and 5 for f_look",
+        ),
         (system("/arm", parameters={"/camera/gain": 2}), "parameter /camera/gain is 2 for f_pick and 5 for f_look"),
     ],
 )
 def test_configuration_that_disagrees_is_refused_with_the_place(wanted, reason):
-    camera = NodeDescription("/camera", "/", "cell", "driver", parameters={"gain": 5})
+    camera = NodeDescription("/camera", "/", "cell", "driver", parameters={"gain": 5, "qa_gain": 5})
     others = {"f_look": SystemDescription({"/camera": camera}, {"/rate": 1})}
     assert reason in disagreement("f_pick", wanted, others)
 

@@ -108,6 +108,15 @@ def same_value(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
+def read_by_nodes(system: SystemDescription) -> dict[str, Any]:
+    """Return the parameters of a system that a node may read, by full name: all but the expected quality levels.
+
+    Only a parameter outside the nodes' namespaces can be such a level.
+    """
+    shared = {name: value for name, value in system.parameters.items() if not is_quality(name)}
+    return SystemDescription(system.nodes, shared).all_parameters()
+
+
 def is_quality(name: str) -> bool:
-    """Tell whether a parameter holds an expected quality level, which no node reads."""
+    """Tell whether a parameter outside the nodes' namespaces holds an expected quality level, which no node reads."""
     return name.rpartition("/")[2].startswith(QUALITY_PREFIX)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from rosgraph_launcher.description import SystemDescription
 
-from rosgraph_manipulator.configuration.difference import is_quality, same_value
+from rosgraph_manipulator.configuration.difference import read_by_nodes, same_value
 
 
 def seen_by(
@@ -34,7 +34,7 @@ def disagreement(function: str, wanted: SystemDescription, others: Mapping[str, 
     A node or a parameter of two functions must be the same in both. Expected quality levels are an exception: no node
     reads them.
     """
-    parameters = wanted.all_parameters()
+    parameters = read_by_nodes(wanted)
     for other, system in others.items():
         for name, node in system.nodes.items():
             mine = wanted.nodes.get(name)
@@ -46,8 +46,8 @@ def disagreement(function: str, wanted: SystemDescription, others: Mapping[str, 
                     f"node {name} belongs to {function} and {other}, which runs, and differs in "
                     f"{', '.join(difference)}: make it the same in both, or give it another name in one"
                 )
-        for name, value in system.all_parameters().items():
-            if name in parameters and not is_quality(name) and not same_value(parameters[name], value):
+        for name, value in read_by_nodes(system).items():
+            if name in parameters and not same_value(parameters[name], value):
                 return (
                     f"parameter {name} is {parameters[name]!r} for {function} and {value!r} for {other}, which runs: "
                     "make it the same in both"

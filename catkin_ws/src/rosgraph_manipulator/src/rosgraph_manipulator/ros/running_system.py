@@ -17,7 +17,7 @@ from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.parameters import put_back
 from rosgraph_manipulator.change.progress import ChangeProgress
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
-from rosgraph_manipulator.configuration.difference import is_quality, same_value
+from rosgraph_manipulator.configuration.difference import read_by_nodes, same_value
 from rosgraph_manipulator.configuration.sharing import disagreement, seen_by
 from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError, read_launch_file
 from rosgraph_manipulator.io.master import get_parameters
@@ -146,10 +146,13 @@ class RunningSystem:
         }
 
     def parameters_of(self, function: str, nodes: Collection[str]) -> dict[str, Any]:
-        """Return the parameters of what runs for a function that these nodes may read, by full name."""
+        """Return the parameters of what runs for a function that these nodes may read, by full name.
+
+        Expected quality levels are left out: each function has its own under the same names.
+        """
         runs = self._described_as_deployed(function)
         own = {name: node for name, node in runs.nodes.items() if name in nodes}
-        return SystemDescription(own, runs.parameters if own else {}).all_parameters()
+        return read_by_nodes(SystemDescription(own, runs.parameters if own else {}))
 
     def _described_as_deployed(self, function: str) -> SystemDescription:
         self._runs(function)  # reads what an earlier manipulator has deployed
@@ -171,8 +174,7 @@ class RunningSystem:
 
     def _drifted(self, function: str) -> dict[str, Any]:
         """Return the values that the parameters of what runs have now, where they differ; None: not set."""
-        described = self._described_as_deployed(function).all_parameters()
-        wanted = {name: value for name, value in described.items() if not is_quality(name)}
+        wanted = read_by_nodes(self._described_as_deployed(function))
         try:
             live = get_parameters(wanted)
         except CallError as error:
