@@ -113,6 +113,47 @@ def test_expression_of_an_included_file_is_named_with_that_file(tmp_path):
         read_launch_file(write(tmp_path, f'<include file="{included}"/>'))
 
 
+MANY = "".join(f'<param name="p{i}" value="{i}"/>' for i in range(20))
+FAILS = "$(eval 1/0)"
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f'{NODE} args="{FAILS}">{MANY}</node>',
+        f'{NODE}><param name="x" value="{FAILS}"/>{MANY}</node>',
+        f'{NODE}><env name="x" value="{FAILS}"/>{MANY}</node>',
+        f'{NODE}><remap from="x" to="{FAILS}"/>{MANY}</node>',
+        f'<arg name="x" value="{FAILS}"/>',
+        f'<remap from="x" to="{FAILS}"/>',
+        f'<machine name="x" address="{FAILS}"/>',
+    ],
+)
+@pytest.mark.parametrize("is_included", [False, True])
+def test_refusal_of_an_expression_is_file_expression_and_reason(tmp_path, body, is_included):
+    path = write(tmp_path, body)
+    outer = tmp_path / "outer.launch"
+    outer.write_text(f'<launch><include file="{path}"/></launch>')
+    with pytest.raises(LaunchFileError) as error:
+        read_launch_file(outer if is_included else path)
+    assert str(error.value) == f"{path}: '{FAILS}' fails: ZeroDivisionError: division by zero: correct the expression"
+
+
+def test_long_expression_is_shortened(tmp_path):
+    with pytest.raises(LaunchFileError) as error:
+        read_launch_file(write(tmp_path, f'{NODE} args="$(eval {"1 + " * 200} no_such_name)"/>'))
+    assert len(str(error.value)) < len(str(tmp_path)) + 250
+    assert "no_such_name)' fails: NameError" in str(error.value)
+
+
+def test_refusal_of_a_node_names_it_without_what_is_in_it(tmp_path):
+    path = write(tmp_path, f'<node name="n" pkg="move_base">{MANY}</node>')
+    with pytest.raises(LaunchFileError) as error:
+        read_launch_file(path)
+    told = '<node> tag is missing required attribute: \'type\', in <node name="n" pkg="move_base">'
+    assert str(error.value) == f"{path}: {told}"
+
+
 @pytest.mark.parametrize(
     "content",
     [

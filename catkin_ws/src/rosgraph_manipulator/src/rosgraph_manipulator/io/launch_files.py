@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -77,6 +78,10 @@ _EXPLAINED = (
 )
 """Errors whose message says what is wrong. Any other one is named by its class, too."""
 
+_XML = re.compile(r"\.? (?:\w+ )?xml is (<[^>]*>).*", re.IGNORECASE)
+"""How roslaunch ends a message: with an element and all that is in it."""
+_SHOWN = 100  # characters of an element or expression in a message
+
 
 @contextmanager
 def _refusing(what: str) -> Iterator[None]:
@@ -90,7 +95,24 @@ def _refusing(what: str) -> Iterator[None]:
     except LaunchFileError:
         raise
     except (Exception, SystemExit) as error:
-        raise LaunchFileError(f"{what}: {reason(error, _EXPLAINED).removeprefix(f'{what}: ')}") from error
+        if known := _known(error):
+            raise known from error
+        text = _XML.sub(lambda element: f", in {_shortened(element[1])}", reason(error, _EXPLAINED))
+        raise LaunchFileError(f"{what}: {text.removeprefix(f'{what}: ')}") from error
+
+
+def _known(error: BaseException | None) -> LaunchFileError | None:
+    """Return the error of this module that another one was raised about; None: there is none."""
+    while error is not None and not isinstance(error, LaunchFileError):
+        error = error.__context__
+    return error
+
+
+def _shortened(text: str) -> str:
+    """Return a text in one line, without its middle where it is long."""
+    line = " ".join(text.split())
+    half = _SHOWN // 2
+    return line if len(line) <= _SHOWN else f"{line[:half]} ... {line[-half:]}"
 
 
 class _StableNames(dict[str, str]):
@@ -122,16 +144,16 @@ class _Loader(roslaunch.xmlloader.XmlLoader):
         """Return an attribute with its `$(...)` replaced.
 
         Raises:
-            XmlParseException: an expression fails; roslaunch's own error would not name it.
+            LaunchFileError: an expression fails. roslaunch's own error would not name it, and roslaunch would add the
+                whole element to an error of its own kind.
         """
         try:
             return super().resolve_args(args, context)
         except (*_EXPLAINED, RecursionError):  # the latter comes of a file that includes itself
             raise
         except (Exception, SystemExit) as error:
-            raise roslaunch.xmlloader.XmlParseException(
-                f"{context.filename}: '{args}' fails: {type(error).__name__}: {error}: correct the expression"
-            ) from error
+            what = f"'{_shortened(args)}' fails: {type(error).__name__}: {' '.join(str(error).split())}"
+            raise LaunchFileError(f"{context.filename}: {what}: correct the expression") from error
 
     def _parse_launch(self, filename: str, verbose: bool) -> Any:  # noqa: ARG002
         try:
