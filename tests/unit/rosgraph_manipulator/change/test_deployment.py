@@ -177,6 +177,11 @@ def test_released_function_runs_nothing(running, told):
     assert executor.calls == ["release f"]
 
 
+def test_release_of_a_function_that_failed_says_why_it_did():
+    outcome = release(Recorder(), "f", None, Stopwatch(itertools.count().__next__), "old: it died")
+    assert outcome.message == "f is released: nothing ran for it, because old: it died"
+
+
 def test_nodes_that_other_functions_need_are_not_told_to_be_stopped():
     executor = Recorder()
     executor.staying = {"/cell/arm", "/cell/camera"}

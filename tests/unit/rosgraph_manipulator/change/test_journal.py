@@ -124,6 +124,18 @@ def test_system_that_was_ended_starts_anew():
 
 def test_journal_survives_the_parameter_server():
     assert parse_journal(BROKEN.as_parameter()) == BROKEN
+    failed = STEADY.noted({}, NOW, failures={"f_pick": "it died"})
+    assert parse_journal(failed.as_parameter()).failures == {"f_pick": "it died"}
+
+
+def test_why_a_function_failed_is_known_to_the_next_manipulator_for_a_while():
+    journal = Journal().noted({}, NOW, failures={"f_pick": "it died", "f_look": "it fell"})
+    assert resume(journal, "", False, "", NOW) == Resumption(failure="it died")
+    assert resume(journal, "good", True, "", NOW) == Resumption(failure="it died")
+    assert resume(journal, "good", False, "", NOW).failure == ""
+    assert resume(journal, "", False, "first", NOW) == Resumption(deploy="first")
+    assert resume(journal, "", False, "", NOW + 100.0) == Resumption()
+    assert resume(journal.noted({}, NOW, ended=True, failures=journal.failures), "", False, "", NOW) == Resumption()
 
 
 @pytest.mark.parametrize(
@@ -136,6 +148,7 @@ def test_journal_survives_the_parameter_server():
         {**STEADY.as_parameter(), "attempts": True},
         {"configuration": "x"},
         {**STEADY.as_parameter(), "configurations": {"f_pick": 3}},
+        {**STEADY.as_parameter(), "failures": {"f_pick": 3}},
     ],
 )
 def test_parameter_of_another_form_is_no_journal(value):

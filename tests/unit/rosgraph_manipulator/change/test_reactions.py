@@ -101,14 +101,14 @@ def test_failed_configuration_is_not_restored_but_a_lost_one_is():
     deployments = deployed(A)
     deployments.lost()
     assert deployments.fallback(B) == A
-    deployments.failed()
+    deployments.failed("it died")
     assert deployments.fallback(B) is None
 
 
 def test_what_a_lost_host_has_stopped_is_deployed_again_when_it_is_back():
     deployments = deployed(A)
     assert deployments.react(report(A, FAILED), 1.0) is Reaction.GIVE_UP
-    deployments.failed(waits=True)
+    deployments.failed("it died", waits=True)
     assert deployments.react(report(A, FAILED), 2.0) is Reaction.NONE
     for back in (report(None, STABLE), report(A, STABLE)):
         assert deployments.react(back, 3.0) is Reaction.RETURN
@@ -117,7 +117,7 @@ def test_what_a_lost_host_has_stopped_is_deployed_again_when_it_is_back():
 
 def test_what_is_lost_again_during_its_deployment_waits_once_more():
     deployments = deployed(A)
-    deployments.failed(waits=True)
+    deployments.failed("it died", waits=True)
     deployments.finished(Outcome(Result.GENERAL_ERROR, None, "host arm is lost"), 2.0)
     assert deployments.react(report(None, STABLE), 3.0) is Reaction.NONE
     deployments.wait_for(A)
@@ -130,12 +130,30 @@ def test_what_is_lost_again_during_its_deployment_waits_once_more():
     [
         lambda deployments: deployments.finished(Outcome(Result.OK, B, ""), 2.0),
         lambda deployments: deployments.released(),
-        lambda deployments: deployments.failed(),
+        lambda deployments: deployments.failed("it died"),
     ],
 )
 def test_what_was_decided_meanwhile_counts_more_than_the_return_of_a_host(meanwhile):
     deployments = deployed(A)
-    deployments.failed(waits=True)
+    deployments.failed("it died", waits=True)
     meanwhile(deployments)
     assert deployments.waiting is None
     assert deployments.react(report(B, STABLE), 3.0) is Reaction.NONE
+
+
+def test_why_nothing_runs_is_known_until_something_does_even_after_a_release():
+    deployments = deployed(A)
+    deployments.failed("a: it died")
+    assert deployments.failure == "a: it died"
+    deployments.released()
+    assert deployments.failure == "a: it died"
+    deployments.finished(Outcome(Result.OK, B, "b is deployed"), 1.0)
+    assert deployments.failure == ""
+    deployments.released()
+    assert deployments.failure == ""
+
+
+def test_change_that_leaves_nothing_says_why():
+    deployments = deployed(A)
+    deployments.finished(Outcome(Result.GENERAL_ERROR, None, "b: no such node"), 1.0)
+    assert deployments.failure == "b: no such node"

@@ -4,7 +4,7 @@ import socket
 
 import pytest
 from helpers.ports import QUIET_HOST
-from metacontrol_msgs.msg import LaunchedFunction
+from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding, LaunchedFunction
 from rosgraph_manipulator.cli import plan, request, status
 
 NODE = '<node name="{}" pkg="move_base" type="move_base"/>'
@@ -58,6 +58,28 @@ def test_status_leaves_out_a_function_that_was_released():
     )
     assert status.process_lines([released]) == []
     assert status.process_lines([released, picks]) == ["  f_pick: softly RECOVERING", "    /arm (dead)", "    it died"]
+
+
+def test_status_says_why_a_function_failed_even_after_its_release():
+    goes = FunctionGrounding("f_go", "fast", "STABLE")
+    failures = {"f_pick": "softly: node /arm has died"}
+    failed = ActiveConfiguration(functions=[goes, FunctionGrounding("f_pick", "softly", "FAILED")])
+    assert status.function_lines(failed, failures) == [
+        "f_go: fast STABLE",
+        "f_pick: softly FAILED",
+        "  softly: node /arm has died",
+    ]
+    failed.message = "node /arm has died"  # printed below
+    assert status.function_lines(failed, failures) == ["f_go: fast STABLE", "f_pick: softly FAILED"]
+    released = ActiveConfiguration(functions=[goes], message="fast is deployed by restart")
+    assert status.function_lines(released, failures) == [
+        "f_go: fast STABLE",
+        "f_pick: released after it had failed",
+        "  softly: node /arm has died",
+    ]
+    released.message = "f_pick is released: nothing ran for it, because softly: node /arm has died"
+    assert status.function_lines(released, failures) == ["f_go: fast STABLE", "f_pick: released after it had failed"]
+    assert status.function_lines(released, {}) == ["f_go: fast STABLE"]
 
 
 @pytest.mark.parametrize("remapping", ["__ns:=/robot", "__name:=x", "a:=b", "_rate:=1"])

@@ -147,7 +147,9 @@ def deploy(
     return _go_back(executor, wanted.function, last_good, reason, watch)
 
 
-def release(executor: ChangeExecutor, function: str, running: Configuration | None, watch: Stopwatch) -> Outcome:
+def release(
+    executor: ChangeExecutor, function: str, running: Configuration | None, watch: Stopwatch, failure: str = ""
+) -> Outcome:
     """Stop what only one function needs.
 
     Args:
@@ -155,6 +157,7 @@ def release(executor: ChangeExecutor, function: str, running: Configuration | No
         function: its name.
         running: the configuration that runs for it; None: none does.
         watch: measures the phases.
+        failure: why none does, in words; empty: nothing has failed.
     """
     try:
         with watch.phase("stop"):
@@ -163,7 +166,7 @@ def release(executor: ChangeExecutor, function: str, running: Configuration | No
         return Outcome(Result.FAILED, running, f"{function}: {error}", cancelled=True)
     except DeploymentError as error:
         return Outcome(Result.GENERAL_ERROR, None, f"{function} could not be released: {error}")
-    what = f"{running.name} is stopped" if running else "nothing ran for it"
+    what = f"{running.name} is stopped" if running else f"nothing ran for it{failure and f', because {failure}'}"
     if running and staying:
         what = f"{running.name} is given up, and for other functions these of its nodes run on: "
         what += ", ".join(sorted(staying))

@@ -31,6 +31,7 @@ class Journal:
         ended: whether the manipulator has ended because it was told to.
         attempts: how often the wanted configuration was begun, by this manipulator and those before it.
         error: the error of the change under way that has ended the manipulator; empty: none has.
+        failures: why nothing runs for a function, for each function that has failed, even if it was released since.
     """
 
     configurations: Mapping[str, str] = field(default_factory=dict)
@@ -39,9 +40,15 @@ class Journal:
     ended: bool = False
     attempts: int = 0
     error: str = ""
+    failures: Mapping[str, str] = field(default_factory=dict)
 
     def noted(
-        self, configurations: Mapping[str, str], now: float, wanted: str | None = None, ended: bool = False
+        self,
+        configurations: Mapping[str, str],
+        now: float,
+        wanted: str | None = None,
+        ended: bool = False,
+        failures: Mapping[str, str] | None = None,
     ) -> Journal:
         """Return the journal as it is at `now`; one that has ended or has an error does not change any more.
 
@@ -50,6 +57,7 @@ class Journal:
             now: wall time, s since the epoch.
             wanted: the configuration that is being deployed; empty: none is; None: as before.
             ended: whether the manipulator ends because it was told to.
+            failures: why nothing runs, for each function that has failed.
         """
         if self.ended or self.error:
             return self
@@ -63,6 +71,7 @@ class Journal:
             alive=now,
             ended=ended,
             attempts=attempts,
+            failures=dict(failures or {}),
         )
 
     def broken(self, error: str, now: float) -> Journal:
@@ -93,6 +102,7 @@ class Journal:
             "ended": self.ended,
             "attempts": self.attempts,
             "error": self.error,
+            "failures": dict(self.failures),
         }
 
 
@@ -103,7 +113,8 @@ def parse_journal(value: object) -> Journal:
     empty = Journal().as_parameter()
     if not all(type(value.get(key)) is type(default) for key, default in empty.items()):
         return Journal()
-    if not all(isinstance(name, str) for pair in value["configurations"].items() for name in pair):
+    texts = (text for key in ("configurations", "failures") for pair in value[key].items() for text in pair)
+    if not all(isinstance(text, str) for text in texts):
         return Journal()
     return Journal(**{key: value[key] for key in empty})
 
@@ -120,6 +131,7 @@ class Resumption:
         attempts: how often `deploy` was begun before.
         refused: the configuration whose change was under way and is not begun again; empty: there is none.
         reason: why it is not.
+        failure: why nothing runs; empty: something does, or nothing has failed.
     """
 
     deploy: str = ""
@@ -129,6 +141,7 @@ class Resumption:
     attempts: int = 0
     refused: str = ""
     reason: str = ""
+    failure: str = ""
 
 
 def begin_journal(resumptions: Iterable[Resumption]) -> Journal:
@@ -169,7 +182,8 @@ def resume(
             keep_goal=True,
             attempts=attempts,
         )
-    return Resumption(deploy=initial)
+    failure = journal.failures.get(function, "") if fresh and not journal.ended and not initial else ""
+    return Resumption(deploy=initial, failure=failure)
 
 
 def _without_the_change(wanted: str, last_good: str, reason: str, launched: str, initial: str) -> Resumption:

@@ -41,6 +41,12 @@ class DeployedConfigurations:
         self._waiting: Configuration | None = None
         self._recovering = False
         self._deployed_at = float("-inf")
+        self._failure = ""
+
+    @property
+    def failure(self) -> str:
+        """Why nothing runs, in one line; empty: something does, or nothing has failed. A release leaves it."""
+        return "" if self._running else self._failure
 
     @property
     def waiting(self) -> Configuration | None:
@@ -62,9 +68,9 @@ class DeployedConfigurations:
         """The configuration that the running one has replaced; None: there was none."""
         return self._previous
 
-    def resume(self, running: Configuration | None, last_good: Configuration | None) -> None:
+    def resume(self, running: Configuration | None, last_good: Configuration | None, failure: str = "") -> None:
         """Begin with what an earlier manipulator has left."""
-        self._running, self._last_good = running, running or last_good
+        self._running, self._last_good, self._failure = running, running or last_good, failure
 
     def fallback(self, wanted: Configuration) -> Configuration | None:
         """Return the configuration to restore if the wanted one does not come up; None: there is none."""
@@ -79,6 +85,7 @@ class DeployedConfigurations:
     def finished(self, outcome: Outcome, now: float) -> None:
         """Note how a change ended."""
         self._running, self._waiting, self._recovering = outcome.running, None, False
+        self._failure = outcome.message if outcome.result is Result.GENERAL_ERROR else ""
         if outcome.running:
             replaces = outcome.result is Result.OK and self._last_good != outcome.running
             self._previous = self._last_good if replaces else None
@@ -103,15 +110,21 @@ class DeployedConfigurations:
         """Note that the running configuration runs no more, though it was the last good one."""
         self._running = None
 
-    def failed(self, waits: bool = False) -> None:
+    def failed(self, reason: str, waits: bool = False) -> None:
         """Note that the running configuration has failed: it is not restored.
 
         Args:
+            reason: why, in one line.
             waits: whether a host was lost, so that it is deployed again when the host is back.
         """
         self._waiting = self._running if waits else None
         self._running = self._last_good = None
         self._recovering = False
+        self._failure = reason
+
+    def refuses(self, reason: str) -> None:
+        """Note that the change that was under way is not begun again."""
+        self._failure = reason
 
     def wait_for(self, configuration: Configuration) -> None:
         """Note that nothing runs, because a host was lost, and that a configuration is deployed when it is back."""

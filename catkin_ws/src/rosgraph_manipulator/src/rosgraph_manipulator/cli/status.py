@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import click
-from metacontrol_msgs.msg import LaunchedFunction
+from metacontrol_msgs.msg import ActiveConfiguration, LaunchedFunction
 
 from rosgraph_manipulator.cli.invocation import HELP, print_last_change, run
 from rosgraph_manipulator.ros import client
@@ -19,13 +19,30 @@ def status() -> None:
     if active is None and not launchers:
         raise client.ClientError("neither manipulator nor launcher answers: start manipulator.launch")
     if active is not None:
-        for grounding in active.functions:
-            click.echo(f"{grounding.function}: {grounding.configuration} {grounding.state}")
+        for line in function_lines(active, client.failures()):
+            click.echo(line)
         print_last_change(active)
     for name, launcher in launchers.items():
         of = "" if len(launchers) == 1 else f" of {name}"
         lines = process_lines(launcher.functions)
         click.echo("\n".join([f"processes{of}:{'' if lines else ' none'}", *lines]))
+
+
+def function_lines(active: ActiveConfiguration, failures: Mapping[str, str]) -> list[str]:
+    """Return what is deployed for each function, in lines, and why nothing is for one that has failed.
+
+    Args:
+        active: what the manipulator has told; where its message has the reason, that is left out.
+        failures: why nothing runs for a function, by its name.
+    """
+    states = {grounding.function: f"{grounding.configuration} {grounding.state}" for grounding in active.functions}
+    released = {function: "released after it had failed" for function in sorted(failures) if function not in states}
+    lines = []
+    for function, state in (states | released).items():
+        reason = failures.get(function, "")
+        is_told = active.message and (active.message in reason or reason in active.message)
+        lines += [f"{function}: {state}", *([f"  {reason}"] if reason and not is_told else [])]
+    return lines
 
 
 def process_lines(functions: Iterable[LaunchedFunction]) -> list[str]:

@@ -25,6 +25,7 @@ from node_kit.io.xml_rpc import CallError, GoneError
 from node_kit.ros import command
 from node_kit.ros.action_server import wait_for_server
 
+from rosgraph_manipulator.change.journal import parse_journal
 from rosgraph_manipulator.configuration.configurations import DEFAULT_FUNCTION, KEYS
 from rosgraph_manipulator.io.master import publishers
 from rosgraph_manipulator.ros.launcher_reports import TOPIC
@@ -142,6 +143,11 @@ def _wait_for(done: threading.Event) -> None:
 def active_configuration() -> ActiveConfiguration | None:
     """Return what the manipulator has deployed; None where it does not say."""
     return _latest(f"{NODE}/active_configuration", ActiveConfiguration)
+
+
+def failures() -> dict[str, str]:
+    """Return why nothing runs for a function, for each function that has failed, even if it was released since."""
+    return dict(parse_journal(rospy.get_param(f"{NODE}/journal", None)).failures)
 
 
 def launched_functions() -> dict[str, LaunchedFunctions]:

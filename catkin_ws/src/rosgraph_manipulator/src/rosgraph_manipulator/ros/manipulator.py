@@ -122,7 +122,7 @@ class Manipulator:
         known = self._options.configurations
         for function, resumption in self._resumptions.items():
             last_good = known.get(resumption.last_good)
-            self._deployments[function].resume(known.get(resumption.running), last_good)
+            self._deployments[function].resume(known.get(resumption.running), last_good, resumption.failure)
         watch.heartbeat = self._heartbeat
         rospy.on_shutdown(lambda: self._note(ended=True))
         states = {}
@@ -154,6 +154,8 @@ class Manipulator:
             f"configuration, then request it; {running.name if running else 'nothing'} runs"
         )
         rospy.logerr("%s", message)
+        self._deployments[refused.function].refuses(message)
+        self._note()
         outcome = Outcome(Result.FAILED if running else Result.GENERAL_ERROR, running, message)
         state = FunctionGrounding.STABLE if running else FunctionGrounding.FAILED
         self._announcer.announce(running or refused, state, outcome)
@@ -166,8 +168,9 @@ class Manipulator:
     def _note(self, wanted: str | None = None, ended: bool = False) -> None:
         """Write the journal."""
         last_good = {name: d.last_good.name for name, d in self._deployments.items() if d.last_good}
+        failures = {name: d.failure for name, d in self._deployments.items() if d.failure}
         with self._journal_lock:
-            self._write(self._journal.noted(last_good, time.time(), wanted, ended))
+            self._write(self._journal.noted(last_good, time.time(), wanted, ended, failures))
 
     def _write(self, journal: Journal) -> None:
         """Publish a journal as a parameter, where it differs from the present one."""
@@ -239,7 +242,7 @@ class Manipulator:
         watch = Stopwatch(time.monotonic)
         deployments = self._deployments[function]
         try:
-            outcome = release(self._executor, function, deployments.running, watch)
+            outcome = release(self._executor, function, deployments.running, watch, deployments.failure)
         except (rospy.ROSException, OSError) as error:
             outcome = Outcome(Result.GENERAL_ERROR, None, f"{function} could not be released: {error}")
         if outcome.result is Result.OK:
@@ -285,7 +288,7 @@ class Manipulator:
             message = f"{running.name}: {report.message}; {previous.name} is restored"
             rospy.logerr("%s soon after the change: %s: going back to %s", running.name, report.message, previous.name)
             self._announcer.diagnose(False, message, running.name)
-            deployments.failed()
+            deployments.failed(message)
             self._deploy(previous)
         elif reaction is Reaction.BEGIN_RECOVERY:
             self._begin_recovery(running, report)
@@ -319,7 +322,8 @@ class Manipulator:
         self._announcer.diagnose(True, outcome.message, running.name)
 
     def _give_up(self, running: Configuration, reason: str) -> None:
-        self._deployments[running.function].failed(waits=bool(self._executor.lost_hosts(running.function)))
+        waits = bool(self._executor.lost_hosts(running.function))
+        self._deployments[running.function].failed(f"{running.name}: {reason}", waits)
         self._executor.stop_rest(running.function)
         self._executor.stop_robot(running.function)
         self._note(wanted="")
