@@ -8,6 +8,7 @@ from helpers import launch_files
 from ros_model.io.models import read_system
 from ros_model.io.project import load_project
 from ros_model.language.metamodel import compose
+from ros_model.language.remappings import remappings_of, remark
 
 SOURCES = Path(__file__).parents[4] / "catkin_ws" / "src"
 BASE = """RosSystem { Name base
@@ -320,6 +321,20 @@ def test_names_of_generators_complete(run):
 
 def test_project_of_d2_loads_unchanged_through_its_file():
     assert load_project(SOURCES / "metacontrol_sim" / "models").base_file == "d2.rossystem"
+
+
+def test_remapping_of_no_port_reaches_the_launch_files_and_models_of_the_variants(run, models, tmp_path):
+    base = f"// A cart.\n// {remark('/nav', [('~late', 'map')])}\n// {remark('/guard', [('a', 'b')])}\n{BASE}"
+    folder = models({"safe": {"speed": 1}}, base)
+    for arguments in (["all", folder, "-o", tmp_path], ["launch", folder, "-o", tmp_path, "--packages"]):
+        assert run("generate", *arguments)[0] == 0
+    for place in ("launch/variants", "safe/launch"):
+        (node,) = launch_files.read(tmp_path / place / "safe.launch").nodes
+        assert [tuple(pair) for pair in node.remap_args] == [("~late", "map")]
+    assert run("variants", folder, "-o", tmp_path / "whole", "--whole")[0] == 0
+    for place in ("models/variants", "safe"):
+        assert remappings_of(read_system(tmp_path / place / "safe.rossystem").header) == {"nav": (("~late", "map"),)}
+    assert set(remappings_of(read_system(tmp_path / "whole" / "safe.rossystem").header)) == {"nav", "guard"}
 
 
 def test_arguments_of_nodes_reach_the_launch_files(run, models, tmp_path):

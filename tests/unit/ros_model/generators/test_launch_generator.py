@@ -24,6 +24,7 @@ from ros_model.language.metamodel import (
     SystemParameter,
 )
 from ros_model.language.packages_reader import parse_packages
+from ros_model.language.remappings import remappings_of, remark
 from rosgraph.names import resolve_name
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
@@ -257,3 +258,31 @@ def test_action_is_remapped_in_its_five_topics():
 def test_what_roslaunch_would_evaluate_or_misread_is_refused(system):
     with pytest.raises(ModelError):
         launch_file(system)
+
+
+SCAN = (PortPath("filter", "clean"),), (PortPath("laser", "in"),)
+
+
+def kept(*pairs, ports=(), connections=(), namespace=None):
+    return replace(
+        of(ports=ports, connections=connections, namespace=namespace), header="A robot.\n" + remark("/laser", pairs)
+    )
+
+
+def test_remapping_that_belongs_to_no_port_is_kept_and_one_of_a_port_goes_first():
+    system = kept(("late", "/map"), ("~in", "elsewhere"), ports=[port("in", "~in", PortKind.SUBSCRIBER)])
+    assert remaps(system) == [("~in", "in"), ("late", "/map")]
+
+
+def test_all_names_in_the_code_for_one_topic_follow_a_variant_that_connects_another():
+    ports = [port("in", "echo", PortKind.SUBSCRIBER), port("do", "act", PortKind.ACTION_SERVER)]
+    connection = Connection("clean", ConnectionKind.TOPIC, *SCAN)
+    action = Connection("dock", ConnectionKind.ACTION, (PortPath("laser", "do"),), (PortPath("ui", "dock"),))
+    found = remaps(kept(("/in", "in"), ("~go/goal", "do/goal"), ports=ports, connections=[connection, action]))
+    assert {("echo", "clean"), ("/in", "clean"), ("~go/goal", "dock/goal")} < set(found)
+
+
+def test_word_that_is_no_remapping_is_passed_over():
+    assert remappings_of("Also remapped: /cell/eye: a:=b $(x):=c d.e:=f g:= ~h:=/i, j:=k") == {
+        "cell/eye": (("a", "b"), ("j", "k"))
+    }

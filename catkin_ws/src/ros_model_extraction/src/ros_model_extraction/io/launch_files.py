@@ -15,11 +15,12 @@ from ros_model.errors import ModelError
 from ros_model.io.launch_files import load as load_by_roslaunch
 from ros_model.language.graph_names import resolve
 from ros_model.language.metamodel import PortKind, Reference
+from ros_model.language.remappings import remarks
 
 from ros_model_extraction import ros_defaults as plumbing
 from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.io.source_files import read_xml
-from ros_model_extraction.names import node_name, split_name
+from ros_model_extraction.names import as_seen_from, node_name, split_name
 from ros_model_extraction.node_facts import NodeSource, SourceError
 from ros_model_extraction.packages.catkin_package import CatkinPackage, read_package
 from ros_model_extraction.packages.package_source import named, read_executable
@@ -71,7 +72,7 @@ def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
             instance.ends = _ends(node, source)
             lines += [f"{node.package}/{remark}" for remark in source.remarks]
         instances[node.name] = instance
-        lines += _left_out(node, instance.ends)
+        lines += _beside(node, instance.ends)
     unowned = [(key, value) for key, value in share_out(tree, instances) if not plumbing.is_roslaunch_parameter(key)]
     given = f" with {' '.join(arguments)}" if arguments else ""
     title = [
@@ -179,13 +180,12 @@ def _ends(node: LaunchedNode, source: NodeSource) -> list[End]:
     return [end for end in ends.values() if not plumbing.is_plumbing(end)]
 
 
-def _left_out(node: LaunchedNode, ends: Sequence[End]) -> Iterator[str]:
-    """Yield what a launch file says of a node and the model does not; a generated launch file lacks it, too."""
+def _beside(node: LaunchedNode, ends: Sequence[End]) -> Iterator[str]:
+    """Yield what a launch file says of a node and no interface in the model does; models have words for none of it."""
     kept = {resolve(end.declared, node.name) for end in ends if end.declared}
     actions = {f"{name}/{topic}" for name in kept for topic in ("goal", "cancel", "status", "result", "feedback")}
-    lost = [f"{old} to {new}" for old, new in sorted(node.remaps.items()) if old != new and old not in kept | actions]
-    if lost:
-        yield f"Left out: remappings of {node.name}, whose source has no such interface: {', '.join(lost)}."
+    more = [pair for pair in sorted(node.remaps.items()) if pair[0] != pair[1] and pair[0] not in kept | actions]
+    yield from remarks({node.name: [(as_seen_from(node.name, old), as_seen_from(node.name, new)) for old, new in more]})
     if node.unsaid:
         yield f"Left out: {', '.join(node.unsaid)} of {node.name}: a model has no words for it."
 

@@ -20,6 +20,7 @@ from ros_model.language.metamodel import (
     SystemParameter,
 )
 from ros_model.language.packages import Artifact, Node, Package, PackageSet, ParameterDeclaration, PortDeclaration
+from ros_model.language.remappings import remarks
 
 from ros_model_extraction import ros_defaults as plumbing
 from ros_model_extraction.names import as_seen_from, is_known_type, node_name, split_name
@@ -369,10 +370,7 @@ class _Remarks:
         for node, why in sorted(details.unknown.items()):
             if self._everything or node not in plumbing.NODES:
                 yield f"Not known: the package and executable of {node}: {why}."
-        for node, remaps in sorted(self.unused_remaps.items()):
-            if remaps:
-                pairs = ", ".join(f"{inside} to {outside}" for inside, outside in remaps)
-                yield f"Left out, because no interface of {node} has such a name now: the remapping of {pairs}."
+        yield from remarks(self.unused_remaps)
         for node, origin in sorted(details.origins.items()):
             if origin.arguments and node not in details.dead and (self._everything or node not in self.metacontrol):
                 yield (
