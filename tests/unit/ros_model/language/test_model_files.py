@@ -6,6 +6,8 @@ import pytest
 from ros_model.errors import ModelError
 from ros_model.file_names import safe_file_name
 from ros_model.io.files import resolve
+from ros_model.io.models import read_sources
+from ros_model.language.metamodel import Reference
 
 
 @pytest.fixture
@@ -67,3 +69,17 @@ def test_other_names_are_refused(uri):
 def test_name_that_is_no_file_name_is_refused(name):
     with pytest.raises(ModelError, match="can't name a file"):
         safe_file_name(name, "variant")
+
+
+def test_models_of_source_are_read_without_those_of_running_systems_and_without_broken_ones(tmp_path):
+    text = "PackageSet { CatkinPackage carts { Artifact %s { Node { name n Publishers { Publisher { name x } } } } } }"
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below" / "source.ros").write_text("// Written by rosmodel extract.\n" + text % "written")
+    (tmp_path / "snapshot.ros").write_text("// A robot. Written by rosmodel snapshot.\n" + text % "seen")
+    (tmp_path / "broken.ros").write_text("PackageSet {")
+    library, unread = read_sources(tmp_path)
+    known = {name: library.interfaces(Reference("carts", name, "n")) for name in ("written", "seen")}
+    assert [port.name for port in known["written"] or ()] == ["x"]
+    assert known["seen"] is None
+    assert [str(error).startswith(f"{tmp_path}/broken.ros:") for error in unread] == [True]
+    assert read_sources(tmp_path / "nothing")[1] == []

@@ -10,7 +10,10 @@ from ros_model.checks.systems import check_system
 from ros_model.generators.launch import launch_file
 from ros_model.graph.snapshot import GraphSnapshot, build_snapshot
 from ros_model.language.graph_names import resolve
+from ros_model.language.library import Library
 from ros_model.language.metamodel import ConnectionKind, PortKind, RosSystem
+from ros_model.language.packages_reader import parse_packages
+from ros_model.language.remappings import remappings_of
 from ros_model.language.system_reader import parse_system
 from ros_model.language.system_writer import write_system
 from ros_model_extraction.io.live_nodes import executable_of
@@ -334,6 +337,71 @@ def test_launch_file_remaps_names_that_no_interface_has_yet():
     found = launched_remaps(parse_system(write_system(models.system)))
     wanted = {"~in": "/base/mux", "unheard": "/base/silence", "~grasp/goal": "/base/hand/goal"}
     assert found.items() >= wanted.items()
+
+
+def source_of(executable, subscribers):
+    listed = ", ".join(f"Subscriber {{ name '{name}' message 'nav_msgs.Odometry' }}" for name in subscribers)
+    return Library(
+        parse_packages(
+            f"PackageSet {{ CatkinPackage carts {{ Artifact {executable} {{ Node {{ name main"
+            f" Subscribers {{ {listed} }} }} }} }} }}"
+        ).packages
+    )
+
+
+NO_SOURCE = Library()
+
+
+def follower(*remaps, subscribers=("/laser/odom",), sources=NO_SOURCE):
+    snapshot = graph([["/laser/odom", ["/matcher"]]], [[name, ["/follower"]] for name in subscribers])
+    details = Details({"/follower": Origin("carts", "follow.py", remaps)})
+    models = models_of(snapshot, details, "live", sources=sources)
+    found = models.system.component("follower")
+    return models.system, [port.reference.name for port in found.ports if port.reference]
+
+
+OUTER, OWN = ("/laser/odom", "laser/odom"), ("odometry", "laser/odom")
+
+
+@pytest.mark.parametrize("remaps", [(OUTER, OWN), (OWN, OUTER)])
+def test_remapping_to_a_relative_name_for_all_nodes_does_not_hide_that_of_the_node(remaps):
+    system, names = follower(*remaps)
+    assert names == ["odometry"]
+    assert remappings_of(system.header) == {"follower": (OUTER,)}
+
+
+@pytest.mark.parametrize("declared", ["odometry", "~start", "/odometry"])
+def test_of_several_remappings_to_one_name_the_source_tells_which_is_meant(declared):
+    remaps = [OUTER, ("~start", "laser/odom"), OWN]
+    system, (name,) = follower(*remaps, sources=source_of("follow.py", [declared]))
+    assert resolve(name, "/follower") == resolve(declared, "/follower")
+    assert remappings_of(system.header)["follower"] == tuple(pair for pair in remaps if pair[0] != name)
+
+
+def test_remappings_of_which_nothing_tells_which_is_meant_are_all_in_the_launch_file():
+    system, _ = follower(("a", "laser/odom"), OUTER, ("b", "laser/odom"))
+    text = launch_file(system)
+    assert [f'from="{name}" to="laser/odom"' in text for name in ("a", "b", "/laser/odom")] == [True] * 3
+
+
+def test_second_name_of_an_action_stays_beside_the_one_that_is_taken():
+    topics = ("goal", "cancel", "status", "result", "feedback")
+    inputs = [[f"/dock/{topic}", ["/arm"]] for topic in topics[:2]]
+    outputs = [[f"/dock/{topic}", ["/arm"]] for topic in topics[2:]]
+    pairs = {name: tuple((f"{name}/{topic}", f"dock/{topic}") for topic in topics) for name in ("/dock", "~go")}
+    details = Details({"/arm": Origin("demo", "arm", (*pairs["/dock"], *pairs["~go"]))})
+    types = [[f"/dock/{topic}", ACTION_TYPES[topic]] for topic in topics]
+    system = extracted(graph(outputs, inputs, types=types), details).system
+    (port,) = system.components[0].ports
+    assert (port.kind, port.reference.name) == (PortKind.ACTION_SERVER, "~go")
+    assert remappings_of(system.header) == {"arm": pairs["/dock"]}
+
+
+def test_interface_that_the_source_declares_and_the_node_does_not_have_is_told():
+    sources = source_of("follow.py", ["odometry", "~late", "{topic}@follow.py:3"])
+    system, _ = follower(OWN, sources=sources)
+    assert "/follower does not have them now, though its source declares them: subscriber ~late. Use" in system.header
+    assert "does not have them" not in follower(OWN)[0].header
 
 
 def test_executable_in_a_source_tree_belongs_to_the_package_around_it(tmp_path: Path):

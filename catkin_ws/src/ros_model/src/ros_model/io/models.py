@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from ros_model.language.metamodel import RosSystem
-    from ros_model.language.packages import PackageSet
+    from ros_model.language.packages import Package, PackageSet
 
 
 def read_system(path: str | Path) -> RosSystem:
@@ -46,6 +46,23 @@ def read_library(paths: Iterable[Path]) -> Library:
         ModelError: one can't be read.
     """
     return Library((package for path in paths for package in read_packages(path).packages), InstalledPackages())
+
+
+def read_sources(folder: Path) -> tuple[Library, list[ModelError]]:
+    """Return what `.ros` models in a folder and below declare, but for those of running systems, and what is unread.
+
+    A folder that is not there has none.
+    """
+    packages: list[Package] = []
+    unread: list[ModelError] = []
+    for path in files_in(folder, PACKAGES) if os.path.isdir(folder) else ():
+        try:
+            found = read_packages(path)
+        except ModelError as error:
+            unread.append(error)
+            continue
+        packages += () if found.is_observed else found.packages
+    return Library(packages), unread
 
 
 def read_all(path: Path) -> RosSystem | PackageSet:

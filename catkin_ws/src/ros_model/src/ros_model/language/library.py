@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from ros_model.language.metamodel import Reference
-    from ros_model.language.packages import MessageField
+    from ros_model.language.packages import MessageField, PortDeclaration
 
 BUILTIN_TYPES = frozenset(
     ["bool", "byte", "char", "string", "time", "duration", "float32", "float64", "Header"]
@@ -130,6 +130,11 @@ class Library:
             if models[keys[0]].isdisjoint(models[keys[1]]):
                 found = _joined(found, node)
         return found
+
+    def interfaces(self, reference: Reference) -> tuple[PortDeclaration, ...] | None:
+        """Return what is declared of an executable, under any name of its node; None if no model declares it."""
+        nodes = self._nodes.get(reference.package, {}).get(reference.artifact)
+        return None if nodes is None else tuple(port for node in nodes.values() for port in node.ports)
 
     def missing_type(self, kind: SpecKind, name: str) -> Unknown | None:
         """Return what is wrong with the name of a message, service or action type; None if it is known."""

@@ -104,12 +104,21 @@ class Package:
     position: Position = field(default=Position(), compare=False)
 
 
+OBSERVED = "Written by rosmodel snapshot."
+"""What a model of a running system says at its top."""
+
+
 @dataclass(frozen=True)
 class PackageSet:
     """What a `.ros` file says."""
 
     packages: tuple[Package, ...] = ()
     header: str = ""  # comments at the top of the file
+
+    @property
+    def is_observed(self) -> bool:
+        """Whether it tells of a running system, and so not of the source of its nodes."""
+        return OBSERVED in self.header
 
     def node(self, package: str, artifact: str, node: str) -> Node | None:
         """Return the node that `package.artifact.node` refers to, or None."""

@@ -26,7 +26,7 @@ def remark(node: str, pairs: Iterable[tuple[str, str]]) -> str:
     return f"Also remapped: {node}: {' '.join(f'{inside}:={outside}' for inside, outside in pairs)}"
 
 
-def remarks(remappings: Mapping[str, Sequence[tuple[str, str]]]) -> Iterator[str]:
+def remark_lines(remappings: Mapping[str, Sequence[tuple[str, str]]]) -> Iterator[str]:
     """Yield the lines that keep remappings, by the nodes' full names, and what they mean; nothing if there is none."""
     lines = [remark(node, pairs) for node, pairs in sorted(remappings.items()) if pairs]
     yield from [*lines, _KEPT] if lines else ()

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import datetime
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 import click
 from ros_model.cli.ranges import FiniteRange
 from ros_model.errors import ModelError
+from ros_model.language.packages import OBSERVED
 
 if TYPE_CHECKING:
+    from ros_model.language.library import Library
+
     from ros_model_extraction.running.graph import Models
 
 _MASTER = "http://localhost:11311"
@@ -35,12 +39,18 @@ def snapshot(output: str, master: str | None, name: str, timeout: float, everyth
     """Write NAME.ros and NAME.rossystem of the running system.
 
     Nodes, topics, services, actions, parameters and connections are those that the master lists. What can't be known,
-    and what is left out, is said in comments at the top of the files.
+    and what is left out, is said in comments at the top of the files. Models from source that are in the FOLDER tell
+    which name in the code a remapping is for: run `rosmodel extract` first.
     """
-    from ros_model_extraction.io.output import write_models  # imported when asked for
+    from ros_model.io.models import read_sources  # imported when asked for
+
+    from ros_model_extraction.io.output import write_models
 
     uri = _checked_address(master or os.environ.get("ROS_MASTER_URI") or _MASTER)
-    models = _models(uri, name, timeout, everything)
+    sources, unread = read_sources(Path(output))
+    for error in unread:
+        click.echo(f"rosmodel: {error}: names are not looked up there", err=True)
+    models = _models(uri, name, timeout, everything, sources)
     nodes = len(models.system.components)
     for path in write_models(models, output, name):
         click.echo(f"wrote {path}")
@@ -58,7 +68,7 @@ def _checked_address(uri: str) -> str:
     return uri
 
 
-def _models(uri: str, name: str, timeout: float, everything: bool) -> Models:
+def _models(uri: str, name: str, timeout: float, everything: bool, sources: Library) -> Models:
     from node_kit.io.xml_rpc import CallError, GoneError
     from ros_model.io.master import take_snapshot
 
@@ -72,5 +82,5 @@ def _models(uri: str, name: str, timeout: float, everything: bool) -> Models:
     except CallError as error:
         raise ModelError(f"{error}: start the system, or set --master") from error
     stamp = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-    title = f"The running system of the ROS master {uri}, {stamp}. Written by rosmodel snapshot."
-    return models_of(graph, ask_nodes(graph, uri, timeout), name, [title], everything=everything)
+    title = f"The running system of the ROS master {uri}, {stamp}. {OBSERVED}"
+    return models_of(graph, ask_nodes(graph, uri, timeout), name, [title], everything=everything, sources=sources)

@@ -15,7 +15,7 @@ from ros_model.errors import ModelError
 from ros_model.io.launch_files import load as load_by_roslaunch
 from ros_model.language.graph_names import resolve
 from ros_model.language.metamodel import PortKind, Reference
-from ros_model.language.remappings import remarks
+from ros_model.language.remappings import remark_lines
 
 from ros_model_extraction import ros_defaults as plumbing
 from ros_model_extraction.io.python_modules import Library
@@ -185,7 +185,9 @@ def _beside(node: LaunchedNode, ends: Sequence[End]) -> Iterator[str]:
     kept = {resolve(end.declared, node.name) for end in ends if end.declared}
     actions = {f"{name}/{topic}" for name in kept for topic in ("goal", "cancel", "status", "result", "feedback")}
     more = [pair for pair in sorted(node.remaps.items()) if pair[0] != pair[1] and pair[0] not in kept | actions]
-    yield from remarks({node.name: [(as_seen_from(node.name, old), as_seen_from(node.name, new)) for old, new in more]})
+    yield from remark_lines(
+        {node.name: [(as_seen_from(node.name, old), as_seen_from(node.name, new)) for old, new in more]}
+    )
     if node.unsaid:
         yield f"Left out: {', '.join(node.unsaid)} of {node.name}: a model has no words for it."
 

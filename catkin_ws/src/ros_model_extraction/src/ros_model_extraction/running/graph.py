@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from ros_model.language.graph_names import resolve
+from ros_model.language.library import Library
 from ros_model.language.metamodel import (
     Component,
     Connection,
@@ -20,7 +21,7 @@ from ros_model.language.metamodel import (
     SystemParameter,
 )
 from ros_model.language.packages import Artifact, Node, Package, PackageSet, ParameterDeclaration, PortDeclaration
-from ros_model.language.remappings import remarks
+from ros_model.language.remappings import remark_lines
 
 from ros_model_extraction import ros_defaults as plumbing
 from ros_model_extraction.names import as_seen_from, is_known_type, node_name, split_name
@@ -71,7 +72,13 @@ class Instance:
 
 
 def models_of(
-    snapshot: GraphSnapshot, details: Details, name: str, title: Sequence[str] = (), *, everything: bool = False
+    snapshot: GraphSnapshot,
+    details: Details,
+    name: str,
+    title: Sequence[str] = (),
+    *,
+    everything: bool = False,
+    sources: Library = Library(),  # noqa: B008 - nobody changes it
 ) -> Models:
     """Return the models of a running graph.
 
@@ -82,6 +89,7 @@ def models_of(
         title: first lines of both files' comments.
         everything: keep also what ROS makes for every node, the meta-controller's own nodes, and the parameters that
             roslaunch and nodes that have ended leave on the parameter server.
+        sources: models from the nodes' source, as far as there are any.
     """
     remarks = _Remarks(snapshot, details, everything)
     ends = [end for end in interfaces(snapshot, details) if everything or not plumbing.is_plumbing(end)]
@@ -94,9 +102,11 @@ def models_of(
             instances[end.node].ends.append(end)
     for node, instance in instances.items():
         origin = details.origins.get(node)
+        written = sources.interfaces(instance.reference) or ()
         if origin and origin.remaps:
-            instance.ends, unused = as_declared(node, instance.ends, origin.remaps)
+            instance.ends, unused = as_declared(node, instance.ends, origin.remaps, written)
             remarks.unused_remaps[node] = unused
+        remarks.unseen[node] = _unseen(instance, written)
     unowned = share_out(snapshot.parameters, instances)
     if not everything:
         gone = (*details.dead, *remarks.metacontrol)
@@ -182,13 +192,22 @@ def interfaces(snapshot: GraphSnapshot, details: Details) -> Iterator[End]:
 
 
 def as_declared(
-    node: str, ends: Sequence[End], remaps: Sequence[tuple[str, str]]
+    node: str, ends: Sequence[End], remaps: Sequence[tuple[str, str]], written: Iterable[PortDeclaration] = ()
 ) -> tuple[list[End], list[tuple[str, str]]]:
     """Return a node's interfaces with their names in its code, where remappings tell these, and the remappings left.
 
-    If several names in the code are remapped to one name in the graph, each goes to one of the interfaces of that
-    name. Nothing tells which; a launch file has the same remappings either way.
+    If several names in the code are remapped to one name in the graph, an interface of that name gets the one that
+    the source declares; else one that no other interface has; else one that resolves to something else without the
+    remapping, because a remapping for all nodes often only makes a name relative; else one that is not global. Nothing
+    proves the last three. The others are left over, and a launch file has all of them.
+
+    Args:
+        node: full name of the node.
+        ends: its interfaces.
+        remaps: from name in its code to name in the graph.
+        written: the interfaces that its source declares.
     """
+    declared = {(port.kind, resolve(port.name, node)) for port in written}
     unused = list(remaps)
     found = []
     for end in ends:
@@ -197,12 +216,31 @@ def as_declared(
         fitting = [pair for pair in remaps if resolve(pair[1], node) == end.name + suffix and pair[0].endswith(suffix)]
         name = ""
         if fitting:
-            chosen = next((pair for pair in fitting if pair in unused), fitting[0])
-            name = chosen[0].removesuffix(suffix)
-            topics = {end.name + topic for topic in _ACTION_TOPICS} if is_action else set()
-            unused = [pair for pair in unused if pair != chosen and resolve(pair[1], node) not in topics]
+            inside = {pair: resolve(pair[0], node).removesuffix(suffix) for pair in fitting}
+            merits = {
+                pair: ((end.kind, full) in declared, pair in unused, full != end.name, pair[0][0] != "/")
+                for pair, full in inside.items()
+            }
+            name = max(merits, key=merits.__getitem__)[0].removesuffix(suffix)
+            used = {(resolve(name + part, node), end.name + part) for part in (_ACTION_TOPICS if is_action else ("",))}
+            unused = [pair for pair in unused if (resolve(pair[0], node), resolve(pair[1], node)) not in used]
         found.append(replace(end, declared=name) if name else end)
     return found, unused
+
+
+def _unseen(instance: Instance, written: Iterable[PortDeclaration]) -> list[str]:
+    """Return the interfaces that the source of a node declares and the node does not have, clients of services aside.
+
+    They are no part of the model, because the monitor would miss them until the node makes them.
+    """
+    has = {(end.kind, name) for end in instance.ends for name in (end.name, resolve(end.declared, instance.name))}
+    return [
+        f"{port.kind.value} {port.name}"
+        for port in written
+        if port.kind is not PortKind.SERVICE_CLIENT
+        and "{" not in port.name
+        and (port.kind, resolve(port.name, instance.name)) not in has
+    ]
 
 
 def _instances(names: Sequence[str], details: Details) -> dict[str, Instance]:
@@ -358,6 +396,7 @@ class _Remarks:
         ]
         self.abandoned: list[str] = []
         self.unused_remaps: dict[str, list[tuple[str, str]]] = {}
+        self.unseen: dict[str, list[str]] = {}
 
     def lines(self) -> Iterator[str]:
         """Yield the lines."""
@@ -370,7 +409,13 @@ class _Remarks:
         for node, why in sorted(details.unknown.items()):
             if self._everything or node not in plumbing.NODES:
                 yield f"Not known: the package and executable of {node}: {why}."
-        yield from remarks(self.unused_remaps)
+        yield from remark_lines(self.unused_remaps)
+        for node, unseen in sorted(self.unseen.items()):
+            if unseen:
+                yield (
+                    f"Left out, because {node} does not have them now, though its source declares them: "
+                    f"{', '.join(unseen)}. Use every function of the robot once, then take the snapshot again."
+                )
         for node, origin in sorted(details.origins.items()):
             if origin.arguments and node not in details.dead and (self._everything or node not in self.metacontrol):
                 yield (
