@@ -176,3 +176,36 @@ def test_connection_that_begins_or_ends_nowhere_is_told_with_a_remedy(run, yard,
     status, out, _ = run("check", models)
     assert status == 1
     assert message.replace("MODELS", str(models)) in out
+
+
+REMAPPED = """RosSystem { Name x RosComponents ( ComponentInterface { name hoist FromRosNode 'cranes.hoist.py.hoist'
+    RosPublishers { RosPublisher tf { RefPublisher 'cranes.hoist.py.hoist./tf' } }
+    RosSubscribers { RosSubscriber 'hook/load' { RefSubscriber 'cranes.hoist.py.hoist.CODE' } } } ) }"""
+SEEN = """// The running system. Written by rosmodel snapshot.
+PackageSet { CatkinPackage cranes { Artifact hoist.py { Node { name hoist
+    Publishers { Publisher { name '/tf' message 'tf2_msgs.TFMessage' } }
+    Subscribers { Subscriber { name 'CODE' message 'std_msgs.Float32' } } } } } }"""
+WRITTEN = """PackageSet { CatkinPackage cranes { Artifact hoist.py { Node { name main
+    Subscribers { Subscriber { name '~load' message 'std_msgs.Float32' } } } } } }"""
+
+
+@pytest.mark.parametrize(
+    ("code", "sources", "warned"),
+    [
+        ("/hook/load", [WRITTEN], True),
+        ("weight", [WRITTEN], True),
+        ("hook/load", [WRITTEN], False),  # not remapped
+        ("~load", [WRITTEN], False),
+        ("hoist/load", [WRITTEN], False),
+        ("/hook/load", [], False),
+        ("/hook/load", [WRITTEN.replace("hoist.py", "tower.py")], False),
+    ],
+)
+def test_remapped_name_that_only_a_snapshot_declares_is_a_warning(run, tmp_path, code, sources, warned):
+    for name, text in (("x.rossystem", REMAPPED), ("seen.ros", SEEN), *(("w.ros", text) for text in sources)):
+        (tmp_path / name).write_text(text.replace("CODE", code))
+    status, out, _ = run("check", tmp_path / "x.rossystem")
+    message = f"warning: the source of 'cranes.hoist.py' declares no subscriber '{code}': it declares ~load."
+    told = [line for line in out.splitlines() if "the source of" in line]
+    assert ["x.rossystem:3:" in line and message in line for line in told] == [True] * warned
+    assert status == int("error:" in out)

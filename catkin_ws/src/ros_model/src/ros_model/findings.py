@@ -22,6 +22,7 @@ RULES = {
     "incomplete-reference": "A reference names package, artifact, node and, for ports and parameters, a name.",
     "executable": "roslaunch finds the executable of each component.",
     "host": "A machine of a launch file is declared, and its address is one that a host can have.",
+    "remapping": "A remapped name is one that the source of the node declares.",
     "wrong-kind": "References and connections lead to ports of the right kind.",
     "connection": "A connection has ends, and they are ports of the system.",
     "type-mismatch": "The ends of a connection have one type.",

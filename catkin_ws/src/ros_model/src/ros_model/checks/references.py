@@ -10,6 +10,7 @@ from ros_model.findings import WARNING, Finding
 from ros_model.language.library import Library, Unknown, hint
 from ros_model.language.metamodel import RosParameter
 from ros_model.language.typed_values import misfit
+from ros_model.project.wiring import is_shared
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -76,6 +77,34 @@ def followed(system: RosSystem, library: Library) -> Iterator[Finding]:
             elif problem := _wrong_port(element.kind, reference, node, component):
                 text, rule = problem
                 yield Finding(text, _place(reference, element.position), rule)
+
+
+def not_in_source(system: RosSystem, library: Library, sources: Library) -> Iterator[Finding]:
+    """Yield remapped names that a model of a running system declares, but no model from the node's source does.
+
+    Then the remapping may have no effect, or what is known of the source is incomplete.
+
+    Args:
+        system: the system.
+        library: all that is declared.
+        sources: what models declare that are not of running systems.
+    """
+    for component in system.components:
+        for port in component.ports:
+            reference = port.reference
+            if reference is None or reference.name in {"", port.name} or is_shared(reference.name):
+                continue
+            node, declared = library.node(reference), sources.interfaces(reference)
+            if declared is None or isinstance(node, Unknown) or _wrong_port(port.kind, reference, node, component):
+                continue
+            of_kind = [known.name for known in declared if known.kind is port.kind]
+            if component.resolved(reference.name) not in map(component.resolved, of_kind):
+                where, there = f"'{reference.package}.{reference.artifact}'", ", ".join(of_kind[:_SHOWN]) or "none"
+                text = (
+                    f"the source of {where} declares no {port.kind.value} '{reference.name}': it declares {there}. If "
+                    "the code has another name, give that one, else the remapping has no effect"
+                )
+                yield Finding(text, _place(reference, port.position), "remapping", WARNING)
 
 
 def _unknown_node(reference: Reference, position: Position, library: Library, told: set[str]) -> Iterator[Finding]:

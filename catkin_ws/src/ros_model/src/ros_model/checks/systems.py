@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ros_model.checks.connections import wrong_ends, wrong_types
 from ros_model.checks.executables import missing_executables
 from ros_model.checks.launch import check_launch
-from ros_model.checks.references import followed, incomplete, not_followed
+from ros_model.checks.references import followed, incomplete, not_followed, not_in_source
 from ros_model.checks.values import misfits
 from ros_model.findings import WARNING, Finding, sorted_by_place
 from ros_model.language.library import Installed, Library
@@ -30,6 +30,7 @@ def check_system(
     whole: RosSystem | None = None,
     library: Library | None = None,
     installed: Installed | None = None,
+    sources: Library | None = None,
 ) -> tuple[Finding, ...]:
     """Return what is wrong with a system, in the order of the file.
 
@@ -38,11 +39,13 @@ def check_system(
         whole: what its connections may lead to, where the system is a part (a variant); the system itself if None.
         library: what is known of packages; without it, references are not followed.
         installed: knows the executables of this machine; without it, they are not looked for.
+        sources: what models of the nodes' source declare; without it, remapped names are not looked up there.
     """
     whole = whole or system
     findings = [*_twice(system), *incomplete(system), *_values(system), *check_launch(system, whole, library)]
     if library:
         findings += followed(system, library)
+        findings += not_in_source(system, library, sources) if sources else ()
     elif library is not None:
         findings += not_followed(system)
     if installed:

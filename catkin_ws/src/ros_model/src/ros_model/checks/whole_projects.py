@@ -21,18 +21,19 @@ if TYPE_CHECKING:
     from ros_model.project.project import Project
 
 
-def check_project(project: Project, library: Library) -> Iterator[Finding]:
+def check_project(project: Project, library: Library, sources: Library | None = None) -> Iterator[Finding]:
     """Yield what is wrong with a project that could be loaded.
 
     Args:
         project: the project.
         library: what is known of packages, those beside the project included.
+        sources: what of it is from models of the nodes' source.
     """
-    yield from check_system(project.whole_base, library=library, installed=library.installed)
+    yield from check_system(project.whole_base, library=library, installed=library.installed, sources=sources)
     for variant in project.variants:
         # Where nothing is known of packages, the base has told so.
         whole = compose(project.base, variant)
-        yield from check_system(variant, whole, library or None, library.installed)
+        yield from check_system(variant, whole, library or None, library.installed, sources)
     solving = {design.name for function in project.settings["functions"] for design in project.designs(function)}
     for variant in project.variants:
         if variant.name not in solving:

@@ -139,6 +139,7 @@ class Check:
         # Models of observers that are generated do not show that the modeller has models of the robot's nodes.
         known = models.values() if models.keys() - self._generated else ()
         installed = InstalledPackages()
+        sources = Library(package for packages in known if not packages.is_observed for package in packages.packages)
         library = Library((package for packages in known for package in packages.packages), installed)
         found = [*self._refused]
         found += [finding for path, finding in self._unknown.items() if path not in self._asked]
@@ -146,13 +147,13 @@ class Check:
             if path not in self._generated:  # what is wrong there is wrong in metacontrol.yaml
                 found += check_packages(packages, library)
         for path, system in self._systems.items():
-            found += check_system(system, self._wholes.get(path), library, installed)
+            found += check_system(system, self._wholes.get(path), library, installed, sources)
         for launch in self._launch_files.values():
             found += check_launch_file(launch, installed)
         for family in families(self._systems.values()):
             found += check_family(family)
         for project in self._projects.values():
-            found += check_project(project, library)
+            found += check_project(project, library, sources)
         return [*dict.fromkeys(found)]
 
     def _add_launch_file(self, path: Path) -> None:

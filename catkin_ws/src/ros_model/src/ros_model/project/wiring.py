@@ -96,7 +96,7 @@ def _feeds(connection: Connection, system: RosSystem) -> Iterator[tuple[Feed, Un
             why = None
             if connection.kind is ConnectionKind.TOPIC:
                 names = {connection.name, *_names(source, system), *_names(target, system)}
-                if any(_is_shared(name) for name in names):
+                if any(is_shared(name) for name in names):
                     why = Uncounted.SHARED
                 elif any(_is_goal(name) for name in names):
                     why = Uncounted.GOAL
@@ -114,7 +114,8 @@ def _names(end: PortPath, system: RosSystem) -> Iterator[str]:
         yield port.reference.name
 
 
-def _is_shared(name: str) -> bool:
+def is_shared(name: str) -> bool:
+    """Return whether a topic is one on which any node may publish; libraries open most of these for a node."""
     name = name.strip("/")
     return name in _SHARED_BY_ALL or name.rpartition("/")[2] in _SHARED
 
