@@ -57,9 +57,9 @@ def settings():
 
 @pytest.fixture
 def load(tmp_path, settings):
-    def write_and_load(**components):
+    def write_and_load(base=BASE, **components):
         settings["components"].update(components)
-        for name, text in (("cell.rossystem", BASE), ("packer.csv", TABLE), ("sorter.csv", SORTS)):
+        for name, text in (("cell.rossystem", base), ("packer.csv", TABLE), ("sorter.csv", SORTS)):
             (tmp_path / name).write_text(text)
         (tmp_path / "metacontrol.yaml").write_text(yaml.safe_dump(settings))
         return load_project(tmp_path)
@@ -105,6 +105,35 @@ def test_component_needs_no_node_to_be_named_by_a_word(load):
     project = load(eye={"not_required_by": "all"}, touch={"required_by": ["seen"]})
     assert requirements(project) == BY_WIRING | {"seen": {"touch"}}
     assert project.components == {}
+
+
+@pytest.fixture
+def handed_on(settings, load):
+    """Load the project with a sorter that hears the packer, so that touch is behind it."""
+
+    def load_with(designs=("sort",), **components):
+        settings["functions"]["f_sort"] = {"designs": list(designs), "requires": ["f_pack"]}
+        text = BASE.replace(
+            "RosSubscriber 'tf'", "RosSubscriber 'packed' { RefSubscriber 'x.y.z.packed' }, RosSubscriber 'tf'"
+        )
+        text = text.replace(
+            "TopicConnection tf {",
+            "TopicConnection packed { From ( 'packer.packed' ) To ( 'sorter.packed' ) }, TopicConnection tf {",
+        )
+        return load(text, **components)
+
+    return load_with
+
+
+def test_function_that_needs_another_one_does_not_require_its_nodes_nor_what_is_behind_them(handed_on):
+    project = handed_on()
+    assert requirements(project) == BY_WIRING
+    assert project.requirements["sort"].others["packer"] == "packer -> packed -> sorter: another function deploys it"
+    assert requirements(handed_on(touch={"node": "touch", "required_by": ["sort"]}))["sort"] == {"touch"}
+
+
+def test_node_of_the_function_that_a_variant_solves_counts_as_before(handed_on):
+    assert requirements(handed_on(designs=["sort", "soft"]))["sort"] == {"packer", "touch"}
 
 
 def test_words_take_out_what_values_of_parameters_require(load, settings):

@@ -30,11 +30,11 @@ def system(*lines):
     return RosSystem("robot", tuple(map(Component, names)), tuple(connections))
 
 
-def wiring(variant, *lines):
+def wiring(variant, *lines, foreign=()):
     """Return the wiring of the variant that brings these components of a system, with their connections."""
     whole, own = system(*lines), variant.split()
     part = [c for c in whole.connections if {end.component for end in (*c.sources, *c.targets)} & set(own)]
-    return wiring_of(whole, RosSystem("variant", tuple(Component(name) for name in own), tuple(part)))
+    return wiring_of(whole, RosSystem("variant", tuple(Component(name) for name in own), tuple(part)), foreign)
 
 
 def required(variant, *lines):
@@ -153,3 +153,33 @@ def test_chain_is_the_shortest_way_to_the_variant():
 
 def test_wiring_in_a_circle_ends():
     assert required("a", "b > x > c", "c > y > b", "c > z > a", "a > w > b") == {"b", "c"}
+
+
+def test_what_another_function_deploys_is_not_required_and_neither_is_what_feeds_it():
+    lines = [
+        "laser > scan > drive",
+        "drive < action drive < mission",
+        "drive > status > mission",
+        "gps > fix > mission",
+    ]
+    found = wiring("mission", *lines, foreign={"drive"})
+    assert set(found.chains) == {"gps"}
+    assert found.uncounted["drive"][1] is Uncounted.FUNCTION
+    assert "laser" not in found.uncounted
+
+
+def test_what_feeds_the_variant_itself_is_required_though_it_feeds_another_function_too():
+    lines = ["laser > scan > drive, mission", "drive < action drive < mission"]
+    assert set(wiring("mission", *lines, foreign={"drive"}).chains) == {"laser"}
+
+
+def test_plant_that_only_another_function_commands_is_required_if_it_feeds_the_variant_and_not_for_tf():
+    lines = ["drive < action drive < mission", "drive > cmd_vel > base", "base > tf > mission, drive"]
+    assert set(wiring("mission", *lines, foreign={"drive"}).chains) == set()
+    found = wiring("mission", *lines, "base > odom > mission", "bumper > hits > base", foreign={"drive"})
+    assert set(found.chains) == {"base"}
+    assert found.uncounted["bumper"][1] is Uncounted.PLANT
+
+
+def test_component_of_the_variant_is_not_foreign_to_it():
+    assert set(wiring("grasp", "camera > image > grasp", foreign={"grasp"}).chains) == {"camera"}

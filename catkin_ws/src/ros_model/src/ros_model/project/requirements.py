@@ -40,9 +40,10 @@ class Requirements:
 def requirements_of(project: Project) -> dict[str, Requirements]:
     """Return what each variant of a project requires."""
     added, removed = (words(project, word) for word in WORDS)
+    foreign = _foreign(project)
     found = {}
     for variant in project.variants:
-        components, others = _found(project, variant)
+        components, others = _found(project, variant, foreign[variant.name])
         own = {name for component in variant.components for name in project.names_of(component.graph_name)}
         needless = {(REQUIRED, name) for name in added[variant.name] if name in own}
         needless |= {(NOT_REQUIRED, name) for name in removed[variant.name] if name not in components}
@@ -101,9 +102,9 @@ def _line(name: str, reason: str) -> str:
     return f"  {reason}" if reason.startswith(f"{name} -> ") else f"  {name}: {reason}"
 
 
-def _found(project: Project, variant: RosSystem) -> tuple[dict[str, str], dict[str, str]]:
+def _found(project: Project, variant: RosSystem, foreign: frozenset[str]) -> tuple[dict[str, str], dict[str, str]]:
     """Return the components that the models say are required, and those that are not, each with the reason."""
-    wiring = wiring_of(project.base, variant)
+    wiring = wiring_of(project.base, variant, foreign)
     components = {name: _chain(feeds) for source, feeds in wiring.chains.items() for name in project.names_of(source)}
     for source, reason in _by_parameters(variant, project.settings["requires"]):
         for name in project.names_of(source):
@@ -115,6 +116,20 @@ def _found(project: Project, variant: RosSystem) -> tuple[dict[str, str], dict[s
         if name not in components
     }
     return components, others
+
+
+def _foreign(project: Project) -> dict[str, frozenset[str]]:
+    """Return, for each variant, the components that are deployed only by functions which it does not solve."""
+    families = [project.designs(function) for function in project.settings["functions"]]
+    solving = [frozenset(design.name for design in designs) for designs in families]
+    deployed = [frozenset(part.name for design in designs for part in design.components) for designs in families]
+    found = {}
+    for variant in project.variants:
+        own = [variant.name in names for names in solving]
+        theirs = (parts for parts, is_own in zip(deployed, own, strict=True) if not is_own)
+        ours = (parts for parts, is_own in zip(deployed, own, strict=True) if is_own)
+        found[variant.name] = frozenset[str]().union(*theirs) - frozenset[str]().union(*ours)
+    return found
 
 
 def _chain(feeds: tuple[Feed, ...]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections import defaultdict, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from ros_model.language.metamodel import Connection, ConnectionKind, PortPath, RosSystem, compose
@@ -26,6 +26,7 @@ class Uncounted(enum.Enum):
     COMMAND = "it commands, and who obeys can do without it"
     GOAL = "it sets goals, and who pursues them can do without it"
     PLANT = "the variant commands that component itself"
+    FUNCTION = "another function deploys it"
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Wiring:
     uncounted: Mapping[str, tuple[Feed, Uncounted]] = field(default_factory=dict)
 
 
-def wiring_of(base: RosSystem, variant: RosSystem) -> Wiring:
+def wiring_of(base: RosSystem, variant: RosSystem, foreign: Collection[str] = ()) -> Wiring:
     """Return the components of the base that feed the variant's, directly or through others.
 
     The plant is what the variant commands, itself or through a server that it uses, or through a node that passes
@@ -60,9 +61,17 @@ def wiring_of(base: RosSystem, variant: RosSystem) -> Wiring:
     - topics that carry commands or goals: as the server of an action needs none of its clients, a driver needs none of
       the nodes that command it;
     - topics on which any node may publish, such as /tf: they do not tell who needs whom;
-    - what else acts on the plant: the variant requires the plant if that feeds it, but not what feeds the plant.
+    - what else acts on the plant: the variant requires the plant if that feeds it, but not what feeds the plant;
+    - all of a component that another function deploys: a variant that needs this function says so, and what feeds the
+      component is a matter of that function.
 
-    On topics of the first two kinds, components of the plant do count: they close the loop of the variant.
+    On topics of the first two kinds, components of the plant do count: they close the loop of the variant. But if only
+    another function commands them for it, they close the loop of that one.
+
+    Args:
+        base: the system without the variant.
+        variant: what it brings.
+        foreign: components that other functions deploy.
     """
     system = compose(base, variant)
     own = [component.name for component in variant.components]
@@ -70,7 +79,9 @@ def wiring_of(base: RosSystem, variant: RosSystem) -> Wiring:
     for connection in system.connections:
         for feed, why in _feeds(connection, system):
             feeds[feed.target].append((feed, why))
+    foreign = frozenset(foreign) - {*own}
     plant = _plant(system, frozenset(own))
+    own_plant = _plant(system, frozenset(own), foreign) if foreign else plant
     chains: dict[str, tuple[Feed, ...]] = {}
     uncounted: dict[str, tuple[Feed, Uncounted]] = {}
     waiting = deque(own)
@@ -79,9 +90,11 @@ def wiring_of(base: RosSystem, variant: RosSystem) -> Wiring:
         for feed, why in feeds[name]:
             if feed.source in own or feed.source in chains:
                 continue
-            if not why and name in plant:
+            if feed.source in foreign:
+                uncounted.setdefault(feed.source, (feed, Uncounted.FUNCTION))
+            elif not why and name in plant:
                 uncounted.setdefault(feed.source, (feed, Uncounted.PLANT))
-            elif why and feed.source not in plant:
+            elif why and feed.source not in own_plant:
                 uncounted.setdefault(feed.source, (feed, why))
             else:
                 chains[feed.source] = (feed, *chains.get(name, ()))
@@ -129,24 +142,30 @@ def _is_command(name: str) -> bool:
     return any(not _COMMANDS.isdisjoint(words) for words in parts) and _ANSWERS.isdisjoint(parts[-1])
 
 
-def _plant(system: RosSystem, own: frozenset[str]) -> frozenset[str]:
-    """Return the components that the variant commands, itself, through servers that it uses, or through one another."""
+def _plant(system: RosSystem, own: frozenset[str], foreign: frozenset[str] = frozenset()) -> frozenset[str]:
+    """Return the components that the variant commands, itself, through servers that it uses, or through one another.
+
+    Nothing is commanded through the foreign components.
+    """
     commands = defaultdict(set)
     for connection in system.connections:
         for feed, why in _feeds(connection, system):
             if why is Uncounted.COMMAND:
                 commands[feed.source].add(feed.target)
     plant: set[str] = set()
-    waiting = [*own, *_servers(system, own)]
+    waiting = [*own, *_servers(system, own, foreign)]
     while waiting:
-        reached = commands[waiting.pop()] - plant - own
+        reached = commands[waiting.pop()] - plant - own - foreign
         plant |= reached
         waiting += reached
     return frozenset(plant)
 
 
-def _servers(system: RosSystem, own: frozenset[str]) -> set[str]:
-    """Return the components whose services and actions the variant uses, and those that these use in turn."""
+def _servers(system: RosSystem, own: frozenset[str], foreign: frozenset[str]) -> set[str]:
+    """Return the components whose services and actions the variant uses, and those that these use in turn.
+
+    The foreign components are not among them, nor is what only these use.
+    """
     calls = [connection for connection in system.connections if connection.kind is not ConnectionKind.TOPIC]
     used: set[str] = set()
     waiting = list(own)
@@ -154,7 +173,7 @@ def _servers(system: RosSystem, own: frozenset[str]) -> set[str]:
         client = waiting.pop()
         for connection in calls:
             if any(end.component == client for end in connection.targets):
-                servers = {end.component for end in connection.sources} - used - own
+                servers = {end.component for end in connection.sources} - used - own - foreign
                 used |= servers
                 waiting += servers
     return used
