@@ -128,23 +128,36 @@ class HostsTest(PairTest):
         self.wait_for_state("both")
         self.assertTrue(pid_of(NEAR) and pid_of(FAR))
 
-    def test_host_that_is_lost_again_during_the_deployment_after_its_return_is_waited_for_once_more(self):
-        self.assertEqual(self.request("held"), 1, self.text)
-        hold = Path(f"{LIFE}.hold")
-        hold.touch()
-        self.addCleanup(hold.unlink, missing_ok=True)
-        link("down")
-        self.wait_for_state("held", "FAILED")
+    def lose_host_while_it_deploys_again(self, begin):
+        """Have the configuration deployed again by what `begin` does, lose the host during that, and end the loss."""
         lives = LIFE.read_text().count("begins")
-        link("up")
+        begin()
         wait_for(lambda: LIFE.read_text().count("begins") > lives, "its node has begun, and is held")
         link("down")
         self.wait_for_state("held", "FAILED")
         self.assertIn(f"host {ADDRESS} is lost", self.states[-1].message)
-        hold.unlink()
+        self.hold.unlink()
         link("up")
         self.wait_for_state("held")
         self.assertTrue(pid_of(NEAR) and pid_of(FAR))
+
+    def deploy_held(self):
+        """Have the configuration run whose far node, when it begins the next time, waits before it is one."""
+        self.assertEqual(self.request("held"), 1, self.text)
+        self.hold = Path(f"{LIFE}.hold")
+        self.hold.touch()
+        self.addCleanup(self.hold.unlink, missing_ok=True)
+
+    def test_host_that_is_lost_again_during_the_deployment_after_its_return_is_waited_for_once_more(self):
+        self.deploy_held()
+        link("down")
+        self.wait_for_state("held", "FAILED")
+        self.lose_host_while_it_deploys_again(lambda: link("up"))
+
+    def test_host_that_is_lost_during_the_deployment_after_the_death_of_its_launcher_is_waited_for(self):
+        self.deploy_held()
+        launcher = pid_of(f"/{FAR_LAUNCHER}")
+        self.lose_host_while_it_deploys_again(lambda: os.kill(launcher, signal.SIGKILL))
 
     def test_lost_host_does_not_delay_the_start_of_the_manipulator(self):
         self.assertEqual(self.request("near"), 1, self.text)

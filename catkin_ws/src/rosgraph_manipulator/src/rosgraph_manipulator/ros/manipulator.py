@@ -274,14 +274,15 @@ class Manipulator:
         running, previous = deployments.running, deployments.previous
         reaction = deployments.react(report, time.monotonic())
         if reaction is Reaction.RETURN and deployments.waiting:
-            self._deploy_after_loss(deployments.waiting)
+            rospy.logwarn("%s: deploying it again, because its hosts are back", deployments.waiting.name)
+            self._deploy_unasked(deployments.waiting)
         if report is None or running is None:
             return
         if reaction is Reaction.DEPLOY_AGAIN:
             found = report.configuration or "not all of it"
             rospy.logwarn("rosgraph_launcher runs %s: deploying %s", found, running.name)
             deployments.lost()
-            self._deploy(running)
+            self._deploy_unasked(running)
         elif reaction is Reaction.GIVE_UP:
             self._give_up(running, report.message)
         elif reaction is Reaction.GO_BACK and previous is not None:
@@ -289,20 +290,19 @@ class Manipulator:
             rospy.logerr("%s soon after the change: %s: going back to %s", running.name, report.message, previous.name)
             self._announcer.diagnose(False, message, running.name)
             deployments.failed(message)
-            self._deploy(previous)
+            self._deploy_unasked(previous)
         elif reaction is Reaction.BEGIN_RECOVERY:
             self._begin_recovery(running, report)
         elif reaction is Reaction.END_RECOVERY:
             self._end_recovery(running)
 
-    def _deploy_after_loss(self, waiting: Configuration) -> None:
-        """Deploy a configuration again whose hosts are back; if one is lost during that, wait for it once more."""
-        rospy.logwarn("%s: deploying it again, because its hosts are back", waiting.name)
+    def _deploy_unasked(self, wanted: Configuration) -> None:
+        """Deploy a configuration that nobody asks for now; if a host is lost during that, wait for it."""
         losses = self._executor.losses
-        self._deploy(waiting)
-        if self._deployments[waiting.function].running is None and self._executor.losses != losses:
-            self._executor.adopt(waiting)
-            self._deployments[waiting.function].wait_for(waiting)
+        self._deploy(wanted)
+        if self._deployments[wanted.function].running is None and self._executor.losses != losses:
+            self._executor.adopt(wanted)
+            self._deployments[wanted.function].wait_for(wanted)
 
     def _begin_recovery(self, running: Configuration, report: LauncherReport) -> None:
         self._deployments[running.function].begin_recovery()
