@@ -175,6 +175,24 @@ def test_better_design_that_always_fails_is_tried_again_ever_more_rarely(make):
     assert gaps == [60, 120, 240, 480, 600, 600, 600]
 
 
+class InTurn:
+    """Lives of one design, one after the other; all others live for ever."""
+
+    def __init__(self, design, lives):
+        self._design, self._lives = design, list(lives)
+
+    def __getitem__(self, design):
+        return self._lives.pop(0) if design == self._design else FOR_EVER
+
+
+def test_failures_of_a_design_are_in_a_row_only_until_it_has_lasted(make):
+    lives = [1.0, 1.0, 1000.0, 1.0, 1000.0, 1000.0, FOR_EVER]
+    plant = make(InTurn("laser_weld", lives), ["laser_weld", "glue"])
+    begun = [moment for moment, design in plant.run(4000.0) if design == "laser_weld"]
+    gaps = [round(after - before - life, -1) for (before, after), life in zip(pairwise(begun), lives, strict=False)]
+    assert gaps == [60, 120, 60, 120, 60, 60]
+
+
 def test_design_that_failed_and_is_hardly_better_is_not_tried_again(make):
     plant = make({"laser_weld": 1.0, "glue": FOR_EVER}, ["laser_weld", "glue"], improvement=0.9)
     assert [design for _, design in plant.run(200.0)] == ["laser_weld", "glue"]

@@ -14,7 +14,7 @@ from mros1_reasoner.loop.settings import Settings
 
 def has_lasted(running: Running, settings: Settings, now: float) -> bool:
     """Return whether the deployed design works and has run for so long that its failures before no longer count."""
-    return running.design is not None and not running.is_broken and not _is_brief(running, settings, now)
+    return running.design is not None and not running.is_broken and not is_brief(running, settings, now)
 
 
 def ended(running: Running, settings: Settings, now: float, how: str = "ended") -> Running:
@@ -26,7 +26,7 @@ def ended(running: Running, settings: Settings, now: float, how: str = "ended") 
         now: present time.
         how: what has happened to the design.
     """
-    if not _is_brief(running, settings, now):
+    if not is_brief(running, settings, now):
         return replace(running, brief=0, retry_from=-math.inf, ending="")
     brief = running.brief + 1
     ending = f"{how} {now - running.deployed_at:.1f} s after it was deployed"
@@ -35,7 +35,7 @@ def ended(running: Running, settings: Settings, now: float, how: str = "ended") 
 
 def is_taken_back(running: Running, configuration: str, settings: Settings, now: float) -> bool:
     """Return whether the configuration runs again that the deployed design has replaced a short while ago."""
-    return configuration == running.replaced and _is_brief(running, settings, now)
+    return configuration == running.replaced and is_brief(running, settings, now)
 
 
 def words(running: Running, reason: str) -> str:
@@ -44,6 +44,6 @@ def words(running: Running, reason: str) -> str:
     return f"the last {deployments} did not last ({reason})"
 
 
-def _is_brief(running: Running, settings: Settings, now: float) -> bool:
+def is_brief(running: Running, settings: Settings, now: float) -> bool:
     """Return whether the deployed design runs for less than the time that a failure counts."""
     return now - running.deployed_at < settings.error_log_expiry

@@ -179,7 +179,8 @@ class State(View):
             self._run(name, restarts=(), put_back={})
         if lasting.has_lasted(running, self.settings, now):
             self._run(name, brief=0)
-            self._failures.pop((running.design or "", name), None)
+            if (running.design, name) not in self.error_log:  # it has not ended by a failure
+                self._failures.pop((running.design or "", name), None)
         self._run(name, way=() if self.wanted.get(name, design) == design else running.way)
         self._run(name, design=design, degraded=False, binding_error=False, task_failure=None, refusal=())
         self._run(name, replaced=None, ending="")
@@ -369,8 +370,11 @@ class State(View):
         """Put a design that failed for an objective into the error log."""
         key = design, objective
         if reason != VIOLATED:  # that may be tried again when the cause is gone
+            running = self.running.get(objective, Running())
+            has_lasted = running.design == design and not lasting.is_brief(running, self.settings, now)
+            before = 0 if has_lasted else self._failures.get(key, 0)
             # As long as an entry is there, it is the same failure.
-            failures = self._failures[key] = self._failures.get(key, 0) + (key not in self.error_log)
+            failures = self._failures[key] = max(before + (key not in self.error_log), 1)
             self.retries[key] = now + self.settings.retry_after(failures - 1), reason
         self.error_log[key] = now + self.settings.error_log_expiry, reason
 
