@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,7 @@ from ros_model.generators import write_files
 from ros_model.generators.family import origin
 from ros_model.io.models import read_system
 from ros_model.io.project import locate, read_settings, read_table
-from ros_model.language.remappings import with_remappings
+from ros_model.language.remappings import with_header
 from ros_model.language.system_writer import write_system
 from ros_model.project.columns import Columns, parse_columns
 from ros_model.project.schema_check import dotted, load_schema, violations
@@ -99,10 +98,7 @@ def variants(
     folder = Path(output) if output else default
     systems = [(complete if whole else part) for complete, part in found]
     texts = {
-        folder / f"{system.name}{_SYSTEM}": write_system(
-            replace(system, header=with_remappings(header, system, system))
-        )
-        for system in systems
+        folder / f"{system.name}{_SYSTEM}": write_system(with_header(system, header, system)) for system in systems
     }
     written = write_files(texts, folder)
     click.echo(f"variants: {len(written)} file{'s' * (len(written) != 1)} in {folder}")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ros_model.file_names import safe_file_name
 from ros_model.generators import write_files
-from ros_model.language.remappings import with_remappings
+from ros_model.language.remappings import with_header
 from ros_model.language.system_writer import write_system
 
 if TYPE_CHECKING:
@@ -37,15 +36,13 @@ def generate(project: Project, output: Path) -> list[Path]:
     folder = output / "models"
     texts = {
         folder / "variants" / f"{safe_file_name(variant.name, 'variant')}.rossystem": write_system(
-            replace(variant, header=with_remappings(header, project.base, variant))
+            with_header(variant, header, project.base)
         )
         for variant in project.variants
         if not _by_hand(project, variant)
     }
     if project.base_file != project.settings["base"]:
-        texts[folder / project.base_file] = write_system(
-            replace(project.base, header=with_remappings(header, project.base, project.base))
-        )
+        texts[folder / project.base_file] = write_system(with_header(project.base, header, project.base))
     return write_files(texts, output)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from catkin_pkg.package import InvalidPackage, parse_package
 
 from ros_model.errors import ModelError
 from ros_model.generators import write_files
-from ros_model.language.remappings import with_remappings
+from ros_model.language.remappings import with_header
 from ros_model.language.system_writer import write_system
 
 if TYPE_CHECKING:
@@ -63,8 +62,7 @@ def write(project: Project, launch_files: Mapping[str, str]) -> list[Path]:
         folder = root / name
         texts[folder / "package.xml"] = _manifest(variant, about)
         texts[folder / "CMakeLists.txt"] = _CMAKE.format(header=_HEADER, name=name)
-        header = with_remappings(_HEADER, project.base, variant)
-        texts[folder / f"{name}.rossystem"] = write_system(replace(variant, header=header))
+        texts[folder / f"{name}.rossystem"] = write_system(with_header(variant, _HEADER, project.base))
         texts[folder / "launch" / f"{name}.launch"] = launch_files[name]
     return write_files(texts, root)
 

@@ -63,6 +63,13 @@ CONNECTION_OF = {port: kind for kind, ends in ENDS.items() for port in ends}
 """The kind of the connections of a port."""
 
 
+def topic_suffixes(port: PortKind) -> tuple[str, ...]:
+    """Return what follows the name of a port in its names in the graph: an action has five topics."""
+    if CONNECTION_OF[port] is ConnectionKind.ACTION:
+        return "/goal", "/cancel", "/status", "/result", "/feedback"
+    return ("",)
+
+
 @dataclass(frozen=True)
 class Reference:
     """A dotted reference `package.artifact.node.name`; the name may itself hold dots and slashes.

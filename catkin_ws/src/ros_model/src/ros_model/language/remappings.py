@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -43,8 +44,8 @@ def remappings_of(header: str) -> dict[str, Remappings]:
     return found
 
 
-def with_remappings(header: str, base: RosSystem, part: RosSystem) -> str:
-    """Return a header with the lines of the base's that keep remappings of nodes that the part brings."""
+def with_header(part: RosSystem, header: str, base: RosSystem) -> RosSystem:
+    """Return a part of a system with a header, and in it the base's lines that keep remappings of the part's nodes."""
     nodes = {component.graph_name for component in part.components}
     lines = (remark(f"/{node}", pairs) for node, pairs in remappings_of(base.header).items() if node in nodes)
-    return "\n".join([*([header] if header else []), *lines])
+    return replace(part, header="\n".join([*([header] if header else []), *lines]))

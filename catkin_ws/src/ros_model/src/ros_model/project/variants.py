@@ -23,7 +23,7 @@ from ros_model.language.metamodel import (
     SystemParameter,
     Value,
 )
-from ros_model.language.remappings import with_remappings
+from ros_model.language.remappings import with_header
 from ros_model.project.columns import TARGET_OF, check_columns, outlet, with_implied, with_ports
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def _whole(base: RosSystem, columns: Columns, row: Row, expected: list[SystemPar
     own = {parameter.name for parameter in expected}
     inherited = tuple(parameter for parameter in base.parameters if parameter.name not in own)
     system = RosSystem(row.name, components, rewired.connections, (*inherited, *expected), position=row.position)
-    return replace(system, header=with_remappings("", base, system))
+    return with_header(system, "", base)
 
 
 def _wrong_cells(columns: Columns, row: Row) -> Iterator[ModelError]:

@@ -14,7 +14,7 @@ from node_kit.yaml_text import YamlError, parse_yaml
 from ros_model.errors import ModelError
 from ros_model.io.launch_files import load as load_by_roslaunch
 from ros_model.language.graph_names import resolve
-from ros_model.language.metamodel import PortKind, Reference
+from ros_model.language.metamodel import PortKind, Reference, topic_suffixes
 from ros_model.language.remappings import remark_lines
 
 from ros_model_extraction import ros_defaults as plumbing
@@ -183,7 +183,7 @@ def _ends(node: LaunchedNode, source: NodeSource) -> list[End]:
 def _beside(node: LaunchedNode, ends: Sequence[End]) -> Iterator[str]:
     """Yield what a launch file says of a node and no interface in the model does; models have words for none of it."""
     kept = {resolve(end.declared, node.name) for end in ends if end.declared}
-    actions = {f"{name}/{topic}" for name in kept for topic in ("goal", "cancel", "status", "result", "feedback")}
+    actions = {name + topic for name in kept for topic in topic_suffixes(PortKind.ACTION_SERVER)}
     more = [pair for pair in sorted(node.remaps.items()) if pair[0] != pair[1] and pair[0] not in kept | actions]
     yield from remark_lines(
         {node.name: [(as_seen_from(node.name, old), as_seen_from(node.name, new)) for old, new in more]}

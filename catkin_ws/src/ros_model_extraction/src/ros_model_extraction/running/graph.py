@@ -19,6 +19,7 @@ from ros_model.language.metamodel import (
     RosParameter,
     RosSystem,
     SystemParameter,
+    topic_suffixes,
 )
 from ros_model.language.packages import Artifact, Node, Package, PackageSet, ParameterDeclaration, PortDeclaration
 from ros_model.language.remappings import remark_lines
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 
     from ros_model_extraction.running.details import Details
 
-_ACTION_TOPICS = ("/goal", "/cancel", "/status", "/result", "/feedback")
 NO_PACKAGE = "unknown_package"
 """Package of nodes whose executable can't be traced; the artifact is then named as the node."""
 
@@ -211,8 +211,8 @@ def as_declared(
     unused = list(remaps)
     found = []
     for end in ends:
-        is_action = end.kind in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT)
-        suffix = "/goal" if is_action else ""
+        suffixes = topic_suffixes(end.kind)
+        suffix = suffixes[0]
         fitting = [pair for pair in remaps if resolve(pair[1], node) == end.name + suffix and pair[0].endswith(suffix)]
         name = ""
         if fitting:
@@ -222,7 +222,7 @@ def as_declared(
                 for pair, full in inside.items()
             }
             name = max(merits, key=merits.__getitem__)[0].removesuffix(suffix)
-            used = {(resolve(name + part, node), end.name + part) for part in (_ACTION_TOPICS if is_action else ("",))}
+            used = {(resolve(name + part, node), end.name + part) for part in suffixes}
             unused = [pair for pair in unused if (resolve(pair[0], node), resolve(pair[1], node)) not in used]
         found.append(replace(end, declared=name) if name else end)
     return found, unused
