@@ -86,7 +86,10 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Client]:
         with client:
             yield client
         return
-    settings = {"distributed.worker.multiprocessing-method": "spawn"}  # PyBullet and threads do not survive a fork
+    settings = {
+        "distributed.worker.multiprocessing-method": "spawn",  # PyBullet and threads do not survive a fork
+        "distributed.worker.profile.enabled": False,  # nobody looks at it
+    }
     with dask.config.set(settings), _interrupts_ignored():
         cluster = LocalCluster(
             n_workers=jobs,
