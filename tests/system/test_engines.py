@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import statistics
 import subprocess
@@ -12,22 +13,41 @@ from typing import TYPE_CHECKING, Any
 import psutil
 import pytest
 from metacontrol_experiments.io.processes import wait_until
+from pyarrow import parquet
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 SEEDS = 3
 LIMIT_S = 500.0
-ROUTE = "short: {start: [-8, -8, 0.78], goal: [-3, -4.2, 0]}\n"
-MISSION = ("--route", "short", "--contingency", "clutter:2", "--failure", "front_laser", "--failure-at", "0.3")
+ROUTES = "short: {start: [-8, -8, 0.78], goal: [-3, -4.2, 0]}\n"
+CAMPAIGN = f"""
+routes_file: routes.yaml
+parts:
+  short:
+    routes: [short]
+    initial_configurations: [f2_v2_r2]
+    clutter: [2]
+    failures: {{dead: ["kill:front_laser@share:0.3"]}}
+    managers: {{mros: {SEEDS}}}
+"""
 
 
-def compare(folder: Path, *arguments: str) -> list[str]:
-    return ["metacontrol", "compare", "--runs", str(folder), *arguments]
+def write_campaign(folder: Path) -> None:
+    (folder / "routes.yaml").write_text(ROUTES)
+    (folder / "short.yaml").write_text(CAMPAIGN)
+
+
+def campaign(engine: str) -> list[str]:
+    return ["metacontrol", "campaign", "short.yaml", "--engine", engine, "--output", engine]
 
 
 def summaries(folder: Path, engine: str) -> list[dict[str, Any]]:
-    return [json.loads((folder / f"{engine}_{seed}" / "summary.json").read_text()) for seed in range(1, SEEDS + 1)]
+    rows = parquet.read_table(folder / engine / "results.parquet").to_pylist()
+    assert [(row["status"], row["engine"], row["repeat"]) for row in rows] == [
+        ("done", engine, number + 1) for number in range(SEEDS)
+    ]
+    return [json.loads(row["summary"]) for row in rows]
 
 
 def placed(summary: dict[str, Any]) -> list[list[float]]:
@@ -64,13 +84,12 @@ def test_both_engines_tell_the_same_story_over_seeds(tmp_path):
     20 % less energy there than in lockstep, which is half of the commands missed, and for 33 % more, which is 6 more
     stops. Chance is far below: the engines differ by 1.0 +- 1.0 % on an idle machine (docs/engines.md).
     """
-    (tmp_path / "routes.yaml").write_text(ROUTE)
-    page = tmp_path / "engines.md"
-    options = ("--routes", str(tmp_path / "routes.yaml"), *MISSION)
-    command = compare(tmp_path, "--seeds", str(SEEDS), "--output", str(page), *options)
-    done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
-    assert done.returncode == 0, done.stderr
-    report = page.read_text()
+    write_campaign(tmp_path)
+    compared = ["metacontrol", "compare", "ros", "lockstep"]
+    for command in (campaign("ros"), campaign("lockstep"), compared):
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=LIMIT_S, check=False)
+        assert done.returncode == 0, done.stderr
+    report = done.stdout
     sys.stdout.write(report)
     ros, lockstep = summaries(tmp_path, "ros"), summaries(tmp_path, "lockstep")
     for one, other in zip(ros, lockstep, strict=True):
@@ -91,18 +110,23 @@ def test_both_engines_tell_the_same_story_over_seeds(tmp_path):
         assert means[1] == pytest.approx(means[0], rel=share), report
 
 
-def test_interrupted_comparison_ends_its_mission(tmp_path):
-    console, log = tmp_path / "ros_1" / "log" / "console.log", str(tmp_path / "ros_1" / "log")
-    with subprocess.Popen(compare(tmp_path, "--seeds", "1"), stderr=subprocess.PIPE, text=True) as process:
-        assert wait_until(lambda: process.poll() is not None or console.exists(), LIMIT_S)
+def of_missions(folder: Path) -> list[psutil.Process]:
+    """Return the processes of missions that have their temporary files in a folder."""
+    return [
+        process
+        for process in psutil.process_iter(["environ"])
+        if str(folder) in (process.info["environ"] or {}).get("ROS_LOG_DIR", "")
+    ]
+
+
+def test_campaign_on_ros_that_is_interrupted_ends_its_mission(tmp_path):
+    write_campaign(tmp_path)
+    own = {**os.environ, "TMPDIR": str(tmp_path)}
+    with subprocess.Popen(campaign("ros"), cwd=tmp_path, env=own, stderr=subprocess.PIPE, text=True) as process:
+        assert wait_until(lambda: process.poll() is not None or of_missions(tmp_path), LIMIT_S)
         process.send_signal(signal.SIGTERM)
         _, said = process.communicate(timeout=150.0)
     assert process.returncode == 130, said
     assert "interrupted" in said and "Traceback" not in said
-    assert not (tmp_path / "ros_1" / "summary.json").exists()
-    left = [
-        process
-        for process in psutil.process_iter(["environ"])
-        if (process.info["environ"] or {}).get("ROS_LOG_DIR") == log
-    ]
-    assert left == []
+    assert not list(tmp_path.glob("ros/runs/**/result.json"))
+    assert of_missions(tmp_path) == []

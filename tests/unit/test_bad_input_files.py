@@ -11,9 +11,10 @@ import pytest
 from click.testing import CliRunner
 from metacontrol_bags.bag import BagError, read_record
 from metacontrol_experiments.campaign.calibration import CalibrationError
+from metacontrol_experiments.campaign.matrix import CampaignError
 from metacontrol_experiments.cli.main import metacontrol
 from metacontrol_experiments.contingency.parsing import ComponentError, ContingencyError
-from metacontrol_experiments.io.comparison_runs import ComparisonError, read_summary
+from metacontrol_experiments.io.campaign_folder import read_table as read_results
 from metacontrol_experiments.io.input_files import read_components, read_contingencies, read_route, route_names
 from metacontrol_experiments.io.tables import read_delays, read_runs
 from metacontrol_experiments.lockstep.delays import DelayError
@@ -139,7 +140,7 @@ READERS: list[tuple[Callable[[str], object], tuple[type[Exception], ...], str]] 
     (lambda path: read_components(Path(path)), (ComponentError,), ".yaml"),
     (lambda path: read_delays(Path(path)), (DelayError,), ".csv"),
     (lambda path: read_runs(Path(path)), (CalibrationError,), ".csv"),
-    (lambda path: read_summary(Path(path)), (ComparisonError,), ".json"),
+    (lambda path: read_results(Path(path)), (CampaignError,), ".parquet"),
     (lambda path: read_goal(Path(path)), (GoalFileError,), ".yaml"),
     (read_file, (ConfigurationError,), ".yaml"),
     (deployed, (ConfigurationError,), ".launch"),
@@ -229,6 +230,8 @@ OTHERS = [
     (metacontrol, "calibrate --runs BAD --seeds 1 --variant nothing", ".csv"),
     (metacontrol, "variants --runs BAD", ".csv"),
     (metacontrol, "campaign BAD --output out", ".yaml"),
+    (metacontrol, "compare BAD", ".parquet"),
+    (metacontrol, "delays BAD --output out.csv", ".parquet"),
     (explain, "BAD", ".bag"),
     (replay, "BAD", ".bag"),
 ]

@@ -2,6 +2,7 @@
 
 import itertools
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,11 +15,12 @@ from metacontrol_experiments.campaign.matrix import (
     parse_campaign,
     seed_of,
 )
+from mros1_reasoner.io.parameters import setting_names
 
 FILES = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_experiments/campaigns"
 VARIANTS = [f"f{f}_v{v}_r{r}" for f in (1, 2, 3) for v in (1, 2, 3) for r in (1, 2, 3)]
 MANAGERS = ["none", "mros", "as_published", "random", "rules", "respawn"]
-KNOWN = Known(["r1", "r2", "r3", "r4", "r5", "r6"], VARIANTS, MANAGERS, ["front_laser", "camera"])
+KNOWN = Known(["r1", "r2", "r3", "r4", "r5", "r6"], VARIANTS, MANAGERS, ["front_laser", "camera"], ["calm", "horizon"])
 SMALL = {
     "seed": 3,
     "parts": {
@@ -32,6 +34,9 @@ SMALL = {
         }
     },
 }
+
+
+PROFILES = {"profiles": {"slow": {"horizon": 0.5, "calm": 3}}}
 
 
 def campaign(**changes):
@@ -105,9 +110,28 @@ def test_paper_has_the_matrix_of_the_paper():
     assert {run.failure for run in runs} == {"none", "killed", "unplugged"}
 
 
-@pytest.mark.parametrize(("name", "count"), [("smoke.yaml", 40), ("ci.yaml", 8)])
+@pytest.mark.parametrize(("name", "count"), [("smoke.yaml", 40), ("ci.yaml", 8), ("steps.yaml", 648)])
 def test_other_campaigns_of_the_project(name, count):
-    assert len(read(name).runs) == count
+    known = replace(KNOWN, parameters=setting_names())
+    assert len(parse_campaign(yaml.safe_load((FILES / name).read_text()), known, name).runs) == count
+
+
+def test_profile_is_the_meta_controller_with_its_parameters():
+    content = {**changed("managers", {"mros": 1, "slow": 1, "rules": 1}), **PROFILES}
+    runs = parse_campaign(content, KNOWN, "").runs
+    assert {(run.manager, run.plug_in, run.parameters) for run in runs} == {
+        ("mros", "mros", ""),
+        ("slow", "mros", '{"calm": 3, "horizon": 0.5}'),
+        ("rules", "rules", ""),
+    }
+
+
+def test_engine_that_is_given_takes_the_place_of_that_of_the_file():
+    assert {run.engine for run in parse_campaign({**SMALL, "engine": "ros"}, KNOWN, "").runs} == {"ros"}
+    assert {run.engine for run in parse_campaign({**SMALL, "engine": "ros"}, KNOWN, "", "lockstep").runs} == {
+        "lockstep"
+    }
+    assert {run.engine for run in parse_campaign(SMALL, KNOWN, "", "ros").runs} == {"ros"}
 
 
 @pytest.mark.parametrize(
@@ -117,6 +141,9 @@ def test_other_campaigns_of_the_project(name, count):
         ({"parts": {}}, "parts: is '{}', must be a mapping of names to matrices"),
         ({**SMALL, "engines": "ros"}, "engines: unknown key, allowed here: engine, seed"),
         ({**SMALL, "engine": "gazebo"}, "engine: is 'gazebo', must be lockstep or ros"),
+        ({**SMALL, "profiles": {"mros": {"calm": 3}}}, "profiles.mros: there is a manager of that name: take another"),
+        ({**SMALL, "profiles": {"slow": {"clam": 3}}}, "profiles.slow: no parameter 'clam'; there are calm, horizon"),
+        ({**SMALL, "profiles": {"slow": {}}}, "profiles.slow: is '{}', must be a mapping of parameters to values"),
         ({**SMALL, "seed": 1.5}, "seed: is 1.5; give a whole number, 0 or more"),
         ({**SMALL, "deadline": 0}, "deadline: is '0', must be wall s for a run, more than 0"),
         ({"parts": {"a/b": SMALL["parts"]["small"]}}, "'a/b' must be a name of letters, digits and _"),

@@ -5,6 +5,9 @@ from click.testing import CliRunner
 from helpers.office import write_office
 from metacontrol_experiments.cli import run as cli
 from metacontrol_experiments.cli.main import metacontrol
+from metacontrol_experiments.lockstep.system import private_parameters
+from ros_model.io.files import resolve
+from rosgraph_manipulator.io.launch_files import read_launch_file
 
 
 def settings_of(monkeypatch, *arguments):
@@ -56,6 +59,8 @@ def test_world_and_routes_of_the_users_own(monkeypatch, tmp_path):
     [
         (("--manager", "magic"), "no manager 'magic'; there are as_published, mros, none, random, respawn, rules"),
         (("--manager", "rules", "--no-metacontrol"), "--no-metacontrol is --manager none"),
+        (("--manager", "rules", "--parameters", "{calm: 3}"), "--parameters are those of the reasoner, and --manager"),
+        (("--parameters", "{clam: 3}"), "--parameters: no parameter 'clam'; there are history, "),
     ],
 )
 def test_managers_that_cannot_be_had_are_refused_with_one_line(arguments, said):
@@ -67,6 +72,16 @@ def test_baseline_is_the_manager_none(monkeypatch):
     assert settings_of(monkeypatch, "--no-metacontrol").manager == "none"
     assert settings_of(monkeypatch, "--manager", "none").manager == "none"
     assert settings_of(monkeypatch).manager == "mros"
+
+
+def test_parameters_reach_the_reasoner_through_the_launch_file(monkeypatch):
+    settings = settings_of(monkeypatch, "--parameters", "{horizon: 0, calm: 3.5}")
+    assert 'reasoner_parameters:={"calm": 3.5, "horizon": 0}' in settings.launch_command(4000)
+    file = resolve(f"package://{settings.launch_package}/launch/{settings.launch_file}")
+    for arguments, calm in ((settings.launch_arguments, 3.5), (settings_of(monkeypatch).launch_arguments, None)):
+        launched = read_launch_file(file, arguments).system
+        assert private_parameters(launched, "mros1_reasoner", "reasoner").get("calm") == calm
+    assert not [word for word in settings_of(monkeypatch).launch_command(4000) if "parameters" in word]
 
 
 @pytest.mark.parametrize(

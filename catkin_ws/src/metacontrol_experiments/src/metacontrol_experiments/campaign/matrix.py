@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,9 @@ from ros_model.project.schema_check import violations
 
 from metacontrol_experiments.contingency.contingency import Contingency, Kind
 from metacontrol_experiments.contingency.parsing import ContingencyError, make, parse_contingency
+from metacontrol_experiments.managers.manager import MROS
 from metacontrol_experiments.mission.ground import FACTORY, Ground
+from metacontrol_experiments.mission.settings import ENGINES, LOCKSTEP
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -63,13 +66,23 @@ _SCHEMA = {
     "required": ["parts"],
     "additionalProperties": False,
     "properties": {
-        "engine": {"type": "string", "enum": ["lockstep", "ros"], "title": "lockstep or ros"},
+        "engine": {"type": "string", "enum": list(ENGINES), "title": " or ".join(ENGINES)},
         "seed": {"type": "number", "title": "a whole number"},
         "timeout": {"type": "number", "exclusiveMinimum": 0, "title": "simulated s, more than 0"},
         "deadline": {"type": "number", "exclusiveMinimum": 0, "title": "wall s for a run, more than 0"},
         "logs": {"type": "boolean", "title": "true or false"},
         "world": {"type": "string", "title": "the path of a world file or of a map's YAML file"},
         "routes_file": {"type": "string", "title": "the path of a YAML file of routes"},
+        "profiles": {
+            "type": "object",
+            "propertyNames": _NAME,
+            "additionalProperties": {
+                "type": "object",
+                "minProperties": 1,
+                "title": "a mapping of parameters to values",
+            },
+            "title": "a mapping of names to parameters of the reasoner",
+        },
         "parts": {
             "type": "object",
             "minProperties": 1,
@@ -97,12 +110,13 @@ class Run:
         power: factor of the power load.
         failure: name of what goes wrong beside these.
         contingencies: all that goes wrong, as users write it.
-        manager: what adapts.
+        manager: what adapts: a plug-in, or a profile.
         repeat: 1, 2, ...
         seed: of everything random; the same for all managers.
         engine: lockstep or ros.
         timeout: simulated s after which the mission has failed.
         ground: what tells the ground from others; empty for the factory.
+        parameters: of the manager where that is a profile: JSON of a mapping; empty where it is a plug-in.
     """
 
     part: str
@@ -115,9 +129,15 @@ class Run:
     manager: str
     repeat: int
     seed: int
-    engine: str = "lockstep"
+    engine: str = LOCKSTEP
     timeout: float = TIMEOUT_S
     ground: str = ""
+    parameters: str = ""
+
+    @property
+    def plug_in(self) -> str:
+        """The plug-in that adapts. A profile is the meta-controller with other parameters."""
+        return MROS if self.parameters else self.manager
 
     @property
     def name(self) -> str:
@@ -151,7 +171,18 @@ class Known:
     configurations: Collection[str]
     managers: Collection[str]
     components: Collection[str]
+    parameters: Collection[str] = ()
     ground: Ground = FACTORY
+
+
+@dataclass(frozen=True)
+class _Common:
+    """What the runs of all parts have in common; profiles are name -> JSON of the reasoner's parameters."""
+
+    seed: int
+    engine: str
+    timeout: float
+    profiles: Mapping[str, str]
 
 
 def ground_files(content: Any, where: str) -> tuple[str | None, str | None]:
@@ -165,24 +196,29 @@ def ground_files(content: Any, where: str) -> tuple[str | None, str | None]:
     return content.get("world"), content.get("routes_file")
 
 
-def parse_campaign(content: Any, known: Known, where: str) -> Campaign:
+def parse_campaign(content: Any, known: Known, where: str, engine: str | None = None) -> Campaign:
     """Return the campaign of a YAML file's content.
 
     Args:
         content: as the YAML reader returns it.
         known: names that may be used.
         where: the file, for messages.
+        engine: takes the place of what the content names.
 
     Raises:
         CampaignError: it is none; the message names the place.
     """
     ground_files(content, where)
-    seed = _whole(content.get("seed", 0), 0, f"{where}: seed")
-    engine, timeout = content.get("engine", "lockstep"), float(content.get("timeout", TIMEOUT_S))
+    common = _Common(
+        seed=_whole(content.get("seed", 0), 0, f"{where}: seed"),
+        engine=engine or content.get("engine", LOCKSTEP),
+        timeout=float(content.get("timeout", TIMEOUT_S)),
+        profiles=_profiles(content.get("profiles", {}), known, f"{where}: profiles"),
+    )
     runs = [
         run
         for name, part in content["parts"].items()
-        for run in _runs(name, part, known, f"{where}: parts.{name}", (seed, engine, timeout))
+        for run in _runs(name, part, known, f"{where}: parts.{name}", common)
     ]
     runs.sort(key=lambda run: (run.repeat, run.seed))  # stable: the managers of a cell stay together
     deadline, logs = float(content.get("deadline", DEADLINE_S)), bool(content.get("logs", False))
@@ -200,12 +236,20 @@ def seed_of(base: int, *world: object) -> int:
     return FIRST_SEED + int.from_bytes(hashlib.sha256(told.encode()).digest()[:8]) % _SEEDS
 
 
-def _runs(name: str, part: Mapping[str, Any], known: Known, where: str, given: tuple[int, str, float]) -> Iterator[Run]:
+def _profiles(given: Mapping[str, Mapping[str, Any]], known: Known, where: str) -> dict[str, str]:
+    """Return profiles of the reasoner: name -> JSON of its parameters."""
+    for name, parameters in given.items():
+        if name in known.managers:
+            raise CampaignError(f"{where}.{name}: there is a manager of that name: take another one")
+        _check_names(parameters, known.parameters, f"{where}.{name}", "parameter")
+    return {name: json.dumps(parameters, sort_keys=True) for name, parameters in given.items()}
+
+
+def _runs(name: str, part: Mapping[str, Any], known: Known, where: str, common: _Common) -> Iterator[Run]:
     """Yield the runs of a part."""
-    base, engine, timeout = given
     _check_names(part["routes"], known.routes, f"{where}.routes", "route")
     _check_names(part["initial_configurations"], known.configurations, f"{where}.initial_configurations", "variant")
-    _check_names(part["managers"], known.managers, f"{where}.managers", "manager")
+    _check_names(part["managers"], [*known.managers, *common.profiles], f"{where}.managers", "manager")
     clutter = [_whole(number, 0, f"{where}.clutter") for number in part.get("clutter", [0])]
     power = [float(number) for number in part.get("power", [1.0])]
     _check_once(clutter, f"{where}.clutter")
@@ -217,10 +261,21 @@ def _runs(name: str, part: Mapping[str, Any], known: Known, where: str, given: t
     for repeat in range(1, max(repeats.values()) + 1):
         for cell in itertools.product(part["routes"], part["initial_configurations"], clutter, power, failures):
             contingencies = (*_disturbances(cell[2], cell[3], where), *failures[cell[4]])
-            seed = seed_of(base, *cell[:3], f"{cell[3]:g}", cell[4], repeat)
+            seed = seed_of(common.seed, *cell[:3], f"{cell[3]:g}", cell[4], repeat)
             for manager, count in repeats.items():
                 if repeat <= count:
-                    yield Run(name, *cell, contingencies, manager, repeat, seed, engine, timeout, known.ground.mark)
+                    yield Run(
+                        name,
+                        *cell,
+                        contingencies,
+                        manager,
+                        repeat,
+                        seed,
+                        engine=common.engine,
+                        timeout=common.timeout,
+                        ground=known.ground.mark,
+                        parameters=common.profiles.get(manager, ""),
+                    )
 
 
 def _disturbances(clutter: int, power: float, where: str) -> tuple[str, ...]:

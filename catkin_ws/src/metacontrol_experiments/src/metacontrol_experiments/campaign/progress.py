@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
@@ -122,6 +122,16 @@ def from_json(text: str, where: str) -> Result:
         raise CampaignError(f"{where}: is no result of a run ({error}): delete it to drive the run again") from error
 
 
+def run_of(content: Mapping[str, Any]) -> Run:
+    """Return the run of a row of a table, which may lack the columns of later versions.
+
+    Raises:
+        AttributeError, KeyError, TypeError: it lacks others, or a value is none.
+    """
+    given = {item.name: content[item.name] for item in fields(Run) if item.default is MISSING or item.name in content}
+    return Run(**{**given, "contingencies": tuple((content["contingencies"] or "").split())})
+
+
 def from_row(content: Mapping[str, Any], where: str) -> Result:
     """Return the result of a row of a table. Of attempts before the last one, it knows only that they were.
 
@@ -129,8 +139,7 @@ def from_row(content: Mapping[str, Any], where: str) -> Result:
         CampaignError: it is none.
     """
     try:
-        values = {item.name: content[item.name] for item in fields(Run)}
-        run = Run(**{**values, "contingencies": tuple(content["contingencies"].split())})
+        run = run_of(content)
         before = int(content["attempts"]) - 1
         last = Attempt(Status(content["status"]), content["wall_s"], content["problem"])
         attempts = (*(Attempt(Status.CRASHED, 0.0) for _ in range(before)), last)

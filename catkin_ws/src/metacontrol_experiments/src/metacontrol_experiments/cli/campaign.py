@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from mros1_reasoner.io.parameters import setting_names
 from node_kit.io.input_files import InputFileError, read_text, read_yaml
 from node_kit.plugins import find
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
@@ -23,6 +24,7 @@ from metacontrol_experiments.io.input_files import PackageError, read_components
 from metacontrol_experiments.io.processes import RunError, alone_in, signals_as_interrupts
 from metacontrol_experiments.managers.manager import PACKAGE
 from metacontrol_experiments.mission.routes import RouteError
+from metacontrol_experiments.mission.settings import ENGINES
 
 if TYPE_CHECKING:
     from rich.progress import Task
@@ -49,11 +51,18 @@ _FAILED = 1
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="A results.parquet whose missions are not driven again, such as one of another machine. May be repeated.",
 )
+@click.option("--engine", type=click.Choice(ENGINES), help="What drives, in place of what FILE names.")
 @click.option("--jobs", type=click.IntRange(1), default=1, show_default=True, help="Worker processes on this machine.")
 @click.option("--scheduler", metavar="ADDRESS", help="Drive by the workers of this scheduler of Dask instead.")
 @ground_options
 def campaign(
-    file: Path, output: Path | None, tables: tuple[Path, ...], jobs: int, scheduler: str | None, **ground: Path | None
+    file: Path,
+    output: Path | None,
+    tables: tuple[Path, ...],
+    engine: str | None,
+    jobs: int,
+    scheduler: str | None,
+    **ground: Path | None,
 ) -> None:
     """Drive the missions that a FILE asks for, and leave a table of their results.
 
@@ -63,7 +72,7 @@ def campaign(
     Exit status: 0 all missions were driven, 1 some crashed or hung twice, 2 bad input, 130 interrupted.
     """
     with refusing(CampaignError, PackageError, RouteError, RunError):
-        asked = _read(file, ground)
+        asked = _read(file, engine, ground)
         folder = output or Path("results/campaign") / file.stem
         folder.mkdir(parents=True, exist_ok=True)
         with alone_in(folder), signals_as_interrupts():
@@ -78,11 +87,12 @@ def campaign(
     raise click.exceptions.Exit(0 if all(result.status is Status.DONE for result in results.values()) else _FAILED)
 
 
-def _read(file: Path, given: dict[str, Path | None]) -> Campaign:
+def _read(file: Path, engine: str | None, given: dict[str, Path | None]) -> Campaign:
     """Return the campaign of a file.
 
     Args:
         file: of the campaign.
+        engine: takes the place of what the file names.
         given: files of `world` and `routes` that take the place of those that it names.
 
     Raises:
@@ -102,9 +112,10 @@ def _read(file: Path, given: dict[str, Path | None]) -> Campaign:
         configurations=sorted(path.stem for path in (package / "launch" / "variants").glob("*.launch")),
         managers=sorted(find(PACKAGE, "manager")),
         components=list(read_components(package / "models" / "metacontrol.yaml")),
+        parameters=setting_names(),
         ground=ground,
     )
-    asked = parse_campaign(content, known, str(file))
+    asked = parse_campaign(content, known, str(file), engine)
     read_routes(ground, dict.fromkeys(run.route for run in asked.runs))
     return asked
 

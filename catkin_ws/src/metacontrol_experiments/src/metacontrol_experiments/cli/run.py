@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from pathlib import Path
@@ -12,6 +13,8 @@ from metacontrol_bags.bag import BagError, read_record
 from metacontrol_bags.decision import DECIDED
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S, MetricsError, summarise
 from metacontrol_bags.timeline import Timeline
+from mros1_reasoner.io.parameters import setting_names
+from node_kit.yaml_text import YamlError, parse_yaml
 
 from metacontrol_experiments.cli.figure import draw_figure
 from metacontrol_experiments.cli.options import ground_options
@@ -34,10 +37,19 @@ from metacontrol_experiments.io.input_files import (
     simulation_package,
 )
 from metacontrol_experiments.io.processes import RunError
-from metacontrol_experiments.managers.manager import MROS, NONE, ManagerError, find_manager
+from metacontrol_experiments.managers.manager import AS_PUBLISHED, MROS, NONE, ManagerError, find_manager
 from metacontrol_experiments.mission.mission import MissionError, Outcome
 from metacontrol_experiments.mission.routes import RouteError
-from metacontrol_experiments.mission.settings import BAG_NAME, FIGURE_NAME, LOG_NAME, SUMMARY_NAME, Settings
+from metacontrol_experiments.mission.settings import (
+    BAG_NAME,
+    ENGINES,
+    FIGURE_NAME,
+    LOCKSTEP,
+    LOG_NAME,
+    ROS,
+    SUMMARY_NAME,
+    Settings,
+)
 from metacontrol_experiments.ros.runner import run_mission
 
 if TYPE_CHECKING:
@@ -70,11 +82,27 @@ class _Number(click.FloatRange):
         return float(number)
 
 
+class _Mapping(click.ParamType):
+    """A YAML mapping; its value is JSON."""
+
+    name = "mapping"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the mapping as JSON; empty for an empty one."""
+        try:
+            content = parse_yaml(str(value)) or {}
+        except YamlError as error:
+            self.fail(f"is no YAML: {error}", param, ctx)
+        if not isinstance(content, dict):
+            self.fail(f"{value!r} is no mapping of names to values.", param, ctx)
+        return json.dumps(content, sort_keys=True) if content else ""
+
+
 @click.command()
 @click.option(
     "--engine",
-    type=click.Choice(["ros", "lockstep"]),
-    default="ros",
+    type=click.Choice(ENGINES),
+    default=ROS,
     show_default=True,
     help="lockstep: in one process without ROS, as fast as it can, the same bytes for a seed.",
 )
@@ -83,6 +111,12 @@ class _Number(click.FloatRange):
     default=MROS,
     show_default=True,
     help="What adapts: mros, as_published, none, random, rules, respawn, or one that a package exports.",
+)
+@click.option(
+    "--parameters",
+    type=_Mapping(),
+    default="",
+    help="YAML mapping of parameters of the reasoner, in place of those that it has, e.g. '{cool_down: 3}'.",
 )
 @click.option("--no-metacontrol", is_flag=True, help="The baseline, everything but the reasoner: --manager none.")
 @click.option(
@@ -153,7 +187,7 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
         for name in (SUMMARY_NAME, FIGURE_NAME):  # those of an earlier run
             (output / name).unlink(missing_ok=True)
         with Display(quiet) as display:
-            if engine == "lockstep":
+            if engine == LOCKSTEP:
                 if options["gui"] or options["rviz"]:
                     raise RunError("--engine lockstep has no window; leave --gui and --rviz out")
                 state, record = _run_lockstep(settings, display)
@@ -164,7 +198,7 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
         write_summary(summary, output / SUMMARY_NAME)
         draw_figure(record, output / FIGURE_NAME)
     display.summary(summary)
-    for name in (LOG_NAME if engine == "lockstep" else BAG_NAME, SUMMARY_NAME, FIGURE_NAME):
+    for name in (LOG_NAME if engine == LOCKSTEP else BAG_NAME, SUMMARY_NAME, FIGURE_NAME):
         display.say(str(output / name))
     raise click.exceptions.Exit(0 if state.outcome is Outcome.REACHED else _FAILED)
 
@@ -185,12 +219,15 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
     if name not in variants:
         known = ", ".join(variants) or "none generated yet"
         raise RunError(f"--initial-configuration: no configuration {name!r}; there are {known}")
+    manager = _manager(options["manager"], baseline=options["no_metacontrol"])
+    _check_parameters(options["parameters"], manager)
     components = read_components(simulation / "models" / "metacontrol.yaml")
     ground = read_ground(options["world"], options["routes"])
     return Settings(
         route=read_routes(ground, [options["route"]])[options["route"]],
         output=output,
-        manager=_manager(options["manager"], baseline=options["no_metacontrol"]),
+        manager=manager,
+        parameters=options["parameters"],
         seed=options["seed"],
         initial_configuration=name,
         contingencies=_contingencies(options, components),
@@ -217,6 +254,20 @@ def _manager(asked: str, *, baseline: bool) -> str:
         raise RunError(f"--no-metacontrol is --manager none, and --manager is {asked}: leave one of them out")
     find_manager(asked)
     return NONE if baseline else asked
+
+
+def _check_parameters(text: str, manager: str) -> None:
+    """Check that the reasoner is what adapts, and that it has these parameters.
+
+    Raises:
+        RunError: it is not, or it lacks one.
+    """
+    if text and manager not in (MROS, AS_PUBLISHED):
+        raise RunError(f"--parameters are those of the reasoner, and --manager is {manager}: leave one of them out")
+    known = setting_names()
+    for name in json.loads(text or "{}"):
+        if name not in known:
+            raise RunError(f"--parameters: no parameter {name!r}; there are {', '.join(known)}")
 
 
 def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionRecord]:

@@ -66,7 +66,8 @@ def _drive(asked: dict[str, Any]) -> dict[str, Any]:
     settings = Settings(
         route=read_route(routes or package / "worlds" / "routes.yaml", run.route),
         output=Path(),  # nothing is written
-        manager=run.manager,
+        manager=run.plug_in,
+        parameters=run.parameters,
         seed=run.seed,
         initial_configuration=run.initial_configuration,
         contingencies=contingencies_of(run),

@@ -24,6 +24,7 @@ from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.ground_files import read_ground
 from metacontrol_experiments.mission.ground import FACTORY, Ground
 from metacontrol_experiments.mission.routes import RouteError
+from metacontrol_experiments.mission.settings import ROS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -52,7 +53,7 @@ def drive(run: Run, deadline: float, *, keep_log: bool, ground: Ground = FACTORY
     attempts = [Attempt(Status.CRASHED, 0.0, problem)] * MOST_ATTEMPTS if problem else []
     answer: dict[str, Any] = {}
     while not is_final(attempts):
-        if run.engine == "ros":
+        if run.engine == ROS:
             attempt, answer = drive_on_ros(run, deadline, ground)
         else:
             child = _child()

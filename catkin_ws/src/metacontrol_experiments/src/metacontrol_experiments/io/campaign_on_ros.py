@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from metacontrol_experiments.campaign.progress import LONGEST_LOG, Attempt, Status
-from metacontrol_experiments.mission.settings import SUMMARY_NAME
+from metacontrol_experiments.mission.settings import ROS, SUMMARY_NAME
 
 if TYPE_CHECKING:
     from metacontrol_experiments.campaign.matrix import Run
@@ -59,7 +59,7 @@ def drive_on_ros(run: Run, deadline: float, ground: Ground) -> tuple[Attempt, di
 
 def _command(run: Run, ground: Ground, output: Path) -> list[str]:
     asked = {
-        "--manager": run.manager,
+        "--manager": run.plug_in,
         "--route": run.route,
         "--initial-configuration": run.initial_configuration,
         "--seed": run.seed,
@@ -67,11 +67,13 @@ def _command(run: Run, ground: Ground, output: Path) -> list[str]:
         "--failure": "none",
         "--output": output,
     }
+    if run.parameters:
+        asked["--parameters"] = run.parameters
     files = {"--world": ground.world, "--routes": ground.routes}
     options = [*asked.items(), *(("--contingency", text) for text in run.contingencies)]
     options += [(option, path) for option, path in files.items() if path is not None]
     words = [str(word) for option in options for word in option]
-    return [sys.executable, "-m", "metacontrol_experiments.cli.main", "run", "--engine", "ros", "--quiet", *words]
+    return [sys.executable, "-m", "metacontrol_experiments.cli.main", "run", "--engine", ROS, "--quiet", *words]
 
 
 def _ends(process: subprocess.Popen[bytes], deadline: float) -> bool:

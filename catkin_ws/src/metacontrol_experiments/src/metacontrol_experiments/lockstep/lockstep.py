@@ -28,6 +28,7 @@ from metacontrol_experiments.lockstep.system import LockstepError
 from metacontrol_experiments.managers.manager import Restart
 from metacontrol_experiments.mission import mission
 from metacontrol_experiments.mission.mission import Inject
+from metacontrol_experiments.mission.settings import LOCKSTEP
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -167,7 +168,7 @@ class Lockstep:
         now, pose = self._simulation.time, self._simulation.localised
         self._state = mission.start(self._plan, now, pose.x, pose.y)
         told = self._settings.describe() | {
-            "engine": "lockstep",
+            "engine": LOCKSTEP,
             "controller_hz": repr(self._navigation.parameters.controller_frequency),
         }
         self._recorder.event(Event(now, MissionEvent.MISSION_START, self._settings.route.name, told))

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from metacontrol_experiments.mission.routes import Route
 
+ENGINES = LOCKSTEP, ROS = "lockstep", "ros"
+"""What drives a mission."""
 MANAGER_NODE = "mission_manager"
 """Name of the node that runs a manager on ROS."""
 BAG_NAME, SUMMARY_NAME, FIGURE_NAME, LOG_NAME = "mission.bag", "summary.json", "mission.png", "mission.log"
@@ -30,6 +32,7 @@ class Settings:
         route: where it starts and goes.
         output: folder for bag, summary, figure and logs.
         manager: name of what adapts.
+        parameters: of the reasoner, in place of those that the system has; JSON of a mapping, empty for none.
         seed: of everything random in the simulation.
         initial_configuration: name of the variant deployed first.
         contingencies: what goes wrong, and when.
@@ -47,6 +50,7 @@ class Settings:
     route: Route
     output: Path
     manager: str = MROS
+    parameters: str = ""
     seed: int = 1
     initial_configuration: str = "f2_v2_r2"
     contingencies: tuple[Contingency, ...] = ()
@@ -103,6 +107,8 @@ class Settings:
             arguments |= {f"nfr_{name}": repr(level) for name, level in self.thresholds.items()}
         if self.manager == AS_PUBLISHED:
             arguments["as_published"] = "true"
+        if self.parameters:
+            arguments["reasoner_parameters"] = self.parameters
         return [f"{name}:={value}" for name, value in arguments.items()]
 
     @property
@@ -125,6 +131,7 @@ class Settings:
         broken = [entry for entry in self.contingencies if entry.kind.breaks_component]
         power = [entry.value for entry in self.contingencies if entry.kind is Kind.POWER]
         other = {} if self.manager in (NONE, MROS) else {"manager": self.manager}
+        other |= {"parameters": self.parameters} if self.parameters else {}
         return {
             "mission": "D2",
             "route": self.route.name,

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from metacontrol_experiments.campaign.matrix import Run
-from metacontrol_experiments.campaign.progress import Status
+from metacontrol_experiments.campaign.progress import PROVENANCE, Status, run_of
 from metacontrol_experiments.contingency.contingency import Kind
 from metacontrol_experiments.contingency.parsing import ContingencyError, parse_contingency
 from metacontrol_experiments.managers.manager import MROS, NONE
@@ -159,13 +159,12 @@ def _mission(row: Mapping[str, Any], where: str) -> Mission:
             "results.parquet that metacontrol campaign left"
         )
     try:
-        asked = {item.name: row[item.name] for item in fields(Run) if item.name in row}
-        run = Run(**{**asked, "contingencies": tuple(str(row["contingencies"] or "").split())})
+        run = run_of(row)
         summary = json.loads(row.get("summary") or "{}")
         status = Status(row["status"])
         if not isinstance(summary, dict):
             raise TypeError("its summary is no mapping")
-    except (ValueError, TypeError, RecursionError) as error:
+    except (AttributeError, ValueError, TypeError, RecursionError) as error:
         raise ReportError(f"{where}: is no result of a run ({error}); drive the campaign again") from error
     return Mission(
         run=run,
@@ -173,7 +172,5 @@ def _mission(row: Mapping[str, Any], where: str) -> Mission:
         problem=str(row.get("problem") or ""),
         figures={name: row[name] for name in _FIGURES},
         summary=summary,
-        provenance={
-            name: str(row[name]) for name in ("commit", "host", "ended", "versions") if row.get(name) is not None
-        },
+        provenance={name: str(row[name]) for name in PROVENANCE if row.get(name) is not None},
     )
