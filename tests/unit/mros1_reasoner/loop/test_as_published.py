@@ -88,10 +88,21 @@ def test_nothing_is_done_where_no_design_keeps_the_limit(start):
     assert decision.to_configuration == "" and "camera_fast would be a makeshift" in decision.explanation
 
 
-def test_component_that_works_again_is_no_way_back(start):
+def test_component_that_works_again_is_a_reason_to_choose_anew(start):
     core = start()
     core.observe_component(1.0, "laser", "FALSE")
     (decision,) = core.step(1.0)
     assert deploy(core, 2.0, decision) == "camera_slow"
     core.observe_component(9.0, "laser", "RECOVERED")
-    assert [core.step(now) for now in (9.0, 20.0, 500.0)] == [[], [], []]
+    (decision,) = core.step(9.0)
+    assert deploy(core, 9.5, decision) == "scan_slow"
+    assert [core.step(now) for now in (20.0, 500.0)] == [[], []]
+
+
+def test_end_of_the_cause_of_a_violation_is_no_way_back(start):
+    core = start()
+    (decision,) = violated(core, 1.0)
+    assert deploy(core, 1.1, decision) == "scan_slower"
+    for second in range(2, 300):
+        core.observe_level(float(second), "energy", 0.1)
+        assert core.step(float(second)) == []

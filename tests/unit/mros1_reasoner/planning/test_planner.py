@@ -250,3 +250,25 @@ def test_of_designs_as_useful_the_one_wins_that_keeps_all_limits_best_with_the_f
     lost = {c.name: c.lost_because for c in result.candidates}
     assert lost["loud"] == "as useful as the choice, but nearer to a limit"
     assert lost["other"] == "as useful as the choice, but a bigger change"
+
+
+def test_desired_design_comes_first_where_it_keeps_every_limit():
+    result = choose(design("a", use=0.9), design("b", use=0.2), desired="b")
+    assert result.choice == "b" and not result.degraded
+    assert result.reason == "b is the desired configuration, and keeps every limit"
+    assert result.candidates[1].lost_because == "b is the desired configuration"
+
+
+def test_desired_design_that_violates_a_limit_is_not_taken_while_others_keep_all():
+    result = choose(design("a", use=0.9), design("b", use=0.5), design("c", risk=0.7), desired="c")
+    assert result.choice == "a" and not result.degraded
+    assert result.reason.endswith("; c, the desired configuration, is not taken: risk 0.7 > 0.6")
+
+
+def test_desired_design_is_taken_where_no_design_keeps_every_limit():
+    designs = design("a", risk=0.65), design("b", risk=0.9), design("c", risk=0.7)
+    result = choose(*designs, desired="b")
+    assert result.choice == "b" and result.degraded
+    assert result.reason == "degraded: no design keeps every limit; b is the desired configuration"
+    assert choose(*designs, desired="b", unrealisable={"b": ["laser"]}).choice == "a"
+    assert choose(*designs, desired="b", strained={"b": ["f_look"]}).choice == "a"

@@ -28,13 +28,15 @@ def read_knowledge_base(
     models: Sequence[Path],
     vocabularies: Sequence[Path] = (),
     directions: Mapping[str, Direction] | None = None,
+    utility: str = "",
 ) -> KnowledgeBase:
     """Return the knowledge base of models, read beside the vocabulary.
 
     Args:
         models: OWL files of the application.
         vocabularies: further OWL files to load before them; the package's own are always loaded.
-        directions: of quality attributes by name; else as the models say (`qa_sign`), else lower is better.
+        directions: of quality attributes by name; see read_model.
+        utility: the quality attribute that is the utility of designs; empty for none.
 
     Raises:
         KnowledgeBaseError: a file or an individual can't be used.
@@ -44,7 +46,7 @@ def read_knowledge_base(
     own = own_ontologies()
     others = [path for path in vocabularies if real_path(path) not in {real_path(file) for file in own}]
     triples, files = _read_ontologies(own, [*others, *models])
-    return KnowledgeBase(read_model(triples, ", ".join(str(path) for path in models), directions), files)
+    return KnowledgeBase(read_model(triples, ", ".join(str(path) for path in models), directions, utility), files)
 
 
 def save_knowledge_base(

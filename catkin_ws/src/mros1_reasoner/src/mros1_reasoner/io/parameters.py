@@ -114,7 +114,9 @@ class Parameters:
                 known = " or ".join(d.value for d in Direction)
                 raise ParameterError(f"parameter ~qa_direction/{quality} is {direction!r}: expected {known}") from error
         models = self.model_files if models is None else models
-        return read_knowledge_base(models, self.vocabulary_files if vocabularies is None else vocabularies, directions)
+        vocabularies = self.vocabulary_files if vocabularies is None else vocabularies
+        utility = self.values.get("utility", Settings.utility)
+        return read_knowledge_base(models, vocabularies, directions, utility if isinstance(utility, str) else "")
 
     def objectives(self, knowledge_base: KnowledgeBase) -> tuple[Objective, ...]:
         """Return the model's objectives, or one for each function that no design requires, with the given NFRs."""

@@ -70,24 +70,26 @@ class ApplicationModel:
 
 
 def read_model(
-    triples: Sequence[Triple], where: str, directions: Mapping[str, Direction] | None = None
+    triples: Sequence[Triple], where: str, directions: Mapping[str, Direction] | None = None, utility: str = ""
 ) -> ApplicationModel:
     """Return what the triples of ontologies say.
 
     Args:
         triples: of the vocabulary, its rules and the application's models.
         where: the files, for messages.
-        directions: of quality attributes by name; else as the models say (`qa_sign`), else lower is better.
+        directions: of quality attributes by name; else as the models say (`qa_sign`, `qa_comparison_operator`). Where
+            they do not, lower is better, and higher for the utility.
+        utility: the quality attribute that is the utility of designs; empty for none.
 
     Raises:
         KnowledgeBaseError: an individual can't be used.
     """
-    return _Reader(Graph(triples), where, directions or {}).read()
+    return _Reader(Graph(triples), where, directions or {}, utility).read()
 
 
 class _Reader:
-    def __init__(self, graph: Graph, where: str, directions: Mapping[str, Direction]) -> None:
-        self._graph, self._where, self._directions = graph, where, directions
+    def __init__(self, graph: Graph, where: str, directions: Mapping[str, Direction], utility: str) -> None:
+        self._graph, self._where, self._directions, self._utility = graph, where, directions, utility
         self._functions = self._names((v.FUNCTION,), graph.objects(v.SOLVES_F) | graph.objects(v.TYPE_F))
         if not self._functions:
             raise KnowledgeBaseError(f"{where}: no individual of class Function: give the model that has them")
@@ -101,7 +103,14 @@ class _Reader:
         self._function_name = _inverse(self._functions)
         self._component_name = _inverse(self._components)
         self._quality_name = _inverse(self._quality_types)
+        self._guessed: list[str] = []  # directions of which nobody says anything
         self._qualities = {name: self._quality(name) for name in sorted(self._quality_types)}
+        if self._guessed:
+            _log.warning(
+                "%s: no direction is given (qa_sign): %s; set ~qa_direction where that is wrong",
+                where,
+                ", ".join(self._guessed),
+            )
 
     def read(self) -> ApplicationModel:
         graph = self._graph
@@ -152,24 +161,36 @@ class _Reader:
         return result
 
     def _quality(self, name: str) -> Quality:
-        """Return how levels of a quality compare: by the given direction, else by the model, else lower is better."""
+        """Return how levels of a quality compare: by the given direction, else by the model, else by a guess."""
         iri = self._quality_types[name]
         low, high = (self._bound(iri, predicate) for predicate in (v.QA_MIN, v.QA_MAX))
         operators = set(self._graph.literals_of(iri, v.QA_COMPARISON_OPERATOR))
         signs = {_number(text) for text in self._graph.literals_of(iri, v.QA_SIGN)}
         if signs - {1.0, -1.0} or len(signs) > 1:
             raise KnowledgeBaseError(f"{self._where}: qa_sign of {name} must be one value, 1 or -1")
+        compared = bool(operators)
         try:
             quality = Quality.compared_by(operators.pop() if operators else ">", low, high)
         except ValueError as error:
             raise KnowledgeBaseError(f"{self._where}: qa_comparison_operator of {name}: {error}") from error
         if operators:
             raise KnowledgeBaseError(f"{self._where}: {name} has several qa_comparison_operator: give it one")
-        direction = Direction.HIGHER_IS_BETTER if signs == {-1.0} else Direction.LOWER_IS_BETTER
         reaching = quality.reaching_violates or "true" in self._graph.literals_of(iri, v.QA_REACHING_VIOLATES)
-        direction = self._directions.get(name, direction if signs else quality.direction)
+        direction = self._directions.get(name)
+        if direction is None and signs:
+            direction = Direction.HIGHER_IS_BETTER if signs == {-1.0} else Direction.LOWER_IS_BETTER
+        elif direction is None:
+            direction = quality.direction if compared else self._guess(name)
         typical = self._typical(name, iri)
         return replace(quality, direction=direction, reaching_violates=reaching, typical=typical)
+
+    def _guess(self, name: str) -> Direction:
+        """Return the direction of a quality of which nothing says it."""
+        if name == self._utility:
+            self._guessed.append(f"{name}: higher is better, as it is the utility")
+            return Direction.HIGHER_IS_BETTER
+        self._guessed.append(f"{name}: lower is better")
+        return Direction.LOWER_IS_BETTER
 
     def _typical(self, name: str, iri: str) -> str:
         """Return the quality whose expected level is the usual one of a quality; empty: there is none."""

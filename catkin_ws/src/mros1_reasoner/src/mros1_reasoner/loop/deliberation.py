@@ -299,6 +299,7 @@ class Deliberation:
                 if tried_for == name
             },
             current=None if running.is_broken or (running.failed_nodes and is_tried) else running.design,
+            desired=self._state.settings.desired if running.design is None else "",
             observed=self._state.levels.high(now, name),
             corrections=self.corrections(name, now),
             worth=self._state.settings.worth,
@@ -311,10 +312,6 @@ class Deliberation:
                 objective, [self._state.kb.designs[running.design or ""]], situation, self._utility, self._distance
             )
             return replace(same, degraded=False, is_retry=False, reason=f"{running.design} is deployed again")
-        desired = self._state.settings.desired
-        is_possible = situation.can_deploy(desired) and desired not in strained and desired not in situation.tried
-        if running.design is None and is_possible:
-            designs = tuple(design for design in designs if design.name == desired) or designs
         if self._state.settings.only_last_limit:
             objective = replace(objective, limits=dict(sorted(objective.limits.items())[-1:]))
         found = plan(objective, designs, situation, self._utility, self._distance)

@@ -156,8 +156,8 @@ class Mape:
         before = known.status if known else v.WORKS
         if status == v.WORKS and before in (v.FAILED, v.RECOVERED):
             status = v.RECOVERED
-        elif status == v.RECOVERED and before == v.WORKS:
-            status = v.WORKS  # it was never seen to fail, or its return has been heeded
+        elif status == v.RECOVERED and known and before == v.WORKS:
+            status = v.WORKS  # it was not seen to fail, or its return has been heeded
         if status == v.RECOVERED and component in self._kb.own_nodes:
             status = v.WORKS  # no design waits for it
         if known is None or status != before:

@@ -53,6 +53,7 @@ class Situation:
         strained: the same for functions that are provided, but not as they should be.
         tried: why a design failed a short while ago, by its name.
         current: name of the deployed design.
+        desired: name of the design that is taken first, if it keeps every limit, or if no design does.
         observed: levels that were observed with the deployed design; they replace its expected levels.
         corrections: of the expected levels of a quality, for a group of designs.
         worth: by how much better another design must keep a limit, or less violate limits, as a share of a limit; less
@@ -68,6 +69,7 @@ class Situation:
     strained: Mapping[str, Collection[str]] = field(default_factory=dict)
     tried: Mapping[str, str] = field(default_factory=dict)
     current: str | None = None
+    desired: str = ""
     observed: Mapping[str, float] = field(default_factory=dict)
     corrections: Mapping[tuple[str, str], Correction] = field(default_factory=dict)
     worth: float = 0.0
@@ -95,8 +97,9 @@ def plan(
     Where a limit is violated, designs that keep it by the relief come before others that keep it barely. Then the
     highest utility wins; of equally useful designs, the smaller change wins. With an indifference, of the designs that
     are as useful within it, those count that keep the nearest limit best, then all limits; then components and utility
-    decide. When no design keeps every limit, the least violating one is taken; the deployed design stays unless another
-    one is worth the change. When all have failed, they are tried again.
+    decide. The desired design comes before all of these. When no design keeps every limit, the desired one is taken,
+    else the least violating one; the deployed design stays unless another one is worth the change. When all have
+    failed, they are tried again.
     """
     running = next((design for design in designs if design.name == situation.current), None)
     candidates = [_judge(objective, design, situation, utility) for design in designs]
@@ -113,25 +116,18 @@ def plan(
     fit = sorted((c for c in candidates if not c.refused_because), key=lambda c: (not c.relieves, *by_use(c)))
     deployable = [c for c in candidates if situation.can_deploy(c.design.name)]
     kept: list[_Judged] = []
+    wanted = next((c for c in candidates if c.design.name == situation.desired), None)
     fresh = [c for c in deployable if c.design.name not in situation.tried or c.design.name == situation.current]
-    if fit:
-        fit = [c for c in fit if c.relieves == fit[0].relieves]
-        useful = [c for c in fit if c.utility >= fit[0].utility - situation.indifference]
-        if situation.indifference > 0.0:
-            kept = _least_strained(useful, situation.worth)
-            best = min(kept, key=lambda c: (math.floor(change(c)), *by_use(c)))
-        else:
-            best = fit[0]
-        reason = f"{best.design.name} has the highest utility ({best.utility:g}) of the {len(fit)} (out of "
-        reason += f"{len(candidates)}) designs that can be deployed and keep every limit"
-        reason += " clearly" if situation.relief and best.relieves else ""
-        if best is not fit[0]:
-            reason = reason.replace("has the highest utility", "is as useful as any")
-            reason += (
-                f", and keeps them best of the {len(useful)} within {situation.indifference:g} of the highest utility"
-            )
-        elif len(fit) > 1 and fit[1].utility == best.utility and running:
-            reason += f", and is a smaller change than {fit[1].design.name}, which is as useful"
+    if fit and wanted in fit:
+        best = wanted
+        reason = f"{best.design.name} is the desired configuration, and keeps every limit"
+    elif fit:
+        best, kept, reason = _most_useful(fit, len(candidates), situation, change)
+        if wanted:
+            reason += f"; {wanted.design.name}, the desired configuration, is not taken: {wanted.refused_because}"
+    elif wanted in fresh and not situation.strained.get(situation.desired):
+        best = wanted
+        reason = f"degraded: no design keeps every limit; {best.design.name} is the desired configuration"
     elif deployable:
         best = min(fresh or deployable, key=by_violation)
         now = next((c for c in fresh if c.design.name == situation.current), None)
@@ -152,7 +148,7 @@ def plan(
         return Plan(None, False, tuple(c.lost(c.refused_because) for c in ranked), _nothing(designs, situation))
     others = sorted((c for c in candidates if c is not best), key=lambda c: (bool(c.refused_because), *by_use(c)))
     degraded = not best.keeps_limits
-    lost = (c.lost(_loss(c, best, degraded, keeps_as_well=c in kept)) for c in others)
+    lost = (c.lost(_loss(c, best, degraded, keeps_as_well=c in kept, is_desired=best is wanted)) for c in others)
     return Plan(best.design.name, degraded, (best.chosen(), *lost), reason, is_retry=not fit and not degraded)
 
 
@@ -283,6 +279,34 @@ def _judge(objective: Objective, design: Design, situation: Situation, utility: 
     return _Judged(design, utility(design), violation, "; ".join(reasons), keeps_limits, relieves, excesses, levels)
 
 
+def _most_useful(
+    fit: Sequence[_Judged], count: int, situation: Situation, change: Callable[[_Judged], float]
+) -> tuple[_Judged, list[_Judged], str]:
+    """Return the best of the designs that keep every limit, those that keep them as well as it, and why it is the best.
+
+    Args:
+        fit: these designs: those that relieve first, then the most useful first.
+        count: of all designs.
+        situation: of the plan.
+        change: how much changes from the deployed design to another.
+    """
+    fit = [c for c in fit if c.relieves == fit[0].relieves]
+    useful = [c for c in fit if c.utility >= fit[0].utility - situation.indifference]
+    best, kept = fit[0], list[_Judged]()
+    if situation.indifference > 0.0:
+        kept = _least_strained(useful, situation.worth)
+        best = min(kept, key=lambda c: (math.floor(change(c)), -c.utility, change(c), c.design.name))
+    has_highest = best is fit[0]
+    reason = f"{best.design.name} {'has the highest utility' if has_highest else 'is as useful as any'} "
+    reason += f"({best.utility:g}) of the {len(fit)} (out of {count}) designs that can be deployed and keep every limit"
+    reason += " clearly" if situation.relief and best.relieves else ""
+    if not has_highest:
+        reason += f", and keeps them best of the {len(useful)} within {situation.indifference:g} of the highest utility"
+    elif len(fit) > 1 and fit[1].utility == best.utility and situation.current:
+        reason += f", and is a smaller change than {fit[1].design.name}, which is as useful"
+    return best, kept, reason
+
+
 def _least_strained(designs: Collection[_Judged], worth: float) -> list[_Judged]:
     """Return those that keep the nearest limit best, and of these those that keep all limits best."""
 
@@ -299,12 +323,14 @@ def _corrected(correction: Correction) -> str:
     return "" if correction == _AS_EXPECTED else f" ({correction} what was expected)"
 
 
-def _loss(candidate: _Judged, best: _Judged, degraded: bool, *, keeps_as_well: bool) -> str:
+def _loss(candidate: _Judged, best: _Judged, degraded: bool, *, keeps_as_well: bool, is_desired: bool) -> str:
     """Return why a candidate was rejected."""
     if candidate.refused_because:
         worse = f"; violates limits by {candidate.violation:.2g}, the choice by {best.violation:.2g}"
         tells = degraded and math.isfinite(candidate.violation) and candidate.violation > 0.0
         return candidate.refused_because + (worse if tells else "")
+    if is_desired:
+        return f"{best.design.name} is the desired configuration"
     if best.relieves and not candidate.relieves:
         return "it would keep the violated limit barely"
     if candidate.utility < best.utility:
