@@ -6,6 +6,7 @@ import math
 import pytest
 from click.testing import CliRunner
 from metacontrol_bags.bag import read_record
+from metacontrol_bags.bag_file import BagError
 from metacontrol_bags.cli.main import bag as group
 from metacontrol_bags.metrics import summarise
 from metacontrol_bags.side_by_side import short_names
@@ -98,6 +99,11 @@ def test_bag_of_a_killed_recorder_tells_what_it_has(unfinished):
     summary = json.loads(result.stdout)[0]["summary"]
     assert summary["route"] == "r1" and len(summary["reconfigurations"]) == 1
     assert summary["outcome"] == "unknown"
+
+
+def test_bag_of_something_else_is_no_record_of_a_mission(foreign):
+    with pytest.raises(BagError, match=r"foreign\.bag: holds nothing of a mission, only "):
+        read_record(foreign)
 
 
 @pytest.mark.parametrize("command", [name for name in COMMANDS if name != "info"])

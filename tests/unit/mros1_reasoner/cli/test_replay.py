@@ -1,5 +1,7 @@
 """The commands replay and explain on bags that the tests write."""
 
+import random
+
 import pytest
 from bag_helpers import Bag, Life
 from click.testing import CliRunner
@@ -7,9 +9,11 @@ from mros1_reasoner.cli import replay as replay_module
 from mros1_reasoner.cli.explain import explain
 from mros1_reasoner.cli.replay import replay
 from mros1_reasoner.io.parameters import Parameters
+from mros1_reasoner.io.reasoner_bag import read_decisions, read_recording
 from mros1_reasoner.loop.entries import ActiveFact, ComponentFact, LevelFact, Lock, Unlock
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.replay.comparison import first_messages
+from mros1_reasoner.replay.recording import RecordingError
 from reasoner_helpers import HEAD, application
 
 PARAMETERS = {
@@ -271,6 +275,43 @@ def test_nonsense_in_a_journal_is_refused(tmp_path, model, kind, values):
     result = run(replay, path)
     assert result.exit_code == 2, result.output
     assert repr(kind) in result.output
+
+
+def damaged(content, number):
+    """Return a bag's bytes with damage: cut off, changed, or with a piece taken out."""
+    rng = random.Random(number)
+    place, length = rng.randrange(len(content)), rng.randrange(1, 3000)
+    match number % 3:
+        case 0:
+            return content[:place]
+        case 1:
+            return content[:place] + rng.randbytes(length) + content[place + length :]
+        case _:
+            return content[:place] + content[place + length :]
+
+
+def test_damaged_bag_is_read_in_part_or_refused(life, bag, tmp_path):
+    content, path = bag(life()).read_bytes(), tmp_path / "damaged.bag"
+    ends = set()
+    for number in range(150):
+        path.write_bytes(damaged(content, number))
+        for read in (read_decisions, read_recording):
+            try:
+                read(path)
+                ends.add("read")
+            except RecordingError as error:
+                ends.add("refused")
+                assert str(error).startswith(f"{path}: ")
+    assert ends == {"read", "refused"}
+
+
+def test_bag_that_was_cut_off_tells_the_decisions_that_it_still_holds(life, bag, tmp_path):
+    whole = bag(life())
+    path = tmp_path / "cut.bag"
+    path.write_bytes(whole.read_bytes()[:-200])
+    result = run(explain, path)
+    assert result.exit_code == 0 and "scan_slow -> camera_slow" in result.stdout
+    assert result.stdout == run(explain, whole).stdout
 
 
 def test_two_reasoners_in_a_bag_need_a_namespace(life, bag):

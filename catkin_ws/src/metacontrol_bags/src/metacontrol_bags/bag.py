@@ -7,18 +7,16 @@ topics that the record needs are decoded.
 from __future__ import annotations
 
 import math
-import struct
-from collections import Counter
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rosbags.serde import SerdeError
-from rosbags.typesys import TypesysError
 
 from metacontrol_bags import messages, ownership
 from metacontrol_bags.bag_file import BagError, BagFile
+from metacontrol_bags.decoding import decode
+from metacontrol_bags.gaps import is_mission, nothing_of_a_mission
 from metacontrol_bags.record import (
     ComponentReport,
     CostReport,
@@ -26,13 +24,10 @@ from metacontrol_bags.record import (
     OccupancyMap,
     QualityReport,
 )
-from metacontrol_bags.typestore import types_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator
     from pathlib import Path
-
-    from rosbags.interfaces import Connection as RosbagsConnection
 
     from metacontrol_bags.bag_file import Connection
 
@@ -74,10 +69,6 @@ _CUBE = 1
 """Type of a visualization_msgs/Marker that shows clutter; people are cylinders."""
 
 
-_ERRORS = (SerdeError, ValueError, AttributeError, AssertionError, LookupError, TypeError, OverflowError, struct.error)
-"""What messages raise that do not fit their definition, or are of another type than their topic has in a mission."""
-
-
 @dataclass(frozen=True)
 class Salvaged:
     """What could be read of a bag.
@@ -97,13 +88,14 @@ def read_record(path: Path) -> MissionRecord:
     """Return the record of a mission from its bag, which must be whole.
 
     Raises:
-        BagError: the file is missing, no bag, not closed, or holds messages that do not fit their definition.
+        BagError: the file is missing, no bag, not closed, holds messages that do not fit their definition, or nothing
+            of a mission.
     """
     found = salvage(path)
     if found.problems:
         raise BagError(f"{path}: not a readable mission bag ({found.problems[0]})")
-    if not found.topics:
-        raise BagError(f"{path}: holds no messages")
+    if not is_mission(found.record):
+        raise BagError(f"{path}: {nothing_of_a_mission(found)}")
     return found.record
 
 
@@ -120,41 +112,11 @@ def salvage(path: Path, topics: Collection[str] = (), namespace: str = "/") -> S
     """
     builder = _Builder(namespace)
     wanted = set(topics or builder.handlers)
-    decoders: dict[tuple[str, str], Callable[[bytes], Any] | str] = {}
-    lost: Counter[str] = Counter()
     with BagFile(path) as bag:
-        for connection, stamp, data in bag.messages(lambda connection: builder.topic_of(connection) in wanted):
-            kind = connection.type, connection.definition
-            if kind not in decoders:
-                decoders[kind] = _decoder(*kind)
-            decode = decoders[kind]
-            try:
-                if isinstance(decode, str):
-                    raise LookupError(decode)
-                builder.take(connection, stamp, decode(data))
-            except _ERRORS:
-                reason = decode if isinstance(decode, str) else f"do not fit as {connection.type}"
-                lost[f"messages on {connection.topic} {reason}"] += 1
-        problems = [*bag.problems, *(f"{count} {what}" for what, count in lost.items())]
+        lost = decode(bag, lambda connection: builder.topic_of(connection) in wanted, builder.take)
         held = frozenset(bag.connections[number].topic for number, count in bag.counts.items() if count)
         record = builder.build((bag.first or 0) * 1e-9, (bag.last or 0) * 1e-9)
-    return Salvaged(record, held, tuple(problems))
-
-
-def _decoder(name: str, definition: str) -> Callable[[bytes], Any] | str:
-    """Return a function that decodes messages of a type, or why there is none."""
-    try:
-        store, known = types_of(name, definition)
-    except LookupError:
-        return f"are of the type {name}, which the bag does not define"
-    except TypesysError:
-        return f"are of the type {name}, whose definition makes no sense"
-    return lambda data: store.deserialize_ros1(data, known)
-
-
-def publisher_of(connection: RosbagsConnection) -> str:
-    """Return the name of the node that published the messages of a connection; empty where the bag does not tell."""
-    return str(getattr(connection.ext, "callerid", None) or "")
+    return Salvaged(record, held, (*bag.problems, *lost))
 
 
 class _Builder:

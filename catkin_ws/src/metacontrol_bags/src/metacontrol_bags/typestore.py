@@ -2,21 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-from rosbags.interfaces import Connection
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.msg import normalize_msgtype
 from rosbags.typesys.store import Typestore
-
-
-def typestore(connections: Iterable[Connection]) -> Typestore:
-    """Return the standard types and those that the connections of a bag define."""
-    store = get_typestore(Stores.ROS1_NOETIC)
-    for connection in connections:
-        if connection.msgtype not in store.types:
-            _register(store, connection.msgtype, connection.msgdef.data)
-    return store
 
 
 def types_of(name: str, definition: str) -> tuple[Typestore, str]:

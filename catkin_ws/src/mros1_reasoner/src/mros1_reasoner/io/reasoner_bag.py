@@ -1,32 +1,32 @@
-"""Reads a reasoner's journal and decisions from a bag, without ROS; if there is no journal, its inputs."""
+"""Reads a reasoner's journal and decisions from a bag, without ROS; if there is no journal, its inputs.
+
+What is lost of a damaged bag is told by a warning.
+"""
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+import logging
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 from metacontrol_bags import messages, ownership
-from metacontrol_bags.bag import publisher_of
+from metacontrol_bags.bag_file import BagError, BagFile, Connection
 from metacontrol_bags.decision import Decision
-from metacontrol_bags.typestore import typestore
-from node_kit.io.input_files import is_file
+from metacontrol_bags.decoding import decode
 from node_kit.yaml_text import YamlError, parse_yaml
-from rosbags.interfaces import Connection
-from rosbags.rosbag1 import Reader, ReaderError
-from rosbags.serde import SerdeError
-from rosbags.typesys import TypesysError
 
 from mros1_reasoner.loop.entries import ActiveFact
 from mros1_reasoner.loop.entry_text import read_entry
 from mros1_reasoner.replay.recording import Recording, RecordingError, Run, Statuses
 
+_log = logging.getLogger(__name__)
+
 _JOURNAL = "mros1_reasoner/journal"
 _DECISION = "mros1_reasoner/decision"
 _ACTIVE = "rosgraph_manipulator/active_configuration"
-_UNREADABLE = (ReaderError, TypesysError, AttributeError, IndexError, UnicodeDecodeError)
 
 
 def read_decisions(path: Path, namespace: str | None = None) -> list[Decision]:
@@ -36,11 +36,14 @@ def read_decisions(path: Path, namespace: str | None = None) -> list[Decision]:
         RecordingError: the bag can't be read, or holds several reasoners and no namespace is given.
     """
     last: dict[str, Decision] = {}
-    with _open(path) as reader:
-        topic = _topic(path, reader, _DECISION, namespace)
-        for _, now, message in _messages(path, reader, [topic] if topic else []):
-            decision = messages.decision(message, now)
-            last[decision.id] = decision
+    topics, _ = _contents(path)
+    found, lost = _messages(path, [_topic(path, topics, _DECISION, namespace)], _decision)
+    for problem in lost:
+        if not found:
+            raise RecordingError(f"{path}: {problem}")
+        _log.warning("%s: %s", path, problem)
+    for _, _, decision in found:
+        last[decision.id] = decision
     return list(last.values())
 
 
@@ -48,86 +51,135 @@ def read_recording(path: Path, namespace: str | None = None) -> Recording:
     """Return what a bag holds of a reasoner.
 
     Raises:
-        RecordingError: the bag can't be read, or holds several reasoners and no namespace is given.
+        RecordingError: the bag or a message can't be read, or it holds several reasoners and no namespace is given.
     """
-    recording = Recording()
-    with _open(path) as reader:
-        journal = _topic(path, reader, _JOURNAL, namespace)
-        decision = _topic(path, reader, _DECISION, namespace)
-        active = _topic(path, reader, _ACTIVE, namespace)
-        robot = "/" if namespace is None else namespace
-        for topic, name in ((decision, _DECISION), (active, _ACTIVE)):
-            robot = topic.removesuffix(name) if topic and namespace is None else robot
-        raw = [] if journal else [active, ownership.TOPIC]
-        recording.start = reader.start_time * 1e-9
-        wanted = [topic for topic in (journal, decision, *raw) if topic]
-        for connection, now, message in _messages(path, reader, wanted):
-            topic = connection.topic
-            if topic == journal:
-                _add_journal(path, recording, message)
-            elif topic == decision:
-                recording.decisions.append((now, messages.decision(message, now)))
-            elif topic == active:
-                recording.active += [(now, ActiveFact(f.function, f.configuration, f.state)) for f in message.functions]
-            else:
-                own = ownership.own(message.status, robot, publisher_of(connection))
-                recording.diagnostics.append(Statuses(now, messages.seconds(message.header.stamp), tuple(own)))
+    topics, start = _contents(path)
+    recording = Recording(start)
+    journal, decision, active = (_topic(path, topics, name, namespace) for name in (_JOURNAL, _DECISION, _ACTIVE))
+    robot = "/" if namespace is None else namespace
+    for topic, name in ((decision, _DECISION), (active, _ACTIVE)):
+        robot = topic.removesuffix(name) if topic and namespace is None else robot
+    readers = {journal: _part, decision: _decision, active: _active}
+
+    def read(connection: Connection, now: float, message: Any) -> Any:
+        if connection.topic in readers:
+            return readers[connection.topic](connection, now, message)
+        own = ownership.own(message.status, robot, connection.publisher)
+        return Statuses(now, messages.seconds(message.header.stamp), tuple(own))
+
+    raw = [] if journal in topics else [active, ownership.TOPIC]
+    found, lost = _messages(path, [journal, decision, *raw], read)
+    if lost:
+        raise RecordingError(f"{path}: {lost[0]}: it can't be replayed")
+    for topic, now, content in found:
+        if topic == journal:
+            _add(path, recording, content)
+        elif topic == decision:
+            recording.decisions.append((now, content))
+        elif topic == active:
+            recording.active += [(now, fact) for fact in content]
+        else:
+            recording.diagnostics.append(content)
     return recording
 
 
-def _add_journal(path: Path, recording: Recording, message: Any) -> None:
-    runs = [run for run in recording.runs if run.name == message.name]
-    if not runs:
-        runs = [Run(str(message.name), first=int(message.first))]
-        recording.runs += runs
-    run = runs[-1]
-    if message.parameters and not run.parameters:
+@dataclass(frozen=True)
+class _Part:
+    """What a message of the journal adds: entries from the number `first` on, as `read_entry` takes them."""
+
+    name: str
+    first: int
+    parameters: str
+    files: dict[str, str]
+    entries: list[tuple[float, str, tuple[str, ...]]]
+
+
+def _part(_connection: Connection, _now: float, message: Any) -> _Part:
+    return _Part(
+        str(message.name),
+        int(message.first),
+        str(message.parameters),
+        dict(zip(message.files, message.contents, strict=False)),
+        [(float(item.now), str(item.kind), tuple(map(str, item.values))) for item in message.entries],
+    )
+
+
+def _decision(_connection: Connection, now: float, message: Any) -> Decision:
+    return messages.decision(message, now)
+
+
+def _active(_connection: Connection, _now: float, message: Any) -> list[ActiveFact]:
+    return [ActiveFact(f.function, f.configuration, f.state) for f in message.functions]
+
+
+def _add(path: Path, recording: Recording, part: _Part) -> None:
+    """Add a part of the journal.
+
+    Raises:
+        RecordingError: an earlier part is missing, or this one makes no sense.
+    """
+    run = next((run for run in recording.runs if run.name == part.name), None)
+    if run is None:
+        run = Run(part.name, first=part.first)
+        recording.runs.append(run)
+    if part.parameters and not run.parameters:
         try:
-            parameters = parse_yaml(message.parameters)
+            parameters = parse_yaml(part.parameters)
         except YamlError as error:
             raise RecordingError(f"{path}: the reasoner's parameters are no YAML: {error}") from error
         run.parameters = parameters if isinstance(parameters, dict) else {}
-        run.files = dict(zip(message.files, message.contents, strict=False))
+        run.files = part.files
     held = run.first + len(run.entries)
-    if int(message.first) > held:
+    if part.first > held:
         raise RecordingError(f"{path}: a part of the reasoner's journal is missing: it can't be replayed")
-    fresh = message.entries[held - int(message.first) :]
-    run.entries += [read_entry(float(item.now), str(item.kind), tuple(map(str, item.values))) for item in fresh]
-
-
-@contextmanager
-def _open(path: Path) -> Iterator[Reader]:
-    """Open a bag; any error becomes a RecordingError."""
-    if not is_file(path):
-        raise RecordingError(f"{path}: no such bag")
     try:
-        with Reader(path) as reader:
-            yield reader
-    except _UNREADABLE as error:
-        hint = "; it was not closed: run `rosbag reindex`" if path.suffix == ".active" else ""
-        raise RecordingError(f"{path}: not a readable bag ({error}){hint}") from error
+        run.entries += [read_entry(*entry) for entry in part.entries[held - part.first :]]
+    except ValueError as error:
+        raise RecordingError(f"{path}: {error}: it can't be replayed") from error
 
 
-def _topic(path: Path, reader: Reader, name: str, namespace: str | None) -> str:
+def _contents(path: Path) -> tuple[frozenset[str], float]:
+    """Return the topics of a bag, and when it begins in s.
+
+    Raises:
+        RecordingError: it can't be read.
+    """
+    try:
+        with BagFile(path) as bag:
+            bag.scan()  # without an index, only its end tells
+    except BagError as error:
+        raise RecordingError(str(error)) from error
+    return frozenset(connection.topic for connection in bag.connections.values()), (bag.first or 0) * 1e-9
+
+
+def _topic(path: Path, topics: Collection[str], name: str, namespace: str | None) -> str:
     """Return the topic of that name in the namespace, or in the only namespace; empty if there is none."""
     if namespace is not None:
         return f"/{namespace.strip('/')}/{name}".replace("//", "/")
-    found = sorted({c.topic for c in reader.connections if c.topic == f"/{name}" or c.topic.endswith(f"/{name}")})
+    found = sorted(topic for topic in topics if topic.endswith(f"/{name}"))
     if len(found) > 1:
         spaces = ", ".join(topic.removesuffix(name) for topic in found)
         raise RecordingError(f"{path}: holds several reasoners: choose one with --namespace: {spaces}")
     return found[0] if found else ""
 
 
-def _messages(path: Path, reader: Reader, topics: Collection[str]) -> Iterator[tuple[Connection, float, Any]]:
-    """Yield connection, time of recording and message, in the order of recording."""
-    connections = [connection for connection in reader.connections if connection.topic in topics]
-    if not connections:
-        return
-    store = typestore(connections)
-    for connection, nanoseconds, data in reader.messages(connections=connections):
-        try:
-            message = store.deserialize_ros1(data, connection.msgtype)
-        except (SerdeError, ValueError, struct.error, AssertionError) as error:
-            raise RecordingError(f"{path}: a message on {connection.topic} does not fit its definition") from error
-        yield connection, nanoseconds * 1e-9, message
+def _messages(
+    path: Path, topics: Collection[str], read: Callable[[Connection, float, Any], Any]
+) -> tuple[list[tuple[str, float, Any]], tuple[str, ...]]:
+    """Return topic, time of recording and content of each message, in the order of recording, and what is lost.
+
+    Args:
+        path: of the bag.
+        topics: those that are read.
+        read: returns the content of a message, given its connection, its time of recording in s and itself.
+    """
+    found: list[tuple[str, float, Any]] = []
+
+    def take(connection: Connection, stamp: int, message: Any) -> None:
+        found.append((connection.topic, stamp * 1e-9, read(connection, stamp * 1e-9, message)))
+
+    with BagFile(path) as bag:
+        lost = decode(bag, lambda connection: connection.topic in topics, take)
+        for problem in bag.problems:
+            _log.warning("%s: %s", path, problem)
+    return sorted(found, key=itemgetter(1)), lost
