@@ -1,0 +1,107 @@
+"""SWRL rules, read from triples: what they conclude from what."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.knowledge.triples import Graph, local_name
+
+_IMP, _VARIABLE = v.SWRL + "Imp", v.SWRL + "Variable"
+_BODY, _HEAD, _ARGUMENTS = v.SWRL + "body", v.SWRL + "head", v.SWRL + "arguments"
+_PREDICATES = tuple(v.SWRL + name for name in ("propertyPredicate", "classPredicate", "builtin"))
+_KINDS = {v.SWRL + "DifferentIndividualsAtom": "differentFrom", v.SWRL + "SameIndividualAtom": "sameAs"}
+
+
+@dataclass(frozen=True)
+class Atom:
+    """What holds, or is to be concluded.
+
+    Attributes:
+        predicate: IRI of a property, a class or a built-in.
+        arguments: `?name` for a variable, an IRI for an individual, `"text"` for a literal.
+    """
+
+    predicate: str
+    arguments: tuple[str, ...]
+
+    def __str__(self) -> str:
+        names = (text if text[:1] in ("?", '"') else local_name(text) for text in self.arguments)
+        return f"{local_name(self.predicate)}({', '.join(names)})"
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule: where all of the body holds, all of the head does.
+
+    Attributes:
+        node: IRI or blank node of the rule.
+        label: its name; empty without one.
+        comment: what it says in words; empty without one.
+    """
+
+    node: str
+    label: str
+    comment: str
+    body: tuple[Atom, ...]
+    head: tuple[Atom, ...]
+
+    def __str__(self) -> str:
+        return f"{', '.join(map(str, self.body))} -> {', '.join(map(str, self.head))}"
+
+
+def rules_of(graph: Graph) -> list[Rule]:
+    """Return the rules, in the order of their labels."""
+    variables = graph.instances(_VARIABLE)
+    found = [
+        Rule(
+            node,
+            _text(graph, node, v.RDFS_LABEL),
+            _text(graph, node, v.RDFS_COMMENT),
+            tuple(_atoms(graph, node, _BODY, variables)),
+            tuple(_atoms(graph, node, _HEAD, variables)),
+        )
+        for node in graph.instances(_IMP)
+    ]
+    return sorted(found, key=lambda rule: (rule.label, str(rule)))
+
+
+def _atoms(graph: Graph, rule: str, side: str, variables: set[str]) -> Iterator[Atom]:
+    for start in sorted(graph.objects_of(rule, side)):
+        for cell in _cells(graph, start):
+            for node in graph.objects_of(cell, v.RDF_FIRST):
+                yield Atom(_predicate(graph, node), tuple(_arguments(graph, node, variables)))
+
+
+def _predicate(graph: Graph, atom: str) -> str:
+    named = [iri for predicate in _PREDICATES for iri in graph.objects_of(atom, predicate)]
+    kinds = [_KINDS[kind] for kind in graph.objects_of(atom, v.RDF_TYPE) if kind in _KINDS]
+    return (named or kinds or ["unknown"])[0]
+
+
+def _arguments(graph: Graph, atom: str, variables: set[str]) -> Iterator[str]:
+    for number in ("argument1", "argument2"):
+        yield from _values(graph, atom, v.SWRL + number, variables)
+    for start in graph.objects_of(atom, _ARGUMENTS):
+        for cell in _cells(graph, start):
+            yield from _values(graph, cell, v.RDF_FIRST, variables)
+
+
+def _values(graph: Graph, node: str, predicate: str, variables: set[str]) -> Iterator[str]:
+    yield from (f'"{text}"' for text in graph.literals_of(node, predicate))
+    for iri in graph.objects_of(node, predicate):
+        yield f"?{local_name(iri)}" if iri in variables else iri
+
+
+def _cells(graph: Graph, start: str) -> Iterator[str]:
+    """Yield the cells of a list, each once."""
+    seen: set[str] = set()
+    while start not in seen and graph.objects_of(start, v.RDF_FIRST) | set(graph.literals_of(start, v.RDF_FIRST)):
+        seen.add(start)
+        yield start
+        start = next(iter(graph.objects_of(start, v.RDF_REST)), "")
+
+
+def _text(graph: Graph, node: str, predicate: str) -> str:
+    return next(iter(graph.literals_of(node, predicate)), "")
