@@ -149,11 +149,33 @@ def test_adopted_goal_is_kept_until_the_new_server_has_it():
     assert keeper.to_send(0.0).goal_id.id == "a"
 
 
-def test_goal_at_work_that_is_not_pending_is_a_stray():
+@pytest.mark.parametrize("is_adopted", [True, False])
+def test_goal_at_work_that_was_replaced_is_a_stray(is_adopted):
     keeper = GoalKeeper()
+    keeper.server_changes(True)
+    (keeper.adopt if is_adopted else keeper.on_goal)(goal("old"))
     keeper.on_goal(goal("new"))
     keeper.on_status(status("old", GoalStatus.ACTIVE))
     assert keeper.strays == {"old"}
+
+
+def test_goal_at_work_that_was_cancelled_is_a_stray():
+    keeper = GoalKeeper()
+    keeper.server_changes(True)
+    keeper.on_goal(goal("old"))
+    keeper.on_cancel(GoalID(id="old"))
+    keeper.on_status(status("old", GoalStatus.ACTIVE))
+    assert keeper.strays == {"old"}
+
+
+def test_goal_of_which_the_server_heard_first_is_no_stray():
+    keeper = GoalKeeper()
+    keeper.server_changes(True)
+    keeper.on_status(status("new", GoalStatus.ACTIVE))
+    keeper.server_changes(False)
+    assert keeper.strays == frozenset()
+    keeper.on_goal(goal("new"))
+    assert keeper.strays == frozenset() and keeper.pending_id == "new" and keeper.is_at_work
 
 
 def test_goal_at_work_of_which_no_message_has_come_is_missed(keeper):

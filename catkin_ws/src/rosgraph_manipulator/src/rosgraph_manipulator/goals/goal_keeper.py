@@ -36,6 +36,7 @@ class GoalKeeper:
         self._repeats = 0  # how often the goal was repeated after a death, with nobody who is known to wait for it
         self._is_repeat = False  # whether sending it to the next server counts as such
         self._finished: OrderedDict[str, None] = OrderedDict()
+        self._replaced: OrderedDict[str, None] = OrderedDict()
         self._changing = False
         self._doubted = False  # the goal was known to an earlier keeper: the server has to confirm it
         self._listed: frozenset[str] = frozenset()
@@ -65,8 +66,11 @@ class GoalKeeper:
 
     @property
     def strays(self) -> frozenset[str]:
-        """Goals that the server works at although they were cancelled or replaced while it was being started."""
-        return self._listed - {self.pending_id}
+        """Goals that the server works at although they were cancelled or replaced while it was being started.
+
+        A goal that is not known yet is none: the server may have heard of it earlier.
+        """
+        return self._listed & (self._finished.keys() | self._replaced.keys()) - {self.pending_id}
 
     @property
     def missed(self) -> frozenset[str]:
@@ -143,6 +147,8 @@ class GoalKeeper:
             return
         if client or not goal.goal_id.id or goal.goal_id.id != self.pending_id:
             self._client, self._repeats, self._is_repeat = client, 0, False
+        if self.pending_id and self.pending_id != goal.goal_id.id:
+            _remember(self._replaced, self.pending_id)
         self._goal, self._doubted, self._cancelled = copy.deepcopy(goal), False, None
 
     def on_status(self, status: Any) -> None:
@@ -208,6 +214,11 @@ class GoalKeeper:
     def _finish(self, goal_id: str) -> None:
         if goal_id == self.pending_id:
             self._goal = None
-        self._finished[goal_id] = None
-        if len(self._finished) > REMEMBERED:
-            self._finished.popitem(last=False)
+        _remember(self._finished, goal_id)
+
+
+def _remember(ids: OrderedDict[str, None], goal_id: str) -> None:
+    """Add an id; the oldest ones are forgotten."""
+    ids[goal_id] = None
+    if len(ids) > REMEMBERED:
+        ids.popitem(last=False)
