@@ -10,6 +10,7 @@ from pathlib import Path
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
+from helpers.waiting import DEADLINE_S
 
 SCRIPT = Path(__file__).parent / "monitor_node.py"
 NODE = "import rospy, sys; rospy.init_node(sys.argv[1]); rospy.spin()"
@@ -101,7 +102,7 @@ class GraphTest(unittest.TestCase):
         """Start a node, by default as the model has it, in place of the one of that name."""
         if name in cls.nodes:
             cls.nodes[name].terminate()  # it unregisters: what it was remains nowhere
-            cls.nodes.pop(name).wait()
+            cls.nodes.pop(name).wait(DEADLINE_S)
         namespace, _, base = name.rpartition("/")
         cls.nodes[name] = subprocess.Popen(
             [sys.executable, str(SCRIPT), base, *(interfaces or cls.NODES.get(name, ()))],

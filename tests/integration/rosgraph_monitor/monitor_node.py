@@ -7,6 +7,7 @@ What it publishes changes with each message, or what ~mode says: "quiet" nothing
 """
 
 import itertools
+import signal
 
 import actionlib
 import roslib.message
@@ -69,6 +70,9 @@ def message(message_class, number):
 
 
 if __name__ == "__main__":
+    # Until it spins, the handler of rospy may wait for a lock that the main thread holds.
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     _, name, *arguments = rospy.myargv()
     node = Node(name, [argument for argument in arguments if "=" in argument])
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
     rospy.spin()

@@ -30,6 +30,10 @@ CONNECT_S = 10.0
 """Wall s until a scheduler must have answered."""
 
 
+START_S = 120.0
+"""Wall s until worker processes on this machine must have answered: it may be busy."""
+
+
 def drive_all(
     campaign: Campaign, runs: Sequence[Run], *, jobs: int, scheduler: str | None
 ) -> Iterator[tuple[Result, str | None]]:
@@ -89,17 +93,22 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Client]:
     settings = {
         "distributed.worker.multiprocessing-method": "spawn",  # PyBullet and threads do not survive a fork
         "distributed.worker.profile.enabled": False,  # nobody looks at it
+        "distributed.comm.timeouts.connect": f"{START_S}s",
     }
     with dask.config.set(settings), _interrupts_ignored():
-        cluster = LocalCluster(
-            n_workers=jobs,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        )
+        try:
+            cluster = LocalCluster(
+                n_workers=jobs,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                memory_limit=0,
+                silence_logs=logging.CRITICAL,
+            )
+        except (TimeoutError, RuntimeError) as error:
+            why = " ".join(str(error).split()) or type(error).__name__
+            raise CampaignError(f"the worker processes do not start ({why}): give the same command again") from error
     with cluster, Client(cluster, set_as_default=False) as client:
         yield client
 

@@ -36,7 +36,7 @@ def refusing(*kinds: type[Exception]) -> Iterator[None]:
     try:
         yield
     except refused as error:
-        said = str(error)
+        said = str(error) or type(error).__name__
         if isinstance(error, OSError) and error.filename:
             said = f"{error.filename}: {error.strerror}"
         click.echo(f"metacontrol: {' '.join(said.split())}", err=True)
