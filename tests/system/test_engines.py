@@ -82,7 +82,7 @@ def test_both_engines_tell_the_same_story_over_seeds(tmp_path):
     commands that are missed takes 0.8 / 4.8 * 17 / 7.1 = 40 % of m away. A second of standing still under commands adds
     0.125, or 2 %; one more stop adds a second of driving at most, 0.37 or 5 %. The bound, relative to ROS, allows for
     20 % less energy there than in lockstep, which is half of the commands missed, and for 33 % more, which is 6 more
-    stops. Chance is far below: the engines differ by 1.0 +- 1.0 % on an idle machine (docs/engines.md).
+    stops. Chance is far below: the engines differ by 1.0 +- 1.0 % on an idle machine (docs/decisions/0015).
     """
     write_campaign(tmp_path)
     compared = ["metacontrol", "compare", "ros", "lockstep"]

@@ -15,7 +15,7 @@ from metacontrol_experiments.campaign.matrix import (
     parse_campaign,
     seed_of,
 )
-from mros1_reasoner.io.parameters import setting_names
+from mros1_reasoner.loop.settings import setting_names
 
 FILES = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_experiments/campaigns"
 VARIANTS = [f"f{f}_v{v}_r{r}" for f in (1, 2, 3) for v in (1, 2, 3) for r in (1, 2, 3)]

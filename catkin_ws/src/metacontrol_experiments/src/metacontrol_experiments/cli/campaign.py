@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from mros1_reasoner.io.parameters import setting_names
+from mros1_reasoner.loop.settings import setting_names
 from node_kit.io.input_files import InputFileError, read_text, read_yaml
 from node_kit.plugins import find
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn

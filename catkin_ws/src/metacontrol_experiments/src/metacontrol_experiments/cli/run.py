@@ -13,7 +13,7 @@ from metacontrol_bags.bag import BagError, read_record
 from metacontrol_bags.decision import DECIDED
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S, MetricsError, summarise
 from metacontrol_bags.timeline import Timeline
-from mros1_reasoner.io.parameters import setting_names
+from mros1_reasoner.loop.settings import setting_names
 from node_kit.yaml_text import YamlError, parse_yaml
 
 from metacontrol_experiments.cli.figure import draw_figure

@@ -1,1 +1,1 @@
-"""The commands `explain` and `replay`, one module each."""
+"""The commands `explain`, `replay` and `vocabulary`, one module each."""

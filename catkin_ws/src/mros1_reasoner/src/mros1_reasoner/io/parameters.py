@@ -26,11 +26,6 @@ _NFR = "nfr_"
 _NAMED_OTHERWISE = ("desired", "start_grace", "utility")  # settings whose parameter needs more than its default's type
 
 
-def setting_names() -> list[str]:
-    """Return the names of the parameters that say how the loop behaves: any model goes with any of them."""
-    return [item.name for item in fields(Settings) if item.name != "desired"]
-
-
 @dataclass(frozen=True)
 class Parameters:
     """The private parameters of the node reasoner; the package's README tells what they mean.

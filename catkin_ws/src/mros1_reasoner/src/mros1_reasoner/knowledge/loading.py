@@ -7,9 +7,12 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.triples import Triple, iri_of, literal_of, local_name
+from mros1_reasoner.knowledge.rules import rules_of
+from mros1_reasoner.knowledge.triples import Graph, Triple, iri_of, local_name, term_of
 
 _log = logging.getLogger(__name__)
+
+_A_RULE = f"<{v.SWRL}Imp>"
 
 
 def renamed(triples: Iterable[Triple], number: int) -> list[Triple]:
@@ -35,6 +38,15 @@ def without_concluding_rules(triples: list[Triple], where: str) -> list[Triple]:
 
     A warning names them and the file `where` they are.
     """
+    if not any(value == _A_RULE for _, _, value in triples):
+        return triples  # as in most models, some of which are large
+    concluding = [
+        (rule, statuses)
+        for rule in rules_of(Graph(triples))
+        if (statuses := {atom.predicate for atom in rule.head} & set(v.DERIVED_STATUSES))
+    ]
+    if not concluding:
+        return triples
     by_subject: dict[str, list[Triple]] = defaultdict(list)
     for triple in triples:
         by_subject[triple[0]].append(triple)
@@ -49,24 +61,9 @@ def without_concluding_rules(triples: list[Triple], where: str) -> list[Triple]:
                     waiting.append(value)
         return nodes
 
-    dropped: set[str] = set()
-    labels = []
-    for rule in [s for s, p, o in triples if iri_of(p) == v.RDF_TYPE and iri_of(o) == v.SWRL + "Imp"]:
-        heads = [o for _, p, o in by_subject[rule] if iri_of(p) == v.SWRL + "head"]
-        concluded = {
-            iri_of(o)
-            for head in heads
-            for node in reach(head)
-            for _, p, o in by_subject[node]
-            if iri_of(p) == v.SWRL + "propertyPredicate"
-        }
-        statuses = concluded & set(v.DERIVED_STATUSES)
-        if statuses:
-            dropped |= reach(rule)
-            label = next((literal_of(o) for _, p, o in by_subject[rule] if iri_of(p) == v.RDFS_LABEL), None)
-            labels.append(label[0] if label else f"a rule for {local_name(sorted(statuses)[0])}")
-    if labels:
-        _log.warning("%s: its own rules are set aside, the generic ones hold: %s", where, ", ".join(sorted(labels)))
+    dropped = {node for rule, _ in concluding for node in reach(term_of(rule.node))}
+    labels = [rule.label or f"a rule for {local_name(min(statuses))}" for rule, statuses in concluding]
+    _log.warning("%s: its own rules are set aside, the generic ones hold: %s", where, ", ".join(sorted(labels)))
     return [triple for triple in triples if triple[0] not in dropped]
 
 

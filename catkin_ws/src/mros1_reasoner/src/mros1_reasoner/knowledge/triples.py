@@ -136,6 +136,11 @@ def iri_of(term: str) -> str:
     return term[1:-1] if term.startswith("<") else term
 
 
+def term_of(iri: str) -> str:
+    """Return the term of an IRI or of a blank node's label."""
+    return iri if iri.startswith("_:") else f"<{iri}>"
+
+
 def literal_of(term: str) -> tuple[str, str] | None:
     """Return value and datatype (empty for plain ones) of a literal, or None for another term."""
     match = _LITERAL.match(term)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 _MOST_DOUBLINGS = 30  # of a wait; a float holds more, but no robot waits as long
@@ -98,3 +98,8 @@ class Settings:
 
     def _doubled(self, wait: float, times: int) -> float:
         return float(min(wait * 2 ** min(times, _MOST_DOUBLINGS), self.backoff_limit))
+
+
+def setting_names() -> list[str]:
+    """Return the names of the parameters that say how the loop behaves: any model goes with any of them."""
+    return [item.name for item in fields(Settings) if item.name != "desired"]

@@ -118,7 +118,7 @@ def plan(
     kept: list[_Judged] = []
     wanted = next((c for c in candidates if c.design.name == situation.desired), None)
     fresh = [c for c in deployable if c.design.name not in situation.tried or c.design.name == situation.current]
-    if fit and wanted in fit:
+    if wanted in fit:
         best = wanted
         reason = f"{best.design.name} is the desired configuration, and keeps every limit"
     elif fit:
