@@ -1,5 +1,6 @@
 """Statements of OWL and SWRL as N-Triples."""
 
+import re
 from itertools import count
 
 from mros1_reasoner.knowledge import vocabulary as v
@@ -8,6 +9,9 @@ APP = "http://example.org/app#"
 OWL = "http://www.w3.org/2002/07/owl#"
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 RDFS = "http://www.w3.org/2000/01/rdf-schema#"
+
+BUILT_INS = ("greaterThan", "lessThan", "greaterThanOrEqual", "lessThanOrEqual", "equal", "multiply")
+DATA_PROPERTIES = ("hasValue", "status", "cause", "realisability", "qa_sign", "updatable", "weight")
 
 _numbers = count()
 
@@ -78,6 +82,68 @@ def rule(body, head):
         first, statements = listed(nodes, v.SWRL + "AtomList")
         lines += [statements, assertion(node, v.SWRL + name, first)]
     return "".join([typed(node, v.SWRL + "Imp"), *lines])
+
+
+def swrl(text, label=""):
+    """Return a rule such as `solvesO(?fg, ?o), fg_status(?fg, 'IN_ERROR_NFR') -> o_status(?o, 'IN_ERROR_NFR')`.
+
+    A name is of TOMASys, of SWRL's built-ins, or with a prefix: `app:near`, `mros:requiredBy`. Text stands in quotes;
+    true and false are booleans, numbers decimals.
+    """
+    node, lines = _blank(), []
+    for name, part in zip(("body", "head"), text.split("->"), strict=True):
+        nodes = []
+        for predicate, arguments in re.findall(r"([\w:]+)\(([^)]*)\)", part):
+            atom, terms = _blank(), [term.strip() for term in arguments.split(",")]
+            nodes.append(atom)
+            lines += _atom(atom, predicate, terms)
+        first, statements = listed(nodes, v.SWRL + "AtomList")
+        lines += [statements, assertion(node, v.SWRL + name, first)]
+    lines += [assertion(node, v.RDFS_LABEL, label, v.XSD + "string")] if label else []
+    return "".join([typed(node, v.SWRL + "Imp"), *lines])
+
+
+def _atom(node, predicate, terms):
+    """Yield the statements of an atom."""
+    is_value = terms[-1][0] != "?" and _value(terms[-1]) is not None
+    if predicate in BUILT_INS:
+        yield typed(node, v.SWRL + "BuiltinAtom")
+        yield assertion(node, v.SWRL + "builtin", v.SWRLB + predicate)
+        cells = [_blank() for _ in terms]
+        yield assertion(node, v.SWRL + "arguments", cells[0])
+        for cell, term, rest in zip(cells, terms, [*cells[1:], RDF + "nil"], strict=True):
+            yield typed(cell, RDF + "List") + _argument(cell, RDF + "first", term) + assertion(cell, RDF + "rest", rest)
+        return
+    if len(terms) == 1:
+        yield typed(node, v.SWRL + "ClassAtom") + assertion(node, v.SWRL + "classPredicate", _iri(predicate))
+    else:
+        is_data = is_value or predicate.endswith(DATA_PROPERTIES)
+        yield typed(node, v.SWRL + ("DatavaluedPropertyAtom" if is_data else "IndividualPropertyAtom"))
+        yield assertion(node, v.SWRL + "propertyPredicate", _iri(predicate))
+    for number, term in enumerate(terms, 1):
+        yield _argument(node, f"{v.SWRL}argument{number}", term)
+
+
+def _argument(node, predicate, term):
+    if term[0] == "?":
+        iri = f"urn:swrl:var#{term[1:]}"
+        return typed(iri, v.SWRL + "Variable") + assertion(node, predicate, iri)
+    value = _value(term)
+    return assertion(node, predicate, *value) if value else assertion(node, predicate, _iri(term))
+
+
+def _value(term):
+    """Return text and datatype of a value; None: it is an individual."""
+    if term[0] == "'":
+        return term.strip("'"), v.XSD + "string"
+    if term in ("true", "false"):
+        return term, v.XSD + "boolean"
+    return (term, v.XSD + "decimal") if re.fullmatch(r"-?[\d.]+", term) else None
+
+
+def _iri(name):
+    prefix, _, local = name.rpartition(":")
+    return {"": v.TOMASYS, "app": APP, "mros": v.MROS}[prefix] + local
 
 
 def _term(name):

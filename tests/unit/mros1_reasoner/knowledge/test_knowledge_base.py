@@ -1,4 +1,3 @@
-import logging
 import socket
 
 import pytest
@@ -6,8 +5,6 @@ from mros1_reasoner.io.ontology_files import read_knowledge_base, save_knowledge
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Direction, Facts
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
-from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.loop.settings import Settings
 from reasoner_helpers import HEAD, OBJECTIVE, application, value
 
 RULE = """
@@ -82,37 +79,12 @@ def test_required_by_of_the_models_own_namespace_counts(load, pellet):
     assert knowledge_base.analyse(facts, pellet).unrealisable == {"scan_slow": ("sonar",)}
 
 
-@pytest.mark.parametrize(("head", "body"), [("o_status", "Objective"), ("fg_status", "FunctionGrounding")])
-def test_rules_that_conclude_a_status_are_set_aside_in_one_line(load, pellet, caplog, head, body):
-    extra = RULE.format(label="own_rule", body=body, head=head, value="INTERNAL_ERROR")
-    extra += RULE.format(label="own_rule_2", body=body, head=head, value="IN_ERROR_NFR")
-    with caplog.at_level(logging.WARNING):
-        knowledge_base = load(application(extra=extra))
-    lines = [record.getMessage() for record in caplog.records if "set aside" in record.getMessage()]
-    assert len(lines) == 1
-    assert "own_rule, own_rule_2" in lines[0]
-    pellet.load(knowledge_base.ontology)
-    facts = Facts((OBJECTIVE,), {"o_move": "scan_slow"}, components={"laser": "FALSE"})
-    assert knowledge_base.analyse(facts, pellet).objectives["o_move"].status == v.IN_ERROR_COMPONENT
-
-
 def test_other_rules_of_a_model_stay(load, pellet):
     extra = RULE.format(label="eager", body="Objective", head="o_cause", value="UPDATABLE")
     knowledge_base = load(application(extra=extra))
     pellet.load(knowledge_base.ontology)
     result = knowledge_base.analyse(Facts((OBJECTIVE,)), pellet)
     assert result.objectives["o_move"].causes == {v.UPDATABLE}
-
-
-def test_error_that_a_rule_of_the_model_concludes_calls_for_a_change(load, pellet):
-    extra = RULE.format(label="strict", body="Objective", head="o_cause", value="IN_ERROR_NFR")
-    knowledge_base = load(application(extra=extra))
-    pellet.load(knowledge_base.ontology)
-    core = Mape(knowledge_base, pellet, [OBJECTIVE], Settings())
-    core.observe_active(0.0, "f_move", "scan_slow", "STABLE")
-    (decision,) = core.step(0.0)
-    assert decision.trigger == "qa:o_move"
-    assert decision.to_configuration == "scan_slower"
 
 
 def test_asserted_statuses_are_lifted(load, pellet):

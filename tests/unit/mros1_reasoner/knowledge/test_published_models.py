@@ -123,12 +123,11 @@ def test_import_is_found_by_the_iri_of_a_file_of_another_name(write, caplog):
     assert "going on without" not in caplog.text
 
 
-def test_rules_of_the_model_are_set_aside_and_named(write, pellet, caplog):
+def test_error_that_a_rule_calls_by_its_former_name_counts(write, pellet, caplog):
     with caplog.at_level(logging.WARNING):
         knowledge_base = read_knowledge_base(write(navigation=navigation(extra=STATUS_RULE)))
-    assert "its own rules are set aside, the generic ones hold: qa_safety_rule" in caplog.text
-    assert "INTERNAL_ERROR" not in knowledge_base.ontology
-    assert causes(knowledge_base, pellet) == set()
+    assert "INTERNAL_ERROR" not in knowledge_base.ontology + caplog.text
+    assert causes(knowledge_base, pellet) == {v.IN_ERROR_COMPONENT}
 
 
 def test_quality_that_is_a_degree_takes_its_direction_from_the_setting(write, pellet):

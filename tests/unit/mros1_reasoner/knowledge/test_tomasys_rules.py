@@ -55,6 +55,13 @@ def test_published_labels_are_there():
         "S6b",
         "S10",
         "S11",
+        "F1",
+        "F2",
+        "F3",
+        "F4",
+        "realisable",
+        "updatable",
+        "updatable_too",
     ]
     assert sorted(labels) == sorted(expected)
 

@@ -1,5 +1,6 @@
 """Functions that require functions, on the model of a dual-arm mobile manipulator that builds a pyramid (D1)."""
 
+import owlready2
 import pytest
 from hierarchy_helpers import D1, PICK_AND_PLACE, model
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
@@ -9,6 +10,7 @@ from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.pellet.owlready import run_pellet
 
 
 class Robot:
@@ -358,6 +360,46 @@ def test_feasible_heeds_requirements(make):
     assert core.feasible() == {"F0": ("FD2", "FD1"), "F1": ("FD1.1",), "F2": ("FD2.1", "FD2.2")}
     core.observe_component(1.0, "rgbd", "FALSE")
     assert core.feasible() == {"F0": ("FD2",), "F1": (), "F2": ()}
+
+
+def test_saved_knowledge_base_says_what_can_be_deployed_as_feasible_does(make, tmp_path):
+    robot = make()
+    for component in ("rgbd", "left_arm"):
+        robot.core.observe_component(0.0, component, "FALSE")
+    robot.run()
+    assert robot.core.feasible() == {"F0": (), "F1": (), "F2": ()}
+    world = robot.knowledge_base.world(robot.core.known)  # without what the node concluded
+    run_pellet(world)
+    told = {name: world[f"http://example.org/app#{name}"].fd_realisability for name in D1}
+    assert all(values == [False] for values in told.values())
+
+
+def test_function_of_which_one_design_is_left_can_be_fulfilled(make):
+    designs = {**D1, "FD2.3": ("F2", 0.1, ())}
+    core = make(text=model(designs)).core
+    core.observe_component(0.0, "rgbd", "FALSE")
+    core.step(0.0)
+    assert core.feasible() == {"F0": ("FD2", "FD1"), "F1": ("FD1.1",), "F2": ("FD2.3",)}
+
+
+def test_function_that_no_design_solves_keeps_those_that_require_it_from_being_deployed(make):
+    text = model(extra='<t:Function rdf:about="#F9"/>').replace(
+        'requiresF rdf:resource="#F2"', 'requiresF rdf:resource="#F9"'
+    )
+    core = make(text=text).core
+    core.step(0.0)
+    assert core.feasible()["F0"] == ("FD2",)
+    assert set(core.analysis.unrealisable) == {"FD1", "FD1.1"}
+
+
+def test_saved_knowledge_base_holds_what_has_failed(make, tmp_path):
+    robot = make(broken=("FD2",))
+    robot.run()
+    save_knowledge_base(tmp_path / "saved.owl", robot.knowledge_base, robot.core.known, robot.core.analysis)
+    world = owlready2.World()
+    saved = world.get_ontology((tmp_path / "saved.owl").as_uri()).load()
+    design, objective = saved.search_one(iri="*#FD2"), saved.search_one(iri="*#o_build")
+    assert list(design.fd_error_log) == [objective]
 
 
 def test_saved_knowledge_base_asks_for_the_root_only(one_arm, tmp_path):

@@ -11,7 +11,8 @@ from node_kit.io.input_files import InputFileError, is_file, read_bytes, real_pa
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
-from mros1_reasoner.knowledge.loading import renamed, without_concluding_rules
+from mros1_reasoner.knowledge.loaded_rules import fit
+from mros1_reasoner.knowledge.loading import renamed
 from mros1_reasoner.knowledge.model import Analysis, Direction, Facts
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError, read_model
 from mros1_reasoner.knowledge.triples import Triple, TripleError, iri_of, local_name, parse_owl
@@ -45,8 +46,11 @@ def read_knowledge_base(
         raise KnowledgeBaseError("no application model is given: set model_file to an OWL file")
     own = own_ontologies()
     others = [path for path in vocabularies if real_path(path) not in {real_path(file) for file in own}]
-    triples, files = _read_ontologies(own, [*others, *models])
-    return KnowledgeBase(read_model(triples, ", ".join(str(path) for path in models), directions, utility), files)
+    generic, loaded, files = _read_ontologies(own, [*others, *models])
+    where = ", ".join(str(path) for path in models)
+    fitted, reads = fit(generic, loaded, where)
+    triples = list(dict.fromkeys([*generic, *fitted]))
+    return KnowledgeBase(read_model(triples, where, directions, utility, reads), files)
 
 
 def save_knowledge_base(
@@ -97,21 +101,20 @@ def read_triples(path: Path) -> list[Triple]:
         raise KnowledgeBaseError(f"{path}: {error}") from error
 
 
-def _read_ontologies(own: Sequence[Path], others: Sequence[Path]) -> tuple[list[Triple], tuple[Path, ...]]:
+def _read_ontologies(
+    own: Sequence[Path], others: Sequence[Path]
+) -> tuple[list[Triple], list[Triple], tuple[Path, ...]]:
     """Read files and, from the folders they lie in, what they import.
 
-    Args:
-        own: the vocabulary and its rules, which are taken as they are.
-        others: rules of theirs that conclude a derived status are set aside, with a warning that names them.
-
     Returns:
-        The triples, and the files that were read beside our own.
+        The triples of our own ontologies, those of the others, and the files that these were read from.
 
     Raises:
         KnowledgeBaseError: a file can't be read.
     """
     known = set()
-    triples: list[Triple] = []
+    generic: list[Triple] = []
+    loaded: list[Triple] = []
     queue = [(path, True) for path in own] + [(path, False) for path in others]
     read: dict[Path, Path] = {}
     imports: list[tuple[str, Path]] = []
@@ -134,9 +137,8 @@ def _read_ontologies(own: Sequence[Path], others: Sequence[Path]) -> tuple[list[
             iri_of(s).rstrip("#/") for s, p, o in content if iri_of(p) == v.RDF_TYPE and iri_of(o) == v.OWL_ONTOLOGY
         }
         imports += [(iri_of(o).rstrip("#/"), path) for _, p, o in content if iri_of(p) == v.OWL_IMPORTS]
-        content = renamed(content, len(read))
-        triples += content if ours else without_concluding_rules(content, str(path))
-    return list(dict.fromkeys(triples)), tuple(read.values())[len(own) :]
+        (generic if ours else loaded).extend(renamed(content, len(read)))
+    return generic, loaded, tuple(read.values())[len(own) :]
 
 
 def _find_import(iri: str, importer: Path) -> Path | None:

@@ -11,11 +11,11 @@ from pathlib import Path
 import owlready2
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.model import Analysis, Design, Facts, ObjectiveAnalysis
+from mros1_reasoner.knowledge.model import Analysis, Design, Facts, Objective, ObjectiveAnalysis
 from mros1_reasoner.knowledge.model_reader import ApplicationModel, KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Assertion, Reasoner
 from mros1_reasoner.knowledge.scale import Scale
-from mros1_reasoner.knowledge.triples import assertion_triple, local_name, write_ntriples
+from mros1_reasoner.knowledge.triples import assertion_triple, decimal_text, local_name, write_ntriples
 
 _DECIMAL = v.XSD + "decimal"
 _STRING = v.XSD + "string"
@@ -28,12 +28,16 @@ class KnowledgeBase:
         functions: names of all functions.
         designs: every design by name, with its expected levels.
         components: names of all components.
-        own_nodes: components that are nothing but nodes of designs; no rule is about them.
+        own_nodes: components that are nothing but nodes of designs; no generic rule is about them.
+        unread: components whose status no rule reads.
+        levels_read: quality attributes whose observed levels rules of the models read.
+        reads_error_log: whether rules of the models read which designs have failed.
         qualities: how levels compare, of every quality attribute by name.
         objectives: those that the models hold already, but for those that a grounding requires.
         component_statuses: statuses that the models assert.
         files: all that was loaded, imports included, but for the package's own vocabulary.
-        ontology: vocabulary, rules and models as N-Triples, without what comes as facts.
+        ontology: vocabulary, rules and models as N-Triples, without what comes as facts, and without rules that can
+            conclude nothing in these models.
     """
 
     def __init__(self, model: ApplicationModel, files: Sequence[Path] = ()) -> None:
@@ -45,12 +49,25 @@ class KnowledgeBase:
         self.designs = model.designs
         self.components = frozenset(model.component_iris)
         self.own_nodes = model.own_nodes
+        self.unread = frozenset() if model.reads.properties & {v.C_STATUS, v.DEPLOYED_BY} else model.own_nodes
+        self.levels_read = frozenset(
+            name
+            for name, iri in model.quality_iris.items()
+            if model.reads.every_quality or iri in model.reads.qualities
+        )
+        self.reads_error_log = v.FD_ERROR_LOG in model.reads.properties
+        self._labels = model.reads.labels
         self.qualities = model.qualities
         self.objectives = model.objectives
         self.component_statuses = model.component_statuses
         self.files = tuple(files)
         self.ontology = model.ontology
         self._scales: dict[str, Scale] = {}
+
+    def rules_for(self, status: str) -> str:
+        """Return how to call the rules of the models that conclude a status."""
+        names = self._labels.get(status, ())
+        return f"rule {' or '.join(names)} of the model" if names else "a rule of the model"
 
     def scale(self, quality: str) -> Scale:
         """Return how levels of a quality are compared: by all that are expected of designs."""
@@ -69,8 +86,12 @@ class KnowledgeBase:
         iri = self._model.grounding_iris.get((objective, design))
         return local_name(iri) if iri else f"fg_{objective}_{design}"
 
-    def assertions(self, facts: Facts) -> list[Assertion]:
+    def assertions(self, facts: Facts, *, all_components: bool = False) -> list[Assertion]:
         """Return the facts as assertions for a reasoner.
+
+        Args:
+            facts: what is known.
+            all_components: assert also of components that they work, though no rule reads that.
 
         Raises:
             KnowledgeBaseError: a fact names something that the models do not hold.
@@ -83,10 +104,11 @@ class KnowledgeBase:
                 Assertion(iri, v.TYPE_F, self._find(self._model.function_iris, objective.function, "Function"))
             )
             for quality, limit in sorted(objective.limits.items()):
-                value = _nfr_iri(objective.name, quality)
+                value = self._nfr_iri(objective, quality)
                 result += [Assertion(iri, v.HAS_NFR, value), *self._level(value, quality, limit)]
             design = facts.groundings.get(objective.name)
             if design is None:
+                result.append(Assertion(iri, v.O_STATUS, v.UNGROUNDED, _STRING))
                 continue
             grounding = self._grounding_iri(objective.name, design)
             result.append(Assertion(grounding, v.RDF_TYPE, v.FUNCTION_GROUNDING))
@@ -104,9 +126,16 @@ class KnowledgeBase:
                 if owner == objective.name:
                     value = f"{grounding}_{quality}"
                     result += [Assertion(grounding, v.HAS_QA_VALUE, value), *self._level(value, quality, level)]
+        reads = self._model.reads
+        # It has one status: where a rule may find a failure, that it works is no more than what is assumed.
+        says_working = reads.working or (all_components and not reads.failures)
         for component, status in sorted(facts.components.items()):
             iri = self._find(self._model.component_iris, component, "Component")
-            result.append(Assertion(iri, v.C_STATUS, status, _STRING))
+            if says_working or status != v.WORKS:
+                result.append(Assertion(iri, v.C_STATUS, status, _STRING))
+        for design, objective_name in sorted(facts.tried):
+            iri = self._find(self._model.design_iris, design, "FunctionDesign")
+            result.append(Assertion(iri, v.FD_ERROR_LOG, self._objective_iri(objective_name)))
         return result
 
     def analyse(self, facts: Facts, reasoner: Reasoner) -> Analysis:
@@ -121,28 +150,34 @@ class KnowledgeBase:
             KnowledgeBaseError: a fact names something that the models do not hold.
         """
         found: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
-        for assertion in reasoner.infer(self.assertions(facts), v.CONCLUSIONS):
+        for assertion in reasoner.infer(self.assertions(facts), self._model.asked):
             found[assertion.property][assertion.subject].add(assertion.value)
         names = {self._objective_iri(objective.name): objective.name for objective in facts.objectives}
         objectives = {}
         for objective in facts.objectives:
             iri = self._objective_iri(objective.name)
-            causes = frozenset(found[v.O_CAUSE][iri])
+            causes = frozenset(found[v.O_CAUSE][iri] - {v.UNGROUNDED, v.IN_PROGRESS})
             violated_values = found[v.O_VIOLATED_NFR][iri]
             design = facts.groundings.get(objective.name)
             grounding_causes = found[v.FG_CAUSE][self._grounding_iri(objective.name, design)] if design else set()
             objectives[objective.name] = ObjectiveAnalysis(
                 status=_worst(causes) or (v.IN_PROGRESS if design else v.UNGROUNDED),
                 causes=causes,
-                violated=tuple(q for q in sorted(objective.limits) if _nfr_iri(objective.name, q) in violated_values),
+                violated=tuple(q for q in sorted(objective.limits) if self._nfr_iri(objective, q) in violated_values),
+                grounding_causes=frozenset(grounding_causes),
                 grounding_status=_worst(grounding_causes),
             )
+        functions = set(self._model.function_iris.values())
         return Analysis(
             objectives=objectives,
             unrealisable={
-                self._design_name[design]: tuple(sorted(self._component_name.get(c, local_name(c)) for c in components))
-                for design, components in found[v.FD_UNREALISABLE_BY].items()
-                if design in self._design_name
+                self._design_name[design]: tuple(
+                    sorted(
+                        self._component_name.get(c, local_name(c))
+                        for c in found[v.FD_UNREALISABLE_BY][design] - functions
+                    )
+                )
+                for design in self._unrealisable(found)
             },
             tried=frozenset(
                 (self._design_name[design], names[objective])
@@ -152,21 +187,27 @@ class KnowledgeBase:
             ),
         )
 
+    def _unrealisable(self, found: Mapping[str, Mapping[str, set[str]]]) -> list[str]:
+        """Return the IRIs of the designs that can't be deployed."""
+        by_rule = (design for design, values in found[v.FD_REALISABILITY].items() if "false" in values)
+        designs = dict.fromkeys([*found[v.FD_UNREALISABLE_BY], *by_rule])
+        return [design for design in designs if design in self._design_name]
+
     def world(self, facts: Facts | None = None, analysis: Analysis | None = None) -> owlready2.World:
         """Return an owlready2 World of its own with the ontology, the facts, and the statuses of an analysis."""
-        triples = [assertion_triple(assertion) for assertion in self.assertions(facts or Facts())]
+        triples = [assertion_triple(assertion) for assertion in self.assertions(facts or Facts(), all_components=True)]
         if facts and analysis:
             triples += [assertion_triple(assertion) for assertion in self._statuses(facts, analysis)]
         for design in self.designs.values():
             for quality, level in sorted(design.expected.items()):
-                iri = f"{v.RUNTIME}expected_{design.name}_{quality}"
                 design_iri = self._model.design_iris[design.name]
+                iri = self._model.level_iris[design_iri, quality, level]
                 triples.append(assertion_triple(Assertion(design_iri, v.HAS_QA_ESTIMATION, iri)))
                 triples += [assertion_triple(assertion) for assertion in self._level(iri, quality, level)]
                 if group := design.group(quality):
                     triples.append(assertion_triple(Assertion(iri, v.QA_CORRECTION_GROUP, group, _STRING)))
         world = owlready2.World()
-        text = self.ontology + write_ntriples(triples)
+        text = self.ontology + self._model.idle + write_ntriples(triples)
         world.get_ontology(v.RUNTIME).load(fileobj=io.BytesIO(text.encode()), format="ntriples")
         return world
 
@@ -192,23 +233,29 @@ class KnowledgeBase:
     def _grounding_iri(self, objective: str, design: str) -> str:
         return self._model.grounding_iris.get((objective, design)) or f"{v.RUNTIME}fg_{objective}_{design}"
 
+    def _nfr_iri(self, objective: Objective, quality: str) -> str:
+        """Return the IRI of a limit: that of the model, unless somebody has set another limit."""
+        iri, limit = self._objective_iri(objective.name), objective.limits[quality]
+        return self._model.level_iris.get((iri, quality, limit)) or f"{v.RUNTIME}nfr_{objective.name}_{quality}"
+
     def _level(self, iri: str, quality: str, level: float) -> list[Assertion]:
         if not math.isfinite(level):
             raise KnowledgeBaseError(f"level of {quality} is {level}: it must be a finite number")
         return [
             Assertion(iri, v.RDF_TYPE, v.QA_VALUE),
             Assertion(iri, v.IS_QA_TYPE, self._find(self._model.quality_iris, quality, "QualityAttributeType")),
-            Assertion(iri, v.HAS_VALUE, f"{level:.12f}".rstrip("0").rstrip("."), _DECIMAL),
+            Assertion(iri, v.HAS_VALUE, decimal_text(level), _DECIMAL),
         ]
 
     def _statuses(self, facts: Facts, analysis: Analysis) -> Iterable[Assertion]:
         for name, objective in analysis.objectives.items():
-            yield Assertion(self._objective_iri(name), v.O_STATUS, objective.status, _STRING)
+            for status in sorted(objective.causes) or [objective.status]:
+                yield Assertion(self._objective_iri(name), v.O_STATUS, status, _STRING)
             updatable = "true" if v.UPDATABLE in objective.causes else "false"
             yield Assertion(self._objective_iri(name), v.O_UPDATABLE, updatable, v.XSD + "boolean")
-            if objective.grounding_status:
+            for status in sorted(objective.grounding_causes):
                 grounding = self._grounding_iri(name, facts.groundings[name])
-                yield Assertion(grounding, v.FG_STATUS, objective.grounding_status, _STRING)
+                yield Assertion(grounding, v.FG_STATUS, status, _STRING)
         for name, iri in self._model.design_iris.items():
             realisable = "false" if name in analysis.unrealisable else "true"
             yield Assertion(iri, v.FD_REALISABILITY, realisable, v.XSD + "boolean")
@@ -217,7 +264,3 @@ class KnowledgeBase:
 def _worst(causes: Iterable[str]) -> str:
     found = set(causes)
     return next((cause for cause in (v.IN_ERROR_COMPONENT, v.IN_ERROR_NFR, v.UPDATABLE) if cause in found), "")
-
-
-def _nfr_iri(objective: str, quality: str) -> str:
-    return f"{v.RUNTIME}nfr_{objective}_{quality}"

@@ -141,6 +141,7 @@ class Facts:
         broken: objectives whose grounding is known to be out of order as a whole.
         failed: objectives whose task has failed, though nothing else is known to be wrong.
         requires: objectives that the grounding of an objective requires, by the objective's name.
+        tried: designs that did not keep a limit of an objective, or failed for it, as (design, objective).
     """
 
     objectives: tuple[Objective, ...] = ()
@@ -150,6 +151,7 @@ class Facts:
     broken: frozenset[str] = frozenset()
     failed: frozenset[str] = frozenset()
     requires: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    tried: frozenset[tuple[str, str]] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -157,15 +159,17 @@ class ObjectiveAnalysis:
     """The result of reasoning about an objective.
 
     Attributes:
-        status: its o_status, derived from the causes.
-        causes: every o_cause that holds.
+        status: the worst o_status that holds.
+        causes: every o_status that a rule concludes.
         violated: quality attributes whose limit is not kept, sorted.
-        grounding_status: fg_status of its grounding, empty without an error.
+        grounding_causes: every fg_cause of its grounding that holds.
+        grounding_status: the worst of them, empty without an error.
     """
 
     status: str
     causes: frozenset[str] = frozenset()
     violated: tuple[str, ...] = ()
+    grounding_causes: frozenset[str] = frozenset()
     grounding_status: str = ""
 
     @property
@@ -180,7 +184,8 @@ class Analysis:
 
     Attributes:
         objectives: by name.
-        unrealisable: components that keep a design from being deployed, by the design's name; others can be.
+        unrealisable: designs that can't be deployed, each with the components that keep it from that; none of these
+            where a rule of the model says so, or where only a function that it requires can't be fulfilled.
         tried: designs that do not keep their objective's limits while deployed, as (design, objective).
     """
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.knowledge.live_rules import without_idle
+from mros1_reasoner.knowledge.loaded_rules import Reads
 from mros1_reasoner.knowledge.model import Design, Direction, Objective, Quality
 from mros1_reasoner.knowledge.reasoner import Assertion
 from mros1_reasoner.knowledge.triples import (
     Graph,
     Triple,
     assertion_triple,
+    decimal_text,
     iri_of,
     literal_of,
     local_name,
@@ -24,7 +28,12 @@ _log = logging.getLogger(__name__)
 
 _DECIMAL = v.XSD + "decimal"
 # Statements that hold at one moment only. They come as facts of each analysis, so the ontology goes without them.
-_MOMENTARY = (*v.DERIVED_STATUSES, v.O_UPDATABLE, v.C_STATUS, v.FD_ERROR_LOG, v.SOLVES_O, v.TYPE_FD, v.REQUIRES_O)
+_MOMENTARY = (
+    *(v.O_STATUS, v.FG_STATUS, v.O_CAUSE, v.FG_CAUSE, v.O_VIOLATED_NFR, v.O_UPDATABLE),
+    *(v.FD_REALISABILITY, v.FD_UNREALISABLE_BY, v.F_FULFILLABLE, v.FD_NONE_SO_FAR, v.FD_ERROR_LOG),
+    *(v.C_STATUS, v.SOLVES_O, v.TYPE_FD, v.REQUIRES_O),
+)
+_ORDER = (v.F_FIRST_DESIGN, v.F_LAST_DESIGN, v.FD_NEXT)  # it is stated anew, of all designs that are read
 _COMPARISONS = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES)
 _OF_NODES = (v.RDF_TYPE, v.RDFS_LABEL, v.C_STATUS, v.DEPLOYED_BY)
 _LEVELS = (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION, v.HAS_VALUE, v.IS_QA_TYPE)
@@ -51,7 +60,11 @@ class ApplicationModel:
         objectives: those that the ontologies hold already, but for those that a grounding requires.
         component_statuses: statuses that the ontologies assert.
         own_nodes: components that are nothing but nodes of designs.
-        ontology: vocabulary, rules and models as N-Triples, without what comes as facts.
+        level_iris: IRI of the QAvalue of a required or expected level, by IRI of its owner, quality and level.
+        reads: what rules and axioms of the models are about.
+        asked: the properties that an analysis asks for.
+        ontology: vocabulary, rules and models as N-Triples, without what comes as facts, and without idle rules.
+        idle: the idle rules, as N-Triples.
     """
 
     where: str
@@ -66,11 +79,19 @@ class ApplicationModel:
     objectives: tuple[Objective, ...]
     component_statuses: Mapping[str, str]
     own_nodes: frozenset[str]
+    level_iris: Mapping[tuple[str, str, float], str]
+    reads: Reads
+    asked: tuple[str, ...]
     ontology: str
+    idle: str
 
 
 def read_model(
-    triples: Sequence[Triple], where: str, directions: Mapping[str, Direction] | None = None, utility: str = ""
+    triples: Sequence[Triple],
+    where: str,
+    directions: Mapping[str, Direction] | None = None,
+    utility: str = "",
+    reads: Reads | None = None,
 ) -> ApplicationModel:
     """Return what the triples of ontologies say.
 
@@ -80,16 +101,21 @@ def read_model(
         directions: of quality attributes by name; else as the models say (`qa_sign`, `qa_comparison_operator`). Where
             they do not, lower is better, and higher for the utility.
         utility: the quality attribute that is the utility of designs; empty for none.
+        reads: what rules and axioms of the models are about.
 
     Raises:
         KnowledgeBaseError: an individual can't be used.
     """
-    return _Reader(Graph(triples), where, directions or {}, utility).read()
+    return _Reader(Graph(triples), where, directions or {}, utility, reads or Reads()).read()
 
 
 class _Reader:
-    def __init__(self, graph: Graph, where: str, directions: Mapping[str, Direction], utility: str) -> None:
+    def __init__(
+        self, graph: Graph, where: str, directions: Mapping[str, Direction], utility: str, reads: Reads
+    ) -> None:
         self._graph, self._where, self._directions, self._utility = graph, where, directions, utility
+        self._reads = reads
+        self._level_iris: dict[tuple[str, str, float], str] = {}
         self._functions = self._names((v.FUNCTION,), graph.objects(v.SOLVES_F) | graph.objects(v.TYPE_F))
         if not self._functions:
             raise KnowledgeBaseError(f"{where}: no individual of class Function: give the model that has them")
@@ -119,6 +145,9 @@ class _Reader:
         asked_for = [name for name, iri in sorted(self._objectives.items()) if iri not in required]
         objectives = tuple(self._objective(name) for name in asked_for)
         self._check_requirements(designs)
+        by_rule = (v.FD_REALISABILITY,) if v.FD_REALISABILITY in self._reads.properties else ()
+        asked = (*v.CONCLUSIONS, *by_rule)
+        ontology, idle = without_idle(self._static(designs), v.FACTS, asked)
         return ApplicationModel(
             where=self._where,
             function_iris=self._functions,
@@ -136,7 +165,11 @@ class _Reader:
                 if value in v.COMPONENT_STATUSES
             },
             own_nodes=self._own_nodes(),
-            ontology=self._static(),
+            level_iris=self._level_iris,
+            reads=self._reads,
+            asked=asked,
+            ontology=write_ntriples(ontology),
+            idle=write_ntriples(idle),
         )
 
     def _groundings(self) -> dict[tuple[str, str], str]:
@@ -273,6 +306,7 @@ class _Reader:
                 _log.warning("%s has two levels of %s: %s is left out", local_name(owner), quality, local_name(value))
                 continue
             levels[quality] = numbers[0]
+            self._level_iris[owner, quality, numbers[0]] = value
         return levels
 
     def _check_requirements(self, designs: Mapping[str, Design]) -> None:
@@ -313,29 +347,49 @@ class _Reader:
         nodes -= {iri_of(term) for subject, _, value in others for term in (subject, value)}
         return frozenset(self._component_name[iri] for iri in nodes)
 
-    def _static(self) -> str:
-        values = self._graph.instances(v.QA_VALUE) | {
-            value
-            for predicate in (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION)
-            for value in self._graph.objects(predicate)
-        }
-        dropped = {*_MOMENTARY, *_LEVELS, *_COMPARISONS, v.DEPLOYED_BY}
+    def _static(self, designs: Mapping[str, Design]) -> list[Triple]:
+        """Return the ontology without what comes as facts, and without what no rule reads."""
+        reads = self._reads.properties
+        values = {value for name in (v.HAS_NFR, v.HAS_QA_VALUE) for value in self._graph.objects(name)}
+        dropped = {*_MOMENTARY, *_ORDER, *_COMPARISONS, v.DEPLOYED_BY} - (reads - {*_MOMENTARY, *_ORDER, v.QA_SIGN})
+        dropped |= {v.HAS_NFR, v.HAS_QA_VALUE}
+        if reads.isdisjoint(_LEVELS):
+            values |= self._graph.instances(v.QA_VALUE) | self._graph.objects(v.HAS_QA_ESTIMATION)
+            dropped |= set(_LEVELS)
+        else:
+            values -= set(self._level_iris.values())
 
         def stays(triple: Triple) -> bool:
-            subject, predicate, value = triple
-            name = iri_of(predicate)
-            if name in (v.B_STATUS, v.CC_AVAILABILITY):
-                return literal_of(value) not in (("true", v.XSD + "boolean"), ("1", v.XSD + "boolean"))
-            return name not in dropped and iri_of(subject) not in values
+            return iri_of(triple[1]) not in dropped and iri_of(triple[0]) not in values
 
-        triples = [triple for triple in self._graph.triples if stays(triple)]
+        triples = [_with_decimal(triple) for triple in self._graph.triples if stays(triple)]
         for name, quality in self._qualities.items():
             iri = self._quality_types[name]
             triples.append(assertion_triple(Assertion(iri, v.RDF_TYPE, v.QA_TYPE)))
             triples.append(assertion_triple(Assertion(iri, v.QA_SIGN, str(quality.direction.sign), _DECIMAL)))
             if quality.reaching_violates:
                 triples.append(assertion_triple(Assertion(iri, v.QA_REACHING_VIOLATES, "true", v.XSD + "boolean")))
-        return write_ntriples(triples)
+        triples += map(assertion_triple, self._order(designs))
+        return list(dict.fromkeys(triples))
+
+    def _order(self, designs: Mapping[str, Design]) -> Iterator[Assertion]:
+        """Yield an order of all designs of each function that a design requires, for the rules F1 to F4."""
+        for function in sorted({name for design in designs.values() for name in design.requires}):
+            iri = self._functions[function]
+            found = [self._designs[name] for name, design in designs.items() if design.function == function]
+            if not found:
+                yield Assertion(iri, v.F_FULFILLABLE, "false", v.XSD + "boolean")
+                continue
+            yield Assertion(iri, v.F_FIRST_DESIGN, found[0])
+            yield Assertion(iri, v.F_LAST_DESIGN, found[-1])
+            for design, following in itertools.pairwise(found):
+                yield Assertion(design, v.FD_NEXT, following)
+
+
+def _with_decimal(triple: Triple) -> Triple:
+    """Return a triple with a level as xsd:decimal, by which all levels can be compared."""
+    number = _number((literal_of(triple[2]) or ("",))[0]) if iri_of(triple[1]) == v.HAS_VALUE else math.nan
+    return (*triple[:2], f'"{decimal_text(number)}"^^<{_DECIMAL}>') if math.isfinite(number) else triple
 
 
 def _inverse(names: Mapping[str, str]) -> dict[str, str]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.triples import Graph, local_name
+from mros1_reasoner.knowledge.triples import Graph, Triple, iri_of, local_name
 
 _IMP, _VARIABLE = v.SWRL + "Imp", v.SWRL + "Variable"
 _BODY, _HEAD, _ARGUMENTS = v.SWRL + "body", v.SWRL + "head", v.SWRL + "arguments"
@@ -65,6 +66,25 @@ def rules_of(graph: Graph) -> list[Rule]:
         for node in graph.instances(_IMP)
     ]
     return sorted(found, key=lambda rule: (rule.label, str(rule)))
+
+
+def rule_nodes(triples: Iterable[Triple], rules: Collection[str]) -> set[str]:
+    """Return the terms of rules with those of their lists and atoms, which belong to nothing else."""
+    by_subject: dict[str, list[Triple]] = defaultdict(list)
+    for triple in triples:
+        by_subject[triple[0]].append(triple)
+    nodes, waiting = set(rules), list(rules)
+    while waiting:
+        for _, _, value in by_subject.get(waiting.pop(), ()):
+            if value in by_subject and value not in nodes and _is_part(by_subject[value]):
+                nodes.add(value)
+                waiting.append(value)
+    return nodes
+
+
+def _is_part(statements: Sequence[Triple]) -> bool:
+    predicates = {iri_of(predicate) for _, predicate, _ in statements}
+    return v.RDF_FIRST in predicates or any(predicate.startswith(v.SWRL) for predicate in predicates)
 
 
 def _atoms(graph: Graph, rule: str, side: str, variables: set[str]) -> Iterator[Atom]:

@@ -131,6 +131,11 @@ def assertion_triple(assertion: Assertion) -> Triple:
     return f"<{assertion.subject}>", f"<{assertion.property}>", value
 
 
+def decimal_text(number: float) -> str:
+    """Return a finite number as text of xsd:decimal, to 12 digits after the point."""
+    return f"{number:.12f}".rstrip("0").rstrip(".")
+
+
 def iri_of(term: str) -> str:
     """Return the IRI of a term; a blank node's label stays as it is."""
     return term[1:-1] if term.startswith("<") else term

@@ -6,6 +6,9 @@ TOMASYS = "http://metacontrol.org/tomasys#"
 MROS = "http://ros/mros#"
 RUNTIME = "http://metacontrol.org/runtime#"  # individuals that exist at run time only
 
+RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+RDFS = "http://www.w3.org/2000/01/rdf-schema#"
+OWL = "http://www.w3.org/2002/07/owl#"
 RDF_TYPE = "http://www.w3.org/1999/02/22-rdf-syntax-ns#type"
 RDF_FIRST = "http://www.w3.org/1999/02/22-rdf-syntax-ns#first"
 RDF_REST = "http://www.w3.org/1999/02/22-rdf-syntax-ns#rest"
@@ -13,14 +16,18 @@ RDFS_LABEL = "http://www.w3.org/2000/01/rdf-schema#label"
 RDFS_COMMENT = "http://www.w3.org/2000/01/rdf-schema#comment"
 RDFS_DOMAIN = "http://www.w3.org/2000/01/rdf-schema#domain"
 RDFS_RANGE = "http://www.w3.org/2000/01/rdf-schema#range"
+RDFS_SUB_PROPERTY_OF = "http://www.w3.org/2000/01/rdf-schema#subPropertyOf"
 OWL_ONTOLOGY = "http://www.w3.org/2002/07/owl#Ontology"
 OWL_IMPORTS = "http://www.w3.org/2002/07/owl#imports"
 OWL_CLASS = "http://www.w3.org/2002/07/owl#Class"
 OWL_OBJECT_PROPERTY = "http://www.w3.org/2002/07/owl#ObjectProperty"
 OWL_DATATYPE_PROPERTY = "http://www.w3.org/2002/07/owl#DatatypeProperty"
 OWL_FUNCTIONAL_PROPERTY = "http://www.w3.org/2002/07/owl#FunctionalProperty"
+OWL_EQUIVALENT_PROPERTY = "http://www.w3.org/2002/07/owl#equivalentProperty"
+OWL_INVERSE_OF = "http://www.w3.org/2002/07/owl#inverseOf"
 OWL_NAMED_INDIVIDUAL = "http://www.w3.org/2002/07/owl#NamedIndividual"
 SWRL = "http://www.w3.org/2003/11/swrl#"
+SWRLB = "http://www.w3.org/2003/11/swrlb#"
 XSD = "http://www.w3.org/2001/XMLSchema#"
 OWLREADY = "http://www.lesfleursdunormal.fr/static/_downloads/owlready_ontology.owl#"
 
@@ -70,26 +77,25 @@ O_CAUSE = TOMASYS + "o_cause"
 O_VIOLATED_NFR = TOMASYS + "o_violated_nfr"
 FG_CAUSE = TOMASYS + "fg_cause"
 FD_UNREALISABLE_BY = TOMASYS + "fd_unrealisable_by"
+F_FIRST_DESIGN = TOMASYS + "f_first_design"
+F_LAST_DESIGN = TOMASYS + "f_last_design"
+FD_NEXT = TOMASYS + "fd_next"
+FD_NONE_SO_FAR = TOMASYS + "fd_none_so_far"
+F_FULFILLABLE = TOMASYS + "f_fulfillable"
 
-# What rules conclude, and an analysis asks for.
-CONCLUSIONS = (
-    O_CAUSE,
-    O_VIOLATED_NFR,
-    FG_CAUSE,
-    FD_UNREALISABLE_BY,
-    FD_ERROR_LOG,
-    B_STATUS,
-    CC_AVAILABILITY,
-    CSPEC_AVAILABILITY,
+# What facts say, and what an analysis asks for.
+FACTS = (
+    *(TYPE_F, HAS_NFR, SOLVES_O, TYPE_FD, REQUIRES_O, HAS_QA_VALUE, IS_QA_TYPE, HAS_VALUE),
+    *(O_STATUS, O_CAUSE, FG_CAUSE, C_STATUS, FD_ERROR_LOG),
 )
-# Functional statuses that are derived after reasoning; a rule that concludes them is set aside.
-DERIVED_STATUSES = (O_STATUS, FG_STATUS, FD_REALISABILITY)
+CONCLUSIONS = (O_CAUSE, O_VIOLATED_NFR, FG_CAUSE, FD_UNREALISABLE_BY, FD_ERROR_LOG)
 
 UNGROUNDED = "UNGROUNDED"
 IN_PROGRESS = "IN_PROGRESS"
 IN_ERROR_NFR = "IN_ERROR_NFR"
 IN_ERROR_COMPONENT = "IN_ERROR_COMPONENT"
 UPDATABLE = "UPDATABLE"
+UNREACHABLE = "UNREACHABLE"
 
 # The ontology's values of c_status. "Component status" on /diagnostics has the same; a test compares them. They are not
 # taken from metacontrol_msgs, whose import would double the 0.17 s of CPU time that importing the OWL generator takes.

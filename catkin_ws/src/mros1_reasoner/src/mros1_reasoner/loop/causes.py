@@ -23,6 +23,9 @@ OPERATOR = "operator"
 RETRY = "retry:"
 """Beginning of the trigger of a cause that lies in a design which failed, and may be tried again."""
 
+RULE = "rule"
+"""Trigger of a cause that only a rule of the model knows."""
+
 _PARAMETER = "parameter:"
 
 
@@ -50,8 +53,9 @@ def errors(view: View, name: str, now: float) -> list[Cause]:
     if running.task_failure:
         stamp, why = running.task_failure
         found.append(Cause(stamp, f"task:{name}", f"the task failed{f': {why}' if why else ''}", "S9"))
-    elif result and v.IN_ERROR_NFR in result.causes and not result.violated and not _inherits(view, running):
-        found.append(Cause(now, f"qa:{name}", f"a rule of the model finds an error of quality in {name}"))
+    elif view.rule_counts(name, now):
+        words = f"{view.kb.rules_for(v.IN_ERROR_NFR)} finds an error of quality"
+        found.append(Cause(running.ruled_since or now, f"qa:{name}", words))
     return sorted(found, key=_by_time)
 
 
@@ -86,7 +90,7 @@ def chances(view: View, name: str, now: float) -> list[Cause]:
 
 
 def _has_no_rule(trigger: str) -> bool:
-    return trigger == OPERATOR or trigger.startswith(RETRY)
+    return trigger in (OPERATOR, RULE) or trigger.startswith(RETRY)
 
 
 def _nothing_runs(view: View, name: str, now: float) -> list[Cause]:
@@ -113,6 +117,9 @@ def _component_errors(view: View, name: str, now: float) -> list[Cause]:
     for node in running.failed_nodes:
         words = f"node {node} of {running.design} does not work"
         found.append(Cause(view.components[node].stamp, f"component:{node}", words, "S1a"))
+    if not found and view.rule_finds(name, v.IN_ERROR_COMPONENT):
+        words = f"{view.kb.rules_for(v.IN_ERROR_COMPONENT)} finds an error of a component"
+        return [Cause(now, f"component:{running.design}", words)]
     if running.is_broken or not (found or _inherits(view, running)):
         words = f"configuration {running.design} does not run"
         found.append(Cause(running.failed_stamp or now, f"component:{running.design}", words, "S1a"))

@@ -235,6 +235,11 @@ class Deliberation:
             self._state.note_in_vain(now, running.design, name, reason)
         elif running.design and self._keeps_not(name, now):
             self._state.note_in_vain(now, running.design, name, VIOLATED)
+        found = v.IN_ERROR_COMPONENT if self._state.rule_finds(name, v.IN_ERROR_COMPONENT) else ""
+        found = v.IN_ERROR_NFR if self._state.rule_counts(name, now) else found
+        if running.design and found:
+            reason = f"{self._state.kb.rules_for(found)} found it in error"
+            self._state.note_in_vain(now, running.design, name, reason)
         if running.is_broken and running.design:
             self._state.note_in_vain(now, running.design, name, running.ending or "did not run")
         restarts = [moment for moment in running.restarts if now - moment < self._state.settings.error_log_expiry]
@@ -247,8 +252,11 @@ class Deliberation:
         if any(objective == name for objective, _ in self._state.violations(now)):
             return True
         result = self._state.analysis.objectives.get(name)
-        is_tried = (self._state.running[name].design or "", name) in self._state.analysis.tried
-        return is_tried and not (result and result.violated)
+        if result is None or result.violated or self._state.rule_finds(name, v.IN_ERROR_NFR):
+            return False
+        key = self._state.running[name].design or "", name
+        is_known = key in self._state.facts.tried and v.IN_ERROR_NFR not in result.causes
+        return key in self._state.analysis.tried and not is_known
 
     def _causes(self, name: str, now: float) -> list[Cause]:
         """Return all causes for an adaptation of an objective itself: errors first, then chances."""

@@ -81,6 +81,11 @@ class Mape:
         return self._state.facts
 
     @property
+    def known(self) -> Facts:
+        """The facts of the last analysis, and which designs have failed of late."""
+        return replace(self._state.facts, tried=frozenset(self._state.error_log))
+
+    @property
     def analysis(self) -> Analysis:
         """The last analysis."""
         return self._state.analysis
@@ -257,7 +262,7 @@ class Mape:
         began = self._wall()
         analysis = self._kb.analyse(facts, self._reasoner)
         timing = Timing(now, self._stamp(now), self._wall() - began)
-        self._state.note_analysis(facts, analysis, seen)
+        self._state.note_analysis(now, facts, analysis, seen)
         return [] if self._state.paused else self._decide_all(timing)
 
     def due(self, now: float) -> float | None:

@@ -81,6 +81,7 @@ class Running:
         way: why a better design was chosen that waits for what it requires.
         returned_at: when a better design was taken again because the cause of a violation was gone.
         relapses: how often in a row a limit was violated again soon after that.
+        ruled_since: since when a rule of the model finds its quality in error; None: none does.
     """
 
     design: str | None = None
@@ -108,6 +109,7 @@ class Running:
     way: tuple[Cause, ...] = ()
     returned_at: float = -math.inf
     relapses: int = 0
+    ruled_since: float | None = None
 
     @property
     def is_broken(self) -> bool:
@@ -275,11 +277,12 @@ class View:
             groundings={name: running.design or "" for name, running in grounded.items()},
             levels=self.levels.present(now),
             components={
-                name: component.status for name, component in self.components.items() if name not in self.kb.own_nodes
+                name: component.status for name, component in self.components.items() if name not in self.kb.unread
             },
             broken=frozenset(name for name, running in grounded.items() if running.is_broken or running.failed_nodes),
             failed=frozenset(name for name, running in grounded.items() if running.task_failure),
             requires={name: self.required(running.design) for name, running in grounded.items()},
+            tried=frozenset(self.error_log) if self.kb.reads_error_log else frozenset(),
         )
 
     def what_counts(self, facts: Facts, now: float) -> tuple[object, ...]:
@@ -293,11 +296,12 @@ class View:
         waits = tuple((self.is_busy(r, now), now < r.not_before, now < r.retry_from) for r in self.running.values())
         improves = tuple((tuple(r.chances), now < r.calm_until) for r in self.running.values() if r.chances)
         return (
-            replace(facts, levels={}),
+            replace(facts, levels={key: level for key, level in facts.levels.items() if key[1] in self.kb.levels_read}),
             frozenset(facts.levels),
             passed,
             self.violations(now),
             frozenset(name for name in self.running if self.is_relieved(name, now)),
+            frozenset(name for name in self.running if self.rule_counts(name, now)),
             tuple(running.failed_nodes for running in self.running.values()),
             tuple((n, d.parameters, d.is_left) for r in self.running.values() for n, d in r.drifts.items()),
             waits,
@@ -314,6 +318,29 @@ class View:
     def violations(self, now: float) -> frozenset[tuple[str, str]]:
         """Return the objectives and qualities whose limits are violated so that it counts."""
         return self.levels.violations(now, self._calm_until())
+
+    def rule_finds(self, name: str, status: str) -> bool:
+        """Return whether a rule of the model finds what runs for an objective in error, and nothing else does.
+
+        Args:
+            name: of the objective.
+            status: the error, of quality or of a component.
+        """
+        running, result = self.running[name], self.analysis.objectives.get(name)
+        below = [self.analysis.objectives.get(required) for required in self.required(running.design)]
+        if result is None or any(found and status in found.causes for found in below):
+            return False
+        if status == v.IN_ERROR_NFR:
+            is_known = bool(result.violated) or name in self.facts.failed
+            return status in result.grounding_causes or (status in result.causes and not is_known)
+        is_known = name in self.facts.broken or bool(self.analysis.unrealisable.get(running.design or ""))
+        return status in result.causes and not is_known
+
+    def rule_counts(self, name: str, now: float) -> bool:
+        """Return whether a rule of the model finds the quality of what runs in error, for long enough to count."""
+        running = self.running[name]
+        since = running.ruled_since
+        return since is not None and now >= max(since + self.settings.violation_window, running.calm_until)
 
     def is_relieved(self, name: str, now: float) -> bool:
         """Return whether the causes for which designs of an objective were left have been gone for long enough."""
@@ -352,6 +379,8 @@ class View:
             times += [running.not_before, running.retry_from]
             if running.chances:
                 times.append(running.calm_until)
+            if running.ruled_since is not None:
+                times += [running.ruled_since + self.settings.violation_window, running.calm_until]
             if running.busy_since is not None:
                 times.append(running.busy_since + self.settings.busy_limit)
             times += [drift.seen + self.settings.level_timeout for drift in running.drifts.values()]

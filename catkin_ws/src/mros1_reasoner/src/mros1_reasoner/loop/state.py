@@ -12,9 +12,9 @@ from metacontrol_msgs.msg import FunctionGrounding
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
-from mros1_reasoner.knowledge.model import Analysis, Design, Facts, Objective
+from mros1_reasoner.knowledge.model import Analysis, Design, Facts, Objective, ObjectiveAnalysis
 from mros1_reasoner.loop import drifts, lasting
-from mros1_reasoner.loop.causes import OPERATOR, RETRY, drifted_nodes, is_chance, is_drift, is_relief
+from mros1_reasoner.loop.causes import OPERATOR, RETRY, RULE, drifted_nodes, is_chance, is_drift, is_relief
 from mros1_reasoner.loop.levels import Expectation, Judging, Levels
 from mros1_reasoner.loop.readable_state import BUSY, Component, Running, View
 from mros1_reasoner.loop.settings import Settings
@@ -183,7 +183,7 @@ class State(View):
                 self._failures.pop((running.design or "", name), None)
         self._run(name, way=() if self.wanted.get(name, design) == design else running.way)
         self._run(name, design=design, degraded=False, binding_error=False, task_failure=None, refusal=())
-        self._run(name, replaced=None, ending="")
+        self._run(name, replaced=None, ending="", ruled_since=None)
         self._run(name, deployed_at=now, failed_nodes=(), drifts={}, drifts_from=now + self.settings.restart_grace)
         if self.wanted.get(name) == design:
             del self.wanted[name]
@@ -299,9 +299,18 @@ class State(View):
             for other in self.kb.solving(function)
         )
 
-    def note_analysis(self, facts: Facts, analysis: Analysis, seen: tuple[object, ...]) -> None:
+    def note_analysis(self, now: float, facts: Facts, analysis: Analysis, seen: tuple[object, ...]) -> None:
         """Keep an analysis. A RECOVERED component is a chance for every objective once; then it counts as working."""
+        before = self.analysis.objectives
         self.has_analysed, self.facts, self.analysis, self.seen = True, facts, analysis, seen
+        for name, running in self.running.items():
+            since = running.ruled_since if running.ruled_since is not None else now
+            self._run(name, ruled_since=since if self.rule_finds(name, v.IN_ERROR_NFR) else None)
+        if v.RECOVERED not in facts.components.values():  # else the chance is of the component
+            for name, result in analysis.objectives.items():
+                if v.UPDATABLE in result.causes and v.UPDATABLE not in before.get(name, ObjectiveAnalysis("")).causes:
+                    words = f"{self.kb.rules_for(v.UPDATABLE)} says that there may be a better design"
+                    self._run(name, chances={**self.running[name].chances, RULE: (now, words)})
         for name, component in self.components.items():
             if component.status != v.RECOVERED or facts.components.get(name) != v.RECOVERED:
                 continue

@@ -48,7 +48,7 @@ class Situation:
 
     Attributes:
         qualities: how the levels of each quality attribute compare.
-        unrealisable: components that are missing, by the name of the design that requires them.
+        unrealisable: designs that can't be deployed, each with the components that are missing, if any are.
         unfulfilled: functions that a design requires and that no design can be deployed for, by the design's name.
         strained: the same for functions that are provided, but not as they should be.
         tried: why a design failed a short while ago, by its name.
@@ -82,7 +82,7 @@ class Situation:
 
     def can_deploy(self, design: str) -> bool:
         """Return whether a design can be deployed, whatever its levels are."""
-        return not self.unrealisable.get(design) and not self.unfulfilled.get(design)
+        return design not in self.unrealisable and not self.unfulfilled.get(design)
 
 
 def plan(
@@ -169,20 +169,11 @@ def feasible_designs(
 
     Args:
         functions: the functions.
-        designs: those that can be realised; without those whose required functions none of them fulfils.
+        designs: those that can be realised.
         utility: of a design.
     """
-    found: dict[str, tuple[str, ...]] = {}
-
-    def fulfilling(function: str) -> tuple[str, ...]:
-        if function not in found:
-            fit = [d for d in designs if d.function == function and all(fulfilling(name) for name in d.requires)]
-            found[function] = tuple(d.name for d in sorted(fit, key=lambda d: (-utility(d), d.name)))
-        return found[function]
-
-    for function in functions:
-        fulfilling(function)
-    return found
+    ranked = sorted(designs, key=lambda design: (-utility(design), design.name))
+    return {function: tuple(d.name for d in ranked if d.function == function) for function in functions}
 
 
 def difference(first: Design, second: Design) -> float:
@@ -251,6 +242,8 @@ def _judge(objective: Objective, design: Design, situation: Situation, utility: 
     ):
         if parts.get(name):
             reasons.append(f"requires {', '.join(sorted(parts[name]))}, {words}")
+    if name in situation.unrealisable and not reasons:
+        reasons.append("a rule of the model says that it can't be deployed")
     violation += len(situation.strained.get(name, ()))
     if name in situation.tried:
         reasons.append(situation.tried[name])

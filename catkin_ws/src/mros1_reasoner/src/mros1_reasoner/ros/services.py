@@ -105,7 +105,7 @@ class Services:
             if not path.parent.is_dir():
                 raise MapeError(f"{path.parent}: no such folder: make it first")
             core = self._node.core
-            save_knowledge_base(path, self._node.knowledge_base, core.facts, core.analysis)
+            save_knowledge_base(path, self._node.knowledge_base, core.known, core.analysis)
             saved.append(str(path))
 
         ok, message = self._answer(work)
