@@ -1,17 +1,20 @@
 """One analysis (R2), from facts to statuses, beside owlready2's own call of Pellet on the same knowledge base.
 
 `analysis_N` is of a model like D2's, in which many designs require the same components; in `analysis_N_unlike` no two
-do. `analysis_memory` is of the process that asks and of Pellet's together, at the largest model.
+do. `analysis_rules_N` is by the rule engine, on the model in which they are unlike. `analysis_memory` is of the process
+that asks and of Pellet's together, at the largest model.
 """
 
 from __future__ import annotations
 
 import statistics
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import psutil
+from mros1_reasoner.forward.engine import RuleEngine
 from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.knowledge.model import Facts, Objective
 from mros1_reasoner.pellet.owlready import run_pellet
@@ -34,22 +37,31 @@ def run() -> list[dict[str, Any]]:
     entries = [_measure(f"analysis_{count}", count, samples)[0] for count, samples in SIZES.items()]
     count, samples = max(SIZES.items())
     unlike, memory = _measure(f"analysis_{count}_unlike", count, samples, unlike=True)
-    return [*entries, unlike, entry("analysis_memory", memory, "MB", 1, LIMIT, MEMORY_LIMIT_MB)]
+    rules, _ = _measure(f"analysis_rules_{count}", count, samples, unlike=True, engine=RuleEngine)
+    return [*entries, unlike, rules, entry("analysis_memory", memory, "MB", 1, LIMIT, MEMORY_LIMIT_MB)]
 
 
-def _measure(name: str, count: int, samples: int, *, unlike: bool = False) -> tuple[dict[str, Any], float]:
+def _measure(
+    name: str,
+    count: int,
+    samples: int,
+    *,
+    unlike: bool = False,
+    engine: Callable[[], PelletReasoner | RuleEngine] = PelletReasoner,
+) -> tuple[dict[str, Any], float]:
     """Return the entry, and the memory in MB of this process and of the reasoner's."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.owl"
         path.write_text(_model(count, unlike=unlike))
         knowledge_base = read_knowledge_base([path])
-    reasoner = PelletReasoner()
+    reasoner = engine()
     try:
         reasoner.load(knowledge_base.ontology)
         for i in range(WARM_UP):
             knowledge_base.analyse(_facts(i), reasoner)
         ours = [seconds(lambda i=i: knowledge_base.analyse(_facts(i), reasoner)) for i in range(samples)]
-        memory = sum(psutil.Process(pid).memory_info().rss for pid in (None, reasoner.pid)) / 1e6
+        family = [psutil.Process(), *psutil.Process().children()]
+        memory = sum(process.memory_info().rss for process in family) / 1e6
     finally:
         reasoner.close()
     peers = []

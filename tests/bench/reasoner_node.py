@@ -22,12 +22,16 @@ _IDLE_S = 20.0
 
 
 def run() -> list[dict[str, Any]]:
-    """Return `reasoner_ready` in s, `reasoner_idle_cpu` in % of a core and `reasoner_memory` in MB."""
+    """Return `reasoner_ready` in s, `reasoner_idle_cpu` in % of a core, `reasoner_memory` in MB; by Pellet, by rules."""
+    return [*_measure("reasoner"), *_measure("reasoner_rules", "_reasoner:=rules")]
+
+
+def _measure(name: str, *arguments: str) -> list[dict[str, Any]]:
     ready = []
     with stand() as system:
         for number in range(_STARTS):
             began = time.monotonic()
-            process = system.start(sys.executable, str(_NODE), *_ARGUMENTS)
+            process = system.start(sys.executable, str(_NODE), *_ARGUMENTS, *arguments)
             wait_until(lambda: system.ask_master("lookupService", _LAST) is not None)
             ready.append(time.monotonic() - began)
             if number == _STARTS - 1:
@@ -35,9 +39,9 @@ def run() -> list[dict[str, Any]]:
             end(process)
             wait_until(lambda: system.ask_master("lookupService", _LAST) is None)
     return [
-        entry("reasoner_ready", statistics.median(ready), "s", _STARTS),
-        entry("reasoner_idle_cpu", idle, "% of a core", 1),
-        entry("reasoner_memory", memory, "MB", 1),
+        entry(f"{name}_ready", statistics.median(ready), "s", _STARTS),
+        entry(f"{name}_idle_cpu", idle, "% of a core", 1),
+        entry(f"{name}_memory", memory, "MB", 1),
     ]
 
 

@@ -94,21 +94,48 @@ GENERAL = {
     "the same by a rule": lambda: [rule([(BESIDE, "?x", "?y")], [(OWL + "sameAs", "?x", "?y")])],
 }
 
+# What rules alone can say: nobody is concluded to be the same as another one.
+FUNCTIONAL = [v.SOLVES_F, *(v.TOMASYS + name for name in ("roleDef", "binding_component", "binding_role"))]
+ONE_VALUE_AT_MOST = ["nothing", "each its own", "all of the first"]
+OF_RULES = {
+    "characteristics": ["Symmetric", "Transitive"],
+    "about individuals": [
+        "different",
+        "all different",
+        "undeclared property",
+        "text in a language",
+        "a rule that names somebody",
+    ],
+    "general": ["peers", "own peers", "rivals"],
+}
+OF_ALL = {
+    "characteristics": CHARACTERISTICS,
+    "about individuals": sorted(ABOUT_INDIVIDUALS),
+    "general": sorted(GENERAL),
+}
+
 individuals = st.sampled_from(ALL)
 
 
 @st.composite
-def ontologies(draw):
-    """Draw an application's ontology: individuals, and for each relation who has whom."""
+def ontologies(draw, of_rules=False):
+    """Draw an application's ontology: individuals, and for each relation who has whom.
+
+    Args:
+        draw: given by hypothesis.
+        of_rules: whether to draw only what rules can say.
+    """
+    kinds = OF_RULES if of_rules else OF_ALL
     lines = [typed(f"{APP}Part", OWL + "Class"), typed(WEIGHT, OWL + "DatatypeProperty")]
     lines += [typed(name, OWL + "ObjectProperty") for name in OWN[:4]]
     for kind, names in INDIVIDUALS.items():
         lines += [typed(name, TOMASYS_CLASSES[kind]) for name in names]
     for predicate, subjects, values in RELATIONS:
-        related = PATTERNS[draw(st.sampled_from(sorted(PATTERNS)))]
+        is_single = of_rules and predicate in FUNCTIONAL
+        related = PATTERNS[draw(st.sampled_from(ONE_VALUE_AT_MOST if is_single else sorted(PATTERNS)))]
         every_pair = product(enumerate(INDIVIDUALS[subjects]), enumerate(INDIVIDUALS[values]))
         pairs = {(s, o) for (i, s), (j, o) in every_pair if related(i, j)}
-        if draw(st.integers(0, 3)) == 0:
+        if not is_single and draw(st.integers(0, 3)) == 0:
             pairs ^= {(draw(st.sampled_from(INDIVIDUALS[subjects])), draw(st.sampled_from(INDIVIDUALS[values])))}
         lines += [assertion(s, predicate, o) for s, o in sorted(pairs)]
     for name in draw(st.lists(st.sampled_from(INDIVIDUALS["K"]), unique=True)):
@@ -117,12 +144,12 @@ def ontologies(draw):
         lines.append(assertion(name, WEIGHT, weight, v.XSD + "decimal"))
     lines += [typed(name, v.OWL_NAMED_INDIVIDUAL) for name in draw(st.lists(individuals, max_size=3))]
     for predicate in (NEAR, BESIDE):
-        for characteristic in draw(st.lists(st.sampled_from(CHARACTERISTICS), max_size=1)):
+        for characteristic in draw(st.lists(st.sampled_from(kinds["characteristics"]), max_size=1)):
             lines.append(typed(predicate, f"{OWL}{characteristic}Property"))
     lines += [assertion(draw(individuals), v.RDFS_LABEL, "label", v.XSD + "string")]
-    for name in draw(st.lists(st.sampled_from(sorted(ABOUT_INDIVIDUALS)), max_size=2, unique=True)):
+    for name in draw(st.lists(st.sampled_from(kinds["about individuals"]), max_size=2, unique=True)):
         lines += ABOUT_INDIVIDUALS[name](*draw(st.lists(individuals, min_size=2, max_size=2, unique=True)))
-    for name in draw(st.lists(st.sampled_from(sorted(GENERAL)), max_size=2, unique=True)):
+    for name in draw(st.lists(st.sampled_from(kinds["general"]), max_size=2, unique=True)):
         lines += GENERAL[name]()
     return "".join(lines)
 

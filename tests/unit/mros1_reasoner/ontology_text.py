@@ -10,7 +10,17 @@ OWL = "http://www.w3.org/2002/07/owl#"
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 RDFS = "http://www.w3.org/2000/01/rdf-schema#"
 
-BUILT_INS = ("greaterThan", "lessThan", "greaterThanOrEqual", "lessThanOrEqual", "equal", "multiply")
+BUILT_INS = (
+    "add",
+    "subtract",
+    "stringConcat",
+    "greaterThan",
+    "lessThan",
+    "greaterThanOrEqual",
+    "lessThanOrEqual",
+    "equal",
+    "multiply",
+)
 DATA_PROPERTIES = ("hasValue", "status", "cause", "realisability", "qa_sign", "updatable", "weight")
 
 _numbers = count()

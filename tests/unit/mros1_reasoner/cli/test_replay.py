@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from mros1_reasoner.cli import replay as replay_module
 from mros1_reasoner.cli.explain import explain
 from mros1_reasoner.cli.replay import replay
+from mros1_reasoner.forward.engine import RuleEngine
 from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.io.reasoner_bag import read_decisions, read_recording
 from mros1_reasoner.loop.entries import ActiveFact, ComponentFact, LevelFact, Lock, Unlock
@@ -38,7 +39,9 @@ class KeptWarm:
 
 @pytest.fixture(autouse=True)
 def warm(pellet, monkeypatch):
-    monkeypatch.setattr(replay_module, "make_reasoner", lambda: KeptWarm(pellet))
+    monkeypatch.setattr(
+        replay_module, "make_reasoner", lambda name: RuleEngine() if name == "rules" else KeptWarm(pellet)
+    )
 
 
 def levels(quality, level, since, until):

@@ -1,12 +1,14 @@
 """What a model's own rules conclude is what plain Pellet concludes of them, over models with rules of every kind.
 
 Plain Pellet gets the whole model, rules as they are written, beside the vocabulary and rules in their published form:
-with functional statuses, which rules conclude. The node gets what the knowledge base makes of the model.
+with functional statuses, which rules conclude. The node gets what the knowledge base makes of the model. The
+rule engine infers there what Pellet does.
 """
 
 import random
 
 import pytest
+from mros1_reasoner.forward.engine import RuleEngine
 from mros1_reasoner.io.ontology_files import own_ontologies, read_knowledge_base, read_triples, save_knowledge_base
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.loading import renamed
@@ -223,6 +225,9 @@ def judged(tmp_path, drawn, pellet, plain, published):
         expected = None
     pellet.load(knowledge_base.ontology)
     analysis = knowledge_base.analyse(facts, pellet)
+    engine = RuleEngine()
+    engine.load(knowledge_base.ontology)
+    assert knowledge_base.analyse(facts, engine) == analysis
     node = {
         "o": {name: set(found.causes) for name, found in analysis.objectives.items() if found.causes},
         "unrealisable": set(analysis.unrealisable),

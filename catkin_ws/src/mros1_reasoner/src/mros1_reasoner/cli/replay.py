@@ -21,12 +21,12 @@ from rich.table import Table
 from mros1_reasoner.cli.output import ERRORS, NAMESPACE, console, refuse
 from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.io.reasoner_bag import read_recording
+from mros1_reasoner.io.reasoners import make_reasoner
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.reasoner import Reasoner
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.entries import ActiveFact
 from mros1_reasoner.loop.mape import Mape
-from mros1_reasoner.pellet.process import make_reasoner
 from mros1_reasoner.replay.comparison import Pair, pairs
 from mros1_reasoner.replay.recording import Recording, RecordingError, Run
 from mros1_reasoner.replay.rerun import Replayed, rerun, usual_duration, without_journal
@@ -64,7 +64,8 @@ def replay(
     try:
         changes = {f"nfr_{name}": value for name, value in _assignments(nfrs)} | dict(_assignments(settings))
         recording = read_recording(bag, namespace)
-        reasoner = make_reasoner()
+        first = recording.runs[0].parameters if recording.runs else {}
+        reasoner = make_reasoner(Parameters({**first, **changes}).reasoner)
         found = [
             _replay_run(recording, run, changes, models, initial, duration, reasoner)
             for run in recording.runs or [Run("replay")]

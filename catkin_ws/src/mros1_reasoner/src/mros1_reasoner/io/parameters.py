@@ -13,6 +13,7 @@ from node_kit.parameters import ParameterError, ParameterTree, named_entries
 from ros_model.io.files import resolve
 
 from mros1_reasoner.io.ontology_files import read_knowledge_base
+from mros1_reasoner.io.reasoners import NAMES, PELLET
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Direction, Objective
 from mros1_reasoner.loop.estimate import MOST
@@ -73,6 +74,11 @@ class Parameters:
             for component, entry in named_entries(self._tree.mapping("components", "component -> {node: name}"))
             if isinstance(entry, dict) and entry.get("node")
         }
+
+    @property
+    def reasoner(self) -> str:
+        """Name of the reasoner."""
+        return self._tree.choice("reasoner", PELLET, NAMES)
 
     @property
     def task_actions(self) -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.triples import Graph, Triple, iri_of, local_name
@@ -22,10 +22,12 @@ class Atom:
     Attributes:
         predicate: IRI of a property, a class or a built-in.
         arguments: `?name` for a variable, an IRI for an individual, `"text"` for a literal.
+        datatypes: of each argument; empty for those that are no literal with a datatype.
     """
 
     predicate: str
     arguments: tuple[str, ...]
+    datatypes: tuple[str, ...] = field(default=(), compare=False)
 
     def __str__(self) -> str:
         names = (text if text[:1] in ("?", '"') else local_name(text) for text in self.arguments)
@@ -91,7 +93,8 @@ def _atoms(graph: Graph, rule: str, side: str, variables: set[str]) -> Iterator[
     for start in sorted(graph.objects_of(rule, side)):
         for cell in _cells(graph, start):
             for node in graph.objects_of(cell, v.RDF_FIRST):
-                yield Atom(_predicate(graph, node), tuple(_arguments(graph, node, variables)))
+                arguments = list(_arguments(graph, node, variables))
+                yield Atom(_predicate(graph, node), tuple(a for a, _ in arguments), tuple(d for _, d in arguments))
 
 
 def _predicate(graph: Graph, atom: str) -> str:
@@ -100,7 +103,8 @@ def _predicate(graph: Graph, atom: str) -> str:
     return (named or kinds or ["unknown"])[0]
 
 
-def _arguments(graph: Graph, atom: str, variables: set[str]) -> Iterator[str]:
+def _arguments(graph: Graph, atom: str, variables: set[str]) -> Iterator[tuple[str, str]]:
+    """Yield the arguments of an atom, each with its datatype."""
     for number in ("argument1", "argument2"):
         yield from _values(graph, atom, v.SWRL + number, variables)
     for start in graph.objects_of(atom, _ARGUMENTS):
@@ -108,10 +112,10 @@ def _arguments(graph: Graph, atom: str, variables: set[str]) -> Iterator[str]:
             yield from _values(graph, cell, v.RDF_FIRST, variables)
 
 
-def _values(graph: Graph, node: str, predicate: str, variables: set[str]) -> Iterator[str]:
-    yield from (f'"{text}"' for text in graph.literals_of(node, predicate))
+def _values(graph: Graph, node: str, predicate: str, variables: set[str]) -> Iterator[tuple[str, str]]:
+    yield from ((f'"{text}"', datatype) for text, datatype in graph.typed_literals_of(node, predicate))
     for iri in graph.objects_of(node, predicate):
-        yield f"?{local_name(iri)}" if iri in variables else iri
+        yield f"?{local_name(iri)}" if iri in variables else iri, ""
 
 
 def _cells(graph: Graph, start: str) -> Iterator[str]:

@@ -32,6 +32,7 @@ class Graph:
         self._objects: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         self._subjects: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
         self._literals: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
+        self._typed: dict[str, dict[str, list[tuple[str, str]]]] = defaultdict(lambda: defaultdict(list))
         for subject, predicate, value in triples:
             name, owner = iri_of(predicate), iri_of(subject)
             literal = literal_of(value)
@@ -40,6 +41,7 @@ class Graph:
                 self._subjects[name][iri_of(value)].add(owner)
             else:
                 self._literals[name][owner].append(literal[0])
+                self._typed[name][owner].append(literal)
 
     def instances(self, class_iri: str) -> set[str]:
         """Return the individuals of a class."""
@@ -72,6 +74,10 @@ class Graph:
     def literals_of(self, subject: str, predicate: str) -> list[str]:
         """Return the texts that a subject has by the property."""
         return self._literals[predicate].get(subject, [])
+
+    def typed_literals_of(self, subject: str, predicate: str) -> list[tuple[str, str]]:
+        """Return text and datatype of the literals that a subject has by the property."""
+        return self._typed[predicate].get(subject, [])
 
 
 def parse_owl(data: bytes, base: str) -> list[Triple]:

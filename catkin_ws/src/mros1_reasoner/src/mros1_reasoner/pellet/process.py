@@ -28,7 +28,7 @@ _Answer = TypeVar("_Answer")
 START_DEADLINE = 20.0  # s, wall: a JVM and its jars, on a loaded machine
 HEAP_MB = 256  # of the JVM; with it, node and child stay below 500 MB
 RETRY_AFTER = 300.0  # s, wall, until the child is tried again; until then owlready2 calls Pellet
-NO_JAVA = "no Java runtime found: install openjdk-17-jre-headless"
+NO_JAVA = "no Java runtime found: install openjdk-17-jre-headless, or set ~reasoner to rules"
 
 
 class NoJavaError(ReasonerError):

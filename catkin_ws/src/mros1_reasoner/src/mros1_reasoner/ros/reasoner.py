@@ -21,6 +21,7 @@ from ros_model.errors import ModelError
 from std_msgs.msg import Bool
 
 from mros1_reasoner.io.parameters import Parameters
+from mros1_reasoner.io.reasoners import make_reasoner
 from mros1_reasoner.knowledge import vocabulary
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Facts, Objective
@@ -32,7 +33,6 @@ from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Released, 
 from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
-from mros1_reasoner.pellet.process import make_reasoner
 from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic
 from mros1_reasoner.ros.log import Log, log_core
@@ -55,13 +55,12 @@ class ReasonerNode:
     Callbacks only queue what they get; everything else happens in the thread that calls `run`.
     """
 
-    def __init__(self, reasoner: Reasoner) -> None:
-        """Read parameters and models, warm the reasoner up, offer and listen to all topics and services.
+    def __init__(self, parameters: Parameters, reasoner: Reasoner) -> None:
+        """Read models, warm the reasoner up, offer and listen to all topics and services.
 
         Raises:
             ParameterError, KnowledgeBaseError, ModelError, ReasonerError: the node can't work.
         """
-        parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
         self._period = parameters.period
         self.knowledge_base = knowledge_base = parameters.knowledge_base()
         objectives = parameters.objectives(knowledge_base)
@@ -257,10 +256,11 @@ class ReasonerNode:
 def main() -> None:
     """Run the node; exit status 2 when it can't start."""
     with Lifetime("reasoner", ParameterError, KnowledgeBaseError, ReasonerError, ModelError) as life:
-        reasoner = make_reasoner()  # its process gets ready while this one goes on
         life.start()
         log_core()
-        ReasonerNode(reasoner).run()
+        parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
+        reasoner = make_reasoner(parameters.reasoner)  # its process gets ready while this one reads models
+        ReasonerNode(parameters, reasoner).run()
 
 
 def _warm_up(knowledge_base: KnowledgeBase, reasoner: Reasoner, objectives: tuple[Objective, ...]) -> None:
