@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from mros1_reasoner.io.parameters import Parameters
+from mros1_reasoner.io.reasoners import RULES, make_reasoner
 from mros1_reasoner.loop.mape import Mape
 from node_kit.io.input_files import InputFileError, read_text, read_yaml
 from ros_model.io.files import resolve
@@ -79,8 +80,9 @@ def _reasoning(kind: type[MrosManager], situation: Situation) -> Manager:
     """
     if situation.knowledge is None:
         raise ManagerError("a manager that reasons needs a model: set the reasoner's ~model_file")
-    behaviour = Parameters(situation.parameters).settings(situation.knowledge)
-    reasoner = WarmReasoner()
+    parameters = Parameters(situation.parameters)
+    behaviour = parameters.settings(situation.knowledge)
+    reasoner = make_reasoner(RULES) if parameters.reasoner == RULES else WarmReasoner()
     try:
         reasoner.load(situation.knowledge.ontology)
         loop = Mape(situation.knowledge, reasoner, situation.objectives, behaviour, wall=lambda: 0.0, name="lockstep")

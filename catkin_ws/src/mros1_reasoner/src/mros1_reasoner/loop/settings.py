@@ -101,5 +101,5 @@ class Settings:
 
 
 def setting_names() -> list[str]:
-    """Return the names of the parameters that say how the loop behaves: any model goes with any of them."""
-    return [item.name for item in fields(Settings) if item.name != "desired"]
+    """Return the names of the parameters that say how the reasoner behaves: any model goes with any of them."""
+    return [*(item.name for item in fields(Settings) if item.name != "desired"), "reasoner"]
