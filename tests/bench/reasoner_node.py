@@ -22,7 +22,7 @@ _IDLE_S = 20.0
 
 
 def run() -> list[dict[str, Any]]:
-    """Return `reasoner_ready` in s, `reasoner_idle_cpu` in % of a core, `reasoner_memory` in MB; by Pellet, by rules."""
+    """Return `reasoner_ready` in s, `reasoner_idle_cpu` in % of a core, `reasoner_memory` in MB; the same by rules."""
     return [*_measure("reasoner"), *_measure("reasoner_rules", "_reasoner:=rules")]
 
 

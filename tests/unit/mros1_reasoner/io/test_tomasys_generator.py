@@ -1,3 +1,4 @@
+import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -79,3 +80,12 @@ def test_ranges_and_comparisons_are_those_of_metacontrol_yaml(project, tmp_path)
     assert knowledge_base.qualities["energy"] == Quality(Direction.LOWER_IS_BETTER, True, 0.0, 2.5)
     assert knowledge_base.qualities["safety"] == Quality(Direction.LOWER_IS_BETTER, False, 0.0, 1.0)
     assert knowledge_base.objectives[0].always_improve is True
+
+
+@pytest.mark.parametrize(("band", "limits"), [([0.2, 0.6], {"safety_min": 0.2, "safety": 0.6})])
+def test_band_becomes_two_limits(project, tmp_path, band, limits):
+    content = copy.deepcopy(project.settings)
+    content["objectives"]["o_navigate"]["nfrs"] = {"safety": band}
+    (path,) = generate(replace(project, settings=content), tmp_path)
+    (objective,) = read_knowledge_base([path]).objectives
+    assert objective.limits == limits

@@ -125,21 +125,23 @@ class Parameters:
         if not objectives:
             required = {function for design in knowledge_base.designs.values() for function in design.requires}
             given = ParameterTree(dict(_leaves(self._tree.mapping("default_nfrs", "QA -> limit"))), "~default_nfrs")
-            defaults = {quality: given.number(quality, 0.0) for quality in sorted(given.values)}
-            known = {quality: limit for quality, limit in defaults.items() if quality in knowledge_base.qualities}
+            known: dict[str, float] = {}
+            for quality in sorted(given.values):
+                known |= _limits(given, quality, quality, knowledge_base)
             objectives = tuple(
                 Objective(f"o_{function.removeprefix('f_')}A", function, known)
                 for function in knowledge_base.functions
                 if function not in required
             )
-        limits = {}
+        limits: dict[str, float] = {}
         nfrs = ParameterTree(dict(_leaves({k: v for k, v in self.values.items() if k.startswith(_NFR)})))
         for name in sorted(nfrs.values):
             quality = name.removeprefix(_NFR)
-            if quality not in knowledge_base.qualities:
+            found = _limits(nfrs, name, quality, knowledge_base)
+            if not found:
                 _log.warning("parameter ~%s: Unsupported QA TYPE received: %s: left out", name, quality)
                 continue
-            limits[quality] = nfrs.number(name, 0.0)
+            limits |= found
         return tuple(replace(o, limits={**o.limits, **limits}) for o in objectives)
 
     def settings(self, knowledge_base: KnowledgeBase) -> Settings:
@@ -170,6 +172,26 @@ class Parameters:
     def _files(self, name: str) -> list[Path]:
         """Return the files that a parameter names: one, several separated by commas, or a list."""
         return [resolve(path.strip()) for path in self._tree.texts(name) if path.strip()]
+
+
+def _limits(tree: ParameterTree, name: str, quality: str, knowledge_base: KnowledgeBase) -> dict[str, float]:
+    """Return the limits that a parameter gives: a number, or the two of a band, the least first; none if unknown."""
+    if not isinstance(tree.value(name), list):
+        limit = tree.number(name, 0.0)
+        return {quality: limit} if knowledge_base.admit(quality) else {}
+    band = tree.numbers(name)
+    if len(band) != len(("least", "most")) or not band[0] < band[1]:
+        raise tree.error(name, "one number, or two, the least one first", tree.value(name))
+    if quality not in knowledge_base.qualities:
+        return {}
+    kind = knowledge_base.qualities[quality]
+    knowledge_base.admit(kind.other_end(quality))
+    ends = (
+        (kind.other_end(quality), quality)
+        if kind.direction is Direction.LOWER_IS_BETTER
+        else (quality, kind.other_end(quality))
+    )
+    return dict(zip(ends, band, strict=True))
 
 
 def _leaves(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

@@ -12,7 +12,7 @@ from ros_model.generators import write_file
 from ros_model.project.corrections import correction_groups
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.model import Direction
+from mros1_reasoner.knowledge.model import Direction, Quality
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -83,12 +83,13 @@ def application_model(project: Project, iri: str) -> str:
         parts.append(_individual("FunctionDesign", variant.name, links))
         parts += _levels(variant.name, levels, {quality: names[variant.name] for quality, names in groups.items()})
     for name, objective in settings["objectives"].items():
-        limits = objective.get("nfrs", {})
+        directions = {quality: entry["direction"] for quality, entry in settings["quality_attributes"].items()}
+        limits, operators = _both_ends(objective.get("nfrs", {}), directions)
         values = [f"{name}_{quality}" for quality in limits]
         links = {"tomasys:typeF": [objective["function"]], "tomasys:hasNFR": values}
         improves = {"o_always_improve": objective["always_improve"]} if "always_improve" in objective else {}
         parts.append(_individual("Objective", name, links, flags=improves))
-        parts += _levels(name, limits)
+        parts += _limits(name, limits, operators)
     return "\n".join([*parts, "</rdf:RDF>", ""])
 
 
@@ -105,6 +106,37 @@ def _own_nodes(project: Project) -> dict[str, frozenset[str]]:
         )
         for variant in project.variants
     }
+
+
+def _both_ends(
+    limits: Mapping[str, float | list[float]], directions: Mapping[str, str]
+) -> tuple[dict[str, float], dict[str, tuple[str, str]]]:
+    """Return limits by name, and quality and comparison of those on the other side of a band."""
+    found: dict[str, float] = {}
+    operators: dict[str, tuple[str, str]] = {}
+    for quality, limit in limits.items():
+        if not isinstance(limit, list):
+            found[quality] = limit
+            continue
+        kind = Quality(Direction(directions[quality]))
+        other = kind.other_end(quality)
+        is_most = kind.direction is Direction.LOWER_IS_BETTER
+        found[quality], found[other] = (limit[1], limit[0]) if is_most else (limit[0], limit[1])
+        operators[other] = quality, kind.direction.opposite.passes
+    return found, operators
+
+
+def _limits(owner: str, limits: Mapping[str, float], operators: Mapping[str, tuple[str, str]]) -> list[str]:
+    return [
+        _individual(
+            "QAvalue",
+            f"{owner}_{name}",
+            {"tomasys:isQAtype": [operators[name][0] if name in operators else name]},
+            {"hasValue": limit},
+            texts={"nfr_comparison_operator": operators[name][1]} if name in operators else None,
+        )
+        for name, limit in limits.items()
+    ]
 
 
 def _levels(owner: str, levels: Mapping[str, float], groups: Mapping[str, str] | None = None) -> list[str]:

@@ -6,12 +6,13 @@ import io
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import owlready2
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.model import Analysis, Design, Facts, Objective, ObjectiveAnalysis
+from mros1_reasoner.knowledge.model import LEAST, MOST, Analysis, Design, Facts, Objective, ObjectiveAnalysis
 from mros1_reasoner.knowledge.model_reader import ApplicationModel, KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Assertion, Reasoner
 from mros1_reasoner.knowledge.scale import Scale
@@ -22,7 +23,7 @@ _STRING = v.XSD + "string"
 
 
 class KnowledgeBase:
-    """The content of the models. It never changes; only the facts that `analyse` gets change.
+    """The content of the models. It never changes, but for the ends of bands that `admit` adds.
 
     Attributes:
         functions: names of all functions.
@@ -46,7 +47,7 @@ class KnowledgeBase:
         self._design_name = {iri: name for name, iri in model.design_iris.items()}
         self._component_name = {iri: name for name, iri in model.component_iris.items()}
         self.functions = tuple(sorted(model.function_iris))
-        self.designs = model.designs
+        self.designs: Mapping[str, Design] = model.designs
         self.components = frozenset(model.component_iris)
         self.own_nodes = model.own_nodes
         self.unread = frozenset() if model.reads.properties & {v.C_STATUS, v.DEPLOYED_BY} else model.own_nodes
@@ -57,12 +58,31 @@ class KnowledgeBase:
         )
         self.reads_error_log = v.FD_ERROR_LOG in model.reads.properties
         self._labels = model.reads.labels
-        self.qualities = model.qualities
+        self.qualities = dict(model.qualities)
+        self._other_end: dict[str, str] = {}  # of a band, by quality
         self.objectives = model.objectives
         self.component_statuses = model.component_statuses
         self.files = tuple(files)
         self.ontology = model.ontology
         self._scales: dict[str, Scale] = {}
+        for objective in model.objectives:
+            for quality in objective.limits:
+                self.admit(quality)
+
+    def admit(self, quality: str) -> bool:
+        """Return whether there may be a limit of that name: of a quality, or of the other side of its band."""
+        base = quality.removesuffix(LEAST) if quality.endswith(LEAST) else quality.removesuffix(MOST)
+        kind = self.qualities.get(base)
+        if quality in self.qualities or kind is None or kind.other_end(base) != quality:
+            return quality in self.qualities
+        self.qualities[quality] = replace(kind, direction=kind.direction.opposite, typical="")
+        self._other_end[base] = quality
+        self.designs = {name: _with_end(design, base, quality) for name, design in self.designs.items()}
+        return True
+
+    def limits_by(self, quality: str) -> tuple[str, ...]:
+        """Return the names of the limits that the observed levels of a quality may violate."""
+        return (quality, *filter(None, (self._other_end.get(quality),)))
 
     def rules_for(self, status: str) -> str:
         """Return how to call the rules of the models that conclude a status."""
@@ -96,7 +116,7 @@ class KnowledgeBase:
         Raises:
             KnowledgeBaseError: a fact names something that the models do not hold.
         """
-        result: list[Assertion] = []
+        result = list(self._ends_of_bands())
         for objective in facts.objectives:
             iri = self._objective_iri(objective.name)
             result.append(Assertion(iri, v.RDF_TYPE, v.OBJECTIVE))
@@ -200,6 +220,8 @@ class KnowledgeBase:
             triples += [assertion_triple(assertion) for assertion in self._statuses(facts, analysis)]
         for design in self.designs.values():
             for quality, level in sorted(design.expected.items()):
+                if quality in self._other_end.values():
+                    continue
                 design_iri = self._model.design_iris[design.name]
                 iri = self._model.level_iris[design_iri, quality, level]
                 triples.append(assertion_triple(Assertion(design_iri, v.HAS_QA_ESTIMATION, iri)))
@@ -236,14 +258,29 @@ class KnowledgeBase:
     def _nfr_iri(self, objective: Objective, quality: str) -> str:
         """Return the IRI of a limit: that of the model, unless somebody has set another limit."""
         iri, limit = self._objective_iri(objective.name), objective.limits[quality]
-        return self._model.level_iris.get((iri, quality, limit)) or f"{v.RUNTIME}nfr_{objective.name}_{quality}"
+        own = None if quality in self._other_end.values() else self._model.level_iris.get((iri, quality, limit))
+        return own or f"{v.RUNTIME}nfr_{objective.name}_{quality}"
+
+    def _ends_of_bands(self) -> Iterable[Assertion]:
+        """Yield the types of levels that are compared with the limits on the other side of bands."""
+        for quality in self._other_end.values():
+            iri, kind = f"{v.RUNTIME}{quality}", self.qualities[quality]
+            yield Assertion(iri, v.RDF_TYPE, v.QA_TYPE)
+            yield Assertion(iri, v.QA_SIGN, str(kind.direction.sign), _DECIMAL)
+            if kind.reaching_violates:
+                yield Assertion(iri, v.QA_REACHING_VIOLATES, "true", v.XSD + "boolean")
+
+    def _quality_iri(self, quality: str) -> str:
+        if quality in self._other_end.values():
+            return f"{v.RUNTIME}{quality}"
+        return self._find(self._model.quality_iris, quality, "QualityAttributeType")
 
     def _level(self, iri: str, quality: str, level: float) -> list[Assertion]:
         if not math.isfinite(level):
             raise KnowledgeBaseError(f"level of {quality} is {level}: it must be a finite number")
         return [
             Assertion(iri, v.RDF_TYPE, v.QA_VALUE),
-            Assertion(iri, v.IS_QA_TYPE, self._find(self._model.quality_iris, quality, "QualityAttributeType")),
+            Assertion(iri, v.IS_QA_TYPE, self._quality_iri(quality)),
             Assertion(iri, v.HAS_VALUE, decimal_text(level), _DECIMAL),
         ]
 
@@ -259,6 +296,14 @@ class KnowledgeBase:
         for name, iri in self._model.design_iris.items():
             realisable = "false" if name in analysis.unrealisable else "true"
             yield Assertion(iri, v.FD_REALISABILITY, realisable, v.XSD + "boolean")
+
+
+def _with_end(design: Design, quality: str, other: str) -> Design:
+    """Return a design with the expected level of a quality under the name of the other limit of its band, too."""
+    if quality not in design.expected:
+        return design
+    groups = {**design.groups, other: design.group(quality)} if design.group(quality) else design.groups
+    return replace(design, expected={**design.expected, other: design.expected[quality]}, groups=groups)
 
 
 def _worst(causes: Iterable[str]) -> str:

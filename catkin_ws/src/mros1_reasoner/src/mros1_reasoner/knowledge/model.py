@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 
 from mros1_reasoner.knowledge.vocabulary import IN_ERROR_COMPONENT, IN_ERROR_NFR
 
+LEAST, MOST = "_min", "_max"
+"""Ends of the names of limits on the other side of a band."""
+
 
 class Direction(enum.Enum):
     """Whether lower or higher levels of a quality attribute are better."""
@@ -20,6 +23,11 @@ class Direction(enum.Enum):
     def sign(self) -> int:
         """1 if a greater level is worse, -1 if it is better (`qa_sign` in the vocabulary)."""
         return 1 if self is Direction.LOWER_IS_BETTER else -1
+
+    @property
+    def opposite(self) -> Direction:
+        """The other direction."""
+        return Direction.HIGHER_IS_BETTER if self is Direction.LOWER_IS_BETTER else Direction.LOWER_IS_BETTER
 
     def excess(self, level: float, limit: float) -> float:
         """Return by how much a level violates a limit; zero or less if it keeps the limit."""
@@ -52,6 +60,10 @@ class Quality:
     low: float | None = None
     high: float | None = None
     typical: str = ""
+
+    def other_end(self, name: str) -> str:
+        """Return how a second limit of the quality of a name is called, on the other side of a band."""
+        return f"{name}{LEAST if self.direction is Direction.LOWER_IS_BETTER else MOST}"
 
     @classmethod
     def compared_by(cls, operator: str, low: float | None = None, high: float | None = None) -> Quality:
@@ -119,7 +131,8 @@ class Objective:
     Attributes:
         name: local name of the individual.
         function: the function.
-        limits: the limit that each quality attribute must keep.
+        limits: the limit that each quality attribute must keep; with `_min` or `_max` behind the name, the limit on the
+            other side of a band.
         always_improve: adapt also when a clearly better design has become available; None: as the settings say.
     """
 

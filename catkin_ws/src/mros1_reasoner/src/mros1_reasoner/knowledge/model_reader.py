@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.live_rules import without_idle
 from mros1_reasoner.knowledge.loaded_rules import Reads
-from mros1_reasoner.knowledge.model import Design, Direction, Objective, Quality
+from mros1_reasoner.knowledge.model import LEAST, MOST, Design, Direction, Objective, Quality
 from mros1_reasoner.knowledge.reasoner import Assertion
 from mros1_reasoner.knowledge.triples import (
     Graph,
@@ -124,11 +124,13 @@ class _Reader:
             (v.COMPONENT, v.COMPONENT_STATE, v.COMPONENT_SPECIFICATION),
             graph.subjects(v.REQUIRED_BY) | graph.subjects(v.C_STATUS) | graph.subjects(v.DEPLOYED_BY),
         )
-        self._quality_types = self._names((v.QA_TYPE,), graph.objects(v.IS_QA_TYPE))
+        types = self._names((v.QA_TYPE,), graph.objects(v.IS_QA_TYPE))
+        # The others are ends of bands, which a saved knowledge base has.
+        self._quality_types = {name: iri for name, iri in types.items() if not iri.startswith(v.RUNTIME)}
         self._objectives = self._names((v.OBJECTIVE,), graph.subjects(v.TYPE_F))
         self._function_name = _inverse(self._functions)
         self._component_name = _inverse(self._components)
-        self._quality_name = _inverse(self._quality_types)
+        self._quality_name = _inverse(types)
         self._guessed: list[str] = []  # directions of which nobody says anything
         self._qualities = {name: self._quality(name) for name in sorted(self._quality_types)}
         if self._guessed:
@@ -290,7 +292,8 @@ class _Reader:
                 )
                 continue
             quality = self._quality_name[types.pop()]
-            kind = self._qualities[quality]
+            kind = self._qualities.get(quality) or self._qualities[quality.removesuffix(LEAST).removesuffix(MOST)]
+            quality = self._end(value, quality, kind)
             if not kind.holds(numbers[0]):
                 _log.warning(
                     "QAvalue %s of %s is left out: %g is not within the range of %s, %s to %s",
@@ -303,11 +306,27 @@ class _Reader:
                 )
                 continue
             if quality in levels:
-                _log.warning("%s has two levels of %s: %s is left out", local_name(owner), quality, local_name(value))
+                _log.warning(
+                    "%s has two levels of %s: %s is left out; the limits of a band differ in nfr_comparison_operator",
+                    local_name(owner),
+                    quality,
+                    local_name(value),
+                )
                 continue
             levels[quality] = numbers[0]
             self._level_iris[owner, quality, numbers[0]] = value
         return levels
+
+    def _end(self, value: str, quality: str, kind: Quality) -> str:
+        """Return how the limit is called that a QAvalue is: on the other side of a band, it has a name of its own."""
+        for operator in self._graph.literals_of(value, v.NFR_COMPARISON_OPERATOR)[:1]:
+            try:
+                direction = Quality.compared_by(operator).direction
+            except ValueError as error:
+                name = local_name(value)
+                raise KnowledgeBaseError(f"{self._where}: nfr_comparison_operator of {name}: {error}") from error
+            return quality if direction is kind.direction else kind.other_end(quality)
+        return quality
 
     def _check_requirements(self, designs: Mapping[str, Design]) -> None:
         """Refuse requirements that nothing can fulfil, and warn of functions that no design solves."""

@@ -123,7 +123,7 @@ class Operator:
         return proposal
 
     def _check_limit(self, quality: str, limit: float) -> None:
-        if quality not in self._state.kb.qualities:
+        if not self._state.kb.admit(quality):
             raise MapeError(f"Unsupported QA TYPE received: {quality}")
         if not math.isfinite(limit):
             raise MapeError(f"limit of {quality} is {limit}, not a finite number: left as it is")

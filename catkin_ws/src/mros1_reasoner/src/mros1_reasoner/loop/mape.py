@@ -141,11 +141,14 @@ class Mape:
         if not math.isfinite(level):
             raise MapeError(f"level of {quality} is {level}, not a finite number: left out")
         for name in self._state.grounded_by(grounding):
-            self._state.note_level(now, name, quality, level, stamp)
+            for limit in self._kb.limits_by(quality):
+                if limit == quality or limit in self._state.objectives[name].limits:
+                    self._state.note_level(now, name, limit, level, stamp)
 
     def observe_stale(self, quality: str) -> None:
         """Note that a quality can't be observed at present, and forget its levels."""
-        self._state.forget_levels(quality)
+        for limit in self._kb.limits_by(quality):
+            self._state.forget_levels(limit)
 
     def observe_component(self, now: float, component: str, status: str, stamp: float = 0.0) -> None:
         """Take in the status of a component; TRUE after FALSE counts as RECOVERED.

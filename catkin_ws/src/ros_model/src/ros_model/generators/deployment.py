@@ -104,7 +104,7 @@ def reasoner(project: Project) -> dict[str, Any]:
     return {
         "model_file": f"package://{project.package}/models/{Path(settings['base']).stem}.owl",
         "desired_configuration": "",
-        **{f"nfr_{qa}": float(level) for qa, level in thresholds.items()},
+        **{f"nfr_{qa}": level if isinstance(level, list) else float(level) for qa, level in thresholds.items()},
         "utility": settings["utility"],
         "qa_direction": {qa: entry["direction"] for qa, entry in settings["quality_attributes"].items()},
         "components": project.components,

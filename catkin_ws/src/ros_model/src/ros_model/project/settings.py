@@ -124,8 +124,7 @@ def _broken_links(settings: Settings) -> Iterator[ModelError]:
     for name, objective in content["objectives"].items():
         if objective["function"] not in content["functions"]:
             yield _no_such(settings, objective["function"], "functions", "objectives", name, "function")
-    for name, entry in content["quality_attributes"].items():
-        yield from _ascending(settings, entry.get("range"), "quality_attributes", name, "range")
+    yield from _unordered(settings)
     seen: set[str] = set()
     for number, entry in enumerate(content["observers"]):
         name = entry["name"] if isinstance(entry, dict) else entry
@@ -168,6 +167,16 @@ def _unknown_qas(settings: Settings) -> Iterator[ModelError]:
     for qa, keys in used:
         if qa not in content["quality_attributes"]:
             yield _no_such(settings, qa, "quality_attributes", *keys)
+
+
+def _unordered(settings: Settings) -> Iterator[ModelError]:
+    """Yield ranges and bands that do not begin with the lower number."""
+    for name, entry in settings.content["quality_attributes"].items():
+        yield from _ascending(settings, entry.get("range"), "quality_attributes", name, "range")
+    for name, entry in settings.content["objectives"].items():
+        for quality, limit in entry.get("nfrs", {}).items():
+            band = limit if isinstance(limit, list) else None
+            yield from _ascending(settings, band, "objectives", name, "nfrs", quality)
 
 
 def _ascending(settings: Settings, limits: list[float] | None, *keys: str | int) -> Iterator[ModelError]:
