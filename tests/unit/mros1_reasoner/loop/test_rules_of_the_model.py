@@ -108,6 +108,22 @@ def test_design_that_a_rule_excludes_is_not_taken(loop):
     assert "a rule of the model says that it can't be deployed" in middle.lost_because
 
 
+def test_design_that_a_rule_no_longer_excludes_is_taken_again(loop):
+    dark = f"{OBSERVED}, lessThan(?x, 0.5) -> fd_realisability(app:far, false)"
+    hurt = f"{OBSERVED}, lessThan(?x, 0.5), typeFD(?fg, app:far) -> fg_status(?fg, 'IN_ERROR_COMPONENT')"
+    core = loop(("too dark", dark), ("cannot see", hurt))
+    core.observe_level(5.0, "clarity", 0.4)
+    (decision,) = decided(core, 5.0)
+    assert decision.to_configuration == "middle"
+    core.report(5.5, decision.id, ok=True)
+    core.observe_level(8.0, "clarity", 0.4)
+    assert decided(core, 8.0) == []
+    core.observe_level(9.0, "clarity", 0.7)
+    (decision,) = decided(core, 9.0)
+    assert decision.to_configuration == "far"
+    assert decision.causes == ("far can be deployed again",)
+
+
 def test_better_design_that_a_rule_calls_for_is_taken(loop):
     bright = f"{OBSERVED}, greaterThan(?x, 0.9), solvesO(?fg, ?o) -> o_status(?o, 'UPDATABLE')"
     core = loop(("bright", bright))

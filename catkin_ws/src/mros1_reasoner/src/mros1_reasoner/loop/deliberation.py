@@ -237,7 +237,8 @@ class Deliberation:
             self._state.note_in_vain(now, running.design, name, VIOLATED)
         found = v.IN_ERROR_COMPONENT if self._state.rule_finds(name, v.IN_ERROR_COMPONENT) else ""
         found = v.IN_ERROR_NFR if self._state.rule_counts(name, now) else found
-        if running.design and found:
+        # A design that can't be deployed needs no entry, and may come back at once when it can.
+        if running.design and found and running.design not in self._state.analysis.unrealisable:
             reason = f"{self._state.kb.rules_for(found)} found it in error"
             self._state.note_in_vain(now, running.design, name, reason)
         if running.is_broken and running.design:

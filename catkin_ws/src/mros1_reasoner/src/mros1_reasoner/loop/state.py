@@ -301,16 +301,13 @@ class State(View):
 
     def note_analysis(self, now: float, facts: Facts, analysis: Analysis, seen: tuple[object, ...]) -> None:
         """Keep an analysis. A RECOVERED component is a chance for every objective once; then it counts as working."""
-        before = self.analysis.objectives
+        before = self.analysis
         self.has_analysed, self.facts, self.analysis, self.seen = True, facts, analysis, seen
         for name, running in self.running.items():
             since = running.ruled_since if running.ruled_since is not None else now
             self._run(name, ruled_since=since if self.rule_finds(name, v.IN_ERROR_NFR) else None)
         if v.RECOVERED not in facts.components.values():  # else the chance is of the component
-            for name, result in analysis.objectives.items():
-                if v.UPDATABLE in result.causes and v.UPDATABLE not in before.get(name, ObjectiveAnalysis("")).causes:
-                    words = f"{self.kb.rules_for(v.UPDATABLE)} says that there may be a better design"
-                    self._run(name, chances={**self.running[name].chances, RULE: (now, words)})
+            self._note_chances_by_rules(now, before)
         for name, component in self.components.items():
             if component.status != v.RECOVERED or facts.components.get(name) != v.RECOVERED:
                 continue
@@ -319,6 +316,27 @@ class State(View):
                     chance = {f"component:{name}": (component.stamp, f"component {name} works again")}
                     self._run(objective, chances={**self.running[objective].chances, **chance})
             self.components[name] = Component(v.WORKS, component.stamp)
+
+    def _note_chances_by_rules(self, now: float, before: Analysis) -> None:
+        """Note what rules of the models have just begun to say of better designs, or ceased to say against them."""
+        chances: dict[str, str] = {}
+        for design in sorted(before.unrealisable.keys() - self.analysis.unrealisable.keys()):
+            words = f"{design} can be deployed again"
+            chances |= {name: words for name, running in self.running.items() if self._may_help(design, name)}
+        for name, result in self.analysis.objectives.items():
+            known = before.objectives.get(name, ObjectiveAnalysis("")).causes
+            if v.UPDATABLE in result.causes and v.UPDATABLE not in known:
+                chances[name] = f"{self.kb.rules_for(v.UPDATABLE)} says that there may be a better design"
+        for name, words in chances.items():
+            self._run(name, chances={**self.running[name].chances, RULE: (now, words)})
+
+    def _may_help(self, design: str, name: str) -> bool:
+        """Return whether a design is one for an objective that has another one, or one that its designs build on."""
+        function, running = self.kb.designs[design].function, self.running[name]
+        others = [d for d in self.kb.solving(self.objectives[name].function) if d.name != running.design]
+        return running.design is not None and any(
+            d.name == design or self._builds_on(d, self.provider(function)) for d in others
+        )
 
     def reconsider(self) -> None:
         """Have the next step analyse and decide in any case."""
