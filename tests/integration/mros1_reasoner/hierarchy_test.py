@@ -47,8 +47,8 @@ class HierarchyTest(StationTest):
         self.wait_for_configurations(f_look="look_right", f_grasp="grasp_rough", f_assemble="glue")
         self.assertEqual(self.pids("f_grasp", "f_look"), below)
 
-        answer = rospy.ServiceProxy("reasoner/remove_objective", RemoveObjective)("o_assemble")
-        self.assertTrue(answer.ok, answer.message)
+        remove = rospy.ServiceProxy("reasoner/remove_objective", RemoveObjective)
+        wait_for(lambda: remove("o_assemble").ok, "the reasoner knows, too, that the adaptation has ended")
         wait_for_equal(lambda: self.active, {}, "what runs without an objective")
         for node in PARTS.values():
             self.assertIsNone(self.answers(self.name(node)), node)
