@@ -1,7 +1,8 @@
 """What the rules of a model conclude leads to decisions that name them."""
 
+import owlready2
 import pytest
-from mros1_reasoner.io.ontology_files import read_knowledge_base
+from mros1_reasoner.io.ontology_files import read_knowledge_base, save_knowledge_base
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.mape import Mape
@@ -122,6 +123,44 @@ def test_design_that_a_rule_no_longer_excludes_is_taken_again(loop):
     (decision,) = decided(core, 9.0)
     assert decision.to_configuration == "far"
     assert decision.causes == ("far can be deployed again",)
+
+
+def test_rule_may_read_which_decisions_have_failed_before(loop):
+    """A design that did not come up is not tried again where the lens is cold, though its entry in the log is gone."""
+    rule = (
+        "decision_to(?d, ?fd), decision_state(?d, 'FAILED'), decision_cause(?d, 'component:lens'), "
+        "c_status(app:lens, 'FALSE') -> fd_realisability(?fd, false)"
+    )
+    cold = "c_status(app:lens, 'FALSE'), typeFD(?fg, app:far) -> fg_status(?fg, 'IN_ERROR_COMPONENT')"
+    core = loop(("failed before", rule), ("cold", cold), extra=assertion(APP + "lens", v.REQUIRED_BY, APP + "far"))
+    core.observe_component(5.0, "lens", "FALSE")
+    (decision,) = decided(core, 5.0)
+    assert decision.to_configuration == "middle"
+    core.report(6.0, decision.id, ok=False, message="no process")
+    core.step(6.0)
+    assert set(core.analysis.unrealisable) == {"far", "middle"}
+    core.observe_component(8.0, "lens", "TRUE")
+    core.step(8.0)
+    assert not core.analysis.unrealisable
+
+
+def test_saved_knowledge_base_has_the_decisions(loop, tmp_path):
+    core = loop(("closer", CLOSER))
+    core.observe_level(5.0, "clarity", 0.6)
+    core.step(5.0)
+    (decision,) = decided(core, 7.0)
+    core.report(7.5, decision.id, ok=True)
+    assert core.facts.history == ()  # no rule reads it
+    knowledge_base = read_knowledge_base([tmp_path / "app.owl"])
+    save_knowledge_base(tmp_path / "saved.owl", knowledge_base, core.known)
+    world = owlready2.World()
+    saved = world.get_ontology((tmp_path / "saved.owl").as_uri()).load()
+    (past,) = world[v.DECISION].instances()
+    assert (past.decision_from.name, past.decision_to.name) == ("far", "middle")
+    assert (past.decision_state, float(past.decision_stamp)) == ("EXECUTED", 7.5)
+    assert list(past.decision_cause) == ["qa:o_see"]
+    assert read_knowledge_base([tmp_path / "saved.owl"]).designs == knowledge_base.designs
+    assert saved
 
 
 def test_better_design_that_a_rule_calls_for_is_taken(loop):

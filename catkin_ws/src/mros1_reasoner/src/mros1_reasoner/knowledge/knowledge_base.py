@@ -12,7 +12,7 @@ from pathlib import Path
 import owlready2
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.model import LEAST, MOST, Analysis, Design, Facts, Objective, ObjectiveAnalysis
+from mros1_reasoner.knowledge.model import LEAST, MOST, Analysis, Design, Facts, Objective, ObjectiveAnalysis, Past
 from mros1_reasoner.knowledge.model_reader import ApplicationModel, KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Assertion, Reasoner
 from mros1_reasoner.knowledge.scale import Scale
@@ -33,6 +33,7 @@ class KnowledgeBase:
         unread: components whose status no rule reads.
         levels_read: quality attributes whose observed levels rules of the models read.
         reads_error_log: whether rules of the models read which designs have failed.
+        reads_history: whether rules of the models read which decisions there were.
         qualities: how levels compare, of every quality attribute by name.
         objectives: those that the models hold already, but for those that a grounding requires.
         component_statuses: statuses that the models assert.
@@ -57,6 +58,7 @@ class KnowledgeBase:
             if model.reads.every_quality or iri in model.reads.qualities
         )
         self.reads_error_log = v.FD_ERROR_LOG in model.reads.properties
+        self.reads_history = not model.reads.properties.isdisjoint({v.DECISION, *v.HISTORY})
         self._labels = model.reads.labels
         self.qualities = dict(model.qualities)
         self._other_end: dict[str, str] = {}  # of a band, by quality
@@ -156,6 +158,8 @@ class KnowledgeBase:
         for design, objective_name in sorted(facts.tried):
             iri = self._find(self._model.design_iris, design, "FunctionDesign")
             result.append(Assertion(iri, v.FD_ERROR_LOG, self._objective_iri(objective_name)))
+        for past in facts.history:
+            result += self._past(past)
         return result
 
     def analyse(self, facts: Facts, reasoner: Reasoner) -> Analysis:
@@ -260,6 +264,19 @@ class KnowledgeBase:
         iri, limit = self._objective_iri(objective.name), objective.limits[quality]
         own = None if quality in self._other_end.values() else self._model.level_iris.get((iri, quality, limit))
         return own or f"{v.RUNTIME}nfr_{objective.name}_{quality}"
+
+    def _past(self, past: Past) -> Iterable[Assertion]:
+        iri, objective = f"{v.RUNTIME}{past.name}", self._objective_iri(past.objective)
+        yield Assertion(iri, v.RDF_TYPE, v.DECISION)
+        yield Assertion(objective, v.RDF_TYPE, v.OBJECTIVE)  # it may have been given up
+        yield Assertion(iri, v.DECISION_OBJECTIVE, objective)
+        for name, design in ((v.DECISION_FROM, past.source), (v.DECISION_TO, past.target)):
+            if design:
+                yield Assertion(iri, name, self._find(self._model.design_iris, design, "FunctionDesign"))
+        yield Assertion(iri, v.DECISION_STATE, past.state, _STRING)
+        yield Assertion(iri, v.DECISION_STAMP, decimal_text(past.stamp), _DECIMAL)
+        for cause in past.causes:
+            yield Assertion(iri, v.DECISION_CAUSE, cause, _STRING)
 
     def _ends_of_bands(self) -> Iterable[Assertion]:
         """Yield the types of levels that are compared with the limits on the other side of bands."""

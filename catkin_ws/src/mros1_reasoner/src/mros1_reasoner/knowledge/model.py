@@ -143,6 +143,29 @@ class Objective:
 
 
 @dataclass(frozen=True)
+class Past:
+    """A decision that has been carried out, or has failed.
+
+    Attributes:
+        name: its id.
+        objective: name of the objective.
+        source: the design that ran before; empty: none.
+        target: the design to deploy.
+        state: EXECUTED or FAILED.
+        stamp: when that was known, s of ROS time.
+        causes: triggers of what called for it.
+    """
+
+    name: str
+    objective: str
+    source: str
+    target: str
+    state: str
+    stamp: float
+    causes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Facts:
     """Everything that is known at one moment: the input of an analysis.
 
@@ -155,6 +178,7 @@ class Facts:
         failed: objectives whose task has failed, though nothing else is known to be wrong.
         requires: objectives that the grounding of an objective requires, by the objective's name.
         tried: designs that did not keep a limit of an objective, or failed for it, as (design, objective).
+        history: the last decisions, the newest last.
     """
 
     objectives: tuple[Objective, ...] = ()
@@ -165,6 +189,7 @@ class Facts:
     failed: frozenset[str] = frozenset()
     requires: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     tried: frozenset[tuple[str, str]] = frozenset()
+    history: tuple[Past, ...] = ()
 
 
 @dataclass(frozen=True)

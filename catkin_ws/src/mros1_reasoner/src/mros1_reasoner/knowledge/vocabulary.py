@@ -37,6 +37,7 @@ OBJECTIVE = TOMASYS + "Objective"
 FUNCTION_GROUNDING = TOMASYS + "FunctionGrounding"
 QA_VALUE = TOMASYS + "QAvalue"
 QA_TYPE = TOMASYS + "QualityAttributeType"
+DECISION = TOMASYS + "Decision"
 COMPONENT = TOMASYS + "Component"
 COMPONENT_STATE = TOMASYS + "ComponentState"
 COMPONENT_SPECIFICATION = TOMASYS + "ComponentSpecification"
@@ -66,6 +67,13 @@ FD_ERROR_LOG = TOMASYS + "fd_error_log"
 REQUIRED_BY = MROS + "requiredBy"
 DEPLOYED_BY = MROS + "deployedBy"
 
+DECISION_OBJECTIVE = TOMASYS + "decision_objective"
+DECISION_FROM = TOMASYS + "decision_from"
+DECISION_TO = TOMASYS + "decision_to"
+DECISION_STATE = TOMASYS + "decision_state"
+DECISION_STAMP = TOMASYS + "decision_stamp"
+DECISION_CAUSE = TOMASYS + "decision_cause"
+
 C_STATUS = TOMASYS + "c_status"
 O_STATUS = TOMASYS + "o_status"
 FG_STATUS = TOMASYS + "fg_status"
@@ -84,10 +92,12 @@ FD_NEXT = TOMASYS + "fd_next"
 FD_NONE_SO_FAR = TOMASYS + "fd_none_so_far"
 F_FULFILLABLE = TOMASYS + "f_fulfillable"
 
+HISTORY = (DECISION_OBJECTIVE, DECISION_FROM, DECISION_TO, DECISION_STATE, DECISION_STAMP, DECISION_CAUSE)
 # What facts say, and what an analysis asks for.
 FACTS = (
     *(TYPE_F, HAS_NFR, SOLVES_O, TYPE_FD, REQUIRES_O, HAS_QA_VALUE, IS_QA_TYPE, HAS_VALUE),
     *(O_STATUS, O_CAUSE, FG_CAUSE, C_STATUS, FD_ERROR_LOG),
+    *HISTORY,
 )
 CONCLUSIONS = (O_CAUSE, O_VIOLATED_NFR, FG_CAUSE, FD_UNREALISABLE_BY, FD_ERROR_LOG)
 

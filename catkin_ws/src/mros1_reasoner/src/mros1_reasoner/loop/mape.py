@@ -82,8 +82,9 @@ class Mape:
 
     @property
     def known(self) -> Facts:
-        """The facts of the last analysis, and which designs have failed of late."""
-        return replace(self._state.facts, tried=frozenset(self._state.error_log))
+        """The facts of the last analysis, with the designs that have failed of late, and with the last decisions."""
+        facts, state = self._state.facts, self._state
+        return replace(facts, tried=frozenset(state.error_log), history=tuple(state.history))
 
     @property
     def analysis(self) -> Analysis:
@@ -314,13 +315,15 @@ class Mape:
         else:
             why = f"could not be deployed{f' ({message})' if message else ''}"
             self._state.fail(now, why if blame else None)
-        return replace(
+        outcome = replace(
             decision,
             state=EXECUTED if ok else FAILED,
             explanation=decision.explanation + ("" if ok else f"; failed: {message or 'no reason given'}"),
             stamp_executed=now,
             execute_wall_s=self._wall() - began,
         )
+        self._state.note_past(outcome)
+        return outcome
 
     def report_released(self, function: str) -> None:
         """Take in that a function was released."""

@@ -6,7 +6,7 @@ Only `state.State` changes it. Times are s of ROS time.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 
 from metacontrol_bags.decision import Cause, Decision
@@ -14,7 +14,7 @@ from metacontrol_msgs.msg import FunctionGrounding
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
-from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
+from mros1_reasoner.knowledge.model import Analysis, Facts, Objective, Past
 from mros1_reasoner.knowledge.scale import Scale
 from mros1_reasoner.loop.levels import Levels
 from mros1_reasoner.loop.settings import Settings
@@ -137,6 +137,7 @@ class View:
         components: last status of components.
         levels: observed levels.
         error_log: until when a design is not tried again for an objective, and why.
+        history: the last decisions that have been carried out or have failed.
         retries: from when on a design that failed may replace a working one of an objective, and why it failed.
         locked: objectives that keep their configuration.
         paused: whether nothing is decided.
@@ -161,6 +162,7 @@ class View:
     components: Mapping[str, Component]
     levels: Levels
     error_log: Mapping[tuple[str, str], tuple[float, str]]
+    history: Sequence[Past]
     retries: Mapping[tuple[str, str], tuple[float, str]]
     locked: Set[str]
     paused: bool
@@ -283,6 +285,7 @@ class View:
             failed=frozenset(name for name, running in grounded.items() if running.task_failure),
             requires={name: self.required(running.design) for name, running in grounded.items()},
             tried=frozenset(self.error_log) if self.kb.reads_error_log else frozenset(),
+            history=tuple(self.history) if self.kb.reads_history else (),
         )
 
     def what_counts(self, facts: Facts, now: float) -> tuple[object, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -12,7 +13,7 @@ from metacontrol_msgs.msg import FunctionGrounding
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
-from mros1_reasoner.knowledge.model import Analysis, Design, Facts, Objective, ObjectiveAnalysis
+from mros1_reasoner.knowledge.model import Analysis, Design, Facts, Objective, ObjectiveAnalysis, Past
 from mros1_reasoner.loop import drifts, lasting
 from mros1_reasoner.loop.causes import OPERATOR, RETRY, RULE, drifted_nodes, is_chance, is_drift, is_relief
 from mros1_reasoner.loop.levels import Expectation, Judging, Levels
@@ -22,6 +23,7 @@ from mros1_reasoner.planning.planner import Utility
 
 _RELAPSE = 5.0  # times the calm after which a better design was taken again: a violation then is a new one
 
+_HISTORY = 100  # decisions that are kept
 VIOLATED = "did not keep a limit while deployed"
 """Why a design is not tried again that was left because of a quality."""
 
@@ -56,6 +58,7 @@ class State(View):
             )
         )
         self.error_log: dict[tuple[str, str], tuple[float, str]] = {}
+        self.history: deque[Past] = deque(maxlen=_HISTORY)
         self.retries: dict[tuple[str, str], tuple[float, str]] = {}
         self._failures: dict[tuple[str, str], int] = {}  # in a row, by design and objective
         self.locked: set[str] = set()
@@ -469,6 +472,14 @@ class State(View):
             self.note_in_vain(now, decision.to_configuration, decision.objective, why)
         wait = self.settings.wait_after(running.attempts)
         self._run(decision.objective, not_before=now + wait, attempts=running.attempts + 1)
+
+    def note_past(self, decision: Decision) -> None:
+        """Keep a decision that has been carried out or has failed."""
+        causes = tuple(dict.fromkeys(cause.trigger for cause in decision.reasons))
+        names = decision.from_configuration, decision.to_configuration
+        self.history.append(
+            Past(decision.id, decision.objective, *names, decision.state, decision.stamp_executed, causes)
+        )
 
     def note_released(self, function: str) -> None:
         """Note that a function has been released."""
