@@ -1,6 +1,7 @@
 """Models that make no sense are refused, or what makes none is left out, with a line that names the individual."""
 
 import pytest
+from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import InconsistentError
 from mros1_reasoner.loop.mape import Mape
@@ -108,15 +109,18 @@ def test_inconsistent_ontology_is_refused_with_the_individual(load, pellet, extr
         pellet.load(knowledge_base.ontology)
 
 
-# A rule of the model's own: a camera that works rules the laser out, which is a contradiction once it is seen to work.
-QUARREL = """
+# A rule of the model's own gives a laser that works a second mode, which is a contradiction once it is seen to work.
+QUARREL = f"""
+<owl:DatatypeProperty rdf:about="#mode"><rdf:type rdf:resource="{v.OWL_FUNCTIONAL_PROPERTY}"/></owl:DatatypeProperty>
+<rdf:Description rdf:about="#laser"><mode rdf:datatype="{v.XSD}string">far</mode></rdf:Description>
 <swrl:Imp><rdfs:label>quarrel</rdfs:label><swrl:body><swrl:AtomList><rdf:first><swrl:DatavaluedPropertyAtom>
- <swrl:propertyPredicate rdf:resource="http://metacontrol.org/tomasys#c_status"/>
- <swrl:argument1 rdf:resource="#camera"/><swrl:argument2>TRUE</swrl:argument2></swrl:DatavaluedPropertyAtom></rdf:first>
+ <swrl:propertyPredicate rdf:resource="{v.C_STATUS}"/>
+ <swrl:argument1 rdf:resource="#laser"/><swrl:argument2>TRUE</swrl:argument2></swrl:DatavaluedPropertyAtom></rdf:first>
  <rdf:rest rdf:resource="http://www.w3.org/1999/02/22-rdf-syntax-ns#nil"/></swrl:AtomList></swrl:body>
  <swrl:head><swrl:AtomList><rdf:first><swrl:DatavaluedPropertyAtom>
- <swrl:propertyPredicate rdf:resource="http://metacontrol.org/tomasys#c_status"/>
- <swrl:argument1 rdf:resource="#laser"/><swrl:argument2>FALSE</swrl:argument2></swrl:DatavaluedPropertyAtom></rdf:first>
+ <swrl:propertyPredicate rdf:resource="http://example.org/app#mode"/>
+ <swrl:argument1 rdf:resource="#laser"/><swrl:argument2 rdf:datatype="{v.XSD}string">near</swrl:argument2>
+ </swrl:DatavaluedPropertyAtom></rdf:first>
  <rdf:rest rdf:resource="http://www.w3.org/1999/02/22-rdf-syntax-ns#nil"/></swrl:AtomList></swrl:head></swrl:Imp>
 """
 
@@ -128,9 +132,7 @@ def test_contradiction_at_run_time_names_the_individual_and_the_loop_goes_on(loa
     core.observe_active(0.0, "f_move", "scan_slow", "STABLE")
     for component in ("camera", "laser"):
         core.observe_component(0.0, component, "TRUE")
-    with pytest.raises(
-        InconsistentError, match=r"#laser has more than one value for the functional property .*c_status"
-    ):
+    with pytest.raises(InconsistentError, match=r"#laser has more than one value for the functional property .*mode"):
         core.step(0.0)
     core.observe_component(1.0, "laser", "FALSE")
     (decision,) = core.step(1.0)

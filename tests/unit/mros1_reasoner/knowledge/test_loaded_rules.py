@@ -99,9 +99,10 @@ def test_design_that_a_rule_excludes_has_no_component_to_blame(read, analyse):
 
 def test_rule_may_find_that_a_component_fails_with_another(read, analyse):
     knowledge_base = read("c_status(app:lens, 'FALSE') -> c_status(app:lamp, 'FALSE')")
-    result = analyse(knowledge_base, components={"lens": "FALSE", "lamp": "TRUE"})
-    assert result.unrealisable == {"far": ("lamp",)}
-    assert result.objectives["o_see"].status == v.IN_ERROR_COMPONENT
+    for status in ("TRUE", "RECOVERED"):
+        result = analyse(knowledge_base, components={"lens": "FALSE", "lamp": status})
+        assert result.unrealisable == {"far": ("lamp",)}
+        assert result.objectives["o_see"].status == v.IN_ERROR_COMPONENT
 
 
 def test_rule_may_call_for_a_better_design_as_a_status_or_as_a_boolean(read, analyse):

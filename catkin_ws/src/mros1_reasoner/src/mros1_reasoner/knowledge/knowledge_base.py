@@ -148,9 +148,7 @@ class KnowledgeBase:
                 if owner == objective.name:
                     value = f"{grounding}_{quality}"
                     result += [Assertion(grounding, v.HAS_QA_VALUE, value), *self._level(value, quality, level)]
-        reads = self._model.reads
-        # It has one status: where a rule may find a failure, that it works is no more than what is assumed.
-        says_working = reads.working or (all_components and not reads.failures)
+        says_working = self._model.reads.working or all_components
         for component, status in sorted(facts.components.items()):
             iri = self._find(self._model.component_iris, component, "Component")
             if says_working or status != v.WORKS:

@@ -378,8 +378,12 @@ class _Reader:
         else:
             values -= set(self._level_iris.values())
 
+        # Where rules find failures, a component has what they find beside what is observed of it.
+        lifted = (f"<{v.C_STATUS}>", f"<{v.OWL_FUNCTIONAL_PROPERTY}>") if self._reads.failures else ()
+
         def stays(triple: Triple) -> bool:
-            return iri_of(triple[1]) not in dropped and iri_of(triple[0]) not in values
+            is_lifted = (triple[0], triple[2]) == lifted
+            return not is_lifted and iri_of(triple[1]) not in dropped and iri_of(triple[0]) not in values
 
         triples = [_with_decimal(triple) for triple in self._graph.triples if stays(triple)]
         for name, quality in self._qualities.items():
