@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from mros1_reasoner.io.ontology_files import read_knowledge_base
 from mros1_reasoner.io.tomasys_generator import generate
-from mros1_reasoner.knowledge.model import Direction, Quality
+from mros1_reasoner.knowledge.model import Direction, Need, Quality
 from ros_model.generators import find_generators
 from ros_model.io.project import load_project
 
@@ -89,3 +89,13 @@ def test_band_becomes_two_limits(project, tmp_path, band, limits):
     (path,) = generate(replace(project, settings=content), tmp_path)
     (objective,) = read_knowledge_base([path]).objectives
     assert objective.limits == limits
+
+
+def test_surroundings_are_needed_by_designs_that_require_a_component_and_by_variants(project, tmp_path):
+    content = copy.deepcopy(project.settings)
+    content["environment"] = {"light": {"required_by": {"camera": {"least": 0.25}, "f1_v1_r1": {"most": 0.9}}}}
+    (path,) = generate(replace(project, settings=content), tmp_path)
+    designs = read_knowledge_base([path]).designs
+    seeing = {name for name, components in project.required_components().items() if "camera" in components}
+    assert {name for name, design in designs.items() if Need("light", least=0.25) in design.needs} == seeing
+    assert Need("light", most=0.9) in designs["f1_v1_r1"].needs

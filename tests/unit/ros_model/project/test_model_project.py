@@ -143,6 +143,22 @@ def test_without_a_table_variants_are_files(load, settings, tmp_path):
             {"objectives": {"o": {"function": "f_move", "nfrs": {"safety": float("nan")}}}},
             "objectives.o.nfrs.safety: is 'nan', must be a finite number",
         ),
+        (
+            {"objectives": {"o": {"function": "f_move", "nfrs": {"safety": [0.6, 0.2]}}}},
+            "objectives.o.nfrs.safety: is '[0.6, 0.2]', must be a list of two numbers, the lower one first",
+        ),
+        (
+            {"environment": {"light": {"required_by": {"lamp": {"least": 1}}}}},
+            "environment.light.required_by.lamp: 'lamp' is no component and none of the 2 variants",
+        ),
+        (
+            {"environment": {"light": {"required_by": {"laser": {}}}}},
+            "environment.light.required_by.laser: is '{}', must be a mapping with least, most, or both",
+        ),
+        (
+            {"environment": {"safety": {"required_by": {"laser": {"least": 1}}}}},
+            "'safety' names a quality attribute and a property of the surroundings: rename one",
+        ),
         ({"objectives": {"o": {"function": "f"}}}, "objectives.o.function: 'f' is none of functions: f_move"),
         (
             {"functions": {"f_move": {"designs": ["fast"]}}},
@@ -350,7 +366,7 @@ def test_every_problem_of_the_settings_is_told_at_its_place(tmp_path):
         "1:1: utility: is missing, must be a name",
         "1:1: package: is 'robot models', must be a name of letters, digits, '_' and '-'",
         "3:1: colour: unknown key, allowed here: package, base, variants, functions, quality_attributes, utility, "
-        "objectives, components, topics, observers, reasoner, manipulator, arguments, requires",
+        "objectives, components, topics, environment, observers, reasoner, manipulator, arguments, requires",
         "4:28: variants.table: is \"['a']\", must be the name of a CSV or YAML file",
         "6:12: functions.f_move.designs: is 'some', must be 'all' or a list of variants",
         "7:22: quality_attributes.safety: the key 15 must be text: put it in quotes",

@@ -105,7 +105,9 @@ def _replay_run(
     core = Mape(knowledge_base, reasoner, objectives, settings, name=run.name)
     entries = run.entries or without_journal(
         recording,
-        DiagnosticsReader(knowledge_base.qualities, knowledge_base.components, parameters.nodes),
+        DiagnosticsReader(
+            {*knowledge_base.qualities, *knowledge_base.environment}, knowledge_base.components, parameters.nodes
+        ),
         _initial(knowledge_base, recording, initial),
     )
     if not entries:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import escape, quoteattr
 
 from ros_model.file_names import safe_file_name
@@ -62,6 +62,7 @@ def application_model(project: Project, iri: str) -> str:
         reaching = {"qa_reaching_violates": True} if entry.get("reaching_violates") else {}
         typical = {"qa_typical": entry["typical"]} if "typical" in entry else {}
         parts.append(_individual("QualityAttributeType", quality, {}, numbers, reaching, typical))
+    parts += _environment(settings.get("environment", {}))
     nodes = _own_nodes(project)
     required = {name: names - nodes[name] for name, names in project.required_components().items()}
     components = {name for names in (*required.values(), *nodes.values()) for name in names}
@@ -79,6 +80,7 @@ def application_model(project: Project, iri: str) -> str:
             "tomasys:solvesF": [function],
             "tomasys:requiresF": project.required_functions(variant.name),
             "tomasys:hasQAestimation": [f"{variant.name}_{quality}" for quality in levels],
+            "tomasys:requiresEnvironment": _constraints_of(project, variant.name),
         }
         parts.append(_individual("FunctionDesign", variant.name, links))
         parts += _levels(variant.name, levels, {quality: names[variant.name] for quality, names in groups.items()})
@@ -106,6 +108,29 @@ def _own_nodes(project: Project) -> dict[str, frozenset[str]]:
         )
         for variant in project.variants
     }
+
+
+def _environment(environment: Mapping[str, Any]) -> list[str]:
+    """Return properties of the surroundings, and what who needs of them."""
+    parts = []
+    for attribute, entry in environment.items():
+        parts.append(_individual("EnvironmentAttribute", attribute, {}))
+        for name, limits in entry["required_by"].items():
+            numbers = {f"env_{end}": limits[end] for end in ("least", "most") if end in limits}
+            link = {"tomasys:constrains": [attribute]}
+            parts.append(_individual("EnvironmentConstraint", f"{attribute}_for_{name}", link, numbers))
+    return parts
+
+
+def _constraints_of(project: Project, variant: str) -> list[str]:
+    """Return the constraints on the surroundings of a variant: its own, and those of what it requires."""
+    required = project.required_components()[variant]
+    return [
+        f"{attribute}_for_{name}"
+        for attribute, entry in project.settings.get("environment", {}).items()
+        for name in entry["required_by"]
+        if name == variant or not project.names_of(name).isdisjoint(required)
+    ]
 
 
 def _both_ends(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,6 +33,8 @@ class KnowledgeBase:
         unread: components whose status no rule reads.
         levels_read: quality attributes whose observed levels rules of the models read.
         reads_error_log: whether rules of the models read which designs have failed.
+        environment: names of the properties of the surroundings.
+        reads_environment: whether rules of the models read their values.
         reads_history: whether rules of the models read which decisions there were.
         qualities: how levels compare, of every quality attribute by name.
         objectives: those that the models hold already, but for those that a grounding requires.
@@ -58,6 +60,8 @@ class KnowledgeBase:
             if model.reads.every_quality or iri in model.reads.qualities
         )
         self.reads_error_log = v.FD_ERROR_LOG in model.reads.properties
+        self.environment = frozenset(model.environment_iris)
+        self.reads_environment = v.ENV_VALUE in model.reads.properties
         self.reads_history = not model.reads.properties.isdisjoint({v.DECISION, *v.HISTORY})
         self._labels = model.reads.labels
         self.qualities = dict(model.qualities)
@@ -120,34 +124,7 @@ class KnowledgeBase:
         """
         result = list(self._ends_of_bands())
         for objective in facts.objectives:
-            iri = self._objective_iri(objective.name)
-            result.append(Assertion(iri, v.RDF_TYPE, v.OBJECTIVE))
-            result.append(
-                Assertion(iri, v.TYPE_F, self._find(self._model.function_iris, objective.function, "Function"))
-            )
-            for quality, limit in sorted(objective.limits.items()):
-                value = self._nfr_iri(objective, quality)
-                result += [Assertion(iri, v.HAS_NFR, value), *self._level(value, quality, limit)]
-            design = facts.groundings.get(objective.name)
-            if design is None:
-                result.append(Assertion(iri, v.O_STATUS, v.UNGROUNDED, _STRING))
-                continue
-            grounding = self._grounding_iri(objective.name, design)
-            result.append(Assertion(grounding, v.RDF_TYPE, v.FUNCTION_GROUNDING))
-            result.append(Assertion(grounding, v.SOLVES_O, iri))
-            result.append(
-                Assertion(grounding, v.TYPE_FD, self._find(self._model.design_iris, design, "FunctionDesign"))
-            )
-            for required in facts.requires.get(objective.name, ()):
-                result.append(Assertion(grounding, v.REQUIRES_O, self._objective_iri(required)))
-            if objective.name in facts.failed:
-                result.append(Assertion(iri, v.O_CAUSE, v.IN_ERROR_NFR, _STRING))
-            if objective.name in facts.broken:
-                result.append(Assertion(grounding, v.FG_CAUSE, v.IN_ERROR_COMPONENT, _STRING))
-            for (owner, quality), level in sorted(facts.levels.items()):
-                if owner == objective.name:
-                    value = f"{grounding}_{quality}"
-                    result += [Assertion(grounding, v.HAS_QA_VALUE, value), *self._level(value, quality, level)]
+            result += self._about(objective, facts)
         says_working = self._model.reads.working or all_components
         for component, status in sorted(facts.components.items()):
             iri = self._find(self._model.component_iris, component, "Component")
@@ -156,9 +133,40 @@ class KnowledgeBase:
         for design, objective_name in sorted(facts.tried):
             iri = self._find(self._model.design_iris, design, "FunctionDesign")
             result.append(Assertion(iri, v.FD_ERROR_LOG, self._objective_iri(objective_name)))
+        for attribute, value in sorted(facts.surroundings.items()):
+            iri = self._find(self._model.environment_iris, attribute, "EnvironmentAttribute")
+            result.append(Assertion(iri, v.RDF_TYPE, v.ENVIRONMENT_ATTRIBUTE))
+            result.append(Assertion(iri, v.ENV_VALUE, decimal_text(value), _DECIMAL))
         for past in facts.history:
             result += self._past(past)
         return result
+
+    def _about(self, objective: Objective, facts: Facts) -> Iterator[Assertion]:
+        """Yield what facts say of an objective, and of what is deployed for it."""
+        iri = self._objective_iri(objective.name)
+        yield Assertion(iri, v.RDF_TYPE, v.OBJECTIVE)
+        yield Assertion(iri, v.TYPE_F, self._find(self._model.function_iris, objective.function, "Function"))
+        for quality, limit in sorted(objective.limits.items()):
+            value = self._nfr_iri(objective, quality)
+            yield from (Assertion(iri, v.HAS_NFR, value), *self._level(value, quality, limit))
+        design = facts.groundings.get(objective.name)
+        if design is None:
+            yield Assertion(iri, v.O_STATUS, v.UNGROUNDED, _STRING)
+            return
+        grounding = self._grounding_iri(objective.name, design)
+        yield Assertion(grounding, v.RDF_TYPE, v.FUNCTION_GROUNDING)
+        yield Assertion(grounding, v.SOLVES_O, iri)
+        yield Assertion(grounding, v.TYPE_FD, self._find(self._model.design_iris, design, "FunctionDesign"))
+        for required in facts.requires.get(objective.name, ()):
+            yield Assertion(grounding, v.REQUIRES_O, self._objective_iri(required))
+        if objective.name in facts.failed:
+            yield Assertion(iri, v.O_CAUSE, v.IN_ERROR_NFR, _STRING)
+        if objective.name in facts.broken:
+            yield Assertion(grounding, v.FG_CAUSE, v.IN_ERROR_COMPONENT, _STRING)
+        for (owner, quality), level in sorted(facts.levels.items()):
+            if owner == objective.name:
+                value = f"{grounding}_{quality}"
+                yield from (Assertion(grounding, v.HAS_QA_VALUE, value), *self._level(value, quality, level))
 
     def analyse(self, facts: Facts, reasoner: Reasoner) -> Analysis:
         """Infer the causes that follow from the facts, and derive the statuses.
@@ -189,14 +197,13 @@ class KnowledgeBase:
                 grounding_causes=frozenset(grounding_causes),
                 grounding_status=_worst(grounding_causes),
             )
-        functions = set(self._model.function_iris.values())
+        others = {*self._model.function_iris.values(), *self._model.environment_iris.values()}
         return Analysis(
             objectives=objectives,
             unrealisable={
                 self._design_name[design]: tuple(
                     sorted(
-                        self._component_name.get(c, local_name(c))
-                        for c in found[v.FD_UNREALISABLE_BY][design] - functions
+                        self._component_name.get(c, local_name(c)) for c in found[v.FD_UNREALISABLE_BY][design] - others
                     )
                 )
                 for design in self._unrealisable(found)

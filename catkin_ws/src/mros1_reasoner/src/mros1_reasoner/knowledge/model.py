@@ -98,6 +98,27 @@ class Quality:
 
 
 @dataclass(frozen=True)
+class Need:
+    """Within which values of a property of the surroundings a design can work.
+
+    Attributes:
+        attribute: name of the property.
+        least: the least such value.
+        most: the greatest one.
+    """
+
+    attribute: str
+    least: float = -math.inf
+    most: float = math.inf
+
+    def lack(self, value: float) -> str:
+        """Return why a value does not fit, such as `light 0.1 < 0.25`; empty if it fits."""
+        if value < self.least:
+            return f"{self.attribute} {value:.3g} < {self.least:g}"
+        return f"{self.attribute} {value:.3g} > {self.most:g}" if value > self.most else ""
+
+
+@dataclass(frozen=True)
 class Design:
     """A FunctionDesign; it has the name of the configuration that deploys it.
 
@@ -108,6 +129,7 @@ class Design:
         components: components that it cannot be deployed without.
         requires: functions that must be provided for it to work.
         nodes: components that it brings itself, as nodes.
+        needs: surroundings that it needs.
         groups: by quality, what the design is like in all that a correction depends on; empty: corrected like all.
     """
 
@@ -118,6 +140,12 @@ class Design:
     requires: tuple[str, ...] = ()
     nodes: frozenset[str] = frozenset()
     groups: Mapping[str, str] = field(default_factory=dict)
+    needs: tuple[Need, ...] = ()
+
+    def lacks(self, surroundings: Mapping[str, float]) -> list[str]:
+        """Return why surroundings do not fit, by the values of their properties; what is not known fits."""
+        known = ((need, surroundings[need.attribute]) for need in self.needs if need.attribute in surroundings)
+        return [words for need, value in known if (words := need.lack(value))]
 
     def group(self, quality: str) -> str:
         """Return the group of designs of which a quality is corrected together."""
@@ -179,6 +207,7 @@ class Facts:
         requires: objectives that the grounding of an objective requires, by the objective's name.
         tried: designs that did not keep a limit of an objective, or failed for it, as (design, objective).
         history: the last decisions, the newest last.
+        surroundings: value of each property of the surroundings that has been observed.
     """
 
     objectives: tuple[Objective, ...] = ()
@@ -190,6 +219,7 @@ class Facts:
     requires: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     tried: frozenset[tuple[str, str]] = frozenset()
     history: tuple[Past, ...] = ()
+    surroundings: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -223,7 +253,8 @@ class Analysis:
     Attributes:
         objectives: by name.
         unrealisable: designs that can't be deployed, each with the components that keep it from that; none of these
-            where a rule of the model says so, or where only a function that it requires can't be fulfilled.
+            where a rule of the model says so, where only a function that it requires can't be fulfilled, or where the
+            surroundings do not fit.
         tried: designs that do not keep their objective's limits while deployed, as (design, objective).
     """
 

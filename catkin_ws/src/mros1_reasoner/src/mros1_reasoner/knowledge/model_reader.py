@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.live_rules import without_idle
 from mros1_reasoner.knowledge.loaded_rules import Reads
-from mros1_reasoner.knowledge.model import LEAST, MOST, Design, Direction, Objective, Quality
+from mros1_reasoner.knowledge.model import LEAST, MOST, Design, Direction, Need, Objective, Quality
 from mros1_reasoner.knowledge.reasoner import Assertion
 from mros1_reasoner.knowledge.triples import (
     Graph,
@@ -31,7 +31,7 @@ _DECIMAL = v.XSD + "decimal"
 _MOMENTARY = (
     *(v.O_STATUS, v.FG_STATUS, v.O_CAUSE, v.FG_CAUSE, v.O_VIOLATED_NFR, v.O_UPDATABLE),
     *(v.FD_REALISABILITY, v.FD_UNREALISABLE_BY, v.F_FULFILLABLE, v.FD_NONE_SO_FAR, v.FD_ERROR_LOG),
-    *(v.C_STATUS, v.SOLVES_O, v.TYPE_FD, v.REQUIRES_O),
+    *(v.C_STATUS, v.SOLVES_O, v.TYPE_FD, v.REQUIRES_O, v.ENV_VALUE),
 )
 _ORDER = (v.F_FIRST_DESIGN, v.F_LAST_DESIGN, v.FD_NEXT)  # it is stated anew, of all designs that are read
 _COMPARISONS = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES)
@@ -62,6 +62,7 @@ class ApplicationModel:
         own_nodes: components that are nothing but nodes of designs.
         level_iris: IRI of the QAvalue of a required or expected level, by IRI of its owner, quality and level.
         reads: what rules and axioms of the models are about.
+        environment_iris: IRI of each property of the surroundings by name.
         asked: the properties that an analysis asks for.
         ontology: vocabulary, rules and models as N-Triples, without what comes as facts, and without idle rules.
         idle: the idle rules, as N-Triples.
@@ -81,6 +82,7 @@ class ApplicationModel:
     own_nodes: frozenset[str]
     level_iris: Mapping[tuple[str, str, float], str]
     reads: Reads
+    environment_iris: Mapping[str, str]
     asked: tuple[str, ...]
     ontology: str
     idle: str
@@ -128,6 +130,9 @@ class _Reader:
         # The others are ends of bands, which a saved knowledge base has.
         self._quality_types = {name: iri for name, iri in types.items() if not iri.startswith(v.RUNTIME)}
         self._objectives = self._names((v.OBJECTIVE,), graph.subjects(v.TYPE_F))
+        self._environment = self._names((v.ENVIRONMENT_ATTRIBUTE,), graph.objects(v.CONSTRAINS))
+        for name in sorted(self._environment.keys() & types.keys()):
+            raise KnowledgeBaseError(f"{where}: {name} is both a quality and of the environment: rename one of them")
         self._function_name = _inverse(self._functions)
         self._component_name = _inverse(self._components)
         self._quality_name = _inverse(types)
@@ -169,6 +174,7 @@ class _Reader:
             own_nodes=self._own_nodes(),
             level_iris=self._level_iris,
             reads=self._reads,
+            environment_iris=self._environment,
             asked=asked,
             ontology=write_ntriples(ontology),
             idle=write_ntriples(idle),
@@ -259,7 +265,21 @@ class _Reader:
             requires=tuple(sorted(local_name(f) for f in self._graph.objects_of(iri, v.REQUIRES_F))),
             nodes=frozenset(self._component_name[c] for c in self._graph.subjects_of(v.DEPLOYED_BY, iri)),
             groups=self._groups(iri),
+            needs=tuple(self._need(k, name) for k in sorted(self._graph.objects_of(iri, v.REQUIRES_ENVIRONMENT))),
         )
+
+    def _need(self, constraint: str, design: str) -> Need:
+        """Return what a design needs of the surroundings."""
+        attributes = self._graph.objects_of(constraint, v.CONSTRAINS)
+        limits = {name: self._bound(constraint, name) for name in (v.ENV_LEAST, v.ENV_MOST)}
+        least, most = limits[v.ENV_LEAST], limits[v.ENV_MOST]
+        if len(attributes) != 1 or (least is None and most is None):
+            raise KnowledgeBaseError(
+                f"{self._where}: {local_name(constraint)}, which {design} requires, must have one constrains, and "
+                "env_least or env_most"
+            )
+        attribute = local_name(attributes.pop())
+        return Need(attribute, -math.inf if least is None else least, math.inf if most is None else most)
 
     def _groups(self, design: str) -> dict[str, str]:
         """Return by quality the group in which the levels that are expected of a design are corrected."""

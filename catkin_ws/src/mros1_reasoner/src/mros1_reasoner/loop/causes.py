@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from metacontrol_bags.decision import Cause
@@ -114,6 +115,12 @@ def _component_errors(view: View, name: str, now: float) -> list[Cause]:
         words = f"component {component}, which {running.design} requires, does not work"
         stamp = known.stamp if known else now
         found.append(Cause(stamp, f"component:{component}", words, "compError, compErrFG, S1a"))
+    for need in view.kb.designs[running.design or ""].needs:
+        words = need.lack(view.facts.surroundings.get(need.attribute, math.nan))
+        if words:
+            stamp = view.surroundings.unmet.get(need, now)
+            words = f"{words}, which {running.design} needs"
+            found.append(Cause(stamp, f"environment:{need.attribute}", words, "E1, E2, E3, S1a"))
     for node in running.failed_nodes:
         words = f"node {node} of {running.design} does not work"
         found.append(Cause(view.components[node].stamp, f"component:{node}", words, "S1a"))

@@ -300,6 +300,7 @@ class Deliberation:
         situation = Situation(
             qualities=self._state.kb.qualities,
             unrealisable=self._state.analysis.unrealisable,
+            unsuited={d.name: words for d in designs if (words := d.lacks(self._state.facts.surroundings))},
             unfulfilled=unfulfilled,
             strained=strained,
             tried={

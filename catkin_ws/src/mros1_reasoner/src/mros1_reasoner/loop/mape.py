@@ -125,11 +125,11 @@ class Mape:
     # R1: facts
 
     def observe_level(self, now: float, quality: str, level: float, grounding: str = "", stamp: float = 0.0) -> None:
-        """Take in an observed level.
+        """Take in an observed level of a quality, or a value of a property of the surroundings.
 
         Args:
             now: present time.
-            quality: name of the quality attribute.
+            quality: name of the quality attribute, or of the property.
             level: the level.
             grounding: name of the grounding that it was observed of; an unknown name means all groundings.
             stamp: of the diagnostic; 0 where it has none.
@@ -137,6 +137,9 @@ class Mape:
         Raises:
             MapeError: the quality is unknown, or the level is not finite.
         """
+        if quality in self._kb.environment and math.isfinite(level):
+            self._state.note_surroundings(now, quality, level, stamp)
+            return
         if quality not in self._kb.qualities:
             raise MapeError(f"Unsupported QA TYPE received: {quality}")
         if not math.isfinite(level):
@@ -276,16 +279,17 @@ class Mape:
     def feasible(self) -> dict[str, tuple[str, ...]]:
         """Return the designs by which each function could be fulfilled now, the most useful first.
 
-        A design is left out while a component that it requires does not work, or no design fulfils a function that
-        it requires.
+        A design is left out while a component that it requires does not work, no design fulfils a function that it
+        requires, or the surroundings are not as it needs them.
 
         Raises:
             ReasonerError: the analysis failed.
         """
         components = {name: component.status for name, component in self._state.components.items()}
-        analysis = self._state.analysis
-        if not self._state.has_analysed or self._state.facts.components != components:
-            analysis = self._kb.analyse(Facts(components=components), self._reasoner)
+        surroundings = dict(self._state.surroundings.values)
+        analysis, facts = self._state.analysis, self._state.facts
+        if not self._state.has_analysed or (facts.components, facts.surroundings) != (components, surroundings):
+            analysis = self._kb.analyse(Facts(components=components, surroundings=surroundings), self._reasoner)
         designs = [design for design in self._kb.designs.values() if design.name not in analysis.unrealisable]
         return feasible_designs(self._kb.functions, designs, self._utility)
 

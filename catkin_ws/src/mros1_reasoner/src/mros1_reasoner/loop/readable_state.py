@@ -18,6 +18,7 @@ from mros1_reasoner.knowledge.model import Analysis, Facts, Objective, Past
 from mros1_reasoner.knowledge.scale import Scale
 from mros1_reasoner.loop.levels import Levels
 from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.loop.surroundings import Surroundings
 
 BUSY = (FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING)
 
@@ -136,6 +137,7 @@ class View:
         released: functions that nothing needs any longer although they run, in the order in which to release them.
         components: last status of components.
         levels: observed levels.
+        surroundings: what is known of them.
         error_log: until when a design is not tried again for an objective, and why.
         history: the last decisions that have been carried out or have failed.
         retries: from when on a design that failed may replace a working one of an objective, and why it failed.
@@ -161,6 +163,7 @@ class View:
     released: Collection[str]
     components: Mapping[str, Component]
     levels: Levels
+    surroundings: Surroundings
     error_log: Mapping[tuple[str, str], tuple[float, str]]
     history: Sequence[Past]
     retries: Mapping[tuple[str, str], tuple[float, str]]
@@ -286,6 +289,7 @@ class View:
             requires={name: self.required(running.design) for name, running in grounded.items()},
             tried=frozenset(self.error_log) if self.kb.reads_error_log else frozenset(),
             history=tuple(self.history) if self.kb.reads_history else (),
+            surroundings=dict(self.surroundings.values),
         )
 
     def what_counts(self, facts: Facts, now: float) -> tuple[object, ...]:
@@ -298,8 +302,10 @@ class View:
         )
         waits = tuple((self.is_busy(r, now), now < r.not_before, now < r.retry_from) for r in self.running.values())
         improves = tuple((tuple(r.chances), now < r.calm_until) for r in self.running.values() if r.chances)
+        levels = {key: level for key, level in facts.levels.items() if key[1] in self.kb.levels_read}
         return (
-            replace(facts, levels={key: level for key, level in facts.levels.items() if key[1] in self.kb.levels_read}),
+            replace(facts, levels=levels, surroundings=facts.surroundings if self.kb.reads_environment else {}),
+            frozenset(self.surroundings.unmet),
             frozenset(facts.levels),
             passed,
             self.violations(now),
@@ -337,6 +343,7 @@ class View:
             is_known = bool(result.violated) or name in self.facts.failed
             return status in result.grounding_causes or (status in result.causes and not is_known)
         is_known = name in self.facts.broken or bool(self.analysis.unrealisable.get(running.design or ""))
+        is_known |= bool(running.design and self.kb.designs[running.design].lacks(self.facts.surroundings))
         return status in result.causes and not is_known
 
     def rule_counts(self, name: str, now: float) -> bool:

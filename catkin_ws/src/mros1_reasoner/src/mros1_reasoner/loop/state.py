@@ -19,6 +19,7 @@ from mros1_reasoner.loop.causes import OPERATOR, RETRY, RULE, drifted_nodes, is_
 from mros1_reasoner.loop.levels import Expectation, Judging, Levels
 from mros1_reasoner.loop.readable_state import BUSY, Component, Running, View
 from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.loop.surroundings import Surroundings
 from mros1_reasoner.planning.planner import Utility
 
 _RELAPSE = 5.0  # times the calm after which a better design was taken again: a violation then is a new one
@@ -57,6 +58,8 @@ class State(View):
                 relief=settings.relief,
             )
         )
+        needs = (need for design in knowledge_base.designs.values() for need in design.needs)
+        self.surroundings = Surroundings(needs, int(settings.history), settings.relief)
         self.error_log: dict[tuple[str, str], tuple[float, str]] = {}
         self.history: deque[Past] = deque(maxlen=_HISTORY)
         self.retries: dict[tuple[str, str], tuple[float, str]] = {}
@@ -103,6 +106,10 @@ class State(View):
             best = self.kb.qualities[quality].direction.better(*levels) if levels else None
             self._better[design.name, quality] = best
         return self._better[design.name, quality]
+
+    def note_surroundings(self, now: float, attribute: str, value: float, stamp: float) -> None:
+        """Note an observed value of a property of the surroundings."""
+        self.surroundings.observe(stamp or now, attribute, value)
 
     def forget_levels(self, quality: str) -> None:
         """Forget the levels of a quality."""

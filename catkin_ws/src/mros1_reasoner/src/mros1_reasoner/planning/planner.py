@@ -49,6 +49,7 @@ class Situation:
     Attributes:
         qualities: how the levels of each quality attribute compare.
         unrealisable: designs that can't be deployed, each with the components that are missing, if any are.
+        unsuited: why the surroundings do not fit designs that can't be deployed.
         unfulfilled: functions that a design requires and that no design can be deployed for, by the design's name.
         strained: the same for functions that are provided, but not as they should be.
         tried: why a design failed a short while ago, by its name.
@@ -65,6 +66,7 @@ class Situation:
 
     qualities: Mapping[str, Quality] = field(default_factory=dict)
     unrealisable: Mapping[str, Collection[str]] = field(default_factory=dict)
+    unsuited: Mapping[str, Collection[str]] = field(default_factory=dict)
     unfulfilled: Mapping[str, Collection[str]] = field(default_factory=dict)
     strained: Mapping[str, Collection[str]] = field(default_factory=dict)
     tried: Mapping[str, str] = field(default_factory=dict)
@@ -242,6 +244,7 @@ def _judge(objective: Objective, design: Design, situation: Situation, utility: 
     ):
         if parts.get(name):
             reasons.append(f"requires {', '.join(sorted(parts[name]))}, {words}")
+    reasons += situation.unsuited.get(name, ())
     if name in situation.unrealisable and not reasons:
         reasons.append("a rule of the model says that it can't be deployed")
     violation += len(situation.strained.get(name, ()))

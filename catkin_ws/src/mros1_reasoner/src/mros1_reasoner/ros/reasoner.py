@@ -72,7 +72,9 @@ class ReasonerNode:
         name = f"{rospy.get_name().strip('/')}-{int(time.time())}"
         self.core = Mape(knowledge_base, reasoner, objectives, settings, clock=rospy.get_time, name=name)
         self._inbox = Inbox()
-        self._reader = DiagnosticsReader(knowledge_base.qualities, knowledge_base.components, parameters.nodes)
+        self._reader = DiagnosticsReader(
+            {*knowledge_base.qualities, *knowledge_base.environment}, knowledge_base.components, parameters.nodes
+        )
         self._node_of = {component: node for node, component in parameters.nodes.items()}
         self._log = Log(self._period)
         self._taken_over: set[str] = set()

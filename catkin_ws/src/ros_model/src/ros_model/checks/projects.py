@@ -44,6 +44,17 @@ def wrong_names(project: Project) -> Iterator[ModelError]:
                 )
 
 
+def wrong_surroundings(project: Project) -> Iterator[ModelError]:
+    """Yield entries of `environment` that are about a component or a variant that is not there."""
+    components = {component.name for component in project.whole_base.components} | set(project.settings["components"])
+    variants = {variant.name for variant in project.variants}
+    for attribute, entry in project.settings.get("environment", {}).items():
+        for name in entry["required_by"]:
+            if name not in components | variants | set(project.nodes):
+                keys = ("environment", attribute, "required_by", name)
+                yield project.source.error(f"{name!r} is no component and none of the {len(variants)} variants", *keys)
+
+
 def wrong_requirements(project: Project) -> Iterator[ModelError]:
     """Yield entries of `components` that stand for nothing, or say of designs what can't be meant."""
     for name, entry in project.settings["components"].items():
@@ -127,6 +138,7 @@ def two_meanings(project: Project) -> Iterator[ModelError]:
     meanings = {
         "a function": settings["functions"],
         "a quality attribute": settings["quality_attributes"],
+        "a property of the surroundings": settings.get("environment", {}),
         "an objective": settings["objectives"],
         "a component": {
             *settings["components"],

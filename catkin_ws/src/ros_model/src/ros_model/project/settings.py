@@ -164,8 +164,9 @@ def _unknown_qas(settings: Settings) -> Iterator[ModelError]:
             used.append((entry["quality_attribute"], ("observers", number, "quality_attribute")))
     for keys, family in settings.families:
         used += [(qa, (*keys, "expected", column)) for column, qa in family.get("expected", {}).items()]
+    surroundings = content.get("environment", {})
     for qa, keys in used:
-        if qa not in content["quality_attributes"]:
+        if qa not in content["quality_attributes"] and not (keys[0] == "observers" and qa in surroundings):
             yield _no_such(settings, qa, "quality_attributes", *keys)
 
 
