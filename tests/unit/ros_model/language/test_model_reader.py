@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from ros_model.errors import ModelError
 from ros_model.io.models import read_system
@@ -168,9 +168,14 @@ def test_reference_without_a_node_after_a_script_is_incomplete_but_read():
 _PART_OF_A_REFERENCE = st.from_regex(r"[A-Za-z][A-Za-z0-9_.]{0,8}", fullmatch=True)
 
 
-@given(_PART_OF_A_REFERENCE, _PART_OF_A_REFERENCE, st.from_regex(r"[a-z]{1,3}", fullmatch=True), st.text(max_size=8))
+_NODE = st.from_regex(r"[a-z]{1,3}", fullmatch=True) | st.sampled_from(sorted(EXTENSIONS_OF_SCRIPTS))
+
+
+@given(_PART_OF_A_REFERENCE, _PART_OF_A_REFERENCE, _NODE, st.text(max_size=8))
+@example("p", "a", "rb", "")
+@example("p", "a", "py", "name")
+@example("p", "a.py", "py", "name")
 def test_any_reference_is_read_as_it_was_written(package, artifact, node, name):
-    assume(node not in EXTENSIONS_OF_SCRIPTS)
     reference = Reference(package, artifact, node, name)
     assert Reference.parse(str(reference)) == reference
 

@@ -75,7 +75,8 @@ class Reference:
     """A dotted reference `package.artifact.node.name`; the name may itself hold dots and slashes.
 
     The artifact is the name of an executable's file. It may have the extension of a script, as in
-    `package.talker.py.node`. Any other dot in one of the first three parts has a backslash before it.
+    `package.talker.py.node`. Any other dot in one of the first three parts has a backslash before it, and so has a node
+    that is called as an extension is.
     """
 
     package: str
@@ -104,6 +105,8 @@ class Reference:
         if len(parts) > 2 and parts[2] in EXTENSIONS_OF_SCRIPTS:
             parts = _cut(text, 4)
             parts[1:3] = [f"{parts[1]}.{parts[2]}"]
+        elif len(parts) > 2 and parts[2][:1] == "\\" and parts[2][1:] in EXTENSIONS_OF_SCRIPTS:
+            parts[2] = parts[2][1:]
         return (*(_ESCAPED.sub(r"\1", part) for part in parts[:3]), *parts[3:])
 
     def __str__(self) -> str:
@@ -111,7 +114,8 @@ class Reference:
         stem, dot, extension = self.artifact.rpartition(".")
         is_script = bool(stem) and extension in EXTENSIONS_OF_SCRIPTS
         artifact = _escaped(stem) + dot + extension if is_script else _escaped(self.artifact)
-        parts = (_escaped(self.package), artifact, _escaped(self.node), self.name)
+        node = f"\\{self.node}" if self.node in EXTENSIONS_OF_SCRIPTS and not is_script else _escaped(self.node)
+        parts = (_escaped(self.package), artifact, node, self.name)
         return ".".join(part for part in parts if part)
 
 
