@@ -166,6 +166,11 @@ class OperatorTest(unittest.TestCase):
         self.assertEqual([f.function for f in answer.functions], ["f_move"])
         self.assertEqual(answer.functions[0].designs[0], "scan_fast")
         self.assertIn("no Function is called 'f_fly'", self.refuses(reasoner, "feasible", Feasible, "f_fly"))
+        command = [sys.executable, str(NODE.with_name("feasible")), "--node", f"{reasoner.namespace}/reasoner"]
+        text = subprocess.run([*command, "--pddl"], capture_output=True, text=True, timeout=60, check=False).stdout
+        self.assertIn("(best scan_fast f_move)", text)
+        told = subprocess.run([*command, "f_fly"], capture_output=True, text=True, timeout=60, check=False)
+        self.assertEqual((told.returncode, "no Function is called 'f_fly'" in told.stderr), (2, True))
 
     def changes_limits_and_objectives(self, reasoner):
         self.assertIn("comfort", self.refuses(reasoner, "set_nfr", SetNfr, "", "comfort", 0.5))

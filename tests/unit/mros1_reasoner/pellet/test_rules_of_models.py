@@ -7,6 +7,7 @@ rule engine infers there what Pellet does.
 
 import random
 
+import owlready2
 import pytest
 from mros1_reasoner.forward.engine import RuleEngine
 from mros1_reasoner.io.ontology_files import own_ontologies, read_knowledge_base, read_triples, save_knowledge_base
@@ -19,6 +20,7 @@ from mros1_reasoner.knowledge.triples import iri_of, write_ntriples
 from mros1_reasoner.pellet.owlready import run_pellet
 from mros1_reasoner.pellet.process import PelletReasoner
 from ontology_text import APP, OWL, assertion, swrl, typed
+from reasoner_helpers import OBJECTIVE, application
 
 PUBLISHED = {
     "S1a": "solvesO(?fg, ?o), fg_status(?fg, 'IN_ERROR_COMPONENT') -> o_status(?o, 'IN_ERROR_COMPONENT')",
@@ -246,6 +248,34 @@ def test_node_concludes_what_plain_pellet_does(tmp_path, pellet, plain, publishe
             consistent += 1
             assert node == expected, (seed, drawn.rules, drawn.observed)
     assert consistent >= 10
+
+
+def test_ontologies_as_files_conclude_the_same_in_plain_owlready2(tmp_path, pellet):
+    """A user opens the vocabulary, the rules and a model, states facts, and lets owlready2 call Pellet."""
+    (tmp_path / "app.owl").write_text(application())
+    knowledge_base = read_knowledge_base([tmp_path / "app.owl"])
+    pellet.load(knowledge_base.ontology)
+    components = {"laser": "FALSE", "camera": "RECOVERED"}
+    known = Facts((OBJECTIVE,), {"o_move": "scan_slow"}, {("o_move", "energy"): 0.9}, components)
+    analysis = knowledge_base.analyse(known, pellet)
+    world = owlready2.World()
+    for path in (*own_ontologies(), tmp_path / "app.owl"):
+        world.get_ontology(path.as_uri()).load(only_local=True)
+    app, tomasys = world.get_namespace("http://example.org/app#"), world.get_namespace(v.TOMASYS)
+    with world.get_ontology("http://example.org/facts#"):
+        o = tomasys.Objective("o_move", typeF=app.f_move)
+        fg = tomasys.FunctionGrounding("fg", solvesO=o, typeFD=app.scan_slow)
+        o.hasNFR = [tomasys.QAvalue("most", isQAtype=app.energy, hasValue=0.62)]
+        fg.hasQAvalue = [tomasys.QAvalue("now", isQAtype=app.energy, hasValue=0.9)]
+        app.energy.qa_sign = 1.0
+        app.laser.c_status, app.camera.c_status = components["laser"], components["camera"]
+    run_pellet(world)
+    assert set(o.o_status) == analysis.objectives["o_move"].causes
+    assert set(fg.fg_status) == analysis.objectives["o_move"].grounding_causes
+    assert len(o.o_status) == 3
+    found = {name for name in knowledge_base.designs if False in getattr(app, name).fd_realisability}
+    assert found == set(analysis.unrealisable)
+    assert True in o.o_updatable
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -302,7 +302,9 @@ def _reads(triples: Iterable[Triple], rules: Sequence[Rule]) -> Reads:
     for rule in rules:
         for atom in rule.head:
             if atom.predicate in _STATUS_NAMES:
-                labels[atom.arguments[-1].strip('"')].append(rule.label or str(rule))
+                status = atom.arguments[-1].strip('"')
+                for present in _ERRORS if status in _FORMER_ERRORS else (status,):
+                    labels[present].append(rule.label or str(rule))
             elif atom.predicate in (v.FD_REALISABILITY, v.FD_UNREALISABLE_BY):
                 labels[v.FD_REALISABILITY].append(rule.label or str(rule))
     return Reads(
