@@ -305,3 +305,14 @@ def test_names_turn_into_each_other():
     assert snake_case("QAObserver2") == "qa_observer2"
     assert camel_case("ride_comfort") == "RideComfort"
     assert variables(["/scan", "scan", "imu/data", "class", "3d"]) == ["scan", "scan_", "imu_data", "class_", "_3d"]
+
+
+def test_property_of_the_surroundings_is_observed_as_a_quality_is(package, generate):
+    folder = package({**DESCRIPTION, "name": "LightObserver", "quality_attribute": "light"})
+    path = folder / "models" / "metacontrol.yaml"
+    environment = {"light": {"required_by": {"v": {"least": 0.25}}}}
+    path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), "environment": environment}, sort_keys=False))
+    generate(folder)
+    text = (folder / "src" / folder.name / "light_observer.py").read_text()
+    assert 'qa_name = "light"' in text
+    assert "a property of the surroundings" in text

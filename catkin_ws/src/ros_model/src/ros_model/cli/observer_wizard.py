@@ -49,14 +49,15 @@ def run_wizard(output: str | None = None) -> None:
     name = _ask("Class of the observer", _checked(_class, project), f"{camel_case(quality)}QualityObserver")
     topics = _ask_topics(signals(project.whole_base, project.library), project.library)
     rate = click.prompt("Evaluations per second", type=FiniteRange(min=0, min_open=True, max=1000), default=10.0)
-    direction = known["direction"] if known else _ask_direction()
+    is_new = known is None and quality not in settings.get("environment", {})
+    direction = _ask_direction() if is_new else (known or {}).get("direction", "")
     lowest = click.prompt("Value of your formula that is level 0", type=FiniteRange(-1e9, 1e9), default=0.0)
     highest = click.prompt(
         "Value of your formula that is level 1", type=FiniteRange(lowest, 1e9, min_open=True), default=lowest + 1.0
     )
     entry = {"name": name, "quality_attribute": quality, "topics": topics, "rate": rate, "range": [lowest, highest]}
     folder = Path(output or click.prompt("Package to write into", default=str(_package_of(project))))
-    _add_to_settings(project, entry, None if known else direction)
+    _add_to_settings(project, entry, direction if is_new else None)
     observer = observer_model(entry, project.package, direction)
     others = [other for other in described_observers(project) if other.name != name]
     for path in write_observers([*others, observer], folder):

@@ -154,7 +154,7 @@ def _filled(template: str, observer: ObserverModel, **more: str) -> str:
         "name": observer.name,
         "module": f"{observer.python_package}.{observer.module}",
         "quality": observer.quality_attribute,
-        "direction": _WORST[observer.direction],
+        "direction": _WORST.get(observer.direction, "a property of the surroundings"),
         "export": f"<export>{observer.export_tag}</export>",
         "imports": "\n".join(f"import {package}.msg" for package in packages),
         "topics": topics,

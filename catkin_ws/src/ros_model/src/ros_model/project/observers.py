@@ -19,13 +19,13 @@ DIAGNOSTICS = PortDeclaration("/diagnostics", PortKind.PUBLISHER, "diagnostic_ms
 
 @dataclass(frozen=True)
 class ObserverModel:
-    """An observer of one quality attribute.
+    """An observer of one quality attribute, or of a property of the surroundings.
 
     Attributes:
         name: of its class.
         package: the package that it is in.
         quality_attribute: what it observes.
-        direction: lower_is_better or higher_is_better.
+        direction: lower_is_better or higher_is_better; empty for a property of the surroundings.
         topics: (topic, `package/Type`) that it listens to.
         rate: evaluations per second of ROS time.
         lowest: value of its formula that is level 0.
@@ -72,7 +72,7 @@ def described_observers(project: Project) -> tuple[ObserverModel, ...]:
     """Return the observers that metacontrol.yaml describes; those that it only names are left out."""
     qualities = project.settings["quality_attributes"]
     return tuple(
-        observer_model(entry, project.package, qualities[entry["quality_attribute"]]["direction"])
+        observer_model(entry, project.package, qualities.get(entry["quality_attribute"], {}).get("direction", ""))
         for entry in project.settings["observers"]
         if isinstance(entry, dict)
     )
