@@ -105,9 +105,8 @@ def test_feasible_heeds_surroundings(loop):
     assert core.feasible() == {"f_see": ("bumper",)}
 
 
-def test_nowhere_to_go_stays(loop, read):
+def test_value_that_only_another_design_minds_changes_nothing(loop):
     core = loop("stereo")
-    assert core.step(1.0) == []
     core.observe_level(2.0, "dust", 5.0)  # of another design
     assert core.step(2.0) == []
 
@@ -119,9 +118,22 @@ def test_saved_knowledge_base_concludes_the_same(loop, read, tmp_path):
     world = read().world(core.known)
     run_pellet(world)
     assert list(world[APP + "stereo"].fd_realisability) == [False]
-    assert "IN_ERROR_COMPONENT" in world[APP + "o_see"].o_status if world[APP + "o_see"] else True
+    assert v.IN_ERROR_COMPONENT in world[v.RUNTIME + "o_see"].o_status
     save_knowledge_base(tmp_path / "saved.owl", read(), core.known)
     assert read_knowledge_base([tmp_path / "saved.owl"]).designs["stereo"].needs == (Need("light", least=0.25),)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_each_need_is_judged_by_itself(order):
+    bright, dim = Need("light", least=0.5), Need("light", least=0.25)
+    seen = Surroundings([bright, dim][::order], 1, 0.2)
+    seen.observe(1.0, "light", 0.1)
+    assert set(seen.unmet) == {bright, dim}
+    seen.observe(2.0, "light", 0.52)
+    assert set(seen.unmet) == {bright}
+    told = seen.values["light"]
+    assert bright.lack(told)
+    assert not dim.lack(told)
 
 
 def test_median_of_values_counts():

@@ -1,1 +1,1 @@
-"""The commands `explain`, `replay` and `vocabulary`, one module each."""
+"""The commands `explain`, `feasible`, `replay` and `vocabulary`, one module each."""

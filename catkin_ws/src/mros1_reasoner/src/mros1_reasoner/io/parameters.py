@@ -179,19 +179,12 @@ def _limits(tree: ParameterTree, name: str, quality: str, knowledge_base: Knowle
     if not isinstance(tree.value(name), list):
         limit = tree.number(name, 0.0)
         return {quality: limit} if knowledge_base.admit(quality) else {}
-    band = tree.numbers(name)
-    if len(band) != len(("least", "most")) or not band[0] < band[1]:
-        raise tree.error(name, "one number, or two, the least one first", tree.value(name))
-    if quality not in knowledge_base.qualities:
-        return {}
-    kind = knowledge_base.qualities[quality]
-    knowledge_base.admit(kind.other_end(quality))
-    ends = (
-        (kind.other_end(quality), quality)
-        if kind.direction is Direction.LOWER_IS_BETTER
-        else (quality, kind.other_end(quality))
-    )
-    return dict(zip(ends, band, strict=True))
+    match tree.numbers(name):
+        case [least, most] if least < most:
+            kind = knowledge_base.qualities.get(quality)
+            limits = kind.band(quality, least, most) if kind else {}
+            return {limit: level for limit, level in limits.items() if knowledge_base.admit(limit)}
+    raise tree.error(name, "one number, or two, the least one first", tree.value(name))
 
 
 def _leaves(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

@@ -144,10 +144,8 @@ def _both_ends(
             found[quality] = limit
             continue
         kind = Quality(Direction(directions[quality]))
-        other = kind.other_end(quality)
-        is_most = kind.direction is Direction.LOWER_IS_BETTER
-        found[quality], found[other] = (limit[1], limit[0]) if is_most else (limit[0], limit[1])
-        operators[other] = quality, kind.direction.opposite.passes
+        found |= kind.band(quality, *limit)
+        operators[kind.other_end(quality)] = quality, kind.direction.opposite.passes
     return found, operators
 
 

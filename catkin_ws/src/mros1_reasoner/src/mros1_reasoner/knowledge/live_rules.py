@@ -1,14 +1,14 @@
 """The rules that an analysis needs. A rule is idle in a model when it can't conclude anything there, or nobody asks.
 
-A rule can conclude something when each property and class in its body is in a statement of the ontology, in a fact, or
-in the head of a rule that can. It is asked for when an analysis asks for what it concludes, or a rule does that is
-asked for. A rule is needed in any case when its conclusion could contradict something: when it is not a value of a
-property that neither is functional nor is related to others by an axiom.
+A rule can conclude something when each property in its body is in a statement of the ontology, in a fact, or in the
+head of a rule that can. It is asked for when an analysis asks for what it concludes, or a rule does that is asked for.
+A rule is needed in any case when its conclusion could contradict something: when it is not a value of a property that
+neither is functional nor is related to others by an axiom.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.rules import Atom, Rule, rule_nodes, rules_of
@@ -51,31 +51,31 @@ def _said(triples: Iterable[Triple]) -> tuple[set[str], set[str]]:
 
 
 def _that_can(rules: Sequence[Rule], said: set[str]) -> list[Rule]:
-    found: dict[str, Rule] = {}
-    while True:
-        new = [
-            rule
-            for rule in rules
-            if rule.node not in found and all(atom.predicate in said or not _is_of_property(atom) for atom in rule.body)
-        ]
-        if not new:
-            return list(found.values())
-        found |= {rule.node: rule for rule in new}
-        said |= {atom.predicate for rule in new for atom in rule.head}
+    def can(rule: Rule, names: set[str]) -> bool:
+        return all(atom.predicate in names or not _is_of_property(atom) for atom in rule.body)
+
+    return _reached(rules, said, can, lambda rule: rule.head)
 
 
 def _that_are_asked(rules: Sequence[Rule], asked: set[str]) -> list[Rule]:
+    def is_asked(rule: Rule, names: set[str]) -> bool:
+        return any(atom.predicate in names or not _is_of_value(atom) for atom in rule.head)
+
+    return _reached(rules, asked, is_asked, lambda rule: rule.body)
+
+
+def _reached(
+    rules: Sequence[Rule],
+    names: set[str],
+    is_reached: Callable[[Rule, set[str]], bool],
+    brings: Callable[[Rule], Iterable[Atom]],
+) -> list[Rule]:
+    """Return the rules that names reach, directly or by the predicates of the atoms that a reached rule brings."""
     found: dict[str, Rule] = {}
-    while True:
-        new = [
-            rule
-            for rule in rules
-            if rule.node not in found and any(atom.predicate in asked or not _is_of_value(atom) for atom in rule.head)
-        ]
-        if not new:
-            return list(found.values())
+    while new := [rule for rule in rules if rule.node not in found and is_reached(rule, names)]:
         found |= {rule.node: rule for rule in new}
-        asked |= {atom.predicate for rule in new for atom in rule.body}
+        names = names | {atom.predicate for rule in new for atom in brings(rule)}
+    return list(found.values())
 
 
 def _is_of_property(atom: Atom) -> bool:

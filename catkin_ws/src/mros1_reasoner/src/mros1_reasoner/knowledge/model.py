@@ -65,6 +65,11 @@ class Quality:
         """Return how a second limit of the quality of a name is called, on the other side of a band."""
         return f"{name}{LEAST if self.direction is Direction.LOWER_IS_BETTER else MOST}"
 
+    def band(self, name: str, least: float, most: float) -> dict[str, float]:
+        """Return the two limits of a band of the quality of a name, by the names of the limits."""
+        is_most = self.direction is Direction.LOWER_IS_BETTER
+        return {name: most if is_most else least, self.other_end(name): least if is_most else most}
+
     @classmethod
     def compared_by(cls, operator: str, low: float | None = None, high: float | None = None) -> Quality:
         """Return a quality whose limit is violated when the operator holds between level and limit.

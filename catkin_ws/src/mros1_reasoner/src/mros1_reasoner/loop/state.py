@@ -331,22 +331,16 @@ class State(View):
         """Note what rules of the models have just begun to say of better designs, or ceased to say against them."""
         chances: dict[str, str] = {}
         for design in sorted(before.unrealisable.keys() - self.analysis.unrealisable.keys()):
-            words = f"{design} can be deployed again"
-            chances |= {name: words for name, running in self.running.items() if self._may_help(design, name)}
+            function = self.kb.designs[design].function
+            owners = {o.name for o in self.objectives.values() if o.function == function} | {self.provider(function)}
+            helped = {name for owner in owners for name in self._improved_by(design, owner)}
+            chances |= dict.fromkeys(helped, f"{design} can be deployed again")
         for name, result in self.analysis.objectives.items():
             known = before.objectives.get(name, ObjectiveAnalysis("")).causes
             if v.UPDATABLE in result.causes and v.UPDATABLE not in known:
                 chances[name] = f"{self.kb.rules_for(v.UPDATABLE)} says that there may be a better design"
         for name, words in chances.items():
             self._run(name, chances={**self.running[name].chances, RULE: (now, words)})
-
-    def _may_help(self, design: str, name: str) -> bool:
-        """Return whether a design is one for an objective that has another one, or one that its designs build on."""
-        function, running = self.kb.designs[design].function, self.running[name]
-        others = [d for d in self.kb.solving(self.objectives[name].function) if d.name != running.design]
-        return running.design is not None and any(
-            d.name == design or self._builds_on(d, self.provider(function)) for d in others
-        )
 
     def reconsider(self) -> None:
         """Have the next step analyse and decide in any case."""

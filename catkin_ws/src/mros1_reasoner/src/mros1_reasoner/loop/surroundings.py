@@ -46,19 +46,23 @@ class Surroundings:
         """Take in an observed value; the stamp is in s."""
         last = self._last.setdefault(attribute, deque(maxlen=self._history))
         last.append(value)
-        present = statistics.median(last)
+        median = told = statistics.median(last)
         for need in self._needs:
             if need.attribute != attribute:
                 continue
-            if need.lack(present):
+            if need.lack(median):
                 self._since.setdefault(need, stamp)
-            elif need in self._since:
-                if self._is_well_within(need, present):
-                    del self._since[need]
-                else:
-                    present = self._values.get(attribute, present)  # it does not fit yet
-        self._values[attribute] = present
+            elif need in self._since and self._is_well_within(need, median):
+                del self._since[need]
+            elif need in self._since:  # it does not fit yet: what is told is just beyond the limit
+                is_low = median - need.least < need.most - median
+                told = min(told, _beyond(need.least, -1)) if is_low else max(told, _beyond(need.most, 1))
+        self._values[attribute] = told
 
     def _is_well_within(self, need: Need, value: float) -> bool:
         limits = [limit for limit in (need.least, need.most) if math.isfinite(limit)]
         return all(abs(value - limit) >= self._margin * abs(limit) for limit in limits)
+
+
+def _beyond(limit: float, side: int) -> float:
+    return limit + side * 1e-6 * max(1.0, abs(limit))

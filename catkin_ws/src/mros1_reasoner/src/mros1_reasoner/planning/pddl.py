@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -38,12 +39,11 @@ def _section(keyword: str, parts: Iterable[str]) -> list[str]:
 def _names(names: Iterable[str]) -> dict[str, str]:
     """Return names of PDDL, which has no capitals: each one stands for one name."""
     found: dict[str, str] = {}
-    for name in names:
+    taken: set[str] = set()
+    for name in dict.fromkeys(names):
         text = re.sub(r"[^a-z0-9_-]", "_", name.lower())
         text = text if text[:1].isalpha() else f"x{text}"
-        taken = {other for known, other in found.items() if known != name}
-        number = 2
-        while (candidate := text if number == 2 else f"{text}-{number - 1}") in taken:
-            number += 1
-        found[name] = candidate
+        numbered = (f"{text}-{number}" for number in itertools.count(2))
+        found[name] = next(candidate for candidate in itertools.chain([text], numbered) if candidate not in taken)
+        taken.add(found[name])
     return found
