@@ -35,12 +35,12 @@ def reference(monkeypatch):
 def load(tmp_path):
     """Return a function that makes a knowledge base of the text of a model."""
 
-    def make(text=None, vocabularies=(), **files):
+    def make(text=None, vocabularies=(), *, spares=True, **files):
         path = tmp_path / "app.owl"
         path.write_text(text if text is not None else application())
         for name, content in files.items():
             (tmp_path / f"{name}.owl").write_text(content)
-        return read_knowledge_base([path], vocabularies, DIRECTIONS)
+        return read_knowledge_base([path], vocabularies, DIRECTIONS, spares=spares)
 
     return make
 

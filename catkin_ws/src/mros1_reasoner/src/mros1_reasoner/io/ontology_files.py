@@ -30,6 +30,8 @@ def read_knowledge_base(
     vocabularies: Sequence[Path] = (),
     directions: Mapping[str, Direction] | None = None,
     utility: str = "",
+    *,
+    spares: bool = True,
 ) -> KnowledgeBase:
     """Return the knowledge base of models, read beside the vocabulary.
 
@@ -38,6 +40,7 @@ def read_knowledge_base(
         vocabularies: further OWL files to load before them; the package's own are always loaded.
         directions: of quality attributes by name; see read_model.
         utility: the quality attribute that is the utility of designs; empty for none.
+        spares: whether designs with other bindings count.
 
     Raises:
         KnowledgeBaseError: a file or an individual can't be used.
@@ -50,7 +53,7 @@ def read_knowledge_base(
     where = ", ".join(str(path) for path in models)
     fitted, reads = fit(generic, loaded, where)
     triples = list(dict.fromkeys([*generic, *fitted]))
-    return KnowledgeBase(read_model(triples, where, directions, utility, reads), files)
+    return KnowledgeBase(read_model(triples, where, directions, utility, reads, spares=spares), files)
 
 
 def save_knowledge_base(

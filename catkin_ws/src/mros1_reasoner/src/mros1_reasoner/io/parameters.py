@@ -117,7 +117,9 @@ class Parameters:
         models = self.model_files if models is None else models
         vocabularies = self.vocabulary_files if vocabularies is None else vocabularies
         utility = self.values.get("utility", Settings.utility)
-        return read_knowledge_base(models, vocabularies, directions, utility if isinstance(utility, str) else "")
+        spares = self._tree.flag("spares", True)
+        quality = utility if isinstance(utility, str) else ""
+        return read_knowledge_base(models, vocabularies, directions, quality, spares=spares)
 
     def objectives(self, knowledge_base: KnowledgeBase) -> tuple[Objective, ...]:
         """Return the model's objectives, or one for each function that no design requires, with the given NFRs."""

@@ -71,6 +71,7 @@ class KnowledgeBase:
         self.files = tuple(files)
         self.ontology = model.ontology
         self._scales: dict[str, Scale] = {}
+        self._fills = model.fills
         for objective in model.objectives:
             for quality in objective.limits:
                 self.admit(quality)
@@ -157,6 +158,8 @@ class KnowledgeBase:
         yield Assertion(grounding, v.RDF_TYPE, v.FUNCTION_GROUNDING)
         yield Assertion(grounding, v.SOLVES_O, iri)
         yield Assertion(grounding, v.TYPE_FD, self._find(self._model.design_iris, design, "FunctionDesign"))
+        for binding in self._model.bindings.of_designs.get(design, ()):
+            yield Assertion(grounding, v.HAS_BINDINGS, binding)
         for required in facts.requires.get(objective.name, ()):
             yield Assertion(grounding, v.REQUIRES_O, self._objective_iri(required))
         if objective.name in facts.failed:
@@ -197,17 +200,9 @@ class KnowledgeBase:
                 grounding_causes=frozenset(grounding_causes),
                 grounding_status=_worst(grounding_causes),
             )
-        others = {*self._model.function_iris.values(), *self._model.environment_iris.values()}
         return Analysis(
             objectives=objectives,
-            unrealisable={
-                self._design_name[design]: tuple(
-                    sorted(
-                        self._component_name.get(c, local_name(c)) for c in found[v.FD_UNREALISABLE_BY][design] - others
-                    )
-                )
-                for design in self._unrealisable(found)
-            },
+            unrealisable=self._unrealisable(found),
             tried=frozenset(
                 (self._design_name[design], names[objective])
                 for design, tried_for in found[v.FD_ERROR_LOG].items()
@@ -216,11 +211,27 @@ class KnowledgeBase:
             ),
         )
 
-    def _unrealisable(self, found: Mapping[str, Mapping[str, set[str]]]) -> list[str]:
-        """Return the IRIs of the designs that can't be deployed."""
-        by_rule = (design for design, values in found[v.FD_REALISABILITY].items() if "false" in values)
-        designs = dict.fromkeys([*found[v.FD_UNREALISABLE_BY], *by_rule])
-        return [design for design in designs if design in self._design_name]
+    def _unrealisable(self, found: Mapping[str, Mapping[str, set[str]]]) -> dict[str, tuple[str, ...]]:
+        """Return the designs that can't be deployed, each with the components that are missing."""
+        bindings = self._model.bindings
+        lost = {binding for binding, values in found[v.B_STATUS].items() if "false" in values}
+        others = {*self._model.function_iris.values(), *self._model.environment_iris.values(), *self._fills}
+        by_rule = (iri for iri, values in found[v.FD_REALISABILITY].items() if "false" in values)
+        by_binding = (self._model.design_iris[name] for name, own in bindings.of_designs.items() if lost & {*own})
+        result = {}
+        for iri in dict.fromkeys([*found[v.FD_UNREALISABLE_BY], *by_rule, *by_binding]):
+            name, missing = self._design_name.get(iri), found[v.FD_UNREALISABLE_BY][iri]
+            if name is None:
+                continue
+            own = set(bindings.of_designs.get(name, ()))
+            filling = {frozenset() if own & all_of_it else all_of_it for all_of_it in map(self._filling, missing)}
+            broken = {bindings.components[binding] for binding in lost & own.union(*filling)}
+            names = {self._component_name.get(what, local_name(what)) for what in missing - others}
+            result[name] = tuple(sorted(names | broken))
+        return result
+
+    def _filling(self, what: str) -> frozenset[str]:
+        return self._fills.get(what, frozenset())
 
     def world(self, facts: Facts | None = None, analysis: Analysis | None = None) -> owlready2.World:
         """Return an owlready2 World of its own with the ontology, the facts, and the statuses of an analysis."""

@@ -131,10 +131,12 @@ class Design:
         name: local name of the individual.
         function: the function that it solves.
         expected: expected level of each quality attribute.
-        components: components that it cannot be deployed without.
+        components: components that it cannot be deployed without, those included that fill its roles.
         requires: functions that must be provided for it to work.
         nodes: components that it brings itself, as nodes.
         needs: surroundings that it needs.
+        bindings: the component that it is deployed with, by the role.
+        rebinds: name of the design that it is with other bindings; empty where it is no such design.
         groups: by quality, what the design is like in all that a correction depends on; empty: corrected like all.
     """
 
@@ -146,6 +148,13 @@ class Design:
     nodes: frozenset[str] = frozenset()
     groups: Mapping[str, str] = field(default_factory=dict)
     needs: tuple[Need, ...] = ()
+    bindings: Mapping[str, str] = field(default_factory=dict)
+    rebinds: str = ""
+
+    @property
+    def root(self) -> str:
+        """Name of the design, whatever its bindings are."""
+        return self.rebinds or self.name
 
     def lacks(self, surroundings: Mapping[str, float]) -> list[str]:
         """Return why surroundings do not fit, by the values of their properties; what is not known fits."""

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.knowledge.bindings import BindingError, Bindings, order, read_bindings, rebound
 from mros1_reasoner.knowledge.live_rules import without_idle
 from mros1_reasoner.knowledge.loaded_rules import Reads
 from mros1_reasoner.knowledge.model import LEAST, MOST, Design, Direction, Need, Objective, Quality
@@ -33,7 +34,8 @@ _MOMENTARY = (
     *(v.FD_REALISABILITY, v.FD_UNREALISABLE_BY, v.F_FULFILLABLE, v.FD_NONE_SO_FAR, v.FD_ERROR_LOG),
     *(v.C_STATUS, v.SOLVES_O, v.TYPE_FD, v.REQUIRES_O, v.ENV_VALUE),
 )
-_ORDER = (v.F_FIRST_DESIGN, v.F_LAST_DESIGN, v.FD_NEXT)  # it is stated anew, of all designs that are read
+# They are stated anew, of all designs and bindings that are read.
+_ORDER = (v.F_FIRST_DESIGN, v.F_LAST_DESIGN, v.FD_NEXT, v.B_NEXT, v.ROLE_LAST_BINDING, v.ROLE_SPARES)
 _COMPARISONS = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES)
 _OF_NODES = (v.RDF_TYPE, v.RDFS_LABEL, v.C_STATUS, v.DEPLOYED_BY)
 _LEVELS = (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION, v.HAS_VALUE, v.IS_QA_TYPE)
@@ -63,6 +65,8 @@ class ApplicationModel:
         level_iris: IRI of the QAvalue of a required or expected level, by IRI of its owner, quality and level.
         reads: what rules and axioms of the models are about.
         environment_iris: IRI of each property of the surroundings by name.
+        bindings: which components fill the roles of designs.
+        fills: the bindings of each role, and of each specification that defines one, by its IRI.
         asked: the properties that an analysis asks for.
         ontology: vocabulary, rules and models as N-Triples, without what comes as facts, and without idle rules.
         idle: the idle rules, as N-Triples.
@@ -83,6 +87,8 @@ class ApplicationModel:
     level_iris: Mapping[tuple[str, str, float], str]
     reads: Reads
     environment_iris: Mapping[str, str]
+    bindings: Bindings
+    fills: Mapping[str, frozenset[str]]
     asked: tuple[str, ...]
     ontology: str
     idle: str
@@ -94,6 +100,8 @@ def read_model(
     directions: Mapping[str, Direction] | None = None,
     utility: str = "",
     reads: Reads | None = None,
+    *,
+    spares: bool = True,
 ) -> ApplicationModel:
     """Return what the triples of ontologies say.
 
@@ -104,10 +112,14 @@ def read_model(
             they do not, lower is better, and higher for the utility.
         utility: the quality attribute that is the utility of designs; empty for none.
         reads: what rules and axioms of the models are about.
+        spares: whether designs with other bindings (`rebinds`) count.
 
     Raises:
         KnowledgeBaseError: an individual can't be used.
     """
+    if not spares:
+        left_out = {subject for subject, predicate, _ in triples if predicate == f"<{v.REBINDS}>"}
+        triples = [triple for triple in triples if triple[0] not in left_out and triple[2] not in left_out]
     return _Reader(Graph(triples), where, directions or {}, utility, reads or Reads()).read()
 
 
@@ -124,7 +136,10 @@ class _Reader:
         self._designs = self._names((v.FUNCTION_DESIGN,), graph.subjects(v.SOLVES_F))
         self._components = self._names(
             (v.COMPONENT, v.COMPONENT_STATE, v.COMPONENT_SPECIFICATION),
-            graph.subjects(v.REQUIRED_BY) | graph.subjects(v.C_STATUS) | graph.subjects(v.DEPLOYED_BY),
+            graph.subjects(v.REQUIRED_BY)
+            | graph.subjects(v.C_STATUS)
+            | graph.subjects(v.DEPLOYED_BY)
+            | graph.objects(v.BINDING_COMPONENT),
         )
         types = self._names((v.QA_TYPE,), graph.objects(v.IS_QA_TYPE))
         # The others are ends of bands, which a saved knowledge base has.
@@ -135,6 +150,10 @@ class _Reader:
             raise KnowledgeBaseError(f"{where}: {name} is both a quality and of the environment: rename one of them")
         self._function_name = _inverse(self._functions)
         self._component_name = _inverse(self._components)
+        try:
+            self._bindings = read_bindings(graph, self._designs, self._component_name)
+        except BindingError as error:
+            raise KnowledgeBaseError(f"{where}: {error}") from error
         self._quality_name = _inverse(types)
         self._guessed: list[str] = []  # directions of which nobody says anything
         self._qualities = {name: self._quality(name) for name in sorted(self._quality_types)}
@@ -147,13 +166,14 @@ class _Reader:
 
     def read(self) -> ApplicationModel:
         graph = self._graph
-        designs = {name: self._design(name) for name in sorted(self._designs)}
+        designs = self._with_rebound({name: self._design(name) for name in sorted(self._designs)})
         required = graph.objects(v.REQUIRES_O)
         asked_for = [name for name, iri in sorted(self._objectives.items()) if iri not in required]
         objectives = tuple(self._objective(name) for name in asked_for)
         self._check_requirements(designs)
         by_rule = (v.FD_REALISABILITY,) if v.FD_REALISABILITY in self._reads.properties else ()
-        asked = (*v.CONCLUSIONS, *by_rule)
+        of_bindings = (v.B_STATUS,) if self._bindings.roles else ()
+        asked = (*v.CONCLUSIONS, *by_rule, *of_bindings)
         ontology, idle = without_idle(self._static(designs), v.FACTS, asked)
         return ApplicationModel(
             where=self._where,
@@ -175,10 +195,20 @@ class _Reader:
             level_iris=self._level_iris,
             reads=self._reads,
             environment_iris=self._environment,
+            bindings=self._bindings,
+            fills=self._fills(),
             asked=asked,
             ontology=write_ntriples(ontology),
             idle=write_ntriples(idle),
         )
+
+    def _fills(self) -> dict[str, frozenset[str]]:
+        """Return the bindings of each role, and of each specification that defines one."""
+        found = {role: frozenset(self._bindings.filling(role)) for role in self._bindings.roles.values()}
+        for role, specification in self._graph.pairs(v.ROLE_DEF):
+            if role in found:
+                found[specification] = found.get(specification, frozenset()) | found[role]
+        return found
 
     def _groundings(self) -> dict[tuple[str, str], str]:
         objective_name, design_name = _inverse(self._objectives), _inverse(self._designs)
@@ -257,16 +287,28 @@ class _Reader:
         expected = self._read_levels(iri, v.HAS_QA_ESTIMATION)
         if not expected:
             _log.warning("FunctionDesign %s has no expected quality levels (hasQAestimation)", name)
+        bindings = self._bindings.filled(name)
+        required = (self._component_name[component] for component in self._graph.subjects_of(v.REQUIRED_BY, iri))
         return Design(
             name=name,
             function=self._function_name[functions[0]],
             expected=expected,
-            components=frozenset(self._component_name[c] for c in self._graph.subjects_of(v.REQUIRED_BY, iri)),
+            components=frozenset([*required, *bindings.values()]),
             requires=tuple(sorted(local_name(f) for f in self._graph.objects_of(iri, v.REQUIRES_F))),
             nodes=frozenset(self._component_name[c] for c in self._graph.subjects_of(v.DEPLOYED_BY, iri)),
             groups=self._groups(iri),
             needs=tuple(self._need(k, name) for k in sorted(self._graph.objects_of(iri, v.REQUIRES_ENVIRONMENT))),
+            bindings=bindings,
         )
+
+    def _with_rebound(self, designs: dict[str, Design]) -> dict[str, Design]:
+        """Return the designs, each with the name of the one that it is with other bindings."""
+        functions = {name: design.function for name, design in designs.items()}
+        try:
+            found = rebound(self._graph, self._designs, functions)
+        except BindingError as error:
+            raise KnowledgeBaseError(f"{self._where}: {error}") from error
+        return designs | {name: replace(designs[name], rebinds=other) for name, other in found.items()}
 
     def _need(self, constraint: str, design: str) -> Need:
         """Return what a design needs of the surroundings."""
@@ -413,6 +455,10 @@ class _Reader:
             if quality.reaching_violates:
                 triples.append(assertion_triple(Assertion(iri, v.QA_REACHING_VIOLATES, "true", v.XSD + "boolean")))
         triples += map(assertion_triple, self._order(designs))
+        try:
+            triples += map(assertion_triple, order(self._graph, self._bindings))
+        except BindingError as error:
+            raise KnowledgeBaseError(f"{self._where}: {error}") from error
         return list(dict.fromkeys(triples))
 
     def _order(self, designs: Mapping[str, Design]) -> Iterator[Assertion]:

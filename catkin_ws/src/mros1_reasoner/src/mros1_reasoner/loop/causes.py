@@ -9,7 +9,7 @@ from metacontrol_bags.decision import Cause
 from metacontrol_msgs.msg import DiagnosticWords as Words
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.model import Objective
+from mros1_reasoner.knowledge.model import Design, Objective
 from mros1_reasoner.loop.readable_state import Running, View
 
 RECOVERY = "compRecov"
@@ -109,13 +109,14 @@ def _inherits(view: View, running: Running) -> bool:
 
 def _component_errors(view: View, name: str, now: float) -> list[Cause]:
     running = view.running[name]
+    design = running.design or ""
     found = []
-    for component in view.analysis.unrealisable.get(running.design or "", ()):
+    for component in view.analysis.unrealisable.get(design, ()):
         known = view.components.get(component)
         words = f"component {component}, which {running.design} requires, does not work"
         stamp = known.stamp if known else now
-        found.append(Cause(stamp, f"component:{component}", words, "compError, compErrFG, S1a"))
-    for need in view.kb.designs[running.design or ""].needs:
+        found.append(Cause(stamp, f"component:{component}", words, _rules_of(view.kb.designs[design], component)))
+    for need in view.kb.designs[design].needs:
         words = need.lack(view.facts.surroundings.get(need.attribute, math.nan))
         if words:
             stamp = view.surroundings.unmet.get(need, now)
@@ -131,6 +132,13 @@ def _component_errors(view: View, name: str, now: float) -> list[Cause]:
         words = f"configuration {running.design} does not run"
         found.append(Cause(running.failed_stamp or now, f"component:{running.design}", words, "S1a"))
     return found
+
+
+def _rules_of(design: Design, component: str) -> str:
+    """Return the rules by which a component that does not work is an error of a design."""
+    if component in design.bindings.values():
+        return "S2, S3, S1a"
+    return "compError, compErrFG, S1a" if component in design.components else "S2, B1, B2, B3, B4, B6, S1a"
 
 
 def _drift(node: str, running: Running) -> Cause:

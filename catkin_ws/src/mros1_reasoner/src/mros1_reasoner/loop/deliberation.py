@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 from metacontrol_bags.decision import ADVISED, DECIDED, FAILED, Cause, Decision
@@ -72,6 +72,8 @@ class Deliberation:
         level, outcome = self._choose(name, timing.now, climbs=not improves_only)
         stays = not self._is_change(level, outcome)
         is_enough = not improves_only or (not stays and self._improves(running, outcome))
+        if not is_enough and (first := self._with_first_bindings(name, timing.now)):
+            level, outcome, stays, is_enough = name, first, False, True
         if not is_enough:
             self._state.rest(name)
         if self._state.waits(level, timing.now) or not is_enough:
@@ -282,11 +284,11 @@ class Deliberation:
         now = self._utility(self._state.kb.designs[running.design]) if running.design else -math.inf
         return not running.degraded and outcome.candidates[0].utility >= now + self._state.settings.improvement
 
-    def _plan(self, name: str, now: float, function: str = "") -> Plan:
-        """Return what to deploy for an objective, or for a function that no objective needs yet."""
+    def _plan(self, name: str, now: float, function: str = "", only: tuple[Design, ...] = ()) -> Plan:
+        """Return what to deploy for an objective, or for a function that none needs yet; of all designs, or of some."""
         objective = self._state.objectives.get(name) or Objective(name, function)
         running = self._state.running.get(name) or Running()
-        designs: tuple[Design, ...] = self._state.kb.solving(objective.function)
+        designs: tuple[Design, ...] = only or self._state.kb.solving(objective.function)
         unfulfilled: dict[str, list[str]] = {}
         strained: dict[str, list[str]] = {}
         for design in designs:
@@ -322,16 +324,44 @@ class Deliberation:
                 objective, [self._state.kb.designs[running.design or ""]], situation, self._utility, self._distance
             )
             return replace(same, degraded=False, is_retry=False, reason=f"{running.design} is deployed again")
+        if other := self._with_other_bindings(name, objective, designs, situation):
+            return other
         if self._state.settings.only_last_limit:
             objective = replace(objective, limits=dict(sorted(objective.limits.items())[-1:]))
         found = plan(objective, designs, situation, self._utility, self._distance)
         return found if self._state.settings.makeshift else without_makeshift(found)
 
+    def _with_other_bindings(
+        self, name: str, objective: Objective, designs: Collection[Design], situation: Situation
+    ) -> Plan | None:
+        """Return how the running design stays with spares, where nothing else is wrong; None if it can't."""
+        running = self._state.kb.designs.get(situation.current or "")
+        if running is None or situation.can_deploy(running.name) or self._has_other_error(name):
+            return None
+        rebound = [design for design in designs if design.root == running.root and design is not running]
+        found = plan(objective, rebound, situation, self._utility, self._distance)
+        if found.choice is None or found.is_makeshift:
+            return None
+        return replace(found, reason=_rebinding(self._state.kb.designs[found.choice], running))
+
+    def _with_first_bindings(self, name: str, now: float) -> Plan | None:
+        """Return how the running design gets its first bindings again in place of spares; None if it can't."""
+        running = self._state.kb.designs.get(self._state.running[name].design or "")
+        if running is None or not running.rebinds:
+            return None
+        found = self._plan(name, now, only=(self._state.kb.designs[running.rebinds],))
+        if found.choice is None or found.is_makeshift:
+            return None
+        return replace(found, reason=_rebinding(self._state.kb.designs[found.choice], running))
+
+    def _has_other_error(self, name: str) -> bool:
+        """Return whether something is wrong with a running design beside its components."""
+        running, result = self._state.running[name], self._state.analysis.objectives.get(name)
+        return bool(running.is_broken or running.task_failure or (result and v.IN_ERROR_NFR in result.causes))
+
     def _needs_only_a_restart(self, name: str, situation: Situation) -> bool:
         """Return whether nothing is wrong with a running design but nodes that do not work, and drifted parameters."""
-        running, result = self._state.running[name], self._state.analysis.objectives.get(name)
-        is_in_error = running.is_broken or running.task_failure or (result and v.IN_ERROR_NFR in result.causes)
-        return not is_in_error and situation.can_deploy(running.design or "")
+        return not self._has_other_error(name) and situation.can_deploy(self._state.running[name].design or "")
 
     def _relief(self, name: str, now: float) -> dict[str, float]:
         """Return by which distance another design should keep a limit that is violated, by quality.
@@ -386,3 +416,9 @@ def _gist(causes: list[Cause], outcome: Plan) -> tuple[object, ...]:
     """Return the part of an outcome that distinguishes it from another one."""
     wrong = tuple(cause.trigger for cause in causes if not is_chance(cause))
     return wrong, outcome.choice, outcome.degraded, outcome.is_retry
+
+
+def _rebinding(design: Design, running: Design) -> str:
+    """Return why a design takes the place of one that it is but for its bindings."""
+    new = sorted((role, part) for role, part in design.bindings.items() if running.bindings.get(role) != part)
+    return f"{design.root} stays: {' and '.join(f'{part} fills its role {role}' for role, part in new)} now"

@@ -109,10 +109,10 @@ def plan(
     def change(judged: _Judged) -> float:
         return distance(running, judged.design) if running else 0.0
 
-    def by_use(judged: _Judged) -> tuple[float, float, str]:
-        return -judged.utility, change(judged), judged.design.name
+    def by_use(judged: _Judged) -> tuple[float, float, bool, str]:
+        return -judged.utility, change(judged), bool(judged.design.rebinds), judged.design.name
 
-    def by_violation(judged: _Judged) -> tuple[float, float, float, str]:
+    def by_violation(judged: _Judged) -> tuple[float, float, float, bool, str]:
         return judged.violation, *by_use(judged)
 
     fit = sorted((c for c in candidates if not c.refused_because), key=lambda c: (not c.relieves, *by_use(c)))
@@ -291,7 +291,9 @@ def _most_useful(
     best, kept = fit[0], list[_Judged]()
     if situation.indifference > 0.0:
         kept = _least_strained(useful, situation.worth)
-        best = min(kept, key=lambda c: (math.floor(change(c)), -c.utility, change(c), c.design.name))
+        best = min(
+            kept, key=lambda c: (math.floor(change(c)), -c.utility, change(c), bool(c.design.rebinds), c.design.name)
+        )
     has_highest = best is fit[0]
     reason = f"{best.design.name} {'has the highest utility' if has_highest else 'is as useful as any'} "
     reason += f"({best.utility:g}) of the {len(fit)} (out of {count}) designs that can be deployed and keep every limit"
