@@ -125,3 +125,12 @@ def test_words_of_the_examples_correct_what_is_required(cart):
     root = cart(**yaml.safe_load(examples(ROOT / "README.md")[0])).required_components()
     assert all("beacon" in names for names in root.values())
     assert root["careful"] == {"base", "beacon", "laser"}
+
+
+def test_example_of_spares_has_one_for_each_hand_and_eye(cart):
+    sections = next(yaml.safe_load(text) for text in examples(README) if "\nspares:" in text)
+    roles = cart(**sections).roles
+    assert roles.filled["right_handed"] == {"hand": "right_arm"}
+    assert roles.filled["by_camera"] == {"sight": "camera"}
+    assert roles.components["careful"] == roles.components["by_camera"] == {"base"}
+    assert roles.components["brisk"] >= {"laser"}

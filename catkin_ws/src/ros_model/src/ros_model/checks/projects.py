@@ -34,12 +34,13 @@ def wrong_names(project: Project) -> Iterator[ModelError]:
                 if design not in solving:
                     keys = ("functions", name, "requires", design)
                     yield source.error(f"{design!r} is none of the designs of {name}", *keys)
+    roles = set(project.settings.get("roles", {}))
     components = {component.name for component in project.whole_base.components} | set(project.settings["components"])
     for parameter, choices in project.settings["requires"].items():
         for value, component in choices.items():
-            if component not in components:
+            if component not in components | roles:
                 yield source.error(
-                    f"{component!r} is a component neither of the base nor of components: add it to one",
+                    f"{component!r} is a component neither of the base nor of components, and no role: add it to one",
                     *("requires", parameter, value),
                 )
 
@@ -53,6 +54,27 @@ def wrong_surroundings(project: Project) -> Iterator[ModelError]:
             if name not in components | variants | set(project.nodes):
                 keys = ("environment", attribute, "required_by", name)
                 yield project.source.error(f"{name!r} is no component and none of the {len(variants)} variants", *keys)
+
+
+def wrong_roles(project: Project) -> Iterator[ModelError]:
+    """Yield roles of components that are not there, of too few, or of designs that are not there, and wrong spares."""
+    known = {*project.nodes, *project.settings["components"]}
+    is_wrong = False
+    for role, entry in project.settings.get("roles", {}).items():
+        for number, component in enumerate(entry["of"]):
+            if component not in known:
+                is_wrong = True
+                yield project.source.error(f"{component!r} is no component", "roles", role, "of", number)
+        if entry.get("least", 1) > len(entry["of"]):
+            yield project.source.error(
+                f"is {entry['least']}, and only {len(entry['of'])} components can fill the role", "roles", role, "least"
+            )
+        for number, other in enumerate(named(entry, REQUIRED)):
+            if other != ALL and not designs_of(project, other) and other not in project.settings["functions"]:
+                keys = ("roles", role, REQUIRED, number)
+                yield project.source.error(f"{other!r} is no function and none of the variants", *keys)
+    if not is_wrong:
+        yield from project.roles.wrong
 
 
 def wrong_requirements(project: Project) -> Iterator[ModelError]:
@@ -146,6 +168,8 @@ def two_meanings(project: Project) -> Iterator[ModelError]:
             *(component.graph_name for variant in project.variants for component in variant.components),
         },
         "a variant": [variant.name for variant in project.variants],
+        "a role": settings.get("roles", {}),
+        "a class of components": {entry["class"] for entry in settings.get("roles", {}).values() if "class" in entry},
         "an expected or required level": values,
     }
     for meaning, names in meanings.items():

@@ -26,6 +26,7 @@ from ros_model.language.library import Library
 from ros_model.language.metamodel import compose
 from ros_model.language.packages import PackageSet
 from ros_model.project.requirements import requirement_lines
+from ros_model.project.roles import role_lines
 from ros_model.project.settings import FILE_NAME
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
         click.echo(text)
     if form == "text":
         for project in checked.projects:
-            for line in requirement_lines(project):
+            for line in (*requirement_lines(project), *role_lines(project)):
                 click.echo(printable(line))
     if any(finding.severity == ERROR and finding.rule in _UNREADABLE for finding in findings):
         return BAD_INPUT

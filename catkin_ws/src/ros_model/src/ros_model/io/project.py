@@ -16,6 +16,7 @@ from ros_model.checks.projects import (
     wrong_levels,
     wrong_names,
     wrong_requirements,
+    wrong_roles,
     wrong_surroundings,
 )
 from ros_model.errors import Gathered, ModelError, first_of
@@ -82,6 +83,7 @@ def load_project(folder: str | Path) -> Project:
     wrong.add(wrong_levels(project))
     wrong.add(wrong_requirements(project))
     wrong.add(wrong_surroundings(project))
+    wrong.add(wrong_roles(project))
     wrong.add(wrong_corrections(project))
     wrong.add(levels_of_nothing(project, levels))
     wrong.tell()

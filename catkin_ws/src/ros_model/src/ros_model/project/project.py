@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from ros_model.language.library import Library
 from ros_model.project.requirements import WORDS, requirements_of
+from ros_model.project.roles import roles_of
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import Position, RosSystem
     from ros_model.project.requirements import Requirements
+    from ros_model.project.roles import Roles
     from ros_model.project.settings import Settings
 
 DIRECTIONS = ("lower_is_better", "higher_is_better")
@@ -99,6 +101,11 @@ class Project:
     def requirements(self) -> dict[str, Requirements]:
         """What each variant requires, and why."""
         return requirements_of(self)
+
+    @cached_property
+    def roles(self) -> Roles:
+        """Roles of the variants, and the components that fill them."""
+        return roles_of(self)
 
     @cached_property
     def components(self) -> dict[str, dict[str, Any]]:

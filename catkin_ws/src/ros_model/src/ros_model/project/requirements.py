@@ -59,9 +59,10 @@ def requirements_of(project: Project) -> dict[str, Requirements]:
 
 
 def words(project: Project, word: str) -> dict[str, list[str]]:
-    """Return, for each variant, the components whose entries have a word (`required_by`, ...) that means it."""
+    """Return, for each variant, the components and roles whose entries have a word that means it."""
     found: dict[str, list[str]] = defaultdict(list)
-    for component, entry in project.settings["components"].items():
+    roles = project.settings.get("roles", {})
+    for component, entry in (*project.settings["components"].items(), *roles.items()):
         for design in dict.fromkeys(design for name in named(entry, word) for design in designs_of(project, name)):
             found[design] += sorted(project.names_of(str(component)))
     return found

@@ -27,6 +27,7 @@ _TYPES: dict[str, tuple[type, ...]] = {
     "string": (str,),
     "boolean": (bool,),
     "number": (int, float),
+    "integer": (int,),
 }
 _INFINITE = 1e300  # NaN is not below it either, nor are integers that no double holds
 
@@ -135,7 +136,8 @@ def _keeps_bounds(value: Any, schema: Mapping[str, Any]) -> bool:
         return fits and bool(re.search(schema.get("pattern", ""), value)) and not value.endswith("\n")
     if isinstance(value, (list, dict)):
         kind = "Items" if isinstance(value, list) else "Properties"
-        return schema.get(f"min{kind}", 0) <= len(value) <= schema.get(f"max{kind}", math.inf)
+        is_unique = not schema.get("uniqueItems") or len(set(map(str, value))) == len(value)
+        return is_unique and schema.get(f"min{kind}", 0) <= len(value) <= schema.get(f"max{kind}", math.inf)
     if isinstance(value, (int, float)):
         return abs(value) < _INFINITE and value > schema.get("exclusiveMinimum", -math.inf)
     return True
