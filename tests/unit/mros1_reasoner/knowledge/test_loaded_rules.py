@@ -146,6 +146,19 @@ def test_direction_that_the_model_states_takes_precedence_over_a_comparison(read
     assert read(rule, extra=said).qualities["clarity"].direction is Direction.LOWER_IS_BETTER
 
 
+@pytest.mark.parametrize(
+    ("how", "stated", "side"),
+    [("less", "1", ""), ("greater", "-1", ""), ("less", "-1", "above"), ("greater", "1.0", "below")],
+)
+def test_comparison_that_contradicts_the_stated_direction_is_named(read, caplog, how, stated, side):
+    said = assertion(APP + "clarity", v.QA_SIGN, stated, v.XSD + "decimal")
+    rule = COMPARISON.format(kind="app:clarity", how=f"{how}Than(?x, ?y)", status="IN_ERROR_NFR")
+    read(rule, extra=said)
+    words = f"takes levels of clarity for violations where they are {side} the limit, against its qa_sign"
+    assert (words in caplog.text) is bool(side)
+    assert ("against its" in caplog.text) is bool(side)
+
+
 def test_comparisons_that_disagree_are_named(read, caplog):
     rules = [
         COMPARISON.format(kind="app:clarity", how=f"{how}Than(?x, ?y)", status="IN_ERROR_NFR")

@@ -129,10 +129,30 @@ class _Fitting:
         """Yield what the comparisons say of qualities of which the models say nothing else."""
         graph = Graph(triples) if self._operators else Graph(())
         said = graph.subjects(v.QA_SIGN) | graph.subjects(v.QA_COMPARISON_OPERATOR)
+        self._check_directions(graph, said)
         for quality in sorted((graph.instances(v.QA_TYPE) | graph.objects(v.IS_QA_TYPE)) - said):
             operator, _ = self._operators.get(quality) or self._operators.get("", ("", ""))
             if operator:
                 yield term_of(quality), f"<{v.QA_COMPARISON_OPERATOR}>", f'"{operator}"^^<{v.XSD}string>'
+
+    def _check_directions(self, graph: Graph, said: set[str]) -> None:
+        """Warn of comparisons that contradict what the models say of a quality; that holds."""
+        for quality in sorted(said & self._operators.keys()):
+            operator, label = self._operators[quality]
+            signs = {
+                "<" if float(text) < 0 else ">" for text in graph.literals_of(quality, v.QA_SIGN) if _is_number(text)
+            }
+            stated = signs | {text[:1] for text in graph.literals_of(quality, v.QA_COMPARISON_OPERATOR)}
+            if stated and operator[0] not in stated:
+                _log.warning(
+                    "%s: rule %s takes levels of %s for violations where they are %s the limit, against its %s: "
+                    "the rule does not count; take it out, or correct that",
+                    self._where,
+                    label,
+                    local_name(quality),
+                    "above" if operator[0] == ">" else "below",
+                    "qa_sign" if signs else "qa_comparison_operator",
+                )
 
     def _rewrite(self, rule: Rule) -> None:
         """Add a rule with the present names. Where it reads an error of either kind, there is a rule for each kind."""
@@ -166,6 +186,14 @@ class _Fitting:
                     value,
                     known,
                 )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _restricts(triple: Triple) -> bool:
