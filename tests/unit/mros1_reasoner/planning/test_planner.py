@@ -44,6 +44,16 @@ def test_where_nothing_can_be_deployed_only_what_these_designs_lack_is_told():
     assert result.reason == "no design can be deployed without gas, pump or f_look"
 
 
+def test_where_nothing_can_be_deployed_surroundings_that_do_not_suit_are_told():
+    unrealisable = {"weld": ["gas"], "glue": [], "rivet": []}
+    unsuited = {"glue": ["dust 5 > 3", "light 0.1 < 0.25"], "rivet": ["dust 5 > 3"]}
+    designs = [design(name) for name in unrealisable]
+    result = choose(*designs, unrealisable=unrealisable, unsuited=unsuited)
+    assert result.reason == "no design can be deployed without gas or where dust 5 > 3 and light 0.1 < 0.25"
+    result = choose(*designs[1:], unrealisable=unrealisable, unsuited=unsuited)
+    assert result.reason == "no design can be deployed where dust 5 > 3 and light 0.1 < 0.25"
+
+
 def test_level_at_the_limit_keeps_it():
     assert choose(design("edge", risk=0.6, power=0.62)).degraded is False
 

@@ -1,6 +1,7 @@
 """`rosmodel generate observer`: a model, a plug-in that the monitor loads, a test that fails until it is written."""
 
 import importlib
+import math
 import os
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from ros_model.project.observers import ObserverModel, camel_case, snake_case, v
 from rosgraph_monitor.observer import TopicObserver
 from rosgraph_monitor.observers.plugins import available, make
 from sensor_msgs.msg import Imu
+from std_msgs.msg import Float32
 
 SOURCES = Path(__file__).parents[4] / "catkin_ws" / "src"
 DESCRIPTION = {
@@ -316,3 +318,23 @@ def test_property_of_the_surroundings_is_observed_as_a_quality_is(package, gener
     text = (folder / "src" / folder.name / "light_observer.py").read_text()
     assert 'qa_name = "light"' in text
     assert "a property of the surroundings" in text
+
+
+def test_observer_of_the_surroundings_tells_values_in_their_own_unit(package, generate, monkeypatch):
+    described = {"name": "SlopeObserver", "quality_attribute": "slope", "topics": {"tilt": "std_msgs/Float32"}}
+    folder = package({**described, "rate": 5, "range": [-90.0, 90.0]})
+    path = folder / "models" / "metacontrol.yaml"
+    environment = {"slope": {"required_by": {"v": {"most": 12.0}}}}
+    path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), "environment": environment}, sort_keys=False))
+    generate(folder)
+    plugin = folder / "src" / folder.name / "slope_observer.py"
+    formula = plugin.read_text().replace("raise NotImplementedError(", "return self.status_of(tilt.data)  # (")
+    plugin.write_text(formula)
+    monkeypatch.syspath_prepend(str(folder / "src"))
+    observer = importlib.import_module(f"{folder.name}.slope_observer").SlopeObserver()
+    told = []
+    for degrees in (-20.0, 35.5, 400.0, math.nan):
+        observer.receive("tilt", Float32(degrees), 0.0)
+        (status,) = observer.evaluate(0.0)
+        told.append(float(status.values[0].value) if status.message == "QA status" else status.message)
+    assert told == [-20.0, 35.5, "QA stale", "QA stale"]

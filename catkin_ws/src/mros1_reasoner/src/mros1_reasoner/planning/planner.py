@@ -343,4 +343,7 @@ def _nothing(designs: Collection[Design], situation: Situation) -> str:
     missing = sorted({component for name in names for component in situation.unrealisable.get(name, ())})
     functions = sorted({function for name in names for function in situation.unfulfilled.get(name, ())})
     without = " or ".join(", ".join(lacking) for lacking in (missing, functions) if lacking)
-    return f"no design can be deployed without {without}" if without else "no design is known"
+    unsuited = sorted({words for name in names for words in situation.unsuited.get(name, ())})
+    causes = [f"without {without}"] if without else []
+    causes += [f"where {' and '.join(unsuited)}"] if unsuited else []
+    return f"no design can be deployed {' or '.join(causes)}" if causes else "no design is known"

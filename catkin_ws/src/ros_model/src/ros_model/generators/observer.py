@@ -29,6 +29,27 @@ _TEMPLATES = Path(__file__).parent / "templates"
 _HEADER = f"{MARK} generate observer`; change metacontrol.yaml, not this."
 _VARIABLES = {"LOWEST": "range", "HIGHEST": "range", "qa_name": "quality_attribute", "max_age": "max_age"}
 _WORST = {"lower_is_better": "lower is better", "higher_is_better": "higher is better"}
+_OF_A_QUALITY = {
+    "bases": "TopicObserver",
+    "lowest_is": "Value of the formula that is level 0 of $quality",
+    "highest_is": "Value of the formula that is level 1 of $quality; $direction",
+    "level": "the level of $quality, 0 to 1,",
+    "status_of": '''\
+        """Return the diagnostics of a value: its level, 0 at LOWEST and 1 at HIGHEST; values beyond are clipped."""
+        return self.qa_status(min(max((value - LOWEST) / (HIGHEST - LOWEST), 0.0), 1.0))''',
+}
+_OF_THE_SURROUNDINGS = {
+    "bases": "StaleInputError, TopicObserver",
+    "lowest_is": "The least value of $quality that makes sense, in the unit of the limits of designs",
+    "highest_is": "The greatest value of $quality that makes sense; $direction",
+    "level": "the value of $quality",
+    "status_of": '''\
+        """Return the diagnostics of a value, which is told as it is; one that makes no sense is stale."""
+        if not LOWEST <= value <= HIGHEST:
+            raise StaleInputError(f"$quality {value} is not from {LOWEST} to {HIGHEST}")
+        return self.qa_status(value)''',
+}
+"""What the templates say of either kind of observer."""
 
 
 def generate(project: Project, output: Path) -> list[Path]:
@@ -150,11 +171,15 @@ test_text.__test__ = False  # type: ignore[attr-defined]  # no test of ours, wha
 def _filled(template: str, observer: ObserverModel, **more: str) -> str:
     packages = sorted({kind.partition("/")[0] for _, kind in observer.topics})
     topics = ", ".join(f'("{topic}", {_python_type(kind)})' for topic, kind in observer.topics)
+    direction = _WORST.get(observer.direction, "a property of the surroundings")
+    kind = _OF_A_QUALITY if observer.direction else _OF_THE_SURROUNDINGS
+    told = {"quality": observer.quality_attribute, "direction": direction}
     values = {
+        **{name: Template(text).substitute(told) for name, text in kind.items()},
         "name": observer.name,
         "module": f"{observer.python_package}.{observer.module}",
         "quality": observer.quality_attribute,
-        "direction": _WORST.get(observer.direction, "a property of the surroundings"),
+        "direction": direction,
         "export": f"<export>{observer.export_tag}</export>",
         "imports": "\n".join(f"import {package}.msg" for package in packages),
         "topics": topics,
