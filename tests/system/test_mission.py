@@ -140,6 +140,25 @@ def test_interrupted_mission_leaves_nothing_but_its_bag(tmp_path):
     assert (tmp_path / "mission.bag").exists()
 
 
+def test_robot_without_its_laser_waits_in_the_dark_until_the_camera_sees(tmp_path):
+    (tmp_path / "routes.yaml").write_text("short: {start: [-8, -8, 0.78], goal: [-5, -5.6, 0]}\n")
+    route = ("--routes", str(tmp_path / "routes.yaml"), "--route", "short")
+    texts = ("light:0@time:1", "kill:front_laser@time:3", "light:1@time:8")
+    strikes = [word for text in texts for word in ("--contingency", text)]
+    result = metacontrol("run", "--output", str(tmp_path), *route, *strikes, *FACTOR)
+    assert result.returncode == 0, account(result, tmp_path)
+    record = read_record(tmp_path / "mission.bag")
+    dark, *_ = [report.stamp for report in record.observed if report.name == "light" and report.level == 0.0]
+    light_again = next(event.stamp for event in record.events if event.name == "light:1")
+    waits, *_ = [decision for decision in record.decisions if decision.state == "FAILED"]
+    assert dark < waits.stamp < light_again
+    assert "no design can be deployed without front_laser or where light 0 < 0.25" in waits.explanation
+    taken = [decision for decision in record.decisions if decision.state == "EXECUTED"]
+    assert taken[0].to_configuration.endswith("_k") and taken[0].stamp > light_again
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["goal_reached"] and summary["collisions"] == 0
+
+
 def test_manager_in_place_of_the_reasoner_starts_the_dead_laser_again(tmp_path):
     (tmp_path / "routes.yaml").write_text("short: {start: [-8, -8, 0.78], goal: [-5, -5.6, 0]}\n")
     route = ("--routes", str(tmp_path / "routes.yaml"), "--route", "short")

@@ -17,7 +17,7 @@ from helpers.cases import case
 from metacontrol_sim.srv import DeleteObstacle, IncreaseConsumptionFactor, SetLight, SpawnObstacle
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import BatteryState, Imu, LaserScan, PointCloud2
+from sensor_msgs.msg import BatteryState, Illuminance, Imu, LaserScan, PointCloud2
 from std_msgs.msg import Float32, Int32
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
@@ -41,6 +41,7 @@ TOPICS = {
     "ground_truth/contacts": Int32,
     "ground_truth/obstacles": MarkerArray,
     "simulator/light": Float32,
+    "illuminance": Illuminance,
     "power_load": Float32,
 }
 
@@ -145,15 +146,19 @@ class SimulatorTest(unittest.TestCase):
         self.assertTrue(self.call("simulator/delete_obstacle", DeleteObstacle, "").success)
         shown.close()
 
-    def test_camera_goes_blind_in_the_dark(self):
+    def test_camera_goes_blind_in_the_dark_which_the_light_sensor_tells(self):
         cloud = Latest("camera/depth/points", PointCloud2)
+        sensor = Latest("illuminance", Illuminance)
+        self.assertIsNotNone(sensor.wait(lambda m: 270.0 < m.illuminance < 330.0 and m.header.stamp.to_sec() > 0.0))
         self.assertIsNotNone(cloud.wait(lambda c: c.width > 1000))
         self.assertTrue(self.call("simulator/set_light", SetLight, 0.0).success)
         self.assertIsNotNone(cloud.wait(lambda c: c.width == 0), "it sees in the dark")
+        self.assertIsNotNone(sensor.wait(lambda m: m.illuminance == 0.0), "the sensor tells light in the dark")
         self.assertFalse(self.call("simulator/set_light", SetLight, math.nan).success)
         self.assertTrue(self.call("simulator/set_light", SetLight, 1.0).success)
         self.assertIsNotNone(cloud.wait(lambda c: c.width > 1000), "it stays blind")
         cloud.close()
+        sensor.close()
 
     def test_command_moves_the_robot_and_its_end_stops_it(self):
         start = self.state.message.pose.pose.position

@@ -4,6 +4,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from mros1_reasoner.io.ontology_files import read_knowledge_base
+from mros1_reasoner.knowledge.model import Need
+from pybullet_simulator.robot.laser_and_camera import FULL_LIGHT
 from ros_model.cli.rosmodel import main
 from ros_model.io.files import resolve
 from ros_model.io.models import read_system
@@ -43,6 +46,12 @@ def test_variant_requires_the_sensor_it_is_wired_to_and_the_battery_if_it_is_fas
         sensor = "camera" if variant.name.endswith("_k") else "front_laser"
         battery = set() if "_v1_" in variant.name else {"battery"}
         assert required[variant.name] == {"simulator", sensor} | battery
+
+
+def test_variants_on_the_camera_need_light():
+    knowledge = read_knowledge_base([MODELS / "d2.owl"])
+    needing = {name: design.needs for name, design in knowledge.designs.items() if design.needs}
+    assert needing == dict.fromkeys(("f1_v1_r3_k", "f1_v3_r1_k", "f2_v1_r3_k"), (Need("light", least=FULL_LIGHT),))
 
 
 def test_models_are_sound_with_all_references_known_and_requirements_shown(capsys):

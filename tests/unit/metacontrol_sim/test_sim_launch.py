@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+import yaml
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
@@ -36,3 +37,18 @@ def test_monitor_expects_what_the_window_listens_to_only_where_there_is_one(file
     text = (PACKAGE.parent / "pybullet_simulator/src/pybullet_simulator/ros/window.py").read_text()
     assert len(ignored) == 8
     assert [name for name in ignored if f'"{name.removeprefix("*/")}"' not in text] == []
+
+
+@pytest.mark.parametrize("file", ROOTS)
+def test_mission_without_surroundings_has_all_other_observers(file):
+    described = yaml.safe_load((PACKAGE / "models/metacontrol.yaml").read_text())
+    names = [observer["name"] for observer in described["observers"]]
+    others = [o["name"] for o in described["observers"] if o["quality_attribute"] not in described["environment"]]
+    assert len(others) < len(names)
+    assert parameters(file)["/rosgraph_monitor/observers"] == names
+    assert parameters(file, "environment:=false")["/rosgraph_monitor/observers"] == others
+
+
+def test_published_reasoner_has_no_surroundings():
+    observers = parameters("metacontrol_sim_reasoner.launch", "as_published:=true")["/rosgraph_monitor/observers"]
+    assert "LightObserver" not in observers

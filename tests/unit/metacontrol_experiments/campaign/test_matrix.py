@@ -126,6 +126,15 @@ def test_profile_is_the_meta_controller_with_its_parameters():
     }
 
 
+def test_surroundings_are_observed_unless_the_file_says_otherwise():
+    assert {run.environment for run in campaign().runs} == {True}
+    assert {run.environment for run in campaign(environment=False).runs} == {False}
+    known = replace(KNOWN, parameters=setting_names())
+    for name, observed in (("paper.yaml", False), ("steps.yaml", False), ("smoke.yaml", True)):
+        runs = parse_campaign(yaml.safe_load((FILES / name).read_text()), known, name).runs
+        assert {run.environment for run in runs} == {observed}
+
+
 def test_engine_that_is_given_takes_the_place_of_that_of_the_file():
     assert {run.engine for run in parse_campaign({**SMALL, "engine": "ros"}, KNOWN, "").runs} == {"ros"}
     assert {run.engine for run in parse_campaign({**SMALL, "engine": "ros"}, KNOWN, "", "lockstep").runs} == {

@@ -78,3 +78,12 @@ def test_run_that_failed_has_a_row_with_the_same_columns():
     failed, done = row(Result(RUN, (CRASHED, HUNG))), row(Result(RUN, (DONE,), SUMMARY))
     assert failed.keys() == done.keys()
     assert (failed["status"], failed["problem"], failed["outcome"], failed["summary"]) == ("hung", "no end", None, None)
+
+
+def test_row_without_the_column_is_of_a_mission_that_observed_no_surroundings():
+    told = row(Result(RUN, (DONE,), SUMMARY, {"host": "a", "commit": "c", "ended": "e", "versions": "v"}))
+    del told["environment"]
+    read = from_row(told, "x.parquet: row 1")
+    check_same([RUN], {RUN.name: read}, "x.parquet", "leave it out")
+    with pytest.raises(CampaignError, match=r"another mission \(environment\)"):
+        check_same([replace(RUN, environment=True)], {RUN.name: read}, "x.parquet", "leave it out")

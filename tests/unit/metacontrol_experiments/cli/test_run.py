@@ -74,6 +74,11 @@ def test_baseline_is_the_manager_none(monkeypatch):
     assert settings_of(monkeypatch).manager == "mros"
 
 
+def test_surroundings_are_observed_unless_the_command_says_otherwise(monkeypatch):
+    assert settings_of(monkeypatch).environment
+    assert not settings_of(monkeypatch, "--no-environment").environment
+
+
 def test_parameters_reach_the_reasoner_through_the_launch_file(monkeypatch):
     settings = settings_of(monkeypatch, "--parameters", "{horizon: 0, calm: 3.5}")
     assert 'reasoner_parameters:={"calm": 3.5, "horizon": 0}' in settings.launch_command(4000)

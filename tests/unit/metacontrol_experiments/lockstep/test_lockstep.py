@@ -248,3 +248,46 @@ def test_launch_file_gives_the_reasoner_the_profile_of_the_published_one():
     values = private_parameters(launched, "mros1_reasoner", "reasoner")
     profile = yaml.safe_load((PACKAGE.parent / "mros1_reasoner/config/as_published.yaml").read_text())
     assert profile and {name: values[name] for name in profile} == profile
+
+
+DARK_AND_BLIND = ("light:0@time:3", "kill:front_laser@time:5", "light:1@time:9")
+
+
+@pytest.mark.parametrize("manager", ["mros", "rules"])
+def test_no_camera_is_taken_in_the_dark_but_when_the_light_comes_back(tmp_path, manager):
+    outcome = set_up(settings(tmp_path, *DARK_AND_BLIND, manager=manager, timeout_s=25.0, route=FAR)).run()
+    start = outcome.record.start_stamp
+    (change,) = summarise(outcome.record)["reconfigurations"]
+    assert change["to"].endswith("_k") and 9.0 < change["stamp_s"] < 10.0
+    refusals = [d for d in outcome.record.decisions if d.state == "FAILED" and d.stamp - start < 9.0]
+    if manager == "mros":
+        (refusal,) = refusals
+        assert "stays with f2_v2_r2" in refusal.explanation
+        assert "no design can be deployed without front_laser or where light 0 < 0.25" in refusal.explanation
+
+
+def test_mission_that_observes_no_surroundings_drives_blindly(tmp_path):
+    asked = settings(tmp_path, *DARK_AND_BLIND, manager="mros", environment=False, timeout_s=7.0, route=FAR)
+    outcome = set_up(asked).run()
+    (change,) = summarise(outcome.record)["reconfigurations"]
+    assert change["to"].endswith("_k") and change["stamp_s"] < 6.0
+    assert {report.name for report in outcome.record.observed} == {"safety", "energy"}
+
+
+@pytest.mark.parametrize("manager", ["mros", "rules", "random"])
+def test_camera_is_left_in_the_dark_at_once(tmp_path, manager):
+    changes = {"manager": manager, "initial_configuration": "f1_v3_r1_k", "timeout_s": 6.0, "route": FAR}
+    outcome = set_up(settings(tmp_path, "light:0.1@time:2", **changes)).run()
+    change = summarise(outcome.record)["reconfigurations"][0]
+    assert change["trigger"] == "environment:light" and 2.0 < change["stamp_s"] < 3.0
+    assert not change["to"].endswith("_k")
+
+
+def test_light_alone_changes_no_mission(tmp_path):
+    lines = [
+        set_up(settings(tmp_path, "power:1.4@time:1", manager="mros", timeout_s=5.0, environment=on, route=FAR))
+        .run()
+        .log
+        for on in (True, False)
+    ]
+    assert lines[0].replace(" environment=true", "") == lines[1]

@@ -9,22 +9,28 @@ from metacontrol_experiments.managers.manager import ManagerError, Restart, Situ
 from metacontrol_experiments.managers.reactive import COOL_DOWN_S, WINDOW_S, ReactiveManager, Trouble, at_random
 from metacontrol_experiments.managers.respawn import RESPAWN_S, RespawnManager
 from metacontrol_experiments.managers.violations import Violations
-from mros1_reasoner.knowledge.model import Design, Direction, Objective, Quality
+from mros1_reasoner.knowledge.model import Design, Direction, Need, Objective, Quality
 from mros1_reasoner.loop.entries import ActiveFact, ComponentFact, LevelFact, StaleFact
 
 TABLE = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_sim/models/variants.csv"
 SAFETY, ENERGY, LASER = Trouble(quality="safety"), Trouble(quality="energy"), Trouble(component="front_laser")
+DARK = Trouble(surroundings="light", words="light 0.1 < 0.25")
 
 
 class Models:
-    """A knowledge base of a pump with three designs, of which one needs a valve."""
+    """A knowledge base of a pump with three designs; one needs a valve, and a depth of water that is not too small."""
 
     qualities = {"noise": Quality(), "flow": Quality(Direction.HIGHER_IS_BETTER)}
+    environment = frozenset({"depth", "frost"})
 
     def solving(self, function):
         assert function == "f_pump"
         needs = {"quiet": (), "strong": (), "valved": ("valve",)}
-        return tuple(Design(name, function, components=frozenset(parts)) for name, parts in needs.items())
+        wet = {"valved": (Need("depth", least=0.4), Need("frost", most=2.0))}
+        return tuple(
+            Design(name, function, components=frozenset(parts), needs=wet.get(name, ()))
+            for name, parts in needs.items()
+        )
 
 
 def reactive(choose, limits=None):
@@ -61,6 +67,7 @@ def table():
         (ENERGY, "f1_v1_r2", None),
         (LASER, "f2_v2_r2", "f2_v1_r3_k"),
         (LASER, "f3_v3_r1", "f1_v3_r1_k"),
+        (DARK, "f1_v3_r1_k", "f1_v3_r1"),
     ],
 )
 def test_rules_take_the_next_step_that_an_engineer_would_write(table, trouble, running, chosen):
@@ -126,6 +133,22 @@ def test_failed_component_is_answered_at_once_and_its_variants_are_left_out():
     needing.take(0.5, ComponentFact("valve", "FALSE"))
     (decision,) = needing.step(0.5, heartbeat=False)
     assert decision.trigger == "component:valve"
+
+
+def test_variant_that_the_surroundings_do_not_suit_is_left_at_once_and_not_taken():
+    manager = reactive(lambda trouble, running, others: others[0])
+    manager.take(0.0, ActiveFact("f_pump", "valved", "STABLE"))
+    manager.take(0.5, LevelFact("depth", 0.9))
+    assert manager.step(0.5, heartbeat=False) == []
+    manager.take(0.6, LevelFact("depth", 0.1))
+    manager.take(0.6, StaleFact("depth"))  # the last value holds
+    (decision,) = manager.step(0.6, heartbeat=False)
+    assert (decision.trigger, decision.causes) == ("environment:depth", ("depth 0.1 < 0.4",))
+    asked = []
+    manager = reactive(lambda trouble, running, others: asked.append(others))
+    manager.take(0.0, LevelFact("frost", 5.0))
+    fed(manager, "noise", 0.7)
+    assert asked == [("quiet",)]
 
 
 def test_mean_of_the_window_counts_and_the_worst_quality_comes_first():

@@ -21,3 +21,16 @@ def test_start_of_the_mission_names_a_manager_that_metacontrol_does_not_tell(tmp
     route = Route("r1", Pose(-1.5, 2.0, 0.5), Pose(3.0, 4.0, 0.0))
     values = Settings(route, tmp_path, manager=manager).describe()
     assert values.get("manager") == told and values["metacontrol"] == str(manager != "none").lower()
+
+
+@pytest.mark.parametrize(
+    ("manager", "environment", "observed"),
+    [("mros", True, True), ("rules", True, True), ("mros", False, False), ("as_published", True, False)],
+)
+def test_surroundings_are_observed_unless_the_mission_or_the_published_reasoner_has_none(
+    tmp_path, manager, environment, observed
+):
+    route = Route("r1", Pose(-1.5, 2.0, 0.5), Pose(3.0, 4.0, 0.0))
+    settings = Settings(route, tmp_path, manager=manager, environment=environment)
+    assert f"environment:={str(observed).lower()}" in settings.launch_arguments
+    assert settings.describe().get("environment") == ("true" if observed else None)

@@ -14,6 +14,7 @@ from rosgraph_monitor.observer import Observer, TopicObserver
 from rosgraph_monitor.observers.cpu import CpuLoadQualityObserver
 from rosgraph_monitor.observers.energy import EnergyQualityObserver
 from rosgraph_monitor.observers.frames import StaticFrames, rotation_translation
+from rosgraph_monitor.observers.light import LightObserver
 from rosgraph_monitor.observers.localization import LocalizationQualityObserver
 from rosgraph_monitor.observers.objective import ObjectiveErrorObserver
 from rosgraph_monitor.observers.safety import (
@@ -26,7 +27,7 @@ from rosgraph_monitor.observers.safety import (
     navigation_sensor,
     scan_points,
 )
-from sensor_msgs.msg import LaserScan, PointCloud2, PointField
+from sensor_msgs.msg import Illuminance, LaserScan, PointCloud2, PointField
 from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
 
@@ -89,6 +90,28 @@ def test_energy():
     assert observer.evaluate(13.5)[0].message == "QA stale"
     observer.receive("power_load", Float32(math.inf), 14.0)
     assert observer.evaluate(14.0)[0].message == "QA stale"
+
+
+@pytest.mark.parametrize(
+    ("measured", "told"), [(75.0, 0.25), (0.0, 0.0), (60000.0, 200.0), (-1.0, None), (math.nan, None)]
+)
+def test_light_is_a_share_of_that_of_a_well_lit_place(measured, told):
+    observer = LightObserver()
+    observer.receive("illuminance", Illuminance(illuminance=measured), 1.0)
+    (status,) = observer.evaluate(1.5)
+    assert (float(status.values[0].value) if status.message == "QA status" else None) == told
+    assert status.values[0].key == "light"
+    assert observer.evaluate(2.5)[0].message == "QA stale"
+
+
+def test_light_sensor_of_another_robot():
+    observer = LightObserver()
+    observer.configure({"topic": "mast/photometer", "well_lit": 1000.0})
+    assert observer.topics == [("mast/photometer", Illuminance)]
+    observer.receive("mast/photometer", Illuminance(illuminance=500.0), 1.0)
+    assert float(observer.evaluate(1.0)[0].values[0].value) == 0.5
+    observer.configure({"well_lit": 0.0})
+    assert "give the lx" in observer.evaluate(1.0)[0].values[0].value
 
 
 def odometry(vx=0.0, vy=0.0):

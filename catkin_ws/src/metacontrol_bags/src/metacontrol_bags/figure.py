@@ -1,4 +1,4 @@
-"""Draw a mission: the map with the path coloured by configuration, and below it both quality series."""
+"""Draw a mission: the map with the path coloured by configuration, both quality series, and what else was observed."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ _SIZE_INCH = (10.0, 12.5)
 _COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#9467bd", "#8c564b", "#e377c2", "#17becf", "#bcbd22")
 _FAILURE = "#d62728"
 _MARGIN_M = 0.6
+_MOST_OTHERS = 3
+"""More series would leave no room for the map."""
 
 
 def draw(record: MissionRecord, path: Path) -> None:
@@ -41,14 +43,23 @@ def draw(record: MissionRecord, path: Path) -> None:
     """
     summary = summarise(record)
     figure = Figure(figsize=_SIZE_INCH, dpi=_DPI, layout="constrained")
-    axes = figure.subplots(3, 1, height_ratios=(3.6, 1.0, 1.0))
+    others = others_observed(record)[:_MOST_OTHERS]
+    axes = figure.subplots(3 + len(others), 1, height_ratios=(3.6, 1.0, 1.0, *(0.5 for _ in others)))
     figure.suptitle(_title(summary), fontsize=13)
     _draw_map(axes[0], record, summary)
-    for axis, name in zip(axes[1:], ("safety", "energy"), strict=True):
+    for axis, name in zip(axes[1:3], ("safety", "energy"), strict=True):
         _draw_quality(axis, record, summary, name)
-    axes[1].tick_params(labelbottom=False)
-    axes[2].set_xlabel("simulated time since the start of the mission (s)")
+    for axis, name in zip(axes[3:], others, strict=True):
+        _draw_other(axis, record, summary, name)
+    for axis in axes[1:-1]:
+        axis.tick_params(labelbottom=False)
+    axes[-1].set_xlabel("simulated time since the start of the mission (s)")
     figure.savefig(path, dpi=_DPI, format="svg" if path.suffix == ".svg" else "png")
+
+
+def others_observed(record: MissionRecord) -> list[str]:
+    """Return what was observed beside both qualities, such as the light: what a design may need of its surroundings."""
+    return [name for name in dict.fromkeys(r.name for r in record.observed) if name not in ("safety", "energy")]
 
 
 def configuration_spans(record: MissionRecord) -> list[tuple[float, float, str]]:
@@ -156,32 +167,59 @@ def _mark(axis: Axes, place: tuple[float, float], marker: str, colour: str, labe
 def _draw_quality(axis: Axes, record: MissionRecord, summary: dict[str, Any], name: str) -> None:
     start, end = record.start_stamp, record.end_stamp
     limit = summary["thresholds"][name]
-    observed = [(r.stamp - start, np.nan if r.level is None else r.level) for r in record.observed if r.name == name]
+    observed = _observed(record, name)
     truth = [(stamp - start, level) for stamp, level in record.true_quality.get(name, ())]
     series = ((observed, "#888888", 0.9, "observed"), (truth, "#1f4e79", 1.4, "ground truth"))
     for samples, colour, width, label in series:
-        if samples:
-            held = [*samples, (end - start, samples[-1][1])] if samples[-1][0] < end - start else samples
-            axis.step(*zip(*held, strict=True), where="post", color=colour, linewidth=width, label=label)
+        _draw_series(axis, samples, end - start, color=colour, linewidth=width, label=label)
     axis.axhline(limit, color=_FAILURE, linestyle="--", linewidth=1.2, label=f"threshold {limit:g}")
-    strikes = [entry["stamp_s"] for entry in summary["perturbations"]]
-    if strikes:
-        axis.axvspan(min(strikes), end - start, color=_FAILURE, alpha=0.10, linewidth=0, label="contingency")
+    _draw_changes(axis, summary, end - start)
     for number, entry in enumerate(summary["reconfigurations"], start=1):
         done = entry["stamp_s"] + (entry["execute_s"] or 0.0)
-        legend = "reconfiguration" if number == 1 else None
-        axis.axvspan(entry["stamp_s"], done, color="#ffb000", alpha=0.6, linewidth=1.5, zorder=0, label=legend)
         axis.annotate(
             f"{number}: {entry['to']}", (done, 1.0), xytext=(4, -2), textcoords="offset points", fontsize=9, va="top"
         )
-    axis.set_xlim(0.0, max(end - start, 1.0))
     axis.set_ylim(0.0, 1.08)
     unit = "safety risk" if name == "safety" else name
     share = summary["time_above_threshold"][name]
     told = "" if share is None else f"\nabove: {share:.1%}"
     axis.set_ylabel(f"{unit}{told}")
-    axis.grid(alpha=0.3)
     axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9, frameon=False)
+
+
+def _draw_other(axis: Axes, record: MissionRecord, summary: dict[str, Any], name: str) -> None:
+    """Draw what was observed without a threshold, in its own unit."""
+    end = record.end_stamp - record.start_stamp
+    _draw_series(axis, _observed(record, name), end, color="#888888", linewidth=1.4, label="observed")
+    axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
+    _draw_changes(axis, summary, end)
+    axis.set_ylabel(name)
+
+
+def _observed(record: MissionRecord, name: str) -> list[tuple[float, float]]:
+    """Return what the observers told: s since the start, and the level, which is NaN while it was stale."""
+    told = (report for report in record.observed if report.name == name)
+    return [(r.stamp - record.start_stamp, np.nan if r.level is None else r.level) for r in told]
+
+
+def _draw_series(axis: Axes, samples: list[tuple[float, float]], end: float, **style: Any) -> None:
+    """Draw samples that hold until the next one; the last one holds until the end, s since the start."""
+    if samples:
+        held = [*samples, (end, samples[-1][1])] if samples[-1][0] < end else samples
+        axis.step(*zip(*held, strict=True), where="post", **style)
+
+
+def _draw_changes(axis: Axes, summary: dict[str, Any], end: float) -> None:
+    """Draw when something went wrong, and when another configuration was deployed, up to the end, s since the start."""
+    strikes = [entry["stamp_s"] for entry in summary["perturbations"]]
+    if strikes:
+        axis.axvspan(min(strikes), end, color=_FAILURE, alpha=0.10, linewidth=0, label="contingency")
+    for number, entry in enumerate(summary["reconfigurations"], start=1):
+        done = entry["stamp_s"] + (entry["execute_s"] or 0.0)
+        legend = "reconfiguration" if number == 1 else None
+        axis.axvspan(entry["stamp_s"], done, color="#ffb000", alpha=0.6, linewidth=1.5, zorder=0, label=legend)
+    axis.set_xlim(0.0, max(end, 1.0))
+    axis.grid(alpha=0.3)
 
 
 def _colours(record: MissionRecord) -> dict[str, str]:

@@ -71,6 +71,7 @@ _SCHEMA = {
         "timeout": {"type": "number", "exclusiveMinimum": 0, "title": "simulated s, more than 0"},
         "deadline": {"type": "number", "exclusiveMinimum": 0, "title": "wall s for a run, more than 0"},
         "logs": {"type": "boolean", "title": "true or false"},
+        "environment": {"type": "boolean", "title": "true (the surroundings are observed) or false"},
         "world": {"type": "string", "title": "the path of a world file or of a map's YAML file"},
         "routes_file": {"type": "string", "title": "the path of a YAML file of routes"},
         "profiles": {
@@ -117,6 +118,7 @@ class Run:
         timeout: simulated s after which the mission has failed.
         ground: what tells the ground from others; empty for the factory.
         parameters: of the manager where that is a profile: JSON of a mapping; empty where it is a plug-in.
+        environment: whether the surroundings are observed; tables without this column are of missions without.
     """
 
     part: str
@@ -133,6 +135,7 @@ class Run:
     timeout: float = TIMEOUT_S
     ground: str = ""
     parameters: str = ""
+    environment: bool = False
 
     @property
     def plug_in(self) -> str:
@@ -182,6 +185,7 @@ class _Common:
     seed: int
     engine: str
     timeout: float
+    environment: bool
     profiles: Mapping[str, str]
 
 
@@ -213,6 +217,7 @@ def parse_campaign(content: Any, known: Known, where: str, engine: str | None = 
         seed=_whole(content.get("seed", 0), 0, f"{where}: seed"),
         engine=engine or content.get("engine", LOCKSTEP),
         timeout=float(content.get("timeout", TIMEOUT_S)),
+        environment=content.get("environment", True),
         profiles=_profiles(content.get("profiles", {}), known, f"{where}: profiles"),
     )
     runs = [
@@ -275,6 +280,7 @@ def _runs(name: str, part: Mapping[str, Any], known: Known, where: str, common: 
                         timeout=common.timeout,
                         ground=known.ground.mark,
                         parameters=common.profiles.get(manager, ""),
+                        environment=common.environment,
                     )
 
 

@@ -119,6 +119,7 @@ class _Mapping(click.ParamType):
     help="YAML mapping of parameters of the reasoner, in place of those that it has, e.g. '{cool_down: 3}'.",
 )
 @click.option("--no-metacontrol", is_flag=True, help="The baseline, everything but the reasoner: --manager none.")
+@click.option("--no-environment", is_flag=True, help="Nothing observes the surroundings, such as the light.")
 @click.option(
     "--seed", type=click.IntRange(0), default=1, show_default=True, help="Of everything random in the simulation."
 )
@@ -228,6 +229,7 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
         output=output,
         manager=manager,
         parameters=options["parameters"],
+        environment=not options["no_environment"],
         seed=options["seed"],
         initial_configuration=name,
         contingencies=_contingencies(options, components),

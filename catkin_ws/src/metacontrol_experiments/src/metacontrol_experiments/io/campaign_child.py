@@ -68,6 +68,7 @@ def _drive(asked: dict[str, Any]) -> dict[str, Any]:
         output=Path(),  # nothing is written
         manager=run.plug_in,
         parameters=run.parameters,
+        environment=run.environment,
         seed=run.seed,
         initial_configuration=run.initial_configuration,
         contingencies=contingencies_of(run),

@@ -202,7 +202,9 @@ def _cores(settings: Settings, launched: SystemDescription, drivers: Drivers, li
         objectives = parameters.objectives(knowledge)
         situation = replace(situation, knowledge=knowledge, objectives=objectives, parameters=values)
         observers = Observers(_observers(private_parameters(launched, *_MONITOR), library), drivers.topics)
-        reader = DiagnosticsReader(knowledge.qualities, knowledge.components, parameters.nodes)
+        reader = DiagnosticsReader(
+            {*knowledge.qualities, *knowledge.environment}, knowledge.components, parameters.nodes
+        )
         tactics = library.once("tactics", load_tactics)
     manager = make_manager(settings.manager, situation, *_UNUSABLE)
     if not manager.observes:

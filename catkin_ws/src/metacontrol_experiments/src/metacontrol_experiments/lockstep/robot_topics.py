@@ -7,10 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
-from pybullet_simulator.messages.state import BASE, ODOM, OdometryWriter, battery_state, localised_pose, stamp
-from pybullet_simulator.physics.simulation import ENERGY_STEPS, LOCALISATION_STEPS, MOTION_STEPS
+from pybullet_simulator.messages.state import (
+    BASE,
+    ODOM,
+    OdometryWriter,
+    battery_state,
+    illuminance,
+    localised_pose,
+    stamp,
+)
+from pybullet_simulator.physics.simulation import ENERGY_STEPS, LIGHT_STEPS, LOCALISATION_STEPS, MOTION_STEPS
 from robot_formulas.geometry import quaternion_of
-from sensor_msgs.msg import BatteryState
+from sensor_msgs.msg import BatteryState, Illuminance
 from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
 
@@ -53,6 +61,7 @@ TOPICS: dict[str, Topic] = {
     "odometry/filtered": Topic(Odometry, MOTION_STEPS, _filtered),
     "amcl_pose": Topic(PoseWithCovarianceStamped, LOCALISATION_STEPS, _localised),
     "battery_state": Topic(BatteryState, ENERGY_STEPS, battery_state),
+    "illuminance": Topic(Illuminance, LIGHT_STEPS, illuminance),
     "power_load": Topic(Float32, ENERGY_STEPS, lambda simulation, _now: Float32(simulation.load)),
 }
 """The topics with a rate, by name without a leading slash. Frames that never move are told once (`static_frames`)."""

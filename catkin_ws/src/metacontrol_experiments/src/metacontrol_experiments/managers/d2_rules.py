@@ -1,7 +1,7 @@
 """The if-then rules that an engineer would write by hand for D2, from the table of its variants.
 
-- The sensor of the running variant has failed: take a variant with another sensor, no faster than the running one where
-  there is one.
+- The sensor of the running variant has failed, or the surroundings do not suit it (a camera in the dark): take a
+  variant with another sensor, no faster than the running one where there is one.
 - Safety violates its limit: slow down by one step; at the lowest velocity, keep a greater distance.
 - Energy violates its limit: lower the frequency of control by one step; at the lowest, slow down.
 
@@ -74,7 +74,7 @@ def by_rules(variants: Mapping[str, Variant]) -> Choose:
     def choose(trouble: Trouble, running: str, others: tuple[str, ...]) -> str | None:
         now = variants[running]
         there = {name: variants[name] for name in others if name in variants}
-        if trouble.component:
+        if trouble.component or trouble.surroundings:
             return _nearest(now, there, lambda other: other.sensor != now.sensor)
         slower = _step_down(now, there, "velocity")
         if trouble.quality == "safety":

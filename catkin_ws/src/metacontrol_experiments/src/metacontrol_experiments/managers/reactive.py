@@ -32,19 +32,27 @@ class Trouble:
     """What is wrong.
 
     Attributes:
-        quality: whose limit is violated; "" where a component has failed.
-        component: that has failed; "" where a limit is violated.
+        quality: whose limit is violated; "" where none is.
+        component: that has failed; "" where none has.
+        surroundings: property of the surroundings that does not suit the running variant; "" where all do.
+        words: what is wrong with the surroundings.
     """
 
     quality: str = ""
     component: str = ""
+    surroundings: str = ""
+    words: str = ""
 
     @property
     def trigger(self) -> str:
         """Its name in a decision."""
+        if self.surroundings:
+            return f"environment:{self.surroundings}"
         return f"qa:{self.quality}" if self.quality else f"component:{self.component}"
 
     def __str__(self) -> str:
+        if self.surroundings:
+            return self.words
         return f"{self.quality} violates its limit" if self.quality else f"{self.component} has failed"
 
 
@@ -54,7 +62,11 @@ if TYPE_CHECKING:
 
 
 class ReactiveManager(Manager):
-    """Asks for another variant while a limit is violated, and when the running variant lacks a component."""
+    """Asks for another variant while a limit is violated, and when the running variant can't work.
+
+    It can't without a component that it needs, and where the surroundings are not as it needs them. The last value of a
+    property of the surroundings holds until the next one comes.
+    """
 
     observes = True
 
@@ -76,6 +88,8 @@ class ReactiveManager(Manager):
         self._designs = {design.name: design for design in situation.knowledge.solving(self._objective.function)}
         self._violations = Violations(situation.knowledge.qualities, self._objective.limits, WINDOW_S)
         self._failed: set[str] = set()
+        self._environment = situation.knowledge.environment
+        self._surroundings: dict[str, float] = {}  # property -> its last value
         self._running = ""
         self._calm_until = 0.0
         self._waits_until = 0.0
@@ -85,6 +99,8 @@ class ReactiveManager(Manager):
     def take(self, now: float, fact: Fact) -> None:
         """See Manager.take."""
         match fact:
+            case LevelFact() if fact.quality in self._environment:
+                self._surroundings[fact.quality] = fact.level
             case LevelFact():
                 self._violations.observe(now, fact.quality, fact.level)
             case StaleFact():
@@ -99,7 +115,7 @@ class ReactiveManager(Manager):
         """See Manager.step."""
         if self._pending is not None or self._running not in self._designs or now < self._waits_until:
             return []
-        others = tuple(sorted(name for name in self._designs if name != self._running and not self._lacks(name)))
+        others = tuple(sorted(name for name in self._designs if name != self._running and not self._hindrances(name)))
         for trouble in self._troubles(now):
             chosen = self._choose(trouble, self._running, others)
             if chosen is not None:
@@ -127,12 +143,16 @@ class ReactiveManager(Manager):
         self._violations.forget()
         return pending
 
-    def _lacks(self, variant: str) -> list[str]:
-        return sorted(self._designs[variant].components & self._failed)
+    def _hindrances(self, variant: str) -> list[Trouble]:
+        """Return why a variant can't work now, failed components first."""
+        design, known = self._designs[variant], self._surroundings
+        troubles = [Trouble(component=component) for component in sorted(design.components & self._failed)]
+        unsuited = ((n, n.lack(known[n.attribute])) for n in design.needs if n.attribute in known)
+        return troubles + [Trouble(surroundings=need.attribute, words=words) for need, words in unsuited if words]
 
     def _troubles(self, now: float) -> list[Trouble]:
-        """Return what is wrong, failed components first."""
-        troubles = [Trouble(component=component) for component in self._lacks(self._running)]
+        """Return what is wrong, the reasons why the running variant can't work first."""
+        troubles = self._hindrances(self._running)
         if now >= self._calm_until:
             troubles += [Trouble(quality=quality) for quality in self._violations.found(now)]
         return troubles

@@ -33,6 +33,7 @@ class Settings:
         output: folder for bag, summary, figure and logs.
         manager: name of what adapts.
         parameters: of the reasoner, in place of those that the system has; JSON of a mapping, empty for none.
+        environment: whether the robot observes its surroundings, such as the light.
         seed: of everything random in the simulation.
         initial_configuration: name of the variant deployed first.
         contingencies: what goes wrong, and when.
@@ -51,6 +52,7 @@ class Settings:
     output: Path
     manager: str = MROS
     parameters: str = ""
+    environment: bool = True
     seed: int = 1
     initial_configuration: str = "f2_v2_r2"
     contingencies: tuple[Contingency, ...] = ()
@@ -71,6 +73,11 @@ class Settings:
     def metacontrol(self) -> bool:
         """Whether anything adapts; the baseline is without it."""
         return self.manager != NONE
+
+    @property
+    def observes_environment(self) -> bool:
+        """Whether the surroundings are observed; the published meta-controller knows nothing of them."""
+        return self.environment and self.manager != AS_PUBLISHED
 
     @property
     def plan(self) -> Plan:
@@ -100,6 +107,7 @@ class Settings:
             "initial_pose_a": repr(start.yaw),
             "seed": str(self.seed),
             "real_time_factor": repr(self.real_time_factor),
+            "environment": _boolean(self.observes_environment),
         }
         if self.world is not None:
             arguments["world"] = str(self.world.resolve())
@@ -132,6 +140,7 @@ class Settings:
         power = [entry.value for entry in self.contingencies if entry.kind is Kind.POWER]
         other = {} if self.manager in (NONE, MROS) else {"manager": self.manager}
         other |= {"parameters": self.parameters} if self.parameters else {}
+        other |= {"environment": "true"} if self.observes_environment else {}
         return {
             "mission": "D2",
             "route": self.route.name,

@@ -91,7 +91,9 @@ class ManagerNode:
         self._period = parameters.period
         self._inbox = Inbox()
         self._reader = DiagnosticsReader(
-            knowledge.qualities if knowledge else (), knowledge.components if knowledge else (), parameters.nodes
+            {*knowledge.qualities, *knowledge.environment} if knowledge else (),
+            knowledge.components if knowledge else (),
+            parameters.nodes,
         )
         self._active: set[str] = set()  # functions for which something runs
         self._decided: set[str] = set()  # ids of decisions under way

@@ -14,11 +14,12 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from robot_formulas.geometry import quaternion_of
 from robot_formulas.power import BATTERY_CAPACITY_WH
-from sensor_msgs.msg import BatteryState, Imu
+from sensor_msgs.msg import BatteryState, Illuminance, Imu
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from pybullet_simulator.physics.physics import GRAVITY
+from pybullet_simulator.robot.light_sensor import NOISE
 from pybullet_simulator.robot.motion_sensors import vibration_variance
 
 if TYPE_CHECKING:
@@ -115,6 +116,16 @@ def localised_pose(pose: Pose, noise: float, now: genpy.Time) -> PoseWithCovaria
     _set_pose(message.pose.pose, pose)
     variance = max(noise**2, _SMALL)
     message.pose.covariance = [*_diagonal(variance, 6)[:35], max(0.01 * variance, _SMALL)]
+    return message
+
+
+def illuminance(simulation: Simulation, now: genpy.Time) -> Illuminance:
+    """Return what the light sensor measures, in lx, with its variance."""
+    message = Illuminance()
+    message.header.stamp = now
+    message.header.frame_id = BASE
+    message.illuminance = simulation.illuminance
+    message.variance = max((NOISE * simulation.illuminance) ** 2, _SMALL)
     return message
 
 

@@ -17,6 +17,7 @@ from robot_formulas.safety import braking_distance, closest_in_direction, safety
 from pybullet_simulator.io.robot_file import RobotFileError
 from pybullet_simulator.physics.physics import Physics, PhysicsError
 from pybullet_simulator.robot.drive import Drive
+from pybullet_simulator.robot.light_sensor import LightSensor
 from pybullet_simulator.robot.motion_sensors import PERFECT, Errors, Imu, Localisation, Odometry, Slip
 from pybullet_simulator.robot.robot import Robot
 from pybullet_simulator.world.obstacles import Obstacles
@@ -38,8 +39,9 @@ MOTION_STEPS = 2
 LOCALISATION_STEPS = 20
 SAFETY_STEPS = 10
 ENERGY_STEPS = 100
-"""Steps between two updates: IMU, odometry and slip at 50 Hz, localisation at 5 Hz, ground truth of safety at 10 Hz and
-of energy at 1 Hz."""
+LIGHT_STEPS = 20
+"""Steps between two updates: IMU, odometry and slip at 50 Hz, localisation and light sensor at 5 Hz, ground truth of
+safety at 10 Hz and of energy at 1 Hz."""
 SAFETY_MIN_SPEED = 0.01
 """m/s; below it the robot counts as at rest, where nothing is a risk."""
 CONTACT_PAUSE_STEPS = 50
@@ -90,6 +92,7 @@ class Simulation:
         battery: state of charge.
         obstacles: what no map shows.
         light: brightness, 1 is a well-lit hall, 0 the dark.
+        illuminance: what the light sensor measures of it, lx.
     """
 
     def __init__(self, world: World, settings: Settings | None = None, robot: Robot | None = None) -> None:
@@ -123,6 +126,8 @@ class Simulation:
         self.energy = 0.0
         self.battery = Battery(self.settings.charge)
         self.light = 1.0
+        self._light_sensor = LightSensor(seed)
+        self.illuminance = self._light_sensor.measure(self.light)
 
         self._steps = 0
         self._base = Drive(self.robot)
@@ -218,6 +223,8 @@ class Simulation:
             self._measure_motion()
         if self._steps % LOCALISATION_STEPS == 0:
             self._localise()
+        if self._steps % LIGHT_STEPS == 0:
+            self.illuminance = self._light_sensor.measure(self.light)
         if self._steps % SAFETY_STEPS == 0:
             self.safety = self._safety_risk()
         if self._steps % ENERGY_STEPS == 0:

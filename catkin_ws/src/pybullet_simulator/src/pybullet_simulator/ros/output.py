@@ -8,14 +8,21 @@ import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan
+from sensor_msgs.msg import BatteryState, Illuminance, Image, Imu, LaserScan
 from std_msgs.msg import Float32, Int32
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from pybullet_simulator.messages import sensors, state
 from pybullet_simulator.messages.grid import occupancy_grid
-from pybullet_simulator.physics.simulation import ENERGY_STEPS, LOCALISATION_STEPS, MOTION_STEPS, SAFETY_STEPS, STEP
+from pybullet_simulator.physics.simulation import (
+    ENERGY_STEPS,
+    LIGHT_STEPS,
+    LOCALISATION_STEPS,
+    MOTION_STEPS,
+    SAFETY_STEPS,
+    STEP,
+)
 from pybullet_simulator.world.world import rasterise
 
 if TYPE_CHECKING:
@@ -48,6 +55,7 @@ class Output:
         self._filtered = rospy.Publisher("odometry/filtered", Odometry, queue_size=10, tcp_nodelay=True)
         self._imu = rospy.Publisher("imu/data", Imu, queue_size=20, tcp_nodelay=True)
         self._battery = rospy.Publisher("battery_state", BatteryState, queue_size=1)
+        self._illuminance = rospy.Publisher("illuminance", Illuminance, queue_size=1)
         self._localised = rospy.Publisher("amcl_pose", PoseWithCovarianceStamped, queue_size=5, latch=True)
         self._tf = rospy.Publisher("/tf", TFMessage, queue_size=20, tcp_nodelay=True)
         self._state = rospy.Publisher("ground_truth/state", Odometry, queue_size=10)
@@ -84,6 +92,8 @@ class Output:
         if step % LOCALISATION_STEPS == 0:
             deviation = simulation.settings.errors.localisation
             self._localised.publish(state.localised_pose(simulation.localised, deviation, now))
+        if step % LIGHT_STEPS == 0:
+            self._illuminance.publish(state.illuminance(simulation, now))
         if step % ENERGY_STEPS == 0:
             self._energy.publish(simulation.energy)
             self._battery.publish(state.battery_state(simulation, now))
