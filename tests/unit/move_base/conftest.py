@@ -18,6 +18,7 @@ from robot_formulas.geometry import Pose, Velocity
 CONFIG = Path(__file__).parents[3] / "catkin_ws/src/metacontrol_sim/config/move_base.yaml"
 RESOLUTION = 0.05
 LASER = Pose(0.4, 0.0, 0.0)
+REAR_LASER = Pose(-0.4, 0.0, math.pi)
 CAMERA = Pose(0.45, 0.0, 0.0)
 SUBSTEP = 0.01
 
@@ -35,7 +36,8 @@ def base_tree(**changes):
 
 
 def variant_tree(speed=0.5, radius=0.65, source="scan", rate=20.0, **changes):
-    """The same for one of the thirty variants."""
+    """The same for one of D2's variants; the one with the rear laser drives backwards."""
+    ahead = (-0.1, -speed) if source == "rear_scan" else (speed, 0.1)
     costmaps = {}
     for costmap in ("local_costmap", "global_costmap"):
         costmaps[f"{costmap}__inflater_layer__inflation_radius"] = radius
@@ -45,7 +47,8 @@ def variant_tree(speed=0.5, radius=0.65, source="scan", rate=20.0, **changes):
         planner_frequency=rate / 5,
         global_costmap__update_frequency=rate / 5,
         local_costmap__update_frequency=rate / 2,
-        TrajectoryPlannerROS__max_vel_x=speed,
+        TrajectoryPlannerROS__max_vel_x=ahead[0],
+        TrajectoryPlannerROS__min_vel_x=ahead[1],
         TrajectoryPlannerROS__max_vel_y=speed,
         TrajectoryPlannerROS__acc_lim_x=12 * speed,
         TrajectoryPlannerROS__acc_lim_y=12 * speed,
@@ -128,6 +131,7 @@ class Simulation:
             "odom": self.map_to_odom,
             "base_link": pose.matrix(),
             "front_laser": (pose @ LASER).matrix(0.2),
+            "rear_laser": (pose @ REAR_LASER).matrix(0.2),
             "camera_link": (pose @ CAMERA).matrix(0.4),
         }
         if target not in in_map or source not in in_map:
@@ -153,6 +157,8 @@ class Simulation:
         for source in self.navigator.sources:
             camera = source.data_type == "PointCloud2"
             mount, frame = (CAMERA, "camera_link") if camera else (LASER, "front_laser")
+            if source.topic == "rear/scan":
+                mount, frame = REAR_LASER, "rear_laser"
             angles = np.radians(np.linspace(-30, 30, 160) if camera else np.linspace(-135, 135, 361))
             reach = 8.0 if camera else 10.0
             ranges = self.cast(self.pose @ mount, angles, reach)

@@ -22,6 +22,8 @@ OTHER_DEFAULTS = {
     ("BaseLocalPlanner", "y_vels"),  # the original's has -0.3 twice
 }
 
+OTHER_RANGES = {("BaseLocalPlanner", "max_vel_x"), ("BaseLocalPlanner", "min_vel_x")}  # negative: backwards
+
 
 def described(name):
     definition = importlib.import_module(f"move_base.cfg.{name}Config")
@@ -45,7 +47,9 @@ def test_parameter_has_type_default_and_range_of_the_original(name, parameter):
     assert ours["type"] == kind
     if (name, parameter) not in OTHER_DEFAULTS:
         assert ours["default"] == pytest.approx(default) if kind == "double" else ours["default"] == default
-    if low is not None:
+    if (name, parameter) in OTHER_RANGES:
+        assert (ours["min"], ours["max"]) == (-high, high)
+    elif low is not None:
         assert ours["min"] == pytest.approx(low)
     if high is not None:
         assert ours["max"] == pytest.approx(high, abs=1e-5)

@@ -103,6 +103,8 @@ def test_costmap_that_no_memory_holds_is_refused(tree):
         ("planner_patience", float("nan"), "must be a finite number"),
         ("TrajectoryPlannerROS__max_vel_x", -0.5, "more than 0"),
         ("TrajectoryPlannerROS__min_vel_x", 0.6, "must not be over max_vel_x"),
+        ("TrajectoryPlannerROS__min_vel_x", -0.2, "max_vel_x 0 or less: the robot then drives backwards"),
+        ("TrajectoryPlannerROS__max_vel_x", 0.0, "more than 0, or min_vel_x less"),
         ("TrajectoryPlannerROS__vx_samples", 2.5, "must be a whole number"),
         ("TrajectoryPlannerROS__y_vels", [0.1, "left"], "must be a list of finite numbers"),
         ("TrajectoryPlannerROS__y_vels", "to the left", "must be a list of finite numbers"),

@@ -184,6 +184,13 @@ def test_parameters_of_dwa_limit_the_controller():
     assert (controller.vx_samples, controller.vtheta_samples) == (3, 40)
 
 
+def test_dwa_without_a_speed_ahead_drives_backwards_no_faster_than_its_limit():
+    controller = read(CART, DWAPlannerROS__max_vel_x=0.0, DWAPlannerROS__max_vel_trans=0.2).controller
+    assert controller.backwards
+    assert (controller.min_vel_x, controller.max_vel_x, controller.escape_vel) == (-0.2, 0.0, 0.0)
+    assert not read(CART).controller.backwards
+
+
 def test_former_names_of_dwa_are_understood():
     assert read(CART, DWAPlannerROS__max_trans_vel=0.15).controller.max_vel_x == 0.15
     assert read(CART, DWAPlannerROS__max_vel_trans=0.1).controller.max_vel_x == 0.1

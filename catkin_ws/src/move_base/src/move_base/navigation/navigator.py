@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from robot_formulas.geometry import STOP, Pose, Velocity, wrap
 
-from move_base.control.dwa import DwaController
+from move_base.control.direction import Controller
 from move_base.costmap.grid import LETHAL
 from move_base.costmap.surroundings import Surroundings
 from move_base.navigation.goal_memory import Work
@@ -51,7 +51,7 @@ class Navigator:
         self._followed: FollowedPlan | None = None
         self._surroundings = Surroundings(parameters)
         self._global, self._local = self._surroundings.global_area, self._surroundings.local_area
-        self._controller = DwaController(parameters)
+        self._controller = Controller(parameters)
         self._work = Work.begun(0.0)
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:

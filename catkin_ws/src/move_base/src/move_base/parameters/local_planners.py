@@ -49,10 +49,10 @@ def read_controller(reader: ParameterTree, kind: str, resolution: float) -> Cont
 
 
 def _read_trajectory_planner(reader: ParameterTree, _resolution: float) -> ControllerParameters:
-    max_vel_x = reader.number("max_vel_x", 0.55, low=0.0, above=True, high=20.0)
-    min_vel_x = reader.number("min_vel_x", 0.0, low=0.0, high=20.0)
-    if min_vel_x > max_vel_x:
-        raise reader.error("min_vel_x", f"must not be over max_vel_x ({max_vel_x:g})", min_vel_x)
+    min_vel_x, max_vel_x = _speeds_ahead(reader, bound=20.0)
+    if min_vel_x < 0.0 < max_vel_x:
+        rule = "must be 0 or more, or max_vel_x 0 or less: the robot then drives backwards; to back off is escape_vel"
+        raise reader.error("min_vel_x", rule, min_vel_x)
     max_vel_theta = reader.number("max_vel_theta", 1.0, low=0.0, above=True, high=20.0, formerly="max_rotational_vel")
     min_in_place = reader.number(
         "min_in_place_vel_theta", 0.4, low=0.0, above=True, high=20.0, formerly="min_in_place_rotational_vel"
@@ -91,10 +91,8 @@ def _read_dwa_planner(reader: ParameterTree, resolution: float) -> ControllerPar
     path, goal = (reader.number(f"{name}_distance_bias", bias, low=0.0) for name, bias in _BIASES.items())
     scale = sum(_BIASES.values()) / (path + goal) if path + goal else 1.0
     speed = reader.number("max_vel_trans", 0.55, low=0.0, above=True, formerly="max_trans_vel")
-    max_vel_x = min(reader.number("max_vel_x", 0.55, low=0.0, above=True), speed)
-    slowest = reader.number("min_vel_x", 0.0)
-    if slowest > max_vel_x:
-        raise reader.error("min_vel_x", f"must not be over max_vel_x ({max_vel_x:g})", slowest)
+    lowest, max_vel_x = _speeds_ahead(reader, limit=speed)
+    backwards = max_vel_x <= 0.0
     max_vel_theta = reader.number("max_vel_theta", 1.0, low=0.0, above=True, formerly="max_rot_vel")
     min_vel_theta = abs(reader.number("min_vel_theta", 0.4, formerly="min_rot_vel"))
     return ControllerParameters(
@@ -104,12 +102,12 @@ def _read_dwa_planner(reader: ParameterTree, resolution: float) -> ControllerPar
         acc_lim_y=_acceleration(reader, "acc_lim_y", 2.5),
         acc_lim_theta=_acceleration(reader, "acc_lim_theta", 3.2, formerly="acc_lim_th"),
         max_vel_x=max_vel_x,
-        min_vel_x=max(0.0, slowest),
+        min_vel_x=lowest if backwards else max(0.0, lowest),
         max_vel_theta=max_vel_theta,
         min_vel_theta=-max_vel_theta,
         min_in_place_vel_theta=min(max_vel_theta, max(SLOWEST_TURN, min_vel_theta)),
         y_vels=_lateral_range(reader, speed),
-        escape_vel=min(0.0, max(slowest, -0.1)),
+        escape_vel=0.0 if backwards else min(0.0, max(lowest, -0.1)),
         xy_goal_tolerance=reader.number("xy_goal_tolerance", 0.10, low=0.0, above=True),
         yaw_goal_tolerance=reader.number("yaw_goal_tolerance", 0.1, low=0.0, above=True),
         latch_xy_goal_tolerance=reader.flag("latch_xy_goal_tolerance", False),
@@ -123,6 +121,23 @@ def _read_dwa_planner(reader: ParameterTree, resolution: float) -> ControllerPar
         heading_lookahead=reader.number("forward_point_distance", 0.325, low=0.0),
         oscillation_reset_dist=reader.number("oscillation_reset_dist", 0.05, low=0.0),
     )
+
+
+def _speeds_ahead(reader: ParameterTree, *, bound: float = math.inf, limit: float = math.inf) -> tuple[float, float]:
+    """Return `min_vel_x` and `max_vel_x` in m/s, neither of which is more than 0 if the robot drives backwards.
+
+    Values beyond `bound` are refused, those beyond `limit` taken as the limit.
+    """
+    low, high = (
+        reader.number(name, default, low=-bound, high=bound)
+        for name, default in (("min_vel_x", 0.0), ("max_vel_x", 0.55))
+    )
+    low, high = max(low, -limit), min(high, limit)
+    if high <= 0.0 <= low:
+        raise reader.error("max_vel_x", "must be more than 0, or min_vel_x less: the robot then drives backwards", high)
+    if low > high:
+        raise reader.error("min_vel_x", f"must not be over max_vel_x ({high:g})", low)
+    return low, high
 
 
 def _acceleration(reader: ParameterTree, name: str, default: float, formerly: str = "") -> float:

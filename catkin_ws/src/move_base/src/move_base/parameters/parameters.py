@@ -150,7 +150,8 @@ class CostmapParameters:
 class ControllerParameters:
     """Parameters of the local planner; metres, radians, seconds.
 
-    `name` is the local planner's name without its package: its namespace for parameters and topics.
+    `name` is the local planner's name without its package: its namespace for parameters and topics. The speeds ahead
+    are between `min_vel_x` and `max_vel_x`; where both are 0 or less, the robot drives backwards.
     """
 
     name: str
@@ -177,6 +178,11 @@ class ControllerParameters:
     occdist_scale: float
     heading_lookahead: float
     oscillation_reset_dist: float
+
+    @property
+    def backwards(self) -> bool:
+        """Whether the robot drives backwards."""
+        return self.max_vel_x <= 0.0
 
 
 @dataclass(frozen=True)
