@@ -39,6 +39,16 @@ def test_meter_takes_the_largest_values_and_the_rate_since_the_last_tick():
     assert meter.tick(13.0) == 0.2
 
 
+@pytest.mark.parametrize(("speed", "counts"), [(-0.3, 0.3), (-0.1, 0.0), (-0.75, 0.75)])
+def test_driving_backwards_takes_as_much_as_driving_ahead_but_backing_off_counts_as_published(speed, counts):
+    meter = PowerMeter(0.0)
+    meter.add_speed(speed)
+    meter.add_speed(0.0)
+    for _ in range(20):
+        meter.add_command()
+    assert meter.tick(1.0) == pytest.approx(1.3 * counts + 0.04 * 20.0)
+
+
 def test_meter_survives_a_clock_that_stands_or_runs_backwards():
     meter = PowerMeter(10.0)
     assert meter.tick(10.0) is None

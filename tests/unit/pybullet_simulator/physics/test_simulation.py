@@ -202,6 +202,22 @@ def test_risk_near_a_wall_and_none_at_rest_or_driving_away(simulate):
     assert simulation.safety == 0.0
 
 
+def test_risk_of_driving_backwards_is_seen_from_the_rear_laser(simulate):
+    simulation = simulate(initial_pose=Pose(2.6, 0.0, math.pi))
+    drive(simulation, 0.4, -0.5, 0.0, 0.0)
+    distance = 4.0 - simulation.pose.x + simulation.robot.rear_laser.mount.x
+    assert simulation.safety == pytest.approx(1.0 - distance / (0.5 / 0.4), abs=0.02)
+    drive(simulation, 0.5, 0.5, 0.0, 0.0)
+    assert simulation.safety == 0.0
+
+
+def test_robot_that_only_backs_off_is_seen_from_the_front_laser(simulate):
+    simulation = simulate(initial_pose=Pose(3.45, 0.0, math.pi))
+    drive(simulation, 0.4, -0.1, 0.0, 0.0)
+    assert simulation.velocity[0] == pytest.approx(-0.1, abs=0.02)
+    assert simulation.safety == 0.0
+
+
 def test_risk_counts_what_is_too_low_for_the_laser(simulate):
     simulation = simulate(boxes=[Box("sill", "box", 1.0, 0.0, 0.2, 1.0, 0.1)])
     drive(simulation, 0.3, 0.5, 0.0, 0.0)

@@ -20,6 +20,7 @@ from rosgraph_monitor.observers.objective import ObjectiveErrorObserver
 from rosgraph_monitor.observers.safety import (
     CLOUD,
     ODOMETRY,
+    REAR_SCAN,
     SCAN,
     STATIC_FRAMES,
     SafetyQualityObserver,
@@ -148,7 +149,7 @@ def cloud(points):
 
 def following(sensor):
     observer = SafetyQualityObserver()
-    source = "scan" if sensor == SCAN else "point_cloud"
+    source = {SCAN: "scan", REAR_SCAN: "rear_scan", CLOUD: "point_cloud"}[sensor]
     parameter = RosParameter("local_costmap/obstacles_layer/observation_sources", value=source)
     observer.follow(RosSystem("s", components=(Component("move_base", parameters=(parameter,)),)))
     return observer
@@ -192,6 +193,37 @@ def test_laser_may_look_elsewhere():
     assert risk(observer) == 0.0
     observer.receive(STATIC_FRAMES, frames("front_laser", yaw=math.pi), 0.0)
     assert risk(observer) == pytest.approx(0.5)
+
+
+def rear_scan(**ranges_by_degree):
+    msg = scan(**ranges_by_degree)
+    msg.header.frame_id = "rear_laser"
+    return msg
+
+
+def test_rear_laser_sees_what_is_behind_a_robot_that_drives_backwards():
+    mount = (STATIC_FRAMES, frames("rear_laser", x=-0.4, yaw=math.pi))
+    observer = fed(following(REAR_SCAN), -0.4, 0.0, (REAR_SCAN, rear_scan(_0=0.25, m120=0.1)), mount)
+    assert risk(observer) == pytest.approx(0.75)
+    assert dict(observer.topics).keys() >= {REAR_SCAN} and SCAN not in dict(observer.topics)
+    observer.receive(ODOMETRY, odometry(0.4), 1.0)
+    assert risk(observer) == pytest.approx(0.9)  # ahead, it sees the return 60 degrees to a side
+    observer.receive(ODOMETRY, odometry(-0.4), 2.0)
+    (status,) = observer.evaluate(2.0)
+    assert status.message == "QA stale" and "rear/scan" in status.values[0].value
+
+
+def test_rear_laser_of_another_robot_has_a_topic_of_its_own_and_needs_its_place():
+    observer = SafetyQualityObserver()
+    observer.configure({"rear_scan_topic": "aft/beam", "base_frame": "hull"})
+    wired = Connection("/aft/beam", ConnectionKind.TOPIC, (), ())
+    observer.follow(RosSystem("ferry", connections=(wired,)))
+    fed(observer, -0.4, 0.0, ("aft/beam", rear_scan(_0=0.25)))
+    assert "no fixed transform from rear_laser to hull" in observer.evaluate(1.0)[0].values[0].value
+    mount = frames("rear_laser", yaw=math.pi)
+    mount.transforms[0].header.frame_id = "hull"
+    observer.receive(STATIC_FRAMES, mount, 1.0)
+    assert risk(observer) == pytest.approx(0.75)
 
 
 def test_distance_may_be_measured_from_the_centre():

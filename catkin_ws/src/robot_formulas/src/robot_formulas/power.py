@@ -19,6 +19,11 @@ BATTERY_CAPACITY_WH = 2400.0
 """Wh of the Ridgeback's battery, 24 V and 100 Ah."""
 
 
+BACKING_SPEED = 0.15
+"""m/s. To drive backwards faster than this takes as much power as to drive ahead. Slower, it counts as standing, as in
+the published model, whose robot only backs off (0.1 m/s)."""
+
+
 class PowerError(ValueError):
     """The power model refuses a value."""
 
@@ -86,14 +91,14 @@ class PowerMeter:
         self._start(now)
 
     def add_speed(self, forward: float) -> None:
-        """Take a forward speed in m/s.
+        """Take a forward speed in m/s; of a negative one, the magnitude counts from `BACKING_SPEED` on.
 
         Raises:
             PowerError: it is not finite.
         """
         if not math.isfinite(forward):
             raise PowerError(f"forward speed {forward} is not finite")
-        self._speed = max(self._speed, forward)
+        self._speed = max(self._speed, -forward if forward < -BACKING_SPEED else forward)
 
     def add_acceleration(self, forward: float) -> None:
         """Take a forward acceleration in m/s2.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from robot_formulas.geometry import ORIGIN, Pose
-from robot_formulas.power import Battery, PowerMeter, check_factor, energy_level
+from robot_formulas.power import BACKING_SPEED, Battery, PowerMeter, check_factor, energy_level
 from robot_formulas.safety import braking_distance, closest_in_direction, safety_risk
 
 from pybullet_simulator.io.robot_file import RobotFileError
@@ -296,13 +296,17 @@ class Simulation:
         self.map_to_odom = self.localised @ self.odometry.filtered.inverse()
 
     def _safety_risk(self) -> float:
-        """Return the risk from the closest obstacle within 90 deg of the motion, seen from the front laser."""
+        """Return the risk from the closest obstacle within 90 deg of the motion, seen from the laser on its side.
+
+        A robot that only backs off (`BACKING_SPEED`) is seen from the front laser, as the published observer sees it.
+        """
         velocity_x, velocity_y = self._world_velocity
         speed = math.hypot(velocity_x, velocity_y)
         if speed <= SAFETY_MIN_SPEED:
             return 0.0
         d_break = braking_distance(speed)
-        mount = self.robot.front_laser.mount
+        backwards = self.velocity[0] < -BACKING_SPEED
+        mount = (self.robot.rear_laser if backwards else self.robot.front_laser).mount
         sensor = self.pose @ Pose(mount.x, mount.y, 0.0)
         if self.physics.is_empty(sensor, _TRUTH_RAY_HEIGHT, d_break):
             return 0.0

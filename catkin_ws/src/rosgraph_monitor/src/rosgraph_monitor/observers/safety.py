@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 ODOMETRY = "odometry/filtered"
 SCAN = "front/scan"
+REAR_SCAN = "rear/scan"
 CLOUD = "camera/depth/points"
 DISTANCE = "d_obstacle"
 """Names as they are published; settings change them."""
@@ -48,6 +49,7 @@ _DEFAULTS: dict[str, Any] = {
     "max_distance": 10.0,  # m, published where nothing is seen
     "odometry_topic": ODOMETRY,
     "scan_topic": SCAN,
+    "rear_scan_topic": REAR_SCAN,
     "cloud_topic": CLOUD,
 }
 _DATA_TYPES = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
@@ -59,8 +61,8 @@ class SafetyQualityObserver(TopicObserver):
     """Publishes `safety` (a risk) and the distance of the closest obstacle at 10 Hz.
 
     It reads the sensor with which the active configuration navigates: the one that a connection brings to a component,
-    or that `observation_sources` name. Where no configuration says so, the laser, and the point cloud when the laser is
-    silent.
+    or that `observation_sources` name (`scan`, `rear_scan`, `point_cloud`). Where no configuration says so, the laser,
+    and the point cloud when the laser is silent.
     """
 
     qa_name = "safety"
@@ -77,10 +79,12 @@ class SafetyQualityObserver(TopicObserver):
     @property
     def topics(self) -> Topics:
         """Odometry, fixed frames, and the sensors in use: a camera may only work while somebody listens."""
-        scan, cloud = self.settings["scan_topic"], self.settings["cloud_topic"]
+        scan, rear, cloud = self._sensor_topics
         topics: Topics = [(self.settings["odometry_topic"], Odometry), (STATIC_FRAMES, TFMessage)]
         if self._chosen in (None, scan):
             topics.append((scan, LaserScan))
+        if self._chosen == rear:
+            topics.append((rear, LaserScan))
         if self._chosen == cloud or self._need_cloud:
             topics.append((cloud, PointCloud2))
         return topics
@@ -92,11 +96,7 @@ class SafetyQualityObserver(TopicObserver):
 
     def follow(self, system: RosSystem | None) -> None:
         """Choose the sensor with which the active system navigates."""
-        self._chosen = (
-            None
-            if system is None
-            else navigation_sensor(system, self.settings["scan_topic"], self.settings["cloud_topic"])
-        )
+        self._chosen = None if system is None else navigation_sensor(system, *self._sensor_topics)
         self._need_cloud = False
 
     def receive(self, topic: str, msg: Any, now: float) -> None:
@@ -125,6 +125,11 @@ class SafetyQualityObserver(TopicObserver):
         self._distance = closest_in_direction(x, y, direction, self.settings["half_angle"])
         return [self.qa_status(safety_risk(self._distance, self._braking(speed)) if moving else 0.0)]
 
+    @property
+    def _sensor_topics(self) -> tuple[str, str, str]:
+        """Topics of the laser, of the one that looks back, and of the point cloud."""
+        return self.settings["scan_topic"], self.settings["rear_scan_topic"], self.settings["cloud_topic"]
+
     def _braking(self, speed: float) -> float:
         if self.settings["max_deceleration"] > 0.0:
             return physical_braking_distance(speed, self.settings["max_deceleration"], self.settings["reaction_time"])
@@ -132,9 +137,11 @@ class SafetyQualityObserver(TopicObserver):
 
     def _obstacles(self, now: float) -> Points:
         """Return obstacle points in the base's orientation, relative to the sensor or the centre."""
-        scan_topic, cloud_topic = self.settings["scan_topic"], self.settings["cloud_topic"]
+        scan_topic, rear_scan_topic, cloud_topic = self._sensor_topics
         if self._chosen == cloud_topic:
             return self._from_cloud(self.latest(cloud_topic, now))
+        if self._chosen == rear_scan_topic:
+            return self._from_rear_scan(self.latest(rear_scan_topic, now))
         try:
             scan = self.latest(scan_topic, now)
         except StaleInputError as silent:
@@ -155,6 +162,11 @@ class SafetyQualityObserver(TopicObserver):
         px, py, _ = _moved(matrix, x, y, np.zeros_like(x))
         return self._from_origin(matrix, px, py)
 
+    def _from_rear_scan(self, scan: LaserScan) -> Points:
+        if self._frames.transform(scan.header.frame_id, self.settings["base_frame"]) is None:
+            raise StaleInputError(f"no fixed transform from {scan.header.frame_id} to {self.settings['base_frame']}")
+        return self._from_scan(scan)
+
     def _from_cloud(self, cloud: PointCloud2) -> Points:
         matrix = self._frames.transform(cloud.header.frame_id, self.settings["base_frame"])
         if matrix is None:
@@ -169,7 +181,9 @@ class SafetyQualityObserver(TopicObserver):
         return x - matrix[0, 3], y - matrix[1, 3]
 
 
-def navigation_sensor(system: RosSystem, scan_topic: str = SCAN, cloud_topic: str = CLOUD) -> str | None:
+def navigation_sensor(
+    system: RosSystem, scan_topic: str = SCAN, rear_scan_topic: str = REAR_SCAN, cloud_topic: str = CLOUD
+) -> str | None:
     """Return the topic of the sensor with which a system navigates, or None if the model does not say.
 
     `observation_sources` decide, because costmaps read them; without them, a connection with the topic's name decides.
@@ -182,10 +196,10 @@ def navigation_sensor(system: RosSystem, scan_topic: str = SCAN, cloud_topic: st
         for word in parameter.value.split()
     }
     wired = {connection.name.strip("/") for connection in system.connections}
-    if "scan" in sources or (not sources and scan_topic.strip("/") in wired):
-        return scan_topic
-    if "point_cloud" in sources or (not sources and cloud_topic.strip("/") in wired):
-        return cloud_topic
+    sensors = {"scan": scan_topic, "rear_scan": rear_scan_topic, "point_cloud": cloud_topic}
+    for source, topic in sensors.items():
+        if source in sources or (not sources and topic.strip("/") in wired):
+            return topic
     return None
 
 
