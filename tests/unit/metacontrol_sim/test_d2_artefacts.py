@@ -35,15 +35,34 @@ def test_committed_artefacts_are_those_of_the_models(tmp_path, capsys):
         assert committed == [path for path in generated if path.parent == Path(folder)]
 
 
-def test_there_are_thirty_variants_three_on_the_camera(project):
-    assert len(project.variants) == 30
+def test_beside_the_thirty_variants_there_are_nine_on_the_rear_laser(project):
+    names = {variant.name for variant in project.variants}
+    backwards = {name for name in names if name.endswith("_b")}
+    assert len(names - backwards) == 30
+    assert backwards == {f"{name}_b" for name in names if "_v1_" in name and name[-2:] not in {"_k", "_b"}}
     assert sum("camera" in required for required in project.required_components().values()) == 3
+
+
+def test_variant_on_the_rear_laser_differs_by_sensor_and_direction_alone(project):
+    parameters = {
+        variant.name: {parameter.key: parameter.value for parameter in variant.components[0].parameters}
+        for variant in project.variants
+    }
+    for name in (name for name in parameters if name.endswith("_b")):
+        ahead, back = parameters[name.removesuffix("_b")], parameters[name]
+        changed = {key: back[key] for key in back if back[key] != ahead.get(key)}
+        assert changed == {
+            "TrajectoryPlannerROS/max_vel_x": -0.1,
+            "TrajectoryPlannerROS/min_vel_x": -0.3,
+            "local_costmap/obstacles_layer/observation_sources": "rear_scan",
+            "global_costmap/obstacles_layer/observation_sources": "rear_scan",
+        }
 
 
 def test_variant_requires_the_sensor_it_is_wired_to_and_the_battery_if_it_is_fast(project):
     required = project.required_components()
     for variant in project.variants:
-        sensor = "camera" if variant.name.endswith("_k") else "front_laser"
+        sensor = {"k": "camera", "b": "rear_laser"}.get(variant.name.rpartition("_")[2], "front_laser")
         battery = set() if "_v1_" in variant.name else {"battery"}
         assert required[variant.name] == {"simulator", sensor} | battery
 

@@ -147,12 +147,12 @@ def test_command_drives_once_and_writes_levels_only_when_all_variants_are_measur
     files = ["--runs", str(tmp_path / "runs.csv"), "--levels", str(tmp_path / "qa.csv")]
     arguments = ["calibrate", "--seeds", "1", "--route", "r1", *files]
     part = CliRunner().invoke(metacontrol, [*arguments, "--variant", "f1_v1_r1"])
-    assert part.exit_code == 0 and "29 missions are missing" in part.output
+    assert part.exit_code == 0 and "38 missions are missing" in part.output
     assert not (tmp_path / "qa.csv").exists()
     assert CliRunner().invoke(metacontrol, arguments).exit_code == 0
-    assert len(driven) == len(set(driven)) == 30
+    assert len(driven) == len(set(driven)) == 39
     rows = list(csv.DictReader((tmp_path / "qa.csv").open()))
-    assert len(rows) == 30
+    assert len(rows) == 39
     first = {"name": "f1_v1_r1", "safety": "0.300", "energy": "0.400", "performance": "1.000", "source": "measured"}
     first["energy_median"] = "0.200"
     assert rows[0] == first | {f"{name}_spread": "0.000" for name in calibration.QUALITIES} | {

@@ -110,6 +110,11 @@ def test_paper_has_the_matrix_of_the_paper():
     assert {run.failure for run in runs} == {"none", "killed", "unplugged"}
 
 
+def test_papers_missions_do_without_spares_and_others_may_use_them():
+    assert not any(run.spares for run in read("paper.yaml").runs)
+    assert all(run.spares for run in read("smoke.yaml").runs)
+
+
 @pytest.mark.parametrize(("name", "count"), [("smoke.yaml", 40), ("ci.yaml", 8), ("steps.yaml", 648)])
 def test_other_campaigns_of_the_project(name, count):
     known = replace(KNOWN, parameters=setting_names())

@@ -67,6 +67,14 @@ def test_row_tells_the_result_again_but_for_attempts_before_the_last(attempts):
     assert row(from_row(told, "x.parquet: row 1")) == told
 
 
+def test_row_of_a_time_before_the_spares_is_of_a_mission_without_them():
+    told = row(Result(RUN, (DONE,), SUMMARY, {"host": "a", "commit": "c", "ended": "e", "versions": "v"}))
+    assert told.pop("spares") is False
+    assert from_row(told, "x").run == RUN
+    with pytest.raises(CampaignError, match=r"is another mission \(spares\)"):
+        check_same([replace(RUN, spares=True)], {RUN.name: from_row(told, "x")}, "out", "delete it")
+
+
 @pytest.mark.parametrize("change", [{"summary": "{"}, {"status": "gone"}, {"attempts": None}, {"contingencies": 3}])
 def test_row_that_is_no_result_is_refused(change):
     told = {**row(Result(RUN, (DONE,), SUMMARY)), **change}

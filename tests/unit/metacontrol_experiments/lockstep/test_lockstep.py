@@ -86,11 +86,15 @@ def test_every_variant_has_its_own_parameters(path, system):
     frequency, speed, radius = ((15, 20, 25), (0.3, 0.5, 0.75), (0.5, 0.65, 0.8))
     numbers = [int(part[1]) - 1 for part in path.stem.split("_")[:3]]
     assert parameters.controller_frequency == frequency[numbers[0]]
-    assert parameters.controller.max_vel_x == speed[numbers[1]]
+    backwards = path.stem.endswith("_b")
+    assert parameters.controller.backwards is backwards
+    ends = (parameters.controller.min_vel_x, parameters.controller.max_vel_x)
+    assert ends == ((-0.3, -0.1) if backwards else (0.1, speed[numbers[1]]))
     for costmap in (parameters.global_costmap, parameters.local_costmap):
         assert [layer.inflation_radius for layer in costmap.layers if layer.kind == "inflation"] == [radius[numbers[2]]]
         kind = "PointCloud2" if path.stem.endswith("_k") else "LaserScan"
         assert [source.data_type for source in costmap.sources] == [kind]
+        assert [source.topic == "rear/scan" for source in costmap.sources] == [backwards]
 
 
 def test_only_another_sensor_restarts_navigation():
@@ -120,7 +124,7 @@ def test_baseline_stands_still_when_its_laser_dies(tmp_path):
 
 
 def test_meta_controller_goes_on_with_the_camera_and_repeats_byte_for_byte(tmp_path):
-    asked = settings(tmp_path, "kill:front_laser@time:2", manager="mros")
+    asked = settings(tmp_path, "kill:front_laser@time:2", manager="mros", spares=False)
     one = set_up(asked).run()
     assert one.state.outcome is Outcome.REACHED
     summary = summarise(one.record)
@@ -176,6 +180,15 @@ def test_camera_variant_drives(tmp_path):
     assert set_up(camera).run().state.outcome is Outcome.REACHED
 
 
+def test_rear_laser_variant_drives_backwards_round_clutter(tmp_path):
+    asked = settings(tmp_path, "clutter:2", initial_configuration="f2_v1_r1_b")
+    speeds = []
+    outcome = set_up(asked).run(lambda simulation: speeds.append(simulation.velocity[0]))
+    assert outcome.state.outcome is Outcome.REACHED and summarise(outcome.record)["collisions"] == 0
+    speeds = np.array(speeds)
+    assert (speeds < -0.2).mean() > 0.5 and speeds.max() < 0.05
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -213,10 +226,63 @@ def test_respawn_helps_where_a_driver_has_died_and_its_device_is_there(tmp_path,
 
 
 def test_rules_go_on_with_the_camera(tmp_path):
-    outcome = set_up(settings(tmp_path, "unplug:front_laser@time:2", manager="rules")).run()
+    outcome = set_up(settings(tmp_path, "unplug:front_laser@time:2", manager="rules", spares=False)).run()
     assert outcome.state.outcome is Outcome.REACHED
     summary = summarise(outcome.record)
     assert summary["final_configuration"] == "f2_v1_r3_k" and "manager=rules" in outcome.log
+
+
+@pytest.mark.parametrize("manager", ["mros", "rules"])
+def test_mission_goes_on_backwards_when_front_laser_and_camera_are_dead(tmp_path, manager):
+    strikes = ("kill:camera@time:1", "kill:front_laser@time:4")
+    outcome = set_up(settings(tmp_path, *strikes, manager=manager)).run()
+    assert outcome.state.outcome is Outcome.REACHED
+    summary = summarise(outcome.record)
+    assert summary["final_configuration"].endswith("_b") and summary["collisions"] == 0
+    assert "spares=true" in outcome.log
+
+
+def test_slow_variant_stays_by_the_rear_laser_when_the_front_laser_freezes_and_has_it_back_later(tmp_path):
+    strikes = ("freeze:front_laser@time:2", "thaw:front_laser@time:6")
+    outcome = set_up(settings(tmp_path, *strikes, manager="mros", initial_configuration="f1_v1_r2")).run()
+    assert outcome.state.outcome is Outcome.REACHED
+    taken = [decision for decision in outcome.record.decisions if decision.state == "EXECUTED"]
+    assert taken[0].to_configuration == "f1_v1_r2_b"  # not the camera's variant
+    assert "f1_v1_r2 stays: rear_laser fills its role scanner now" in taken[0].explanation
+    assert not taken[-1].to_configuration.endswith("_b")
+
+
+@pytest.mark.parametrize("manager", ["mros", "rules", "random"])
+def test_mission_without_spares_knows_no_variant_that_needs_one(tmp_path, manager):
+    strikes = ("kill:camera@time:1", "kill:front_laser@time:2")
+    outcome = set_up(settings(tmp_path, *strikes, manager=manager, spares=False, timeout_s=10.0)).run()
+    assert outcome.state.outcome is Outcome.TIMEOUT
+    assert not any(decision.to_configuration.endswith("_b") for decision in outcome.record.decisions)
+    assert "spares" not in outcome.log
+    with pytest.raises(LockstepError, match="f1_v1_r1_b needs a spare, and the mission goes without spares"):
+        set_up(settings(tmp_path, manager=manager, spares=False, initial_configuration="f1_v1_r1_b"))
+
+
+def test_rear_laser_that_dies_stops_the_robot_that_drives_by_it(tmp_path):
+    starts = {"initial_configuration": "f2_v1_r1_b", "timeout_s": 20.0}
+    outcome = set_up(settings(tmp_path, "kill:rear_laser@time:5", **starts)).run()
+    assert outcome.state.outcome is Outcome.TIMEOUT
+    late = outcome.record.poses[outcome.record.poses[:, 0] > outcome.state.started_s + 8.0, 1:]
+    assert np.ptp(late, axis=0).max() < 0.01
+    outcome = set_up(settings(tmp_path, "kill:rear_laser@time:5", **starts | {"manager": "mros"})).run()
+    assert summarise(outcome.record)["reconfigurations"][0]["trigger"] == "component:rear_laser"
+    assert outcome.state.outcome is Outcome.REACHED
+
+
+def test_rear_rays_are_cast_only_for_those_who_listen(tmp_path):
+    for start, needed in (("f2_v2_r2", False), ("f2_v1_r2_b", True)):
+        lockstep = set_up(settings(tmp_path, initial_configuration=start, timeout_s=1.0))
+        frames, cast = [], lockstep._simulation.scan
+        lockstep._simulation.scan = lambda laser, frames=frames, cast=cast: (
+            frames.append(laser.mount.frame) or cast(laser)
+        )
+        lockstep.run()
+        assert set(frames) == {"rear_laser" if needed else "front_laser"}
 
 
 def test_random_choice_repeats_byte_for_byte_for_a_seed(tmp_path):

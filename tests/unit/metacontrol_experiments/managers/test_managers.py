@@ -51,7 +51,7 @@ def table():
     with TABLE.open() as file:
         rows = {row.pop("name"): row for row in csv.DictReader(file)}
     for row in rows.values():
-        row |= {column: float(row[column]) for column in row if column != "observation_source"}
+        row |= {column: float(row[column]) for column in row if column != "observation_source" and row[column]}
     return variants_of(rows, "variants.csv")
 
 
@@ -65,7 +65,7 @@ def table():
         (ENERGY, "f3_v2_r2", "f2_v2_r2"),
         (ENERGY, "f1_v2_r2", "f1_v1_r2"),
         (ENERGY, "f1_v1_r2", None),
-        (LASER, "f2_v2_r2", "f2_v1_r3_k"),
+        (LASER, "f2_v2_r2", "f2_v1_r2_b"),
         (LASER, "f3_v3_r1", "f1_v3_r1_k"),
         (DARK, "f1_v3_r1_k", "f1_v3_r1"),
     ],
@@ -76,6 +76,8 @@ def test_rules_take_the_next_step_that_an_engineer_would_write(table, trouble, r
 
 
 def test_rules_take_none_that_cannot_run(table):
+    thirty = tuple(name for name in table if not name.endswith("_b"))
+    assert by_rules(table)(LASER, "f2_v2_r2", thirty) == "f2_v1_r3_k"
     with_camera = tuple(name for name in table if name.endswith("_k"))
     assert by_rules(table)(SAFETY, "f1_v3_r1_k", with_camera) == "f1_v1_r3_k"
     assert by_rules(table)(SAFETY, "f2_v1_r3_k", ()) is None

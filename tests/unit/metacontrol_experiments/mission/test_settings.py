@@ -16,6 +16,19 @@ def test_launch_command_gives_the_requirements_to_the_reasoner_only(tmp_path):
     assert not any(argument.startswith("nfr_") for argument in baseline)
 
 
+@pytest.mark.parametrize(
+    ("manager", "spares", "known"),
+    [("mros", True, True), ("rules", True, True), ("rules", False, False), ("as_published", True, False)],
+)
+def test_what_adapts_knows_spares_unless_the_mission_or_the_published_system_has_none(tmp_path, manager, spares, known):
+    route = Route("r1", Pose(-1.5, 2.0, 0.5), Pose(3.0, 4.0, 0.0))
+    settings = Settings(route, tmp_path, manager=manager, spares=spares)
+    assert f"spares:={str(known).lower()}" in settings.launch_command(4000)
+    assert settings.describe().get("spares") == ("true" if known else None)
+    baseline = Settings(route, tmp_path, manager="none")
+    assert not any(text.startswith("spares:=") for text in baseline.launch_command(4000))
+
+
 @pytest.mark.parametrize(("manager", "told"), [("mros", None), ("none", None), ("rules", "rules")])
 def test_start_of_the_mission_names_a_manager_that_metacontrol_does_not_tell(tmp_path, manager, told):
     route = Route("r1", Pose(-1.5, 2.0, 0.5), Pose(3.0, 4.0, 0.0))

@@ -17,11 +17,13 @@ OPTIONS = [
     *("--set", "controller_frequency_hz=planner_frequency*0.2"),
     *("--set", "controller_frequency_hz=global_costmap/update_frequency*0.2"),
     *("--set", "controller_frequency_hz=local_costmap/update_frequency*0.5"),
-    *("--set", "max_vel_mps=TrajectoryPlannerROS/max_vel_x", "--set", "max_vel_mps=TrajectoryPlannerROS/max_vel_y"),
+    *(o for end in ("max", "min") for o in ("--set", f"{end}_vel_x_mps=TrajectoryPlannerROS/{end}_vel_x")),
+    *("--set", "max_vel_mps=TrajectoryPlannerROS/max_vel_y"),
     *(o for axis in "xy" for o in ("--set", f"max_vel_mps=TrajectoryPlannerROS/acc_lim_{axis}*12")),
     *(o for c in COSTMAPS for o in ("--set", f"inflation_radius_m={c}/inflater_layer/inflation_radius")),
     *(o for c in COSTMAPS for o in ("--set", f"observation_source={c}/obstacles_layer/observation_sources")),
     *("--connect", "observation_source:scan=front_laser.front/scan"),
+    *("--connect", "observation_source:rear_scan=rear_laser.rear/scan"),
     *("--connect", "observation_source:point_cloud=camera.camera/depth/points"),
 ]  # fmt: skip
 
@@ -42,9 +44,9 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_options_alone_make_all_thirty_of_d2_from_its_base(run, tmp_path):
+def test_options_alone_make_all_of_d2_from_its_base(run, tmp_path):
     status, out, err = run(BASE, D2 / "variants.csv", "-o", tmp_path, *OPTIONS)
-    assert (status, out, err) == (0, f"variants: 30 files in {tmp_path}\n", "")
+    assert (status, out, err) == (0, f"variants: 39 files in {tmp_path}\n", "")
     assert contents(tmp_path) == contents(D2 / "variants")
 
 
@@ -62,7 +64,8 @@ def test_two_sections_of_metacontrol_yaml_are_enough(run, tmp_path):
 def test_table_in_place_of_that_of_the_project(run, tmp_path):
     table = tmp_path / "other.yaml"
     table.write_text(
-        "crawl: {controller_frequency_hz: 5, max_vel_mps: 0.1, inflation_radius_m: 1, observation_source: scan}"
+        "crawl: {controller_frequency_hz: 5, max_vel_mps: 0.1, inflation_radius_m: 1, observation_source: scan, "
+        "max_vel_x_mps: 0.1, min_vel_x_mps: null}"
     )
     qa = tmp_path / "qa.csv"
     qa.write_text("name,safety,source,safety_spread,missions,seeds\ncrawl,0.1,measured,0.02,30,1-5\n")

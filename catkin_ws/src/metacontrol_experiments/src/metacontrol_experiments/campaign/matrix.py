@@ -72,6 +72,7 @@ _SCHEMA = {
         "deadline": {"type": "number", "exclusiveMinimum": 0, "title": "wall s for a run, more than 0"},
         "logs": {"type": "boolean", "title": "true or false"},
         "environment": {"type": "boolean", "title": "true (the surroundings are observed) or false"},
+        "spares": {"type": "boolean", "title": "true (what adapts may take variants with spares) or false"},
         "world": {"type": "string", "title": "the path of a world file or of a map's YAML file"},
         "routes_file": {"type": "string", "title": "the path of a YAML file of routes"},
         "profiles": {
@@ -119,6 +120,7 @@ class Run:
         ground: what tells the ground from others; empty for the factory.
         parameters: of the manager where that is a profile: JSON of a mapping; empty where it is a plug-in.
         environment: whether the surroundings are observed; tables without this column are of missions without.
+        spares: whether what adapts may take variants with spares; tables without this column are of missions without.
     """
 
     part: str
@@ -136,6 +138,7 @@ class Run:
     ground: str = ""
     parameters: str = ""
     environment: bool = False
+    spares: bool = False
 
     @property
     def plug_in(self) -> str:
@@ -186,6 +189,7 @@ class _Common:
     engine: str
     timeout: float
     environment: bool
+    spares: bool
     profiles: Mapping[str, str]
 
 
@@ -218,6 +222,7 @@ def parse_campaign(content: Any, known: Known, where: str, engine: str | None = 
         engine=engine or content.get("engine", LOCKSTEP),
         timeout=float(content.get("timeout", TIMEOUT_S)),
         environment=content.get("environment", True),
+        spares=content.get("spares", True),
         profiles=_profiles(content.get("profiles", {}), known, f"{where}: profiles"),
     )
     runs = [
@@ -281,6 +286,7 @@ def _runs(name: str, part: Mapping[str, Any], known: Known, where: str, common: 
                         ground=known.ground.mark,
                         parameters=common.profiles.get(manager, ""),
                         environment=common.environment,
+                        spares=common.spares,
                     )
 
 

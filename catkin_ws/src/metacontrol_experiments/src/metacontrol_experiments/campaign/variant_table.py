@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from metacontrol_experiments.campaign.calibration import Run
 
-_NAME = re.compile(r"f(\d+)_v(\d+)_r(\d+)(_k)?")
+_NAME = re.compile(r"f(\d+)_v(\d+)_r(\d+)(_[bk])?")
 
 
 @dataclass(frozen=True)

@@ -121,6 +121,9 @@ class _Mapping(click.ParamType):
 @click.option("--no-metacontrol", is_flag=True, help="The baseline, everything but the reasoner: --manager none.")
 @click.option("--no-environment", is_flag=True, help="Nothing observes the surroundings, such as the light.")
 @click.option(
+    "--no-spares", is_flag=True, help="What adapts does not know variants with spares, such as the rear laser."
+)
+@click.option(
     "--seed", type=click.IntRange(0), default=1, show_default=True, help="Of everything random in the simulation."
 )
 @click.option("--route", default="r1", show_default=True, help="One of the routes.")
@@ -230,6 +233,7 @@ def _settings(output: Path, options: dict[str, Any]) -> Settings:
         manager=manager,
         parameters=options["parameters"],
         environment=not options["no_environment"],
+        spares=not options["no_spares"],
         seed=options["seed"],
         initial_configuration=name,
         contingencies=_contingencies(options, components),

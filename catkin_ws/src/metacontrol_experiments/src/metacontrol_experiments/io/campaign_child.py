@@ -69,6 +69,7 @@ def _drive(asked: dict[str, Any]) -> dict[str, Any]:
         manager=run.plug_in,
         parameters=run.parameters,
         environment=run.environment,
+        spares=run.spares,
         seed=run.seed,
         initial_configuration=run.initial_configuration,
         contingencies=contingencies_of(run),

@@ -69,22 +69,13 @@ def _command(run: Run, ground: Ground, output: Path) -> list[str]:
     }
     if run.parameters:
         asked["--parameters"] = run.parameters
-    observed = [] if run.environment else ["--no-environment"]
     files = {"--world": ground.world, "--routes": ground.routes}
     options = [*asked.items(), *(("--contingency", text) for text in run.contingencies)]
     options += [(option, path) for option, path in files.items() if path is not None]
     words = [str(word) for option in options for word in option]
-    return [
-        sys.executable,
-        "-m",
-        "metacontrol_experiments.cli.main",
-        "run",
-        "--engine",
-        ROS,
-        "--quiet",
-        *observed,
-        *words,
-    ]
+    words += [] if run.environment else ["--no-environment"]
+    words += [] if run.spares else ["--no-spares"]
+    return [sys.executable, "-m", "metacontrol_experiments.cli.main", "run", "--engine", ROS, "--quiet", *words]
 
 
 def _ends(process: subprocess.Popen[bytes], deadline: float) -> bool:

@@ -197,8 +197,10 @@ def _cores(settings: Settings, launched: SystemDescription, drivers: Drivers, li
     if settings.metacontrol:
         values = private_parameters(launched, *_REASONER)
         parameters = Parameters(values)
-        files = tuple(repr(values.get(name)) for name in ("model_file", "tomasys_file", "qa_direction"))
+        files = tuple(repr(values.get(name)) for name in ("model_file", "tomasys_file", "qa_direction", "spares"))
         knowledge = library.once(("knowledge", files), parameters.knowledge_base)
+        if settings.initial_configuration not in knowledge.designs:
+            raise ParameterError(f"{settings.initial_configuration} needs a spare, and the mission goes without spares")
         objectives = parameters.objectives(knowledge)
         situation = replace(situation, knowledge=knowledge, objectives=objectives, parameters=values)
         observers = Observers(_observers(private_parameters(launched, *_MONITOR), library), drivers.topics)

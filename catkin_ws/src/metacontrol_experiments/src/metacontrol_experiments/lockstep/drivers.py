@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pybullet_simulator.physics.simulation import Simulation
+    from pybullet_simulator.robot.robot import Laser
     from ros_model.language.metamodel import RosSystem
 
 
@@ -37,12 +39,16 @@ class Drivers:
     def __init__(self, simulation: Simulation, base: RosSystem, seed: int) -> None:
         """Start all, with the random numbers that the nodes have."""
         self._simulation = simulation
-        self._laser_rng = np.random.default_rng([seed, 3])
+        self._laser_rngs = {
+            laser.mount.frame: np.random.default_rng([seed, stream])
+            for laser, stream in ((simulation.robot.front_laser, 3), (simulation.robot.rear_laser, 7))
+        }
         self._camera_rng = np.random.default_rng([seed, 8])
         camera = simulation.robot.camera
         self._projector = DepthProjector(camera.width, camera.height, camera.field_of_view)
         made: dict[str, tuple[type, Callable[[Any], Any]]] = {  # by executable
-            "front_laser": (LaserScan, self._scan),
+            "front_laser": (LaserScan, partial(self._scan, simulation.robot.front_laser)),
+            "rear_laser": (LaserScan, partial(self._scan, simulation.robot.rear_laser)),
             "camera": (PointCloud2, self._cloud),
         }
         self.topics: dict[str, type] = {}
@@ -81,10 +87,11 @@ class Drivers:
         component, measure = self._sources[topic]
         return None if component in self._silent else self._outlets[component].pass_on(measure(stamp))
 
-    def _scan(self, stamp: Any) -> Any:
-        laser = self._simulation.robot.front_laser
+    def _scan(self, laser: Laser, stamp: Any) -> Any:
         ranges = self._simulation.scan(laser)
-        noisy = measure_ranges(ranges, laser.range_min, laser.range_max, LASER_NOISE, self._laser_rng)
+        noisy = measure_ranges(
+            ranges, laser.range_min, laser.range_max, LASER_NOISE, self._laser_rngs[laser.mount.frame]
+        )
         return laser_scan(laser, noisy, stamp)
 
     def _cloud(self, stamp: Any) -> Any:

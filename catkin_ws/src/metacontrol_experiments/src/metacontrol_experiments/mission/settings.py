@@ -34,6 +34,7 @@ class Settings:
         manager: name of what adapts.
         parameters: of the reasoner, in place of those that the system has; JSON of a mapping, empty for none.
         environment: whether the robot observes its surroundings, such as the light.
+        spares: whether what adapts may take variants with spares.
         seed: of everything random in the simulation.
         initial_configuration: name of the variant deployed first.
         contingencies: what goes wrong, and when.
@@ -53,6 +54,7 @@ class Settings:
     manager: str = MROS
     parameters: str = ""
     environment: bool = True
+    spares: bool = True
     seed: int = 1
     initial_configuration: str = "f2_v2_r2"
     contingencies: tuple[Contingency, ...] = ()
@@ -78,6 +80,11 @@ class Settings:
     def observes_environment(self) -> bool:
         """Whether the surroundings are observed; the published meta-controller knows nothing of them."""
         return self.environment and self.manager != AS_PUBLISHED
+
+    @property
+    def knows_spares(self) -> bool:
+        """Whether what adapts knows variants with spares; the published meta-controller has none."""
+        return self.spares and self.manager not in (NONE, AS_PUBLISHED)
 
     @property
     def plan(self) -> Plan:
@@ -113,6 +120,7 @@ class Settings:
             arguments["world"] = str(self.world.resolve())
         if self.metacontrol:
             arguments |= {f"nfr_{name}": repr(level) for name, level in self.thresholds.items()}
+            arguments["spares"] = _boolean(self.knows_spares)
         if self.manager == AS_PUBLISHED:
             arguments["as_published"] = "true"
         if self.parameters:
@@ -141,6 +149,7 @@ class Settings:
         other = {} if self.manager in (NONE, MROS) else {"manager": self.manager}
         other |= {"parameters": self.parameters} if self.parameters else {}
         other |= {"environment": "true"} if self.observes_environment else {}
+        other |= {"spares": "true"} if self.knows_spares else {}
         return {
             "mission": "D2",
             "route": self.route.name,
