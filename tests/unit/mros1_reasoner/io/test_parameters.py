@@ -27,6 +27,11 @@ def test_any_number_of_limits(model):
     assert objective.limits == {"safety": 0.5, "energy": 1.0, "performance": 0.1}
 
 
+def test_tasks_may_ask_for_all_objectives_of_a_model_without_any(model):
+    parameters = given(model, default_objectives=False, nfr_safety=0.5)
+    assert parameters.objectives(parameters.knowledge_base()) == ()
+
+
 def test_limit_of_an_unknown_quality_is_left_out_with_a_warning(model, caplog):
     parameters = given(model, nfr_comfort=0.5)
     (objective,) = parameters.objectives(parameters.knowledge_base())

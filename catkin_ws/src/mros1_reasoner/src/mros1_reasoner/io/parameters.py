@@ -122,9 +122,12 @@ class Parameters:
         return read_knowledge_base(models, vocabularies, directions, quality, spares=spares)
 
     def objectives(self, knowledge_base: KnowledgeBase) -> tuple[Objective, ...]:
-        """Return the model's objectives, or one for each function that no design requires, with the given NFRs."""
+        """Return the model's objectives with the given NFRs.
+
+        Where the model has none, there is one for each function that no design requires, unless tasks ask for them.
+        """
         objectives = knowledge_base.objectives
-        if not objectives:
+        if not objectives and self._tree.flag("default_objectives", True):
             required = {function for design in knowledge_base.designs.values() for function in design.requires}
             given = ParameterTree(dict(_leaves(self._tree.mapping("default_nfrs", "QA -> limit"))), "~default_nfrs")
             known: dict[str, float] = {}

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 from metacontrol_bags.decision import DECIDED, FAILED, Decision
 
-from mros1_reasoner.knowledge.model import Objective
+from mros1_reasoner.knowledge.model import LEAST, MOST, Objective
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.state import State
 
@@ -81,17 +81,47 @@ class Operator:
         """Ask for a function from now on.
 
         Raises:
-            MapeError: the name is taken, or the model holds no such function or quality.
+            MapeError: the name is taken or can't be one, or the model holds no such function or quality.
         """
         if objective.name in self._state.roots:
             raise MapeError(f"objective {objective.name} exists already: give another name")
-        functions = self._state.kb.functions
-        if objective.function not in functions:
-            known = ", ".join(functions)
-            raise MapeError(f"objective {objective.name}: no Function is called {objective.function!r}: known: {known}")
-        for quality, limit in objective.limits.items():
-            self._check_limit(quality, limit)
+        _check_name(objective.name)
+        self._check(objective)
         self._state.ask_for(objective)
+
+    def pursue(self, objective: Objective) -> None:
+        """Ask for a function from now on; the limits replace those of an objective of that name.
+
+        Raises:
+            MapeError: the objective of that name has another function, or the model holds no such function or quality.
+        """
+        self._check(objective)
+        if objective.name in self._state.roots:
+            self._state.ask_anew(objective)
+        else:
+            self._state.ask_for(objective)
+
+    def pursuer(self, function: str, name: str = "") -> str:
+        """Return the name of the objective by which a function is to be pursued, which may not exist yet.
+
+        It is the objective of the given name, or the first one of that function that is asked for, or a new one.
+
+        Raises:
+            MapeError: the model holds no such function, the objective of that name has another one, or it can't be one.
+        """
+        self._check_function(function)
+        if name in self._state.roots:
+            self._check(Objective(name, function))
+            return name
+        if name:
+            _check_name(name)
+        known = next((o for o in self._state.roots if self._state.objectives[o].function == function), None)
+        return known or name or self._state.provider(function)
+
+    def can_remove(self, name: str) -> bool:
+        """Return whether a root objective can be removed now: no decision about it is being carried out."""
+        pending = self._state.pending
+        return pending is None or (pending.objective != name and pending.objective in self._state.roots)
 
     def remove_objective(self, name: str) -> None:
         """No longer ask for a function; objectives that only it required go with it.
@@ -99,12 +129,35 @@ class Operator:
         Raises:
             MapeError: there is no such objective, or a decision about it is being carried out.
         """
-        roots, pending = self._state.roots, self._state.pending
-        if name not in roots:
-            raise MapeError(f"no objective is called {name!r}: known: {', '.join(roots)}")
-        if pending and (pending.objective == name or pending.objective not in roots):
+        if name not in self._state.roots:
+            raise MapeError(f"no objective is called {name!r}: known: {', '.join(self._state.roots)}")
+        if not self.can_remove(name):
             raise MapeError(f"objective {name} is being adapted: remove it afterwards")
         self._state.ask_no_longer(name)
+
+    def limits_of(self, given: Iterable[tuple[str, float]]) -> dict[str, float]:
+        """Return limits by name; of two limits of one quality, the first one is the least level of a band.
+
+        Raises:
+            MapeError: a quality is unknown or has more limits, a limit is not finite, or a band is not in order.
+        """
+        found: dict[str, list[float]] = {}
+        for quality, limit in given:
+            self._check_limit(quality, limit)
+            found.setdefault(quality, []).append(limit)
+        limits: dict[str, float] = {}
+        for quality, levels in found.items():
+            if len(levels) > 2:
+                raise MapeError(f"{quality} has {len(levels)} limits: give one, or the two of a band")
+            if len(levels) == 2:
+                band = self._state.kb.qualities[quality].band(quality, levels[0], levels[1])
+                for end, level in band.items():
+                    self._check_limit(end, level)
+                limits |= band
+            else:
+                limits[quality] = levels[0]
+        self._check_bands(limits)
+        return limits
 
     def set_nfr(self, objective: str, quality: str, limit: float) -> None:
         """Give an objective another limit of a quality.
@@ -122,8 +175,36 @@ class Operator:
             raise MapeError(f"decision {decision_id} does not wait for approval")
         return proposal
 
+    def _check(self, objective: Objective) -> None:
+        """Refuse an objective that makes no sense."""
+        name = objective.name
+        self._check_function(objective.function, f"objective {name}: ")
+        other = self._state.objectives[name].function if name in self._state.roots else objective.function
+        if other != objective.function:
+            raise MapeError(f"objective {name} is one of {other}, not of {objective.function}: give another name")
+        for quality, limit in objective.limits.items():
+            self._check_limit(quality, limit)
+        self._check_bands(objective.limits)
+
+    def _check_function(self, function: str, whose: str = "") -> None:
+        if function not in self._state.kb.functions:
+            known = ", ".join(self._state.kb.functions)
+            raise MapeError(f"{whose}no Function is called {function!r}: known: {known}")
+
+    def _check_bands(self, limits: Mapping[str, float]) -> None:
+        for quality in limits:
+            for least, most in ((f"{quality}{LEAST}", quality), (quality, f"{quality}{MOST}")):
+                if least in limits and most in limits and limits[least] >= limits[most]:
+                    band = f"{limits[least]:g} to {limits[most]:g}"
+                    raise MapeError(f"the band of {quality} is {band}: give the least level first")
+
     def _check_limit(self, quality: str, limit: float) -> None:
         if not self._state.kb.admit(quality):
             raise MapeError(f"Unsupported QA TYPE received: {quality}")
         if not math.isfinite(limit):
             raise MapeError(f"limit of {quality} is {limit}, not a finite number: left as it is")
+
+
+def _check_name(name: str) -> None:
+    if not name.replace("_", "a").isalnum():
+        raise MapeError(f"objective {name!r}: use letters, digits and '_' for its name")

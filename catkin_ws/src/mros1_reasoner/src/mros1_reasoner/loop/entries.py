@@ -148,6 +148,23 @@ class AddObjective:
 
 
 @dataclass(frozen=True)
+class Pursue:
+    """Ask for a function with these limits, and no others, by an objective that may exist already.
+
+    Attributes:
+        name: of the objective.
+        function: the function.
+        limits: of quality attributes.
+        always_improve: adapt also when a clearly better design has become available; None: as the settings say.
+    """
+
+    name: str
+    function: str
+    limits: Mapping[str, float]
+    always_improve: bool | None = None
+
+
+@dataclass(frozen=True)
 class RemoveObjective:
     """Ask for an objective's function no longer."""
 
@@ -163,7 +180,7 @@ class SetNfr:
     limit: float
 
 
-Command = Pause | Resume | Lock | Unlock | Approve | Reject | AddObjective | RemoveObjective | SetNfr
+Command = Pause | Resume | Lock | Unlock | Approve | Reject | AddObjective | Pursue | RemoveObjective | SetNfr
 
 # What the loop does
 

@@ -15,6 +15,7 @@
 | lock, unlock | objective; none: all |
 | approve, reject | decision |
 | add_objective | objective, function, then quality and limit of each NFR |
+| pursue | objective, function, whether it is always improved (empty: as set), then quality and limit of each NFR |
 | remove_objective | objective |
 | set_nfr | objective, quality, limit |
 | decided | decision, objective, configuration: the outcome of the entry before it |
@@ -49,6 +50,7 @@ _KINDS: Mapping[str, type[entries.Content]] = {
     "approve": entries.Approve,
     "reject": entries.Reject,
     "add_objective": entries.AddObjective,
+    "pursue": entries.Pursue,
     "remove_objective": entries.RemoveObjective,
     "set_nfr": entries.SetNfr,
     "decided": entries.Decided,
@@ -69,7 +71,9 @@ def values_of(content: entries.Content) -> tuple[str, ...]:
         case entries.Lock(objective="") | entries.Unlock(objective=""):
             return ()
         case entries.AddObjective(name, function, limits):
-            return (name, function, *(_text(part) for limit in limits.items() for part in limit))
+            return (name, function, *_limit_texts(limits))
+        case entries.Pursue(name, function, limits, improve):
+            return (name, function, "" if improve is None else _text(improve), *_limit_texts(limits))
     return tuple(_text(getattr(content, name)) for name, _ in _written(type(content)))
 
 
@@ -86,8 +90,12 @@ def read_entry(now: float, kind: str, values: Sequence[str]) -> entries.Entry:
     if content is entries.AddObjective:
         if len(values) < 2 or len(values) % 2:
             raise unfit
-        limits = {quality: float(limit) for quality, limit in zip(values[2::2], values[3::2], strict=True)}
-        return entries.Entry(now, entries.AddObjective(values[0], values[1], limits))
+        return entries.Entry(now, entries.AddObjective(values[0], values[1], _limits(values[2:])))
+    if content is entries.Pursue:
+        if len(values) < 3 or not len(values) % 2:
+            raise unfit
+        improve = values[2] == _YES if values[2] else None
+        return entries.Entry(now, entries.Pursue(values[0], values[1], _limits(values[3:]), improve))
     written = _written(content)
     is_without = not values and content in (entries.Lock, entries.Unlock)
     if len(values) != len(written) and not is_without:
@@ -101,6 +109,14 @@ def read_entry(now: float, kind: str, values: Sequence[str]) -> entries.Entry:
 def _written(content: type[entries.Content]) -> list[tuple[str, str]]:
     """Return name and type of the written fields: the fields that are used to compare contents."""
     return [(item.name, str(item.type)) for item in fields(content) if item.compare]
+
+
+def _limit_texts(limits: Mapping[str, float]) -> list[str]:
+    return [_text(part) for limit in limits.items() for part in limit]
+
+
+def _limits(values: Sequence[str]) -> dict[str, float]:
+    return {quality: float(limit) for quality, limit in zip(values[::2], values[1::2], strict=True)}
 
 
 def _text(value: object) -> str:

@@ -19,6 +19,7 @@ _COMMANDS = (
     | entries.Lock
     | entries.Unlock
     | entries.AddObjective
+    | entries.Pursue
     | entries.RemoveObjective
     | entries.SetNfr
 )
@@ -119,6 +120,8 @@ def _carry_out(core: Mape, now: float, command: entries.Command) -> list[Decisio
             return [core.operator.reject(decision, now)]
         case entries.AddObjective(name, function, limits):
             core.operator.add_objective(Objective(name, function, limits))
+        case entries.Pursue(name, function, limits, improve):
+            core.operator.pursue(Objective(name, function, limits, improve))
         case entries.RemoveObjective(name):
             core.operator.remove_objective(name)
         case entries.SetNfr(objective, quality, limit):

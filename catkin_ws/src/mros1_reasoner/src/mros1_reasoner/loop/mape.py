@@ -19,6 +19,7 @@ from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Reasoner
 from mros1_reasoner.loop.commands import Operator
 from mros1_reasoner.loop.deliberation import Deliberation, Timing
+from mros1_reasoner.loop.fulfilment import Fulfilment, fulfilment
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.loop.state import State
@@ -74,6 +75,11 @@ class Mape:
     def objectives(self) -> Mapping[str, Objective]:
         """Every objective by name, including those that designs require."""
         return self._state.objectives
+
+    @property
+    def roots(self) -> Collection[str]:
+        """The names of the objectives that were asked for."""
+        return self._state.roots.keys()
 
     @property
     def facts(self) -> Facts:
@@ -275,6 +281,10 @@ class Mape:
     def due(self, now: float) -> float | None:
         """Return when the next step is needed even without a new fact; None if none is."""
         return self._state.due(now)
+
+    def fulfilment(self, objective: str, now: float) -> Fulfilment:
+        """Return how an objective stands, by the last analysis."""
+        return fulfilment(self._state, objective, now)
 
     def feasible(self) -> dict[str, tuple[str, ...]]:
         """Return the designs by which each function could be fulfilled now, the most useful first.

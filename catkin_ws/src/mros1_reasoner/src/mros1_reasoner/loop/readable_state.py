@@ -364,6 +364,19 @@ class View:
     def _calm_until(self) -> dict[str, float]:
         return {name: running.calm_until for name, running in self.running.items()}
 
+    def beyond(self, objective: Objective) -> tuple[str, ...]:
+        """Return the limits that what runs for an objective does not keep, by observed levels, else by expected ones.
+
+        Args:
+            objective: what the limits are of; one of its name is pursued.
+        """
+        design = self.running[objective.name].design
+        if design is None:
+            return ()
+        known = {**self.kb.designs[design].expected, **self.levels.high(math.inf, objective.name)}
+        limits = {quality: limit for quality, limit in sorted(objective.limits.items()) if quality in known}
+        return tuple(q for q, limit in limits.items() if self.kb.qualities[q].violates(known[q], limit))
+
     def has_waited(self, now: float) -> bool:
         """Return whether the loop has waited long enough for a running configuration."""
         return self.started is not None and now - self.started >= self.settings.start_grace

@@ -216,12 +216,32 @@ class State(View):
         self.match_requirements()
         self.reconsider()
 
+    def ask_anew(self, objective: Objective) -> None:
+        """Ask for an objective with other limits; a design that is expected not to keep them is a makeshift now."""
+        is_makeshift = bool(self.beyond(objective))
+        self.forgive(objective.name)
+        if not objective.limits.keys() >= set(self.levels.blamed(objective.name)):  # that cause is never gone
+            self.levels.acquit(objective.name)
+        self.replace_limits(objective, f"{objective.name} is asked for with other limits")
+        self._run(objective.name, degraded=is_makeshift, refusal=())
+
     def set_limit(self, name: str, quality: str, limit: float, why: str) -> None:
         """Give an objective another limit of a quality, which may make another design the better one."""
         before = self.objectives[name]
-        limits = {q: value for q, value in before.limits.items() if q != quality}
-        self.objectives[name] = replace(before, limits={**limits, quality: limit})
-        self.levels.forget(name, quality)  # since when the limit is passed must be found anew
+        self.replace_limits(replace(before, limits={**before.limits, quality: limit}), why)
+
+    def replace_limits(self, objective: Objective, why: str) -> None:
+        """Give an objective other limits, which may make another design the better one.
+
+        Args:
+            objective: what takes the place of the one of its name.
+            why: in words.
+        """
+        name, before = objective.name, self.objectives[objective.name]
+        self.objectives[name] = objective
+        for quality in {**before.limits, **objective.limits}:
+            if before.limits.get(quality) != objective.limits.get(quality):
+                self.levels.forget(name, quality)  # since when the limit is passed must be found anew
         self._run(name, chances={**self.running[name].chances, OPERATOR: (math.inf, why)})
         self.reconsider()
 
@@ -454,6 +474,8 @@ class State(View):
             self._run(name, not_before=now + self.settings.wait_after(len(restarts)))
         if before.design == design:
             self._note_put_back(now, name, drifted_nodes(decision.reasons))
+        if OPERATOR in before.chances and self.beyond(self.objectives[name]):  # the limits have changed meanwhile
+            self._run(name, degraded=True)
         for node in self.failed_nodes_of(design):
             self.components[node] = Component(v.WORKS, now)
 

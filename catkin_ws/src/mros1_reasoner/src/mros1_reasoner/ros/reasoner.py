@@ -31,11 +31,13 @@ from mros1_reasoner.loop import entries, journal
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark, newest_goal
 from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Released, Result, StaleFact, Step, TaskFact
 from mros1_reasoner.loop.entry_text import kind_of, values_of
+from mros1_reasoner.loop.goals import Goals
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic
 from mros1_reasoner.ros.log import Log, log_core
+from mros1_reasoner.ros.objectives import ObjectiveAction
 from mros1_reasoner.ros.requests import Requests, Wanted
 from mros1_reasoner.ros.services import Services
 
@@ -93,6 +95,8 @@ class ReasonerNode:
             )
         self._listen(parameters.task_actions)
         self._services = Services(self, parameters.save_folder)
+        self._asked = Goals(self.core, self.command)
+        self._tasks = ObjectiveAction(self._asked, self._inbox.put, self._log.tell)
         for objective in objectives:
             self._log.tell_objective(objective)
         self._log.tell("Reasoner Initialization Ok")
@@ -122,6 +126,7 @@ class ReasonerNode:
                 if is_heartbeat:
                     self._requests.tell_trouble()
             self._take(Step(is_heartbeat))
+            self._tasks.look()
             if self._requests:
                 self._requests.release(self.core.released)
             self._journal.flush()
@@ -131,10 +136,10 @@ class ReasonerNode:
     def _next_look(self) -> float:
         """Return the wall time of the next look at what the core or a request waits for."""
         ros_now, request = rospy.get_time(), self._requests.next_look if self._requests else math.inf
-        due = self.core.due(ros_now)
-        if due is None:
+        times = [moment for moment in (self.core.due(ros_now), self._asked.due()) if moment is not None]
+        if not times:
             return request
-        return min(request, time.monotonic() + max(_TIMER_PERIOD, (due - ros_now) / _FASTEST))
+        return min(request, time.monotonic() + max(_TIMER_PERIOD, (min(times) - ros_now) / _FASTEST))
 
     # What comes in
 
@@ -157,6 +162,8 @@ class ReasonerNode:
         self._log.tell(f"operator: {' '.join((kind_of(command), *values_of(command)))}".strip())
         if isinstance(command, entries.AddObjective):
             self._log.tell_objective(self.core.objectives[command.name])
+        elif isinstance(command, entries.SetNfr):
+            self._asked.heed_limit(command.objective, command.quality, command.limit)
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         publisher = array._connection_header.get("callerid", "")
@@ -231,6 +238,7 @@ class ReasonerNode:
         """Publish decisions, and have carried out those that need it."""
         for decision in decisions:
             self._decisions.publish(decision)
+            self._asked.heed_decision(decision)
             self._log.tell_decision(decision)
             if decision.state != DECIDED:
                 continue

@@ -64,9 +64,7 @@ class Services:
 
     def _add_objective(self, request: Any) -> services.AddObjectiveResponse:
         def work() -> None:
-            if not request.name or not request.name.replace("_", "a").isalnum():
-                raise MapeError(f"objective {request.name!r}: use letters, digits and '_' for its name")
-            limits = {nfr.name: nfr.value for nfr in request.nfrs}
+            limits = self._node.core.operator.limits_of((nfr.name, nfr.value) for nfr in request.nfrs)
             self._node.command(entries.AddObjective(request.name, request.function, limits))
 
         return services.AddObjectiveResponse(*self._answer(work))
