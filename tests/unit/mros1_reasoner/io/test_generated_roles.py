@@ -164,13 +164,57 @@ def test_role_may_name_who_needs_it(load, settings):
 
 
 @pytest.mark.parametrize(
+    ("of", "least", "lost"), [(["sonar"], 1, ["sonar"]), (["sonar", "gps"], 2, ["bow/gps"]), (["gps", "sonar"], 1, [])]
+)
+def test_role_without_a_spare_that_a_design_names_puts_it_in_error(load, settings, tmp_path, of, least, lost):
+    settings["roles"] = {"eyes": {"of": of, "least": least, "required_by": ["feel"]}}
+    settings["spares"] = {}
+    (path,) = generate(load(), tmp_path)
+    knowledge_base, reasoner = read_knowledge_base([path], utility="speed"), RuleEngine()
+    reasoner.load(knowledge_base.ontology)
+    facts = Facts((Objective("o_sail", "f_sail"),), {"o_sail": "feel"}, components=dict.fromkeys(lost, v.FAILED))
+    found = knowledge_base.analyse(facts, reasoner)
+    assert ("feel" in found.unrealisable) == found.objectives["o_sail"].in_error == bool(lost)
+
+
+def test_spare_that_other_wiring_feeds_is_no_spare(load, settings):
+    settings["roles"]["position"] = {"of": ["gps", "gps_spare", "sonar"]}
+    settings["variants"]["connections"]["receiver"]["first"] = ["gps.fix", "sonar.depth"]
+    with pytest.raises(ModelError, match=r"crawl_2 and crawl differ in .*stern/gps_spare"):
+        load()
+
+
+def test_role_of_which_two_must_work_binds_no_single_one(load, settings):
+    settings["roles"]["position"]["least"] = 2
+    with pytest.raises(ModelError, match="crawl_2 and crawl differ in bow/gps, stern/gps_spare"):
+        load()
+
+
+def test_whoever_takes_what_works_does_so_without_spares_too(load, settings, tmp_path):
+    settings["roles"]["position"]["required_by"] = ["feel"]
+    (path,) = generate(load(), tmp_path)
+    knowledge_base, reasoner = read_knowledge_base([path], utility="speed", spares=False), RuleEngine()
+    reasoner.load(knowledge_base.ontology)
+    found = knowledge_base.analyse(Facts(components={"bow/gps": v.FAILED}), reasoner)
+    assert set(found.unrealisable) == {"cruise", "crawl"}
+
+
+def test_components_of_a_role_count_by_their_names_in_the_system(load, settings):
+    settings["roles"]["position"]["of"] = ["gps", "bow/gps", "gps_spare"]
+    assert load().roles.all["position"].fillers == ("bow/gps", "stern/gps_spare")
+    settings["roles"]["depth_sensor"] = {"of": ["sonar", "/sonar"], "least": 2}
+    with pytest.raises(ModelError):
+        load()
+
+
+@pytest.mark.parametrize(
     ("section", "entry", "words"),
     [
         ("roles", {"position": {"of": ["gps", "gsp_spare"]}}, "'gsp_spare' is no component"),
         ("roles", {"position": {"of": ["gps"], "least": 2}}, "is 2, and only 1 components can fill the role"),
         ("roles", {"position": {"of": ["gps"], "required_by": ["nobody"]}}, "'nobody' is no function and none of"),
         ("roles", {"position": {"of": []}}, "a list of components"),
-        ("roles", {}, "crawl_2 and crawl differ in bow/gps, stern/gps_spare, which fill no role of both"),
+        ("roles", {}, "crawl_2 and crawl differ in bow/gps, stern/gps_spare, of which none fills a role of both alone"),
         ("spares", {"crawl_3": "crawl"}, "'crawl_3' is none of the 4 variants"),
         ("spares", {"crawl_2": "krawl"}, "'krawl' is none of the 4 variants"),
         ("spares", {"crawl_2": "feel", "feel": "cruise"}, "feel is a spare's design itself"),

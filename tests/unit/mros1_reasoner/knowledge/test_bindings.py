@@ -125,6 +125,15 @@ def test_plain_pellet_says_the_same_of_the_saved_knowledge_base(load, tmp_path):
     assert "IN_ERROR_COMPONENT" in grounding.fg_cause
 
 
+def test_conclusions_that_a_model_holds_are_of_another_moment(load, reasoner):
+    old = f'<rdf:Description rdf:about="#height"><t:role_availability rdf:datatype="{XSD}boolean">false'
+    old += '</t:role_availability></rdf:Description><rdf:Description rdf:about="#height_baro"><t:b_status '
+    old += f'rdf:datatype="{XSD}boolean">false</t:b_status></rdf:Description>'
+    knowledge_base = drone(load, old)
+    reasoner.load(knowledge_base.ontology)
+    assert not knowledge_base.analyse(Facts((OBJECTIVE,), {"o_fly": "hover"}), reasoner).unrealisable
+
+
 def test_designs_say_what_they_are_deployed_with(load):
     designs = drone(load).designs
     assert designs["hover"].bindings == {"height": "baro"}

@@ -125,6 +125,26 @@ def test_spare_that_failed_before_is_not_taken(loop):
     assert decided(core, 5.0).to_configuration == "grip_right"
 
 
+def test_spare_that_is_more_useful_than_its_design_stays(loop):
+    levels = {name: dict(levels) for name, levels in LEVELS.items() if name != "suck"}
+    levels["grip_left"]["performance"] = 0.7
+    core = loop("grip_left", levels=levels)
+    for now in (2.0, 12.0, 22.0):
+        core.observe_component(now, "right", "FALSE")
+        assert decided(core, now + 1.0) is None
+        core.observe_component(now + 5.0, "right", "TRUE")
+        assert decided(core, now + 6.0) is None
+
+
+def test_design_comes_before_its_rebindings_though_their_levels_are_nearer_to_the_running_one():
+    running = Design("cam", "f_see", {"p": 0.1, "risk": 0.2}, components=frozenset({"camera"}))
+    first = Design("laser", "f_see", {"p": 0.9, "risk": 0.1}, components=frozenset({"front"}))
+    spare = Design("laser_r", "f_see", {"p": 0.9, "risk": 0.12}, components=frozenset({"rear"}), rebinds="laser")
+    situation = Situation(current="cam")
+    found = plan(Objective("o", "f_see"), [running, first, spare], situation, lambda d: d.expected["p"], difference)
+    assert found.choice == "laser"
+
+
 def test_design_comes_before_its_rebindings_where_they_are_as_useful():
     first, spare = Design("zoom", "f_see", {"p": 1.0}), Design("aaa", "f_see", {"p": 1.0}, rebinds="zoom")
     found = plan(

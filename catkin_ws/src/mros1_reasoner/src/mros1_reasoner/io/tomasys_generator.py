@@ -126,7 +126,7 @@ def _roles(roles: Roles) -> list[str]:
     classes: dict[str, set[str]] = {}
     for role in roles.all.values():
         classes.setdefault(role.kind, set()).update(role.fillers)
-        if role.has_spares:
+        if role.has_spares or not role.is_bound:
             parts.append(_individual("Role", role.name, {}, {"role_least": role.least}))
         else:
             specification = f"{role.name}_specification"

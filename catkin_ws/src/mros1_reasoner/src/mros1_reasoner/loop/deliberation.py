@@ -349,7 +349,11 @@ class Deliberation:
         running = self._state.kb.designs.get(self._state.running[name].design or "")
         if running is None or not running.rebinds:
             return None
-        found = self._plan(name, now, only=(self._state.kb.designs[running.rebinds],))
+        first = self._state.kb.designs[running.rebinds]
+        lost = self._utility(running) - self._utility(first)
+        if lost > 0.0 and lost >= self._state.settings.improvement:
+            return None  # else the next chance would bring the spare back
+        found = self._plan(name, now, only=(first,))
         if found.choice is None or found.is_makeshift:
             return None
         return replace(found, reason=_rebinding(self._state.kb.designs[found.choice], running))

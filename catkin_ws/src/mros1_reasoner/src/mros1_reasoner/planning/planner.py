@@ -109,10 +109,11 @@ def plan(
     def change(judged: _Judged) -> float:
         return distance(running, judged.design) if running else 0.0
 
-    def by_use(judged: _Judged) -> tuple[float, float, bool, str]:
-        return -judged.utility, change(judged), bool(judged.design.rebinds), judged.design.name
+    def by_use(judged: _Judged) -> tuple[float, int, bool, float, str]:
+        size, is_spare = change(judged), bool(judged.design.rebinds)
+        return -judged.utility, math.floor(size), is_spare, size, judged.design.name
 
-    def by_violation(judged: _Judged) -> tuple[float, float, float, bool, str]:
+    def by_violation(judged: _Judged) -> tuple[float, float, int, bool, float, str]:
         return judged.violation, *by_use(judged)
 
     fit = sorted((c for c in candidates if not c.refused_because), key=lambda c: (not c.relieves, *by_use(c)))
@@ -292,7 +293,7 @@ def _most_useful(
     if situation.indifference > 0.0:
         kept = _least_strained(useful, situation.worth)
         best = min(
-            kept, key=lambda c: (math.floor(change(c)), -c.utility, change(c), bool(c.design.rebinds), c.design.name)
+            kept, key=lambda c: (math.floor(change(c)), -c.utility, bool(c.design.rebinds), change(c), c.design.name)
         )
     has_highest = best is fit[0]
     reason = f"{best.design.name} {'has the highest utility' if has_highest else 'is as useful as any'} "

@@ -65,9 +65,10 @@ def wrong_roles(project: Project) -> Iterator[ModelError]:
             if component not in known:
                 is_wrong = True
                 yield project.source.error(f"{component!r} is no component", "roles", role, "of", number)
-        if entry.get("least", 1) > len(entry["of"]):
+        number = len({part for name in entry["of"] for part in project.names_of(name)})
+        if entry.get("least", 1) > number:
             yield project.source.error(
-                f"is {entry['least']}, and only {len(entry['of'])} components can fill the role", "roles", role, "least"
+                f"is {entry['least']}, and only {number} components can fill the role", "roles", role, "least"
             )
         for number, other in enumerate(named(entry, REQUIRED)):
             if other != ALL and not designs_of(project, other) and other not in project.settings["functions"]:

@@ -21,12 +21,14 @@ class Role:
         kind: class of its components.
         fillers: components that can fill it, in the order of metacontrol.yaml.
         least: how many of them must work.
+        is_bound: each of its designs is deployed with a certain one of them.
     """
 
     name: str
     kind: str
     fillers: tuple[str, ...]
     least: int
+    is_bound: bool = False
 
     @property
     def has_spares(self) -> bool:
@@ -65,7 +67,8 @@ def roles_of(project: Project) -> Roles:
     given: Mapping[str, Mapping[str, Any]] = project.settings.get("roles", {})
     spares: Mapping[str, str] = project.settings.get("spares", {})
     parts = {
-        role: tuple(part for name in entry["of"] for part in _names(project, name)) for role, entry in given.items()
+        role: tuple(dict.fromkeys(part for name in entry["of"] for part in _names(project, name)))
+        for role, entry in given.items()
     }
     groups: dict[str, list[str]] = {variant.name: [] for variant in project.variants if variant.name not in spares}
     wrong: list[ModelError] = []
@@ -74,6 +77,14 @@ def roles_of(project: Project) -> Roles:
             wrong.append(_unknown(project, spare, design))
         else:
             groups[design].append(spare)
+
+    def fed_by(name: str, role: str) -> list[str]:
+        return [part for part in parts[role] if role in required[name] or part in required[name]]
+
+    def shares(name: str, role: str) -> bool:
+        return role in required[name] or len(fed_by(name, role)) > max(1, given[role].get("least", 1))
+
+    shared = {role for role in given if any(shares(design, role) for design in groups)}
     found: dict[str, Role] = {}
     of_designs: dict[str, tuple[str, ...]] = {}
     filled: dict[str, dict[str, str]] = defaultdict(dict)
@@ -83,17 +94,16 @@ def roles_of(project: Project) -> Roles:
         own: list[str] = []
         for role, entry in given.items():
             least, kind = entry.get("least", 1), str(entry.get("class", f"{role}_class"))
-            fed = {name: [part for part in parts[role] if part in required[name]] for name in group}
-            if role in required[design]:
-                fed = {name: [*parts[role]] for name in group}
-            is_shared = role in required[design] or len(fed[design]) > max(1, least)
-            is_bound = not is_shared and all(len(part) == 1 for part in fed.values())
+            fed = {name: fed_by(name, role) for name in group}
+            is_shared = shares(design, role) and all(some == fed[design] for some in fed.values())
+            is_bound = least == 1 and all(len(some) == 1 and role not in required[name] for name, some in fed.items())
             union = {part for some in fed.values() for part in some}
             fillers = tuple(part for part in parts[role] if part in union)
             if not fillers or not (is_shared or (is_bound and (len(fillers) > 1 or len(parts[role]) == 1))):
                 continue
-            name = role if fillers == parts[role] else f"{role}_of_{'_or_'.join(fillers)}"
-            found[name] = Role(name, kind, fillers, min(least, len(fillers)))
+            is_whole = fillers == parts[role] and (is_shared or role not in shared)
+            name = role if is_whole else f"{role}_of_{'_or_'.join(fillers)}"
+            found[name] = Role(name, kind, fillers, min(least, len(fillers)), is_bound=is_bound)
             own.append(name)
             for member in group:
                 components[member] -= {role, *fed[member]}
@@ -144,7 +154,8 @@ def _misfits(
         differing = sorted(components[other] ^ components[design])
         if differing:
             yield project.source.error(
-                f"{other} and {design} differ in {', '.join(differing)}, which fill no role of both: give them one",
+                f"{other} and {design} differ in {', '.join(differing)}, of which none fills a role of both alone: "
+                "give them a role of which one must work",
                 *("spares", other),
             )
         elif filled.get(other) == filled.get(design):
