@@ -24,6 +24,23 @@ def pellet():
     reasoner.close()
 
 
+class PlainPellet(PelletReasoner):
+    """Pellet with the ontology as it is, and with all individuals."""
+
+    def load(self, ontology):
+        self._load("whole", ontology)
+
+    def infer(self, facts, properties):
+        return sorted(self._ask_child("whole", facts, properties))
+
+
+@pytest.fixture(scope="session")
+def plain():
+    reasoner = PlainPellet()
+    yield reasoner
+    reasoner.close()
+
+
 @pytest.fixture
 def reference(monkeypatch):
     """Return the reasoner that starts a JVM for each analysis, which ends before a second stage of compilation pays."""

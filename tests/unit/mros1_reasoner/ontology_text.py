@@ -21,7 +21,7 @@ BUILT_INS = (
     "equal",
     "multiply",
 )
-DATA_PROPERTIES = ("hasValue", "status", "cause", "realisability", "qa_sign", "updatable", "weight")
+DATA_PROPERTIES = ("hasValue", "status", "cause", "realisability", "qa_sign", "updatable", "weight", "stamp")
 
 _numbers = count()
 

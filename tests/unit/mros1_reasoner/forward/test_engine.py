@@ -38,12 +38,12 @@ def engine():
 
 
 @pytest.fixture
-def both(engine, pellet):
+def both(engine, plain):
     """Return a function: what both reasoners infer, as one result where they agree."""
 
     def infer(text, *asked, known=()):
         found = []
-        for reasoner in (engine, pellet):
+        for reasoner in (engine, plain):
             try:
                 reasoner.load(DECLARED + text)
                 found.append(reasoner.infer(list(known), asked))
@@ -61,9 +61,9 @@ def pairs(found):
 
 @settings(max_examples=30, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(application=ontologies(of_rules=True), known=facts())
-def test_engine_infers_what_pellet_does_where_rules_can_say_it(pellet, vocabulary, application, known):
+def test_engine_infers_what_pellet_does_where_rules_can_say_it(plain, vocabulary, application, known):
     results = []
-    for reasoner in (RuleEngine(), pellet):
+    for reasoner in (RuleEngine(), plain):
         try:
             reasoner.load(vocabulary + application)
             results.append(reasoner.infer(known, ASKED))
@@ -74,17 +74,17 @@ def test_engine_infers_what_pellet_does_where_rules_can_say_it(pellet, vocabular
 
 @settings(max_examples=30, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(application=ontologies(), known=facts())
-def test_engine_infers_what_pellet_does_of_every_shape_or_refuses_it(pellet, vocabulary, application, known):
+def test_engine_infers_what_pellet_does_of_every_shape_or_refuses_it(plain, vocabulary, application, known):
     results = []
-    for reasoner in (RuleEngine(), pellet):
+    for reasoner in (RuleEngine(), plain):
         try:
             reasoner.load(vocabulary + application)
             results.append(reasoner.infer(known, ASKED))
         except InconsistentError:
             results.append("contradiction")
         except ReasonerError as error:
-            assert reasoner is pellet or "set ~reasoner to pellet" in str(error)
-            event("refused" if reasoner is not pellet else "a defect of Pellet")
+            assert reasoner is plain or "set ~reasoner to pellet" in str(error)
+            event("refused" if reasoner is not plain else "a defect of Pellet")
             return
     event("compared")
     assert results[0] == results[1]

@@ -11,6 +11,7 @@ from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, Reas
 from mros1_reasoner.pellet import process as pellet_module
 from mros1_reasoner.pellet.owlready import OwlreadyReasoner
 from mros1_reasoner.pellet.process import ChildLostError, NoJavaError, PelletReasoner, PelletWithFallback, make_reasoner
+from ontology_text import APP, OWL, typed
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
 
@@ -20,6 +21,23 @@ def test_facts_of_one_analysis_do_not_stay_for_the_next(knowledge_base, reasoner
     first = knowledge_base.analyse(wrong, reasoner)
     assert not knowledge_base.analyse(fine, reasoner).unrealisable
     assert knowledge_base.analyse(wrong, reasoner) == first
+
+
+@pytest.mark.parametrize(
+    ("written", "text"),
+    [
+        ('"\u00e9"', "é"),
+        (r'"\u00e9\t\n\"\\"', 'é\t\n"\\'),
+        (r'"\U0001F600"', "\U0001f600"),
+        ('"\U0001f600"', "\U0001f600"),
+        (r'"\\U0001F600"', r"\U0001F600"),
+        ('"a . b"@en-GB', "a . b"),
+    ],
+)
+def test_text_comes_back_however_it_is_written(pellet, written, text):
+    says = typed(f"{APP}says", f"{OWL}DatatypeProperty") + typed(f"{APP}Part", f"{OWL}Class")
+    pellet.load(f"{says}{typed(f'{APP}ï', f'{APP}Part')}<{APP}ï> <{APP}says> {written} .\n")
+    assert [(a.subject, a.value) for a in pellet.infer([], [f"{APP}says"])] == [(f"{APP}ï", text)]
 
 
 def test_killed_child_is_replaced_and_the_analysis_repeated(knowledge_base):

@@ -18,7 +18,6 @@ from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError
 from mros1_reasoner.knowledge.rules import rule_nodes
 from mros1_reasoner.knowledge.triples import iri_of, write_ntriples
 from mros1_reasoner.pellet.owlready import run_pellet
-from mros1_reasoner.pellet.process import PelletReasoner
 from ontology_text import APP, OWL, assertion, swrl, typed
 from reasoner_helpers import OBJECTIVE, application
 
@@ -76,22 +75,6 @@ RELATIONS = (
     ("beside", "objectives", "objectives"),
     ("peer", "designs", "designs"),
 )
-
-
-class WholePellet(PelletReasoner):
-    """Pellet with the ontology as it is."""
-
-    def load(self, ontology):
-        self._equivalent = type(self._equivalent)(())
-        self._ask_twice({"op": "load", "ontology": ontology})
-        self._ontology = ontology
-
-
-@pytest.fixture(scope="module")
-def plain():
-    reasoner = WholePellet()
-    yield reasoner
-    reasoner.close()
 
 
 @pytest.fixture(scope="module")

@@ -4,39 +4,28 @@ Pellet gets each generated ontology twice: once as `PelletReasoner` hands it ove
 """
 
 from itertools import product
-from unittest import mock
 
 import pytest
 from generated_ontologies import ASKED, BESIDE, INDIVIDUALS, PEER, RIVAL, facts, ontologies
 from hypothesis import HealthCheck, given, reject, settings
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.reasoner import InconsistentError, ReasonerError
-from mros1_reasoner.pellet import process
-from mros1_reasoner.pellet.equivalence import EquivalentIndividuals
 from ontology_text import OWL, assertion, rule, typed
 
 
-class NoGroups(EquivalentIndividuals):
-    """The whole ontology."""
-
-    def __init__(self, triples):
-        super().__init__(())
-        self.reduced = list(triples)
-
-
 @pytest.fixture
-def infer(load, pellet):
+def infer(load, pellet, plain):
     """Return a function: what follows from an application's ontology and facts, or that they contradict each other."""
     prefixes = 'xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:t="http://metacontrol.org/tomasys#"'
     vocabulary = load(f'<rdf:RDF {prefixes}><t:Function rdf:about="http://example.org/app#f"/></rdf:RDF>').ontology
 
     def follows(application, known, *, whole=False):
-        with mock.patch.object(process, "EquivalentIndividuals", NoGroups if whole else EquivalentIndividuals):
-            try:
-                pellet.load(vocabulary + application)
-                return pellet.infer(known, ASKED)
-            except InconsistentError:
-                return "contradiction"
+        reasoner = plain if whole else pellet
+        try:
+            reasoner.load(vocabulary + application)
+            return reasoner.infer(known, ASKED)
+        except InconsistentError:
+            return "contradiction"
 
     return follows
 

@@ -16,7 +16,10 @@ from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, ReasonerError
 from mros1_reasoner.knowledge.triples import TripleError, decimal_text, local_name, parse_ntriples
 
-_Step = Fact | Condition
+Step = Fact | Condition
+Plans = dict[str, list[tuple[Fact, Clause, tuple[Step, ...]]]]
+"""By predicate the patterns that a fact may match; of each its clause, and what else must hold, in order."""
+
 _NOTHING: dict[Term, None] = {}
 
 
@@ -33,11 +36,8 @@ class RuleEngine:
             program = compiled(list(parse_ntriples(ontology)))
         except TripleError as error:
             raise ReasonerError(f"the ontology is no N-Triples: {error}") from error
-        self._plans: dict[str, list[tuple[Fact, Clause, tuple[_Step, ...]]]] = defaultdict(list)
-        for clause in program.clauses:
-            for i, pattern in enumerate(clause.patterns):
-                self._plans[pattern.predicate].append((pattern, clause, _ordered(clause, i)))
-        self._base = _Closure(program, self._plans)
+        self._plans = plans_of(program.clauses)
+        self._base = Closure(program, self._plans)
         self._base.add(program.facts)
         self._program = program
 
@@ -45,23 +45,35 @@ class RuleEngine:
         """See Reasoner.infer."""
         if self._program is None:
             raise ReasonerError("no ontology is loaded")
-        closure = _Closure(self._program, self._plans, below=self._base)
-        closure.add(map(_fact, facts))
+        closure = Closure(self._program, self._plans, below=self._base)
+        closure.add(map(fact_of, facts))
         return sorted(_assertion(fact) for name in properties for fact in closure.with_predicate(name))
 
     def close(self) -> None:
         """See Reasoner.close."""
 
 
-class _Closure:
+def plans_of(clauses: Iterable[Clause]) -> Plans:
+    """Return in which order to apply clauses."""
+    plans: Plans = defaultdict(list)
+    for clause in clauses:
+        for i, pattern in enumerate(clause.patterns):
+            plans[pattern.predicate].append((pattern, clause, _ordered(clause, i)))
+    return plans
+
+
+def fact_of(assertion: Assertion) -> Fact:
+    """Return an assertion as a fact."""
+    if assertion.property == v.RDF_TYPE:
+        return Fact(assertion.value, assertion.subject, None)
+    value = value_of(assertion.value, assertion.datatype) if assertion.datatype else assertion.value
+    return Fact(assertion.property, assertion.subject, value)
+
+
+class Closure:
     """Facts with all that follows from them, perhaps in a layer above another closure."""
 
-    def __init__(
-        self,
-        program: Program,
-        plans: dict[str, list[tuple[Fact, Clause, tuple[_Step, ...]]]],
-        below: _Closure | None = None,
-    ) -> None:
+    def __init__(self, program: Program, plans: Plans, below: Closure | None = None) -> None:
         self._program, self._plans = program, plans
         self._layers = [self] if below is None else [below, self]
         self.values: dict[str, dict[Term, dict[Term, None]]] = defaultdict(dict)  # by predicate and subject
@@ -97,16 +109,21 @@ class _Closure:
                 yield from (Fact(predicate, subject, value) for value in values)
 
     def _holds(self, fact: Fact) -> bool:
-        return any(
-            fact.value in layer.values.get(fact.predicate, {}).get(fact.subject, _NOTHING) for layer in self._layers
-        )
+        predicate, subject, value = fact
+        for layer in self._layers:  # a loop, which is faster than `any`
+            found = layer.values.get(predicate)
+            if found is not None and value in found.get(subject, _NOTHING):
+                return True
+        return False
 
-    def _apply(self, clause: Clause, steps: tuple[_Step, ...], at: int, bound: list[Term], known: list[bool]) -> None:
+    def _conclusions(self, clause: Clause, bound: Sequence[Term]) -> list[Fact]:
+        """Return what a clause concludes, by the values of its variables."""
+        return instances(clause.head, bound)
+
+    def _apply(self, clause: Clause, steps: tuple[Step, ...], at: int, bound: list[Term], known: list[bool]) -> None:
         """Conclude from each way in which the remaining steps hold."""
         if at == len(steps):
-            self._new.extend(
-                Fact(fact.predicate, _term(fact.subject, bound), _term(fact.value, bound)) for fact in clause.head
-            )
+            self._new.extend(self._conclusions(clause, bound))
             return
         step = steps[at]
         if isinstance(step, Condition):
@@ -137,7 +154,7 @@ class _Closure:
             known[:] = before
 
     def _apply_condition(
-        self, clause: Clause, steps: tuple[_Step, ...], at: int, bound: list[Term], known: list[bool]
+        self, clause: Clause, steps: tuple[Step, ...], at: int, bound: list[Term], known: list[bool]
     ) -> None:
         condition = steps[at]
         assert isinstance(condition, Condition)  # noqa: S101 - for the type checker
@@ -186,12 +203,17 @@ class _Closure:
         )
 
 
-def _ordered(clause: Clause, first: int) -> tuple[_Step, ...]:
+def instances(patterns: Iterable[Fact], bound: Sequence[Term]) -> list[Fact]:
+    """Return patterns with the values of their variables."""
+    return [Fact(predicate, _term(subject, bound), _term(value, bound)) for predicate, subject, value in patterns]
+
+
+def _ordered(clause: Clause, first: int) -> tuple[Step, ...]:
     """Return the patterns of a clause but one, and its conditions, each as soon as its terms are known."""
     known = {term for term in clause.patterns[first] if type(term) is int}
     patterns = [*clause.patterns[:first], *clause.patterns[first + 1 :]]
     conditions = list(clause.conditions)
-    steps: list[_Step] = []
+    steps: list[Step] = []
     while patterns or conditions:
         ready = next((c for c in conditions if _needed(c) <= known), None)
         if ready is not None:
@@ -222,15 +244,8 @@ def _unified(term: Term, found: Term, bound: list[Term], known: list[bool]) -> b
     return True
 
 
-def _term(term: Term, bound: list[Term]) -> Term:
+def _term(term: Term, bound: Sequence[Term]) -> Term:
     return bound[term] if type(term) is int else term
-
-
-def _fact(assertion: Assertion) -> Fact:
-    if assertion.property == v.RDF_TYPE:
-        return Fact(assertion.value, assertion.subject, None)
-    value = value_of(assertion.value, assertion.datatype) if assertion.datatype else assertion.value
-    return Fact(assertion.property, assertion.subject, value)
 
 
 def _assertion(fact: Fact) -> Assertion:

@@ -59,7 +59,7 @@ class Expansion:
             is_same = value.subject == value.value
             pairs = zip(subjects, subjects, strict=True) if is_same else permutations(subjects, 2)
         for subject, target in pairs:
-            yield value._replace(subject=subject, value=target)
+            yield Assertion(subject, value.property, target, value.datatype)
 
 
 class EquivalentIndividuals:
@@ -69,9 +69,15 @@ class EquivalentIndividuals:
         reduced: the ontology with the first one of each group only.
     """
 
-    def __init__(self, triples: Sequence[Triple]) -> None:
-        """Find the groups in the triples of an ontology."""
-        about = _plain_statements(triples)
+    def __init__(self, triples: Sequence[Triple], about: Mapping[str, Sequence[Triple]] | None = None) -> None:
+        """Find the groups in the triples of an ontology.
+
+        Args:
+            triples: of the ontology, or the plain statements of it.
+            about: the statements about each individual that only plain statements name; None: they are looked up.
+        """
+        if about is None:
+            about = plain_statements(triples)
         shapes: dict[tuple[tuple[str, ...], ...], list[str]] = defaultdict(list)
         for term in sorted(about):
             shape = sorted({tuple("" if part == term else part for part in triple) for triple in about[term]})
@@ -102,10 +108,10 @@ class EquivalentIndividuals:
             if len(rest) > deputies:
                 members |= dict.fromkeys(map(iri_of, rest[:deputies]), tuple(map(iri_of, rest)))
         added = {t: None for term in present for t in self._about[term] if left_out.isdisjoint(t)}  # each one once
-        return [*facts, *map(_assertion, added)], Expansion(members)
+        return [*facts, *map(assertion_of, added)], Expansion(members)
 
 
-def _plain_statements(triples: Sequence[Triple]) -> dict[str, list[Triple]]:
+def plain_statements(triples: Sequence[Triple]) -> dict[str, list[Triple]]:
     """Return the statements about each individual that only plain statements name, without labels and comments.
 
     An assertion can say each of them: its property is declared, and its individuals have a class.
@@ -156,7 +162,8 @@ def _is_of_language(term: str) -> bool:
     return iri_of(term).startswith(_LANGUAGE)
 
 
-def _assertion(triple: Triple) -> Assertion:
+def assertion_of(triple: Triple) -> Assertion:
+    """Return a plain statement as an assertion."""
     subject, predicate, value = triple
     literal = literal_of(value)
     if literal is None:

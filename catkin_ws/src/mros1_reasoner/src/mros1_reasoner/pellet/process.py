@@ -13,13 +13,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar
 
 from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, Reasoner, ReasonerError
-from mros1_reasoner.knowledge.triples import TripleError, parse_ntriples, write_ntriples
+from mros1_reasoner.knowledge.triples import Triple, TripleError, parse_ntriples, write_ntriples
 from mros1_reasoner.pellet.equivalence import EquivalentIndividuals
 from mros1_reasoner.pellet.owlready import OwlreadyReasoner
+from mros1_reasoner.pellet.slices import SliceError, Slices
 
 _log = logging.getLogger(__name__)
 
@@ -27,8 +29,10 @@ _Answer = TypeVar("_Answer")
 
 START_DEADLINE = 20.0  # s, wall: a JVM and its jars, on a loaded machine
 HEAP_MB = 256  # of the JVM; with it, node and child stay below 500 MB
+ARCHIVE = "mros1_reasoner.jsa"  # of Pellet's classes, beside the jars; `class_archive` makes it
 RETRY_AFTER = 300.0  # s, wall, until the child is tried again; until then owlready2 calls Pellet
 NO_JAVA = "no Java runtime found: install openjdk-17-jre-headless, or set ~reasoner to rules"
+_WHOLE, _COMMON = "whole", "common"  # names of the child's ontologies
 
 
 class NoJavaError(ReasonerError):
@@ -79,8 +83,11 @@ class PelletReasoner:
         if importlib.util.find_spec("jpype") is None:
             raise ReasonerError("the Python package JPype1 is missing: install requirements/python.txt")
         self._jars = _jar_folder()
-        self._ontology: str | None = None
-        self._equivalent = EquivalentIndividuals(())
+        self._triples: list[Triple] = []
+        self._loaded: dict[str, str] = {}  # what the child has, by name
+        self._equivalent: EquivalentIndividuals | None = None
+        self._slices: Slices | None = None
+        self._always: dict[str, list[Assertion]] = {}  # what follows without facts, by property
         self._process: subprocess.Popen[bytes] | None = None
         self._buffer = bytearray()
         self._greeted = False
@@ -93,24 +100,33 @@ class PelletReasoner:
 
     def load(self, ontology: str) -> None:
         """See Reasoner.load."""
-        self._ontology = None
+        self._loaded, self._equivalent, self._slices = {}, None, None
         try:
-            equivalent = EquivalentIndividuals(list(parse_ntriples(ontology)))
+            self._triples = list(parse_ntriples(ontology))
         except TripleError as error:
             raise ReasonerError(f"the ontology is no N-Triples: {error}") from error
-        reduced = write_ntriples(equivalent.reduced)
-        self._ask_twice({"op": "load", "ontology": ontology})  # the whole of it must be free of contradiction
-        self._ask_twice({"op": "load", "ontology": reduced})
-        self._ontology, self._equivalent = reduced, equivalent
+        self._load(_WHOLE, ontology)  # the whole of it must be free of contradiction
+        try:
+            slices = Slices(self._triples)
+            always = self._ask_child(_WHOLE, (), slices.properties)
+        except SliceError as error:
+            _log.debug("Pellet gets the whole ontology for each analysis: %s", error)
+        else:
+            if slices.implies(always):
+                self._load(_COMMON, write_ntriples(slices.common))
+                self._slices = slices
+                self._always = {name: list(values) for name, values in groupby(always, key=lambda a: a.property)}
+                self._forget(_WHOLE)
+                return
+        self._load_whole()
 
     def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
         """See Reasoner.infer."""
-        added, expand = self._equivalent.split(facts)
-        values = self._infer(added, properties)
-        if expand.is_ambiguous(values):
-            added, expand = self._equivalent.split(facts, deputies=2)
-            values = self._infer(added, properties)
-        return sorted(expand(values))
+        part = self._slices.of(facts) if self._slices else None
+        if part is None:
+            return sorted(self._infer(_WHOLE, self._load_whole(), facts, properties))
+        found = self._infer(_COMMON, part.individuals, [*facts, *part.statements], properties)
+        return sorted(found.union(*(self._always.get(name, ()) for name in properties)))
 
     def close(self) -> None:
         """End the child."""
@@ -123,16 +139,49 @@ class PelletReasoner:
                 stream.close()
         process.wait()
 
-    def _infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
-        request = {"op": "infer", "facts": [list(fact) for fact in facts], "properties": list(properties)}
+    def _infer(
+        self, name: str, individuals: EquivalentIndividuals, facts: Sequence[Assertion], properties: Sequence[str]
+    ) -> set[Assertion]:
+        added, expand = individuals.split(facts)
+        values = self._ask_child(name, added, properties)
+        if expand.is_ambiguous(values):
+            added, expand = individuals.split(facts, deputies=2)
+            values = self._ask_child(name, added, properties)
+        return expand(values)
+
+    def _load_whole(self) -> EquivalentIndividuals:
+        """Have the child know the whole ontology, and return its individuals."""
+        if self._equivalent is None:
+            self._equivalent = EquivalentIndividuals(self._triples)
+            self._load(_WHOLE, write_ntriples(self._equivalent.reduced))
+        return self._equivalent
+
+    def _load(self, name: str, ontology: str) -> None:
+        self._ask_twice({"op": "load", "name": name, "ontology": ontology})
+        self._loaded[name] = ontology
+
+    def _forget(self, name: str) -> None:
+        self._ask_twice({"op": "forget", "name": name})
+        del self._loaded[name]
+
+    def _ask_child(self, name: str, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
+        request = {"op": "infer", "name": name, "facts": [list(fact) for fact in facts], "properties": list(properties)}
         return [Assertion(*row) for row in self._ask_twice(request)["values"]]
+
+    def _jvm_options(self) -> list[str]:
+        """Return further options; the JVM goes without an archive that is not of its version and of these jars."""
+        archive = self._jars / ARCHIVE
+        return [f"-XX:SharedArchiveFile={archive}"] if archive.is_file() else []
 
     def _start(self) -> None:
         child = Path(__file__).with_name("child.py")
         self._buffer.clear()
         self._greeted = False
         self._process = subprocess.Popen(
-            [sys.executable, "-P", str(child), str(os.getpid()), str(self._jvm), str(self._jars), str(self._heap_mb)],
+            [
+                *(sys.executable, "-P", str(child)),
+                *(str(os.getpid()), str(self._jvm), str(self._jars), str(self._heap_mb), *self._jvm_options()),
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL if not _log.isEnabledFor(logging.DEBUG) else None,
@@ -149,8 +198,9 @@ class PelletReasoner:
         self.close()
         self._start()
         try:
-            if request["op"] != "load" and self._ontology is not None:
-                self._ask({"op": "load", "ontology": self._ontology})
+            for name, ontology in self._loaded.items():
+                if (request["op"], request["name"]) != ("load", name):
+                    self._ask({"op": "load", "name": name, "ontology": ontology})
             return self._ask(request)
         except _ChildError as error:
             self.close()
@@ -265,14 +315,17 @@ class PelletWithFallback:
         return otherwise(slow)
 
 
-def make_reasoner(deadline: float = 20.0) -> Reasoner:
+def make_reasoner(child: PelletReasoner | None = None) -> Reasoner:
     """Return Pellet in a child process. If the child can't run, warn, and return owlready2's slow call.
+
+    Args:
+        child: one that has been started already.
 
     Raises:
         NoJavaError: there is no Java runtime, without which neither runs.
     """
     try:
-        return PelletWithFallback(PelletReasoner(deadline))
+        return PelletWithFallback(child or PelletReasoner())
     except NoJavaError:
         raise
     except (ReasonerError, OSError) as error:
