@@ -8,17 +8,22 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from metacontrol_bags.words import MissionEvent
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from metacontrol_bags.decision import Decision
 
 Samples = tuple[tuple[float, float], ...]
 """Pairs (stamp in s, value), in the order of time."""
+
+
+def _no_poses() -> NDArray[np.float64]:
+    import numpy as np  # here: nodes that only write messages need none of its 12 MB
+
+    return np.empty((0, 3))
 
 
 @dataclass(frozen=True)
@@ -104,7 +109,7 @@ class MissionRecord:
     """
 
     events: tuple[Event, ...] = ()
-    poses: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    poses: NDArray[np.float64] = field(default_factory=_no_poses)
     true_quality: dict[str, Samples] = field(default_factory=dict)
     contacts: Samples = ()
     components: tuple[ComponentReport, ...] = ()
