@@ -86,7 +86,7 @@ def test_generator_makes_a_table_of_the_variants(workspace, tmp_path):
     run("rosmodel", "generate", "catalogue", str(MODELS), "-o", ".", environment=environment, folder=tmp_path)
     lines = (tmp_path / "docs" / "variants.md").read_text().splitlines()
     assert lines[2] == "| variant | energy | energy_median | performance | safety |"
-    assert len(lines) == 4 + 30
+    assert len(lines) == 4 + 39
     assert lines[4].startswith("| f1_v1_r1 | 0.")
 
 

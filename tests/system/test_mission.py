@@ -145,7 +145,7 @@ def test_robot_without_its_laser_waits_in_the_dark_until_the_camera_sees(tmp_pat
     route = ("--routes", str(tmp_path / "routes.yaml"), "--route", "short")
     texts = ("light:0@time:1", "kill:front_laser@time:3", "light:1@time:8")
     strikes = [word for text in texts for word in ("--contingency", text)]
-    result = metacontrol("run", "--output", str(tmp_path), *route, *strikes, *FACTOR)
+    result = metacontrol("run", "--no-spares", "--output", str(tmp_path), *route, *strikes, *FACTOR)
     assert result.returncode == 0, account(result, tmp_path)
     record = read_record(tmp_path / "mission.bag")
     dark, *_ = [report.stamp for report in record.observed if report.name == "light" and report.level == 0.0]

@@ -66,7 +66,7 @@ class SurroundingsTest(unittest.TestCase):
         decisions = self.listener.decisions
         told = lambda: [(d.to_configuration, d.state, d.explanation) for d in decisions]  # noqa: E731
         wait_for_equal(lambda: self.manipulator.running, configuration, told)
-        wait_for(lambda: [d for d in decisions if d.state == "EXECUTED"][-1].to_configuration == configuration, told)
+        wait_for(lambda: [d.to_configuration for d in decisions if d.state == "EXECUTED"][-1:] == [configuration], told)
         return decisions[-1]
 
     def test_design_suits_what_was_measured_last(self):

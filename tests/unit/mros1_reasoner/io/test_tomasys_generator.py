@@ -54,7 +54,8 @@ def test_every_design_deploys_the_nodes_of_its_variant_and_requires_none_of_them
 
 def test_laser_variants_require_the_laser_and_camera_variants_the_camera(written):
     designs = read_knowledge_base([written]).designs.values()
-    assert all(("front_laser" in d.components) != d.name.endswith("_k") for d in designs)
+    assert all(("front_laser" in d.components) != d.name.endswith(("_k", "_b")) for d in designs)
+    assert all(("rear_laser" in d.components) == d.name.endswith("_b") for d in designs)
     assert all(("camera" in d.components) == d.name.endswith("_k") for d in designs)
 
 
