@@ -112,7 +112,7 @@ def test_paper_has_the_matrix_of_the_paper():
 
 def test_papers_missions_do_without_spares_and_others_may_use_them():
     assert not any(run.spares for run in read("paper.yaml").runs)
-    assert all(run.spares for run in read("smoke.yaml").runs)
+    assert all(run.spares for run in read("ci.yaml").runs)
 
 
 @pytest.mark.parametrize(("name", "count"), [("smoke.yaml", 40), ("ci.yaml", 8), ("steps.yaml", 648)])
@@ -135,7 +135,7 @@ def test_surroundings_are_observed_unless_the_file_says_otherwise():
     assert {run.environment for run in campaign().runs} == {True}
     assert {run.environment for run in campaign(environment=False).runs} == {False}
     known = replace(KNOWN, parameters=setting_names())
-    for name, observed in (("paper.yaml", False), ("steps.yaml", False), ("smoke.yaml", True)):
+    for name, observed in (("paper.yaml", False), ("steps.yaml", False), ("ci.yaml", True)):
         runs = parse_campaign(yaml.safe_load((FILES / name).read_text()), known, name).runs
         assert {run.environment for run in runs} == {observed}
 
