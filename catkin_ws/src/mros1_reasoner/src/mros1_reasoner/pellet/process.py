@@ -315,17 +315,14 @@ class PelletWithFallback:
         return otherwise(slow)
 
 
-def make_reasoner(child: PelletReasoner | None = None) -> Reasoner:
+def make_reasoner() -> Reasoner:
     """Return Pellet in a child process. If the child can't run, warn, and return owlready2's slow call.
-
-    Args:
-        child: one that has been started already.
 
     Raises:
         NoJavaError: there is no Java runtime, without which neither runs.
     """
     try:
-        return PelletWithFallback(child or PelletReasoner())
+        return PelletWithFallback(PelletReasoner())
     except NoJavaError:
         raise
     except (ReasonerError, OSError) as error:

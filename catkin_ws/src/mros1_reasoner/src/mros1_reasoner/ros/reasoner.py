@@ -34,7 +34,6 @@ from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.goals import Goals
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
-from mros1_reasoner.pellet.process import PelletReasoner
 from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic
 from mros1_reasoner.ros.log import Log, log_core
@@ -264,17 +263,13 @@ class ReasonerNode:
         self._inbox.put(lambda: None)  # look at once at what happened meanwhile
 
 
-def run(early: PelletReasoner | None) -> None:
-    """Run the node; exit status 2 when it can't start.
-
-    Args:
-        early: Pellet, if it has been started already.
-    """
+def run() -> None:
+    """Run the node; exit status 2 when it can't start."""
     with Lifetime("reasoner", ParameterError, KnowledgeBaseError, ReasonerError, ModelError) as life:
         life.start()
         log_core()
         parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
-        reasoner = make_reasoner(parameters.reasoner, early)  # its process gets ready while this one reads models
+        reasoner = make_reasoner(parameters.reasoner)  # its process gets ready while this one reads models
         ReasonerNode(parameters, reasoner).run()
 
 
