@@ -124,6 +124,23 @@ class Need:
 
 
 @dataclass(frozen=True)
+class Repair:
+    """How a component that does not work can be repaired; the manipulator knows by what means.
+
+    Attributes:
+        component: name of the component.
+        duration: how long it takes until the component works again, s.
+        success: share of the repairs that succeed, 0 to 1.
+        attempts: how often in a row it is tried.
+    """
+
+    component: str
+    duration: float
+    success: float = 0.8
+    attempts: int = 2
+
+
+@dataclass(frozen=True)
 class Design:
     """A FunctionDesign; it has the name of the configuration that deploys it.
 
