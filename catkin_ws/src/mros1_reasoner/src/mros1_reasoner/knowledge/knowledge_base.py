@@ -12,7 +12,17 @@ from pathlib import Path
 import owlready2
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.knowledge.model import LEAST, MOST, Analysis, Design, Facts, Objective, ObjectiveAnalysis, Past
+from mros1_reasoner.knowledge.model import (
+    LEAST,
+    MOST,
+    Analysis,
+    Design,
+    Facts,
+    Objective,
+    ObjectiveAnalysis,
+    Past,
+    Repair,
+)
 from mros1_reasoner.knowledge.model_reader import ApplicationModel, KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Assertion, Reasoner
 from mros1_reasoner.knowledge.scale import Scale
@@ -39,9 +49,10 @@ class KnowledgeBase:
         qualities: how levels compare, of every quality attribute by name.
         objectives: those that the models hold already, but for those that a grounding requires.
         component_statuses: statuses that the models assert.
+        repairs: how components are repaired, by the component's name.
         files: all that was loaded, imports included, but for the package's own vocabulary.
-        ontology: vocabulary, rules and models as N-Triples, without what comes as facts, and without rules that can
-            conclude nothing in these models.
+        ontology: vocabulary, rules and models as N-Triples, without what comes as facts, without rules that can
+            conclude nothing in these models, and without repairs of which no rule reads.
     """
 
     def __init__(self, model: ApplicationModel, files: Sequence[Path] = ()) -> None:
@@ -68,6 +79,7 @@ class KnowledgeBase:
         self._other_end: dict[str, str] = {}  # of a band, by quality
         self.objectives = model.objectives
         self.component_statuses = model.component_statuses
+        self.repairs: Mapping[str, Repair] = model.repairs
         self.files = tuple(files)
         self.ontology = model.ontology
         self._scales: dict[str, Scale] = {}

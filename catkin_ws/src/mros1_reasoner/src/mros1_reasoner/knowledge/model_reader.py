@@ -12,8 +12,9 @@ from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.bindings import BindingError, Bindings, order, read_bindings, rebound
 from mros1_reasoner.knowledge.live_rules import without_idle
 from mros1_reasoner.knowledge.loaded_rules import Reads
-from mros1_reasoner.knowledge.model import LEAST, MOST, Design, Direction, Need, Objective, Quality
+from mros1_reasoner.knowledge.model import LEAST, MOST, Design, Direction, Need, Objective, Quality, Repair
 from mros1_reasoner.knowledge.reasoner import Assertion
+from mros1_reasoner.knowledge.repairs import PROPERTIES, RepairError, about_repairs, read_repairs
 from mros1_reasoner.knowledge.triples import (
     Graph,
     Triple,
@@ -38,7 +39,8 @@ _MOMENTARY = (
 # They are stated anew, of all designs and bindings that are read.
 _ORDER = (v.F_FIRST_DESIGN, v.F_LAST_DESIGN, v.FD_NEXT, v.B_NEXT, v.ROLE_LAST_BINDING, v.ROLE_SPARES)
 _COMPARISONS = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES)
-_OF_NODES = (v.RDF_TYPE, v.RDFS_LABEL, v.C_STATUS, v.DEPLOYED_BY)
+_OF_NODES = (v.RDF_TYPE, v.RDFS_LABEL, v.C_STATUS, v.DEPLOYED_BY, v.REPAIRS)
+_OF_REPAIRS = (v.REPAIR, *PROPERTIES)
 _LEVELS = (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION, v.HAS_VALUE, v.IS_QA_TYPE)
 
 
@@ -66,11 +68,12 @@ class ApplicationModel:
         level_iris: IRI of the QAvalue of a required or expected level, by IRI of its owner, quality and level.
         reads: what rules and axioms of the models are about.
         environment_iris: IRI of each property of the surroundings by name.
+        repairs: how components are repaired, by the component's name.
         bindings: which components fill the roles of designs.
         fills: the bindings of each role, and of each specification that defines one, by its IRI.
         asked: the properties that an analysis asks for.
-        ontology: vocabulary, rules and models as N-Triples, without what comes as facts, and without idle rules.
-        idle: the idle rules, as N-Triples.
+        ontology: vocabulary, rules and models as N-Triples, without what comes as facts, and without what is idle.
+        idle: what no analysis needs, as N-Triples: idle rules, and repairs of which no rule reads.
     """
 
     where: str
@@ -88,6 +91,7 @@ class ApplicationModel:
     level_iris: Mapping[tuple[str, str, float], str]
     reads: Reads
     environment_iris: Mapping[str, str]
+    repairs: Mapping[str, Repair]
     bindings: Bindings
     fills: Mapping[str, frozenset[str]]
     asked: tuple[str, ...]
@@ -153,7 +157,8 @@ class _Reader:
         self._component_name = _inverse(self._components)
         try:
             self._bindings = read_bindings(graph, self._designs, self._component_name)
-        except BindingError as error:
+            self._repairs = read_repairs(graph, self._component_name)
+        except (BindingError, RepairError) as error:
             raise KnowledgeBaseError(f"{where}: {error}") from error
         self._quality_name = _inverse(types)
         self._guessed: list[str] = []  # directions of which nobody says anything
@@ -175,7 +180,9 @@ class _Reader:
         by_rule = (v.FD_REALISABILITY,) if v.FD_REALISABILITY in self._reads.properties else ()
         of_bindings = (v.B_STATUS,) if self._bindings.roles else ()
         asked = (*v.CONCLUSIONS, *by_rule, *of_bindings)
-        ontology, idle = without_idle(self._static(designs), v.FACTS, asked)
+        repairs = dict.fromkeys(about_repairs(graph) if self._reads.properties.isdisjoint(_OF_REPAIRS) else ())
+        static = [triple for triple in self._static(designs) if triple not in repairs]
+        ontology, idle = without_idle(static, v.FACTS, asked)
         return ApplicationModel(
             where=self._where,
             function_iris=self._functions,
@@ -196,11 +203,12 @@ class _Reader:
             level_iris=self._level_iris,
             reads=self._reads,
             environment_iris=self._environment,
+            repairs=self._repairs,
             bindings=self._bindings,
             fills=self._fills(),
             asked=asked,
             ontology=write_ntriples(ontology),
-            idle=write_ntriples(idle),
+            idle=write_ntriples([*idle, *repairs]),
         )
 
     def _fills(self) -> dict[str, frozenset[str]]:
