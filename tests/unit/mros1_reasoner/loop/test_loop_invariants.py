@@ -101,7 +101,7 @@ def test_loop_holds_whatever_happens(load, pellet, events, approval, improves):
             now = apply(core, now, event)
         check(core, core.step(now))
         if core.proposal:
-            core.operator.approve(core.proposal.id)
+            core.operator.approve(core.proposal.id, now)
     core.operator.resume()
     core.operator.unlock()
     for _ in range(60):
@@ -110,7 +110,7 @@ def test_loop_holds_whatever_happens(load, pellet, events, approval, improves):
         decisions = core.step(now)
         check(core, decisions)
         if core.proposal:
-            core.operator.approve(core.proposal.id)
+            core.operator.approve(core.proposal.id, now)
         due = core.due(now)
         if not decisions and (due is None or due > now + 30.0):
             break

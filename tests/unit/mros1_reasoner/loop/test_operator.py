@@ -72,8 +72,8 @@ def test_proposal_waits_for_approval(make):
     assert core.pending is None
     assert core.step(5.0) == []
     with pytest.raises(MapeError, match="does not wait for approval"):
-        core.operator.approve("another")
-    decision = core.operator.approve(proposal.id)
+        core.operator.approve("another", 5.0)
+    decision = core.operator.approve(proposal.id, 5.0)
     assert (decision.state, decision.id) == (DECIDED, proposal.id)
     assert core.pending == decision
     assert core.report(6.0, decision.id, True).state == EXECUTED

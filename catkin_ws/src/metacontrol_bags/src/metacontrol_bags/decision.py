@@ -82,7 +82,7 @@ class Decision:
         candidates: ranked, best first.
         corrections: by what the expected levels were corrected, in words.
         releases: objectives that are no longer needed once the decision is carried out.
-        repairs: components to repair, in place of a change; the message tells them in its explanation only.
+        repair: component to repair in place of a change; empty: none. The message tells it in its explanation only.
         explanation: one line for people.
         stamp_monitored: R1, of the diagnostic that reported the first cause.
         stamp_analysed: R2 is done.
@@ -106,7 +106,7 @@ class Decision:
     candidates: tuple[Candidate, ...] = ()
     corrections: tuple[str, ...] = ()
     releases: tuple[str, ...] = ()
-    repairs: tuple[str, ...] = ()
+    repair: str = ""
     explanation: str = ""
     stamp_monitored: float = 0.0
     stamp_analysed: float = 0.0

@@ -191,14 +191,17 @@ class Metacontroller:
             decisions = self._cores.manager.step(now, heartbeat=heartbeat)
         except ReasonerError as error:
             raise LockstepError(str(error)) from error
+        again: list[Change | Restart] = [decision for decision in decisions if isinstance(decision, Restart)]
         for decision in decisions:
             if isinstance(decision, Restart):
                 continue
-            if decision.state == DECIDED:
+            if decision.state == DECIDED and not decision.repair:
                 self._pending = self._prepare(decision, now)
-            else:
-                self.decisions.append(replace(decision, stamp=now))
-        return [decision for decision in decisions if isinstance(decision, Restart)]
+                continue
+            self.decisions.append(replace(decision, stamp=now))
+            if decision.state == DECIDED:
+                again.append(Restart(decision.repair))
+        return again
 
     def _prepare(self, decision: Decision, now: float) -> _Pending:
         """Return how and when a decision will be carried out.

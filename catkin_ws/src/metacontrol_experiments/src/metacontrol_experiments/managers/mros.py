@@ -47,11 +47,16 @@ class MrosManager(Manager):
 
     def executed(self, now: float, decision: str) -> Decision:
         """See Manager.executed."""
-        return self._loop.report(now, decision, True)
+        return self._reported(now, decision, True)
 
     def failed(self, now: float, decision: str, reason: str) -> Decision:
         """See Manager.failed."""
-        return self._loop.report(now, decision, False, reason)
+        return self._reported(now, decision, False, reason)
+
+    def _reported(self, now: float, decision: str, ok: bool, reason: str = "") -> Decision:
+        outcome = self._loop.report(now, decision, ok, reason)
+        assert outcome is not None  # noqa: S101 - only changes are reported, and no repairs
+        return outcome
 
     def close(self) -> None:
         """End the reasoner's process."""

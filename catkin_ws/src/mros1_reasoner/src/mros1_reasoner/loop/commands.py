@@ -51,14 +51,14 @@ class Operator:
         """
         self._state.unlock(self._state.named(objective))
 
-    def approve(self, decision_id: str) -> Decision:
+    def approve(self, decision_id: str, now: float) -> Decision:
         """Approve the proposed decision. It is DECIDED now; the caller publishes it and has it carried out.
 
         Raises:
             MapeError: no decision of that id waits for approval.
         """
         decision = replace(self._proposed(decision_id), state=DECIDED)
-        self._state.begin(decision, self._wall())
+        self._state.begin(decision, now, self._wall())
         return decision
 
     def reject(self, decision_id: str, now: float) -> Decision:
@@ -72,7 +72,10 @@ class Operator:
         """
         decision = self._proposed(decision_id)
         words = "rejected by the operator"
-        self._state.note_in_vain(now, decision.to_configuration, decision.objective, words)
+        if decision.repair:
+            self._state.repairs.refuse(now, decision.repair)
+        else:
+            self._state.note_in_vain(now, decision.to_configuration, decision.objective, words)
         self._state.propose(None)
         self._state.reconsider()
         return replace(decision, state=FAILED, explanation=f"{decision.explanation}; {words}", stamp_executed=now)

@@ -16,6 +16,7 @@ from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance
 from mros1_reasoner.loop.readable_state import Running
 from mros1_reasoner.loop.state import VIOLATED, State
 from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan, without_makeshift
+from mros1_reasoner.planning.repairing import Stakes, loss_of_change, loss_of_repair, worth_of_nothing
 
 
 @dataclass(frozen=True)
@@ -61,16 +62,26 @@ class Deliberation:
         if not causes:
             self._state.rest(name)
             return None
-        if self._state.waits(name, timing.now):
+        lost = self._lost(name, causes, timing.now)
+        if self._state.waits(name, timing.now) or (lost and all(map(self._state.repairs.is_under_way, lost))):
             return None
         self._state.use_chances(name)
         if all(is_drift(cause) for cause in causes) and not running.to_put_back:
             return self._leave(name, causes, timing)
+        return self._deliberate(name, causes, lost, timing)
+
+    def _deliberate(self, name: str, causes: list[Cause], lost: tuple[str, ...], timing: Timing) -> Decision | None:
+        """Return the decision for an objective with causes for an adaptation, and components that can be repaired."""
+        running = self._state.running[name]
         improves_only = all(is_chance(cause) for cause in causes)
         self._note_failure(name, timing.now)
         began = self._wall()
         level, outcome = self._choose(name, timing.now, climbs=not improves_only)
         stays = not self._is_change(level, outcome)
+        if lost:
+            repairs_first, outcome = self._compare_with_repair(level, outcome, lost, timing.now)
+            if repairs_first:
+                return self._repair(name, outcome, lost, causes, timing, began)
         is_enough = not improves_only or (not stays and self._improves(running, outcome))
         if not is_enough and (first := self._with_first_bindings(name, timing.now)):
             level, outcome, stays, is_enough = name, first, False, True
@@ -81,6 +92,99 @@ class Deliberation:
         if not stays:
             return self._adapt(name, level, outcome, causes, timing, began)
         return self._refuse(name, outcome, causes, timing, self._wall() - began)
+
+    def repair_beside(self, timing: Timing) -> Decision | None:
+        """Return the decision to repair something that what runs does not require; None where there is nothing."""
+        if self._state.settings.dry_run:
+            return None
+        lacking = self._state.analysis.unrealisable
+        for name in self._state.needed(self._state.deployments()):
+            own = lacking.get(self._state.running[name].design or "", ())
+            designs = self._state.kb.solving(self._state.objectives[name].function)
+            blocked = ((design.name, c) for design in designs for c in lacking.get(design.name, ()) if c not in own)
+            found = next(((d, c) for d, c in blocked if self._state.repairs.may_begin(c, timing.now)), None)
+            if found and not self._state.waits(name, timing.now):
+                return self._repair_for(name, *found, timing)
+        return None
+
+    def _repair_for(self, name: str, design: str, component: str, timing: Timing) -> Decision:
+        """Return the decision to repair a component of a design that does not run."""
+        known, running = self._state.components.get(component), self._state.running[name].design
+        text = f"component {component}, which {design} requires, does not work"
+        cause = Cause(known.stamp if known else timing.now, f"component:{component}", text)
+        reason = f"{component} is repaired ({self._state.repairs.attempt(component)}) while {running or 'nothing'} runs"
+        decision = self._decision(
+            name, [cause], Plan(running, False, (), reason), timing, f"{name}: {text}: {reason}", 0.0
+        )
+        return replace(decision, state=DECIDED, to_configuration=running or "", repair=component)
+
+    def _lost(self, name: str, causes: list[Cause], now: float) -> tuple[str, ...]:
+        """Return the components whose loss is all that is wrong with what runs; none where one can't be repaired."""
+        lost = self._state.analysis.unrealisable.get(self._state.running[name].design or "", ())
+        wrong = {cause.trigger for cause in causes if not is_chance(cause)}
+        repairs = self._state.repairs
+        can_repair = all(repairs.is_under_way(c) or repairs.may_begin(c, now) for c in lost)
+        return lost if can_repair and wrong == {f"component:{component}" for component in lost} else ()
+
+    def _compare_with_repair(self, level: str, outcome: Plan, lost: tuple[str, ...], now: float) -> tuple[bool, Plan]:
+        """Return whether to repair what is lost first, and the plan with the reason for that or against it.
+
+        Args:
+            level: the objective to find another design for.
+            outcome: what could be done for it.
+            lost: components whose loss is all that is wrong.
+            now: present time.
+        """
+        designs = self._state.kb.designs
+        running = designs[self._state.running[level].design or ""]
+        is_other = self._is_change(level, outcome) and not outcome.is_makeshift and level not in self._state.locked
+        other = self._utility(designs[outcome.choice or ""]) if is_other else None
+        repaired = self._utility(running)
+        stakes = Stakes(
+            repaired=repaired,
+            other=other,
+            nothing=worth_of_nothing(map(self._utility, self._state.kb.solving(running.function))),
+            change=self._state.change_duration,
+            outlook=self._state.settings.outlook,
+            returns=other is not None
+            and heeds_chances(self._state, level)
+            and repaired >= other + self._state.settings.improvement,
+        )
+        odds = self._state.repairs.odds(lost, now)
+        repair, change = loss_of_repair(stakes, odds), loss_of_change(stakes, odds)
+        names = " and ".join(lost)
+        with_odds = f"{odds.duration:.3g} s, succeeds in {odds.success:.0%}"
+        if repair < change:
+            against = (
+                f"against {change:.3g} of a change to {outcome.choice} ({stakes.change:.2g} s)" if is_other else ""
+            )
+            words = f"{names} is repaired first ({with_odds}): expected loss {repair:.3g} {against}".rstrip()
+            words += "" if is_other else f", since {outcome.reason}"
+            return True, replace(outcome, reason=words)
+        words = f"{outcome.reason}; a repair of {names} first ({with_odds}) has an expected loss of {repair:.3g}"
+        return False, replace(outcome, reason=f"{words}, a change of {change:.3g}")
+
+    def _repair(
+        self, name: str, outcome: Plan, lost: tuple[str, ...], causes: list[Cause], timing: Timing, began: float
+    ) -> Decision | None:
+        """Return the decision to repair the first component of those that are lost."""
+        repairs, settings = self._state.repairs, self._state.settings
+        component = next(c for c in lost if not repairs.is_under_way(c))
+        running = self._state.running[name].design or ""
+        gist = (*_gist(causes, outcome), component)
+        if settings.dry_run and not self._state.is_news(name, gist):
+            return None
+        if not settings.dry_run:
+            self._state.rest(name)
+        rejected = (
+            replace(c, chosen=False, lost_because=c.lost_because or "a repair is expected to lose less")
+            for c in outcome.candidates
+        )
+        outcome = replace(outcome, candidates=tuple(rejected), degraded=False)
+        words = f"{name}: {'; '.join(cause.text for cause in causes)}: {outcome.reason}; {repairs.attempt(component)}"
+        decision = self._decision(name, causes, outcome, timing, words, self._wall() - began)
+        state = ADVISED if settings.dry_run else DECIDED
+        return replace(decision, state=state, to_configuration=running, repair=component)
 
     def _choose(self, name: str, now: float, *, climbs: bool) -> tuple[str, Plan]:
         """Return the objective to find another design for, and what to do for it.

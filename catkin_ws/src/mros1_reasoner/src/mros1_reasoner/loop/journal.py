@@ -54,7 +54,8 @@ def apply(core: Mape, entry: Entry) -> list[Decision]:
         case entries.Step():
             return core.step(now, heartbeat=content.heartbeat)
         case entries.Result():
-            return [core.report(now, content.decision, content.ok, content.message, blame=content.blame)]
+            outcome = core.report(now, content.decision, content.ok, content.message, blame=content.blame)
+            return [outcome] if outcome else []
         case entries.Released():
             core.report_released(content.function)
         case entries.Decided():
@@ -115,7 +116,7 @@ def _carry_out(core: Mape, now: float, command: entries.Command) -> list[Decisio
         case entries.Unlock(objective):
             core.operator.unlock(objective)
         case entries.Approve(decision):
-            return [core.operator.approve(decision)]
+            return [core.operator.approve(decision, now)]
         case entries.Reject(decision):
             return [core.operator.reject(decision, now)]
         case entries.AddObjective(name, function, limits):

@@ -21,6 +21,7 @@ from mros1_reasoner.loop.commands import Operator
 from mros1_reasoner.loop.deliberation import Deliberation, Timing
 from mros1_reasoner.loop.fulfilment import Fulfilment, fulfilment
 from mros1_reasoner.loop.readable_state import MapeError
+from mros1_reasoner.loop.repairs import UnderWay
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.loop.state import State
 from mros1_reasoner.planning.planner import Distance, Utility, difference, feasible_designs
@@ -179,7 +180,7 @@ class Mape:
         if status == v.RECOVERED and component in self._kb.own_nodes:
             status = v.WORKS  # no design waits for it
         if known is None or status != before:
-            self._state.note_component(component, status, stamp or now)
+            self._state.note_component(now, component, status, stamp or now)
 
     def observe_drift(
         self, now: float, node: str, parameters: str, configurations: Collection[str], stamp: float = 0.0
@@ -255,15 +256,17 @@ class Mape:
             heartbeat: reason also when merely a level has changed.
 
         Returns:
-            Decisions to publish: at most one that is DECIDED, to be carried out and reported, or PROPOSED, to be
-            approved or rejected first; the others are refusals, and proposals that are withdrawn.
+            Decisions to publish: those that are DECIDED are to be carried out and reported, at most one of them is no
+            repair; one that is PROPOSED is to be approved or rejected first; the others are refusals, proposals that
+            are withdrawn, and repairs that have ended. Where repairs have ended, the next step decides.
 
         Raises:
             ReasonerError: the analysis failed; the next step tries it again.
         """
         self._state.begin_step(now)
-        if self._state.pending:
-            return []
+        ended = [self._outcome(now, repair, why) for repair, why in self._state.end_repairs(now)]
+        if ended or self._state.pending:
+            return ended
         self._state.forget_expired(now)
         self._state.note_retries(now)
         self._state.match_requirements()
@@ -305,8 +308,10 @@ class Mape:
 
     # R4
 
-    def report(self, now: float, decision_id: str, ok: bool, message: str = "", *, blame: bool = True) -> Decision:
-        """Take in the outcome of the pending decision.
+    def report(
+        self, now: float, decision_id: str, ok: bool, message: str = "", *, blame: bool = True
+    ) -> Decision | None:
+        """Take in the outcome of the pending decision, or of one to repair something.
 
         Args:
             now: present time.
@@ -316,11 +321,17 @@ class Mape:
             blame: whether the configuration is to blame for the failure; then it goes into the error log.
 
         Returns:
-            The decision, EXECUTED or FAILED, to publish.
+            The decision, EXECUTED or FAILED, to publish; None where it is not known yet whether a repair has helped.
 
         Raises:
             MapeError: no decision of that id is pending.
         """
+        if repair := self._state.repairs.begun_by(decision_id):
+            if ok:
+                return None
+            self._state.repairs.fail(now, repair.decision.repair, counts=blame)
+            self._state.reconsider()
+            return self._outcome(now, repair, message or "no reason given")
         decision, began = self._state.pending, self._state.pending_since
         if decision is None or decision.id != decision_id:
             raise MapeError(f"decision {decision_id} is not under way")
@@ -355,10 +366,14 @@ class Mape:
         # What a root's design requires is released where the root takes another one.
         for name in self._state.needed(self._state.deployments()):
             decision = self._deliberation.decide(name, timing)
-            if decision and decision.state == DECIDED:  # the others' turn comes after it
-                chosen = decision
-                break
+            if decision and decision.state == DECIDED:
+                if not decision.repair or self._state.settings.approval:  # the others' turn comes after it
+                    chosen = decision
+                    break
+                self._state.begin(decision, timing.now, self._wall())
             decisions += [decision] if decision else []
+        if chosen is None and (beside := self._deliberation.repair_beside(timing)):
+            chosen = beside
         found = decisions + self._put_forward(chosen, timing.now)
         self._state.match_requirements()
         return found
@@ -366,8 +381,8 @@ class Mape:
     def _put_forward(self, decision: Decision | None, now: float) -> list[Decision]:
         """Have a decision carried out, after approval if needed; withdraw a proposal that no longer holds."""
         former, waits = self._state.proposal, self._state.settings.approval
-        target = (decision.objective, decision.to_configuration) if decision else None
-        if former and (former.objective, former.to_configuration) == target:
+        target = _target(decision) if decision else None
+        if former and _target(former) == target:
             return []
         found = []
         if former:
@@ -378,5 +393,23 @@ class Mape:
             return found
         if waits:
             return [*found, replace(decision, state=PROPOSED)]
-        self._state.begin(decision, self._wall())
+        self._state.begin(decision, now, self._wall())
         return [*found, decision]
+
+    def _outcome(self, now: float, repair: UnderWay, why: str) -> Decision:
+        """Return the decision of a repair that has ended, EXECUTED, or FAILED for a reason."""
+        decision = repair.decision
+        words = f"failed: {why}" if why else f"{decision.repair} works again"
+        outcome = replace(
+            decision,
+            state=FAILED if why else EXECUTED,
+            explanation=f"{decision.explanation}; {words}",
+            stamp_executed=now,
+            execute_wall_s=self._wall() - repair.wall,
+        )
+        self._state.note_past(outcome)
+        return outcome
+
+
+def _target(decision: Decision) -> tuple[str, str, str]:
+    return decision.objective, decision.to_configuration, decision.repair

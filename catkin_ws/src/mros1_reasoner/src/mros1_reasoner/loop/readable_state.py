@@ -17,6 +17,7 @@ from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Facts, Objective, Past
 from mros1_reasoner.knowledge.scale import Scale
 from mros1_reasoner.loop.levels import Levels
+from mros1_reasoner.loop.repairs import Repairs
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.loop.surroundings import Surroundings
 
@@ -138,6 +139,8 @@ class View:
         components: last status of components.
         levels: observed levels.
         surroundings: what is known of them.
+        repairs: what is known of the repairs of components.
+        change_duration: how long a change takes, by the last ones, s.
         error_log: until when a design is not tried again for an objective, and why.
         history: the last decisions that have been carried out or have failed.
         retries: from when on a design that failed may replace a working one of an objective, and why it failed.
@@ -164,6 +167,7 @@ class View:
     components: Mapping[str, Component]
     levels: Levels
     surroundings: Surroundings
+    repairs: Repairs
     error_log: Mapping[tuple[str, str], tuple[float, str]]
     history: Sequence[Past]
     retries: Mapping[tuple[str, str], tuple[float, str]]
@@ -249,6 +253,11 @@ class View:
         known = ((node, self.components.get(node)) for node in sorted(nodes))
         return tuple(node for node, component in known if component and component.status == v.FAILED)
 
+    @property
+    def change_duration(self) -> float:
+        """How long a change takes, s."""
+        raise NotImplementedError
+
     def runs(self, name: str) -> bool:
         """Return whether a design runs for an objective, be it with errors."""
         running = self.running.get(name)
@@ -316,6 +325,7 @@ class View:
             waits,
             improves,
             self.has_waited(now),
+            self.repairs.what_counts(now),
             frozenset(self.error_log),
         )
 
@@ -395,6 +405,7 @@ class View:
         """Return when the next step is needed even without a new fact; None where none is."""
         times = [self.started + self.settings.start_grace] if self.started is not None else []
         times += self.levels.due(self._calm_until())
+        times += self.repairs.due()
         for name, running in self.running.items():
             gone = self.levels.gone_since(now, name)
             if gone is not None:

@@ -47,6 +47,9 @@ class Settings:
         worth: by how much less another design must violate limits, as a share of a limit, when none keeps every limit.
         only_last_limit: plan by the last limit of an objective alone, in the order of the qualities' names, as the
             published reasoner does.
+        repairs: whether components are repaired; False: only other designs are taken.
+        outlook: for how long the choice between a repair and another design counts.
+        change_duration: how long a change takes, until changes have been measured.
         makeshift: take a design that does not keep every limit, or that failed recently, where there is no other.
         correct_expected: correct expected levels as the observed ones of the deployed design differ from them.
         correction_limit: the greatest factor; the least is its reciprocal.
@@ -77,6 +80,9 @@ class Settings:
     indifference: float = 0.0
     worth: float = 0.1
     only_last_limit: bool = False
+    repairs: bool = True
+    outlook: float = 60.0
+    change_duration: float = 1.5
     makeshift: bool = True
     correct_expected: bool = True
     correction_limit: float = 2.5

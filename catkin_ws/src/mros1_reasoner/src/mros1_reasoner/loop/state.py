@@ -18,6 +18,7 @@ from mros1_reasoner.loop import drifts, lasting
 from mros1_reasoner.loop.causes import OPERATOR, RETRY, RULE, drifted_nodes, is_chance, is_drift, is_relief
 from mros1_reasoner.loop.levels import Expectation, Judging, Levels
 from mros1_reasoner.loop.readable_state import BUSY, Component, Running, View
+from mros1_reasoner.loop.repairs import Repairs, UnderWay
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.loop.surroundings import Surroundings
 from mros1_reasoner.planning.planner import Utility
@@ -25,6 +26,7 @@ from mros1_reasoner.planning.planner import Utility
 _RELAPSE = 5.0  # times the calm after which a better design was taken again: a violation then is a new one
 
 _HISTORY = 100  # decisions that are kept
+_CHANGES = 10  # of which the durations are kept
 VIOLATED = "did not keep a limit while deployed"
 """Why a design is not tried again that was left because of a quality."""
 
@@ -60,6 +62,8 @@ class State(View):
         )
         needs = (need for design in knowledge_base.designs.values() for need in design.needs)
         self.surroundings = Surroundings(needs, int(settings.history), settings.relief)
+        self.repairs = Repairs(knowledge_base.repairs, settings)
+        self._durations: deque[float] = deque(maxlen=_CHANGES)
         self.error_log: dict[tuple[str, str], tuple[float, str]] = {}
         self.history: deque[Past] = deque(maxlen=_HISTORY)
         self.retries: dict[tuple[str, str], tuple[float, str]] = {}
@@ -115,9 +119,10 @@ class State(View):
         """Forget the levels of a quality."""
         self.levels.forget(quality=quality)
 
-    def note_component(self, name: str, status: str, stamp: float) -> None:
+    def note_component(self, now: float, name: str, status: str, stamp: float) -> None:
         """Note another status of a component."""
         self.components[name] = Component(status, stamp)
+        self.repairs.note(now, name, works=status != v.FAILED)
 
     def note_drift(self, now: float, name: str, node: str, parameters: str, stamp: float) -> None:
         """Note that parameters of what runs for an objective have drifted; while it changes, that tells nothing."""
@@ -452,16 +457,30 @@ class State(View):
         """Have a decision wait for approval; None: have none wait."""
         self.proposal = decision
 
-    def begin(self, decision: Decision, wall: float) -> None:
-        """Have a decision carried out from this wall time on."""
-        self.proposal, self.pending, self.pending_since = None, decision, wall
+    def begin(self, decision: Decision, now: float, wall: float) -> None:
+        """Have a decision carried out from this time and wall time on."""
+        self.proposal = None
+        if decision.repair:
+            self.repairs.begin(now, decision, wall)
+        else:
+            self.pending, self.pending_since = decision, wall
         self.reconsider()
+
+    def end_repairs(self, now: float) -> list[tuple[UnderWay, str]]:
+        """End the repairs whose components work, and those that take too long; return why these have failed."""
+        failed = {name for name, component in self.components.items() if component.status == v.FAILED}
+        ended = self.repairs.ended(now, failed)
+        if ended:
+            self.reconsider()
+        return ended
 
     def succeed(self, now: float) -> None:
         """Note that the pending decision was carried out."""
         decision = self._end()
         name, design = decision.objective, decision.to_configuration
         before = self.running[name]
+        if decision.from_configuration not in ("", design):
+            self._durations.append(max(0.0, now - decision.stamp_planned))
         if before.state in (*BUSY, FunctionGrounding.FAILED):
             self._run(name, state=FunctionGrounding.STABLE, busy_since=None)
         restarts = () if lasting.has_lasted(before, self.settings, now) else before.restarts
@@ -478,6 +497,11 @@ class State(View):
             self._run(name, degraded=True)
         for node in self.failed_nodes_of(design):
             self.components[node] = Component(v.WORKS, now)
+
+    @property
+    def change_duration(self) -> float:
+        """How long a change takes: the mean of the last ones, or as the settings say, s."""
+        return sum(self._durations) / len(self._durations) if self._durations else self.settings.change_duration
 
     def _note_put_back(self, now: float, name: str, nodes: Collection[str]) -> None:
         """Note that drifted parameters of nodes have been put back; other functions may have the same nodes."""

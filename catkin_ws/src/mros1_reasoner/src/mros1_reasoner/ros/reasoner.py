@@ -38,6 +38,7 @@ from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic
 from mros1_reasoner.ros.log import Log, log_core
 from mros1_reasoner.ros.objectives import ObjectiveAction
+from mros1_reasoner.ros.repairs import RepairRequests
 from mros1_reasoner.ros.requests import Requests, Wanted
 from mros1_reasoner.ros.services import Services
 
@@ -84,7 +85,10 @@ class ReasonerNode:
         self._journal = JournalTopic(name, parameters, knowledge_base.files)
         self._decisions = DecisionTopic()
         self._requests = None
+        self._repairs = None
         if parameters.asks and not settings.dry_run:
+            if knowledge_base.repairs:
+                self._repairs = RepairRequests(self._inbox.put, self._report)
             self._requests = Requests(
                 parameters.action,
                 parameters.execution_deadline,
@@ -121,6 +125,8 @@ class ReasonerNode:
             if is_heartbeat:
                 heartbeat = now + self._period
             self._inbox.drain()
+            if self._repairs:
+                self._repairs.look()
             if self._requests:
                 self._requests.look()
                 if is_heartbeat:
@@ -136,6 +142,7 @@ class ReasonerNode:
     def _next_look(self) -> float:
         """Return the wall time of the next look at what the core or a request waits for."""
         ros_now, request = rospy.get_time(), self._requests.next_look if self._requests else math.inf
+        request = min(request, self._repairs.next_look if self._repairs else math.inf)
         times = [moment for moment in (self.core.due(ros_now), self._asked.due()) if moment is not None]
         if not times:
             return request
@@ -240,12 +247,24 @@ class ReasonerNode:
             self._decisions.publish(decision)
             self._asked.heed_decision(decision)
             self._log.tell_decision(decision)
-            if decision.state != DECIDED:
+            if decision.repair:
+                self._heed_repair(decision)
+            elif decision.state != DECIDED:
                 continue
-            if self._requests:
+            elif self._requests:
                 self._requests.ask(decision.id, self._wanted(decision))
             else:
                 self._report(decision.id, True)
+
+    def _heed_repair(self, decision: Decision) -> None:
+        """Ask for a repair, or for nothing more where it has ended."""
+        if decision.state == DECIDED and self._repairs:
+            self._repairs.ask(decision.id, decision.repair)
+        elif decision.state == DECIDED:
+            self._report(decision.id, True)
+        elif self._repairs:
+            self._repairs.give_up(decision.id)
+        self._inbox.put(lambda: None)  # decide at once what follows
 
     def _wanted(self, decision: Decision) -> Wanted:
         """Return what to ask the manipulator for."""
