@@ -6,7 +6,7 @@ from hierarchy_helpers import COMPONENTS, D1, model
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from metacontrol_bags.decision import DECIDED
-from mros1_reasoner.knowledge.model import Objective
+from mros1_reasoner.knowledge.model import Objective, Repair
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.settings import Settings
@@ -19,6 +19,10 @@ NODES_OF_DESIGNS = "".join(
     + "</t:Component>"
     for node, designs in NODES.items()
 )
+REPAIRS = {
+    name: Repair(name, duration, success=0.8, attempts=2)
+    for name, duration in zip(sorted(COMPONENTS), (0.5, 3.0, 30.0), strict=False)
+}
 FUNCTIONS = sorted({function for function, _, _ in DESIGNS.values()})
 ROOTS = (Objective("o_build", "F0", {"error": 0.5}), Objective("o_look", "F3"))
 EVENTS = st.one_of(
@@ -70,9 +74,14 @@ def apply(core, now, event):
 def check(core, decisions):
     """Check what was decided, and what is known."""
     decided = [decision for decision in decisions if decision.state == DECIDED]
-    assert len(decided) <= 1
+    assert len([decision for decision in decided if not decision.repair]) <= 1
     assert core.pending is None or core.pending.objective in core.objectives
     for decision in decided:
+        if decision.repair:
+            assert decision.to_configuration == decision.from_configuration
+            assert core._state.components[decision.repair].status == "FALSE"
+            assert core._state.repairs.is_under_way(decision.repair) or core.proposal or core._state.settings.approval
+            continue
         design = core._kb.designs[decision.to_configuration]
         assert design.function == core.objectives[decision.objective].function
         assert design.name not in core.analysis.unrealisable
@@ -92,6 +101,7 @@ def check(core, decisions):
 @given(events=st.lists(EVENTS, max_size=25), approval=st.booleans(), improves=st.booleans())
 def test_loop_holds_whatever_happens(load, pellet, events, approval, improves):
     knowledge_base = load(model(DESIGNS, extra=NODES_OF_DESIGNS))
+    knowledge_base.repairs = REPAIRS
     pellet.load(knowledge_base.ontology)
     core = Mape(knowledge_base, pellet, ROOTS, Settings(approval=approval, always_improve=improves))
     now = 0.0
