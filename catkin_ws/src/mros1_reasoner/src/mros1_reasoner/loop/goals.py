@@ -141,6 +141,8 @@ class Goals:
 
     def heed_decision(self, decision: Decision) -> None:
         """Keep why the loop refuses to adapt an objective, until it decides otherwise."""
+        if decision.repair:
+            return  # that another design is taken, or none, is another decision
         if decision.state == FAILED:
             self._refusals[decision.objective] = decision
         else:
