@@ -60,6 +60,19 @@ def test_locked_objective_keeps_its_configuration_and_says_what_it_would_do(make
     assert decision.to_configuration == "camera_slow"
 
 
+def test_better_design_that_a_lock_has_kept_away_is_taken_afterwards(make):
+    core = make(cool_down=0.0)
+    core.report(2.0, fail(core, 1.0, "laser")[0].id, True)  # camera_slow runs
+    core.operator.lock()
+    core.observe_component(5.0, "laser", "TRUE")
+    refused = [decision for now in (5.0, 6.0, 10.0) for decision in core.step(now)]
+    assert {decision.state for decision in refused} == {FAILED}
+    core.operator.unlock()
+    decisions = [decision for now in (11.0, 20.0) for decision in core.step(now)]
+    assert [decision.to_configuration for decision in decisions] == ["scan_slow"]
+    assert "it may take another design again" in decisions[0].explanation
+
+
 def test_lock_of_an_unknown_objective_is_refused(make):
     with pytest.raises(MapeError, match="no objective is called 'o_fly': known: o_move"):
         make().operator.lock("o_fly")

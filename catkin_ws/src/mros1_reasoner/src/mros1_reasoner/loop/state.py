@@ -386,7 +386,10 @@ class State(View):
         self.reconsider()
 
     def unlock(self, names: Iterable[str]) -> None:
-        """Have objectives no longer keep their configuration."""
+        """Have objectives no longer keep their configuration; what they have missed is a chance now."""
+        for name in self.locked.intersection(names):
+            chance = math.inf, "it may take another design again"
+            self._run(name, chances={**self.running[name].chances, OPERATOR: chance})
         self.locked -= set(names)
         self.reconsider()
 
