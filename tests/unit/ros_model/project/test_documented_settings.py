@@ -63,11 +63,15 @@ def cart(tmp_path):
     """Load the cart of the README, with the sections of another example in place of its own."""
 
     def load(**sections):
+        models = tmp_path / "models"
+        models.mkdir(exist_ok=True)
         for name, text in FILES.items():
-            (tmp_path / name).write_text(text)
+            (models / name).write_text(text)
+        (tmp_path / "launch").mkdir(exist_ok=True)
+        (tmp_path / "launch" / "left_arm.launch").write_text("<launch/>")
         settings = yaml.safe_load(examples(README)[0]) | sections
-        (tmp_path / "metacontrol.yaml").write_text(yaml.safe_dump(settings))
-        project = load_project(tmp_path)
+        (models / "metacontrol.yaml").write_text(yaml.safe_dump(settings))
+        project = load_project(models)
         assert not [
             finding.message for finding in check_project(project, project.library) if "metacontrol" in str(finding)
         ]
@@ -134,3 +138,13 @@ def test_example_of_spares_has_one_for_each_hand_and_eye(cart):
     assert roles.filled["by_camera"] == {"sight": "camera"}
     assert roles.components["careful"] == roles.components["by_camera"] == {"base"}
     assert roles.components["brisk"] >= {"laser"}
+
+
+def test_example_of_repairs_tells_the_manipulator_by_what_means(cart):
+    sections = next(yaml.safe_load(text) for text in examples(README) if "repair:" in text)
+    assert manipulator(cart(**sections))["repairs"] == {
+        "laser": {"service": "laser/reset"},
+        "left_arm": {
+            "launch": {"package": "my_cart", "file": "launch/left_arm.launch", "args": {"port": "/dev/ttyUSB0"}}
+        },
+    }

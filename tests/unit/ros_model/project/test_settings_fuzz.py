@@ -17,6 +17,7 @@ from ros_model.language.metamodel import compose
 from ros_model.language.packages_writer import write_packages
 from ros_model.language.system_writer import write_system
 from ros_model.project.observers import described_observers, observer_packages
+from ros_model.project.repairs import repair_lines
 from ros_model.project.requirements import requirement_lines
 
 BASE = """RosSystem { Name base
@@ -51,6 +52,14 @@ SETTINGS = {
     "components": {
         "robot": {"node": "robot", "required_by": ["a"], "not_required_by": ["g"]},
         "guard": {"not_required_by": "all"},
+        "battery": {
+            "topic": "charge",
+            "repair": {"service": "swap", "duration": 60, "success": 0.5, "attempts": 3},
+        },
+        "lamp": {
+            "node": "lamp",
+            "repair": {"launch": {"package": "p", "file": "l.launch", "args": {"on": True}}, "duration": 1.5},
+        },
     },
     "observers": [
         "X",
@@ -119,6 +128,7 @@ def try_all(folder):
             yaml.safe_dump(content)
         write_packages(observer_packages(described_observers(project)))
         assert list(requirement_lines(project))
+        assert all(repair_lines(project))
         assert all(finding.message for finding in check_project(project, Library()))
     except ModelError as error:
         return error

@@ -69,7 +69,7 @@ def application_model(project: Project, iri: str) -> str:
     required = {name: names - nodes[name] for name, names in roles.components.items()}
     filling = {part: role.kind for role in roles.all.values() for part in role.fillers}
     components = {name for names in (*required.values(), *nodes.values(), filling) for name in names}
-    for component in sorted(components | set(project.components)):
+    for component in sorted(components | set(project.components) | set(project.repairs)):
         of_designs = {
             f"mros:{link}": [variant.name for variant in project.variants if component in names[variant.name]]
             for link, names in (("requiredBy", required), ("deployedBy", nodes))
@@ -77,6 +77,7 @@ def application_model(project: Project, iri: str) -> str:
         kinds = {"tomasys:typeC": [filling[component]]} if component in filling else {}
         parts.append(_individual("Component", component, of_designs | kinds))
     parts += _roles(roles)
+    parts += _repairs(project)
     groups = correction_groups(project)
     for variant in project.variants:
         function = project.function_of(variant.name)
@@ -138,6 +139,18 @@ def _roles(roles: Roles) -> list[str]:
     for kind, members in sorted(classes.items()):
         parts.append(_individual("ComponentClass", kind, {}, flags={"cc_unique": len(members) == 1}))
     return parts
+
+
+def _repairs(project: Project) -> list[str]:
+    return [
+        _individual(
+            "Repair",
+            f"repair_of_{name}",
+            {"tomasys:repairs": [name]},
+            {f"repair_{key}": repair[key] for key in ("duration", "success", "attempts") if key in repair},
+        )
+        for name, repair in project.repairs.items()
+    ]
 
 
 def _role_links(project: Project, variant: str) -> dict[str, list[str]]:

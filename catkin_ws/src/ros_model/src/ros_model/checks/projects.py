@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
 from ros_model.findings import WARNING, Finding
+from ros_model.project.repairs import REPAIR
 from ros_model.project.requirements import ALL, REQUIRED, WORDS, designs_of, named
 from ros_model.project.schema_check import dotted
 
@@ -99,6 +100,33 @@ def wrong_requirements(project: Project) -> Iterator[ModelError]:
                     )
 
 
+def wrong_repairs(project: Project) -> Iterator[ModelError]:
+    """Yield repairs of components that designs bring, or of which it is not clear which one they repair."""
+    bringing: dict[str, str] = {}
+    for variant in project.variants:
+        for component in variant.components:
+            for name in project.names_of(component.graph_name) if component.executable else ():
+                bringing.setdefault(name, variant.name)
+    known: dict[str, str] = {}
+    for component, entry in project.settings["components"].items():
+        if REPAIR not in entry:
+            continue
+        keys = ("components", component, REPAIR)
+        names = sorted(project.names_of(component))
+        if len(names) > 1:
+            yield project.source.error(f"may be of {' or '.join(names)}: give each of them an entry of its own", *keys)
+        for name in names:
+            if name in bringing:
+                yield project.source.error(
+                    f"{bringing[name]} brings {name} itself, and what a design brings is started again without a "
+                    "repair: take it out",
+                    *keys,
+                )
+            if name in known:
+                yield project.source.error(f"{known[name]} has a repair of {name}, too: take one out", *keys)
+            known[name] = component
+
+
 def needless_words(project: Project) -> Iterator[Finding]:
     """Yield words of `components` that change nothing for any design that they mean."""
     for name, entry in project.settings["components"].items():
@@ -172,6 +200,7 @@ def two_meanings(project: Project) -> Iterator[ModelError]:
         "a role": settings.get("roles", {}),
         "a class of components": {entry["class"] for entry in settings.get("roles", {}).values() if "class" in entry},
         "an expected or required level": values,
+        "a repair": [f"{REPAIR}_of_{name}" for name in project.repairs],
     }
     for meaning, names in meanings.items():
         for name in names:

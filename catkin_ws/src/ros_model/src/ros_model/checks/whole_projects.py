@@ -12,6 +12,7 @@ from ros_model.findings import Finding
 from ros_model.generators.launch_parameters import harmless
 from ros_model.language.metamodel import compose
 from ros_model.language.packages import SpecKind
+from ros_model.project.repairs import REPAIR
 from ros_model.project.schema_check import dotted
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def check_project(project: Project, library: Library, sources: Library | None = 
         yield from check_family(project.designs(function))
     yield from needless_words(project)
     yield from wrong_arguments(project)
+    yield from wrong_launch_files(project, library)
     yield from unknown_observed_types(project, library)
 
 
@@ -57,6 +59,27 @@ def wrong_arguments(project: Project) -> Iterator[Finding]:
             harmless(text, where)
         except ModelError as error:
             yield Finding(f"arguments.{name}: {error.message}", where, "substitution")
+
+
+def wrong_launch_files(project: Project, library: Library) -> Iterator[Finding]:
+    """Yield launch files of repairs that are not there, and arguments of them that roslaunch would evaluate."""
+    for name, entry in project.settings["components"].items():
+        launch = entry.get(REPAIR, {}).get("launch")
+        if not launch:
+            continue
+        keys = ("components", name, REPAIR, "launch")
+        package = launch.get("package", project.package)
+        own = project.folder.parent if package == project.package else None
+        missing = library.installed.missing_file(package, launch["file"], own)
+        if missing:
+            where = project.source.at(*keys, "file")
+            yield Finding(f"{dotted(keys)}.file: {missing.message}", where, "settings", missing.severity)
+        for argument, value in launch.get("args", {}).items():
+            where = project.source.at(*keys, "args", argument)
+            try:
+                harmless(str(value), where)
+            except ModelError as error:
+                yield Finding(f"{dotted((*keys, 'args', argument))}: {error.message}", where, "substitution")
 
 
 def unknown_observed_types(project: Project, library: Library) -> Iterator[Finding]:

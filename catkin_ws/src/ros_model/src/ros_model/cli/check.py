@@ -25,6 +25,7 @@ from ros_model.language.any_language import PACKAGES
 from ros_model.language.library import Library
 from ros_model.language.metamodel import compose
 from ros_model.language.packages import PackageSet
+from ros_model.project.repairs import repair_lines
 from ros_model.project.requirements import requirement_lines
 from ros_model.project.roles import role_lines
 from ros_model.project.settings import FILE_NAME
@@ -66,7 +67,8 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
     found with --path. Message types of installed ROS packages are known. A variant is checked with its project's base.
     Of a launch file, the machines and the executables are checked, with the defaults of its arguments. Programs that it
     names in `command=` are run, as roslaunch does.
-    Of a project, the text also tells which components each design requires, and by which way.
+    Of a project, the text also tells which components each design requires and by which way, what fills roles, and how
+    components are repaired.
 
     Exit status: 0 all is well or only warnings were given, 1 something is wrong in a model, 2 a file can't be read.
     """
@@ -78,7 +80,7 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
         click.echo(text)
     if form == "text":
         for project in checked.projects:
-            for line in (*requirement_lines(project), *role_lines(project)):
+            for line in (*requirement_lines(project), *role_lines(project), *repair_lines(project)):
                 click.echo(printable(line))
     if any(finding.severity == ERROR and finding.rule in _UNREADABLE for finding in findings):
         return BAD_INPUT

@@ -47,7 +47,8 @@ def generate(project: Project, output: Path) -> list[Path]:
 def manipulator(project: Project) -> dict[str, Any]:
     """Return what the manipulator needs to know.
 
-    That is each configuration's function, launch file and topics that show that it is ready, and whose goal to keep.
+    That is each configuration's function, launch file and topics that show that it is ready, whose goal to keep, and by
+    what components are repaired.
     """
     settings = project.settings.get("manipulator", {})
     return {
@@ -60,6 +61,7 @@ def manipulator(project: Project) -> dict[str, Any]:
             for variant in project.variants
         },
         **({"functions": functions} if (functions := _functions(project)) else {}),
+        **({"repairs": repairs} if (repairs := _repairs(project)) else {}),
         **{key: settings[key] for key in ("save_action", "goal_msg_type") if key in settings},
         "reconfiguration_action_name": settings.get("action_name", DEFAULT_ACTION),
         "kill_nodes": list(settings.get("kill_nodes", ())),
@@ -71,6 +73,12 @@ def _functions(project: Project) -> dict[str, dict[str, Any]]:
     functions = project.settings["functions"]
     kept = {name: {key: entry[key] for key in FUNCTION_KEYS if key in entry} for name, entry in functions.items()}
     return {name: entry for name, entry in kept.items() if entry}
+
+
+def _repairs(project: Project) -> dict[str, dict[str, Any]]:
+    """Return by what components are repaired; how long that takes and how often it helps, the ontology says."""
+    means = ("service", "launch")
+    return {name: {key: repair[key] for key in means if key in repair} for name, repair in project.repairs.items()}
 
 
 def _deployed(project: Project, name: str) -> dict[str, str]:

@@ -85,6 +85,19 @@ class InstalledPackages:
             self._missing[package, name] = _missing_executable(package, name)
         return self._missing[package, name]
 
+    def missing_file(self, package: str, name: str, own: Path | None = None) -> Unknown | None:
+        """Return why a package lacks a file; None where it has it.
+
+        A package that is not on this machine is a warning, because its models may have been written for another one.
+        """
+        folders = [folder for folder in (own, _folder(package)) if folder]
+        if any((folder / name).is_file() for folder in folders):
+            return None
+        if not folders:
+            text = f"the package '{package}' is not on this machine, so {name} can't be looked for"
+            return Unknown(f"{text}: source the workspace that holds it", WARNING)
+        return Unknown(f"the package '{package}' has no file {name} in {folders[0]}: add it, or correct the name")
+
 
 def _missing_executable(package: str, name: str) -> Unknown | None:
     if _folder(package) is None:

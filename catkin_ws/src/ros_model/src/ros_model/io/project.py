@@ -15,6 +15,7 @@ from ros_model.checks.projects import (
     two_meanings,
     wrong_levels,
     wrong_names,
+    wrong_repairs,
     wrong_requirements,
     wrong_roles,
     wrong_surroundings,
@@ -82,6 +83,7 @@ def load_project(folder: str | Path) -> Project:
     wrong.add(wrong_names(project))
     wrong.add(wrong_levels(project))
     wrong.add(wrong_requirements(project))
+    wrong.add(wrong_repairs(project))
     wrong.add(wrong_surroundings(project))
     wrong.add(wrong_roles(project))
     wrong.add(wrong_corrections(project))

@@ -13,6 +13,7 @@ from ros_model.language.packages import Node, Package, Spec, SpecKind
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+    from pathlib import Path
 
     from ros_model.language.metamodel import Reference
     from ros_model.language.packages import MessageField, PortDeclaration
@@ -53,6 +54,15 @@ class Installed(Protocol):
         A package that is not on this machine is a warning, because its models may have been written for another one.
         """
 
+    def missing_file(self, package: str, name: str, own: Path | None = None) -> Unknown | None:
+        """Return why a package lacks a file; None where it has it.
+
+        Args:
+            package: its name.
+            name: the file, relative to the package's folder.
+            own: the folder, if it is known; the installed package is looked at, too.
+        """
+
 
 class NothingInstalled:
     """Stands for a host without a single package."""
@@ -71,6 +81,9 @@ class NothingInstalled:
 
     def missing_executable(self, package: str, name: str) -> None:
         """Return None: nothing is known of executables."""
+
+    def missing_file(self, package: str, name: str, own: Path | None = None) -> None:
+        """Return None: nothing is known of files."""
 
 
 class Library:

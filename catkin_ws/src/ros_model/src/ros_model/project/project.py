@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ros_model.language.library import Library
+from ros_model.project.repairs import REPAIR, repairs_of
 from ros_model.project.requirements import WORDS, requirements_of
 from ros_model.project.roles import roles_of
 
@@ -109,12 +110,17 @@ class Project:
 
     @cached_property
     def components(self) -> dict[str, dict[str, Any]]:
-        """What stands for each component in the running graph, by its name, without what is said of designs."""
+        """What stands for each component in the running graph, by its name, and nothing else of it."""
         entries = {
-            name: {key: value for key, value in entry.items() if key not in WORDS}
+            name: {key: value for key, value in entry.items() if key not in (*WORDS, REPAIR)}
             for name, entry in self.settings["components"].items()
         }
         return {name: entry for name, entry in entries.items() if entry}
+
+    @cached_property
+    def repairs(self) -> dict[str, dict[str, Any]]:
+        """How components are repaired, by their names in the running system."""
+        return repairs_of(self)
 
     @property
     def arguments(self) -> dict[str, tuple[str, Position]]:

@@ -139,7 +139,8 @@ def _keeps_bounds(value: Any, schema: Mapping[str, Any]) -> bool:
         is_unique = not schema.get("uniqueItems") or len(set(map(str, value))) == len(value)
         return is_unique and schema.get(f"min{kind}", 0) <= len(value) <= schema.get(f"max{kind}", math.inf)
     if isinstance(value, (int, float)):
-        return abs(value) < _INFINITE and value > schema.get("exclusiveMinimum", -math.inf)
+        is_within = schema.get("minimum", -math.inf) <= value <= schema.get("maximum", math.inf)
+        return abs(value) < _INFINITE and is_within and value > schema.get("exclusiveMinimum", -math.inf)
     return True
 
 

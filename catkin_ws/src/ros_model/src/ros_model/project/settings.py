@@ -125,6 +125,7 @@ def _broken_links(settings: Settings) -> Iterator[ModelError]:
         if objective["function"] not in content["functions"]:
             yield _no_such(settings, objective["function"], "functions", "objectives", name, "function")
     yield from _unordered(settings)
+    yield from _unclear_repairs(settings)
     seen: set[str] = set()
     for number, entry in enumerate(content["observers"]):
         name = entry["name"] if isinstance(entry, dict) else entry
@@ -150,6 +151,15 @@ def _unclear_functions(settings: Settings) -> Iterator[ModelError]:
     for name, entry in functions.items():
         if "save_action" in entry and "goal_msg_type" not in entry:
             yield settings.error("has no goal_msg_type: add the action's type", "functions", name, "save_action")
+
+
+def _unclear_repairs(settings: Settings) -> Iterator[ModelError]:
+    """Yield repairs that do not say by what means, or that say two."""
+    for name, entry in settings.content["components"].items():
+        means = [key for key in ("service", "launch") if key in entry.get("repair", {})]
+        if "repair" in entry and len(means) != 1:
+            wrong = "has both service and launch: take one out" if means else "has neither service nor launch: add one"
+            yield settings.error(wrong, "components", name, "repair")
 
 
 def _unknown_qas(settings: Settings) -> Iterator[ModelError]:
