@@ -5,16 +5,17 @@ import shutil
 import pytest
 from mros1_reasoner.knowledge.model import Facts
 from mros1_reasoner.pellet import class_archive, process
-from mros1_reasoner.pellet.process import ARCHIVE, PelletReasoner
+from mros1_reasoner.pellet.process import PelletReasoner
+from mros1_reasoner.pellet.spawning import ARCHIVE
 from reasoner_helpers import OBJECTIVE
 
 
 @pytest.fixture
 def jars(tmp_path, monkeypatch):
     """Return a folder with the jars, and nothing else."""
-    for path in process._jar_folder().glob("*.jar"):
+    for path in process.jar_folder().glob("*.jar"):
         shutil.copy(path, tmp_path)
-    monkeypatch.setattr(process, "_jar_folder", lambda: tmp_path)
+    monkeypatch.setattr(process, "jar_folder", lambda: tmp_path)
     return tmp_path
 
 
@@ -52,6 +53,6 @@ def test_archive_that_does_not_fit_changes_nothing(jars, knowledge_base):
 
 
 def test_archive_that_cannot_be_made_is_told(monkeypatch, tmp_path):
-    monkeypatch.setattr(process, "_jar_folder", lambda: tmp_path / "gone")
+    monkeypatch.setattr(process, "jar_folder", lambda: tmp_path / "gone")
     with pytest.raises(SystemExit, match="no archive of Pellet's classes"):
         class_archive.main()

@@ -1,3 +1,4 @@
+import importlib.util
 import os
 import signal
 import subprocess
@@ -10,7 +11,8 @@ from mros1_reasoner.knowledge.model import Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, ReasonerError
 from mros1_reasoner.pellet import process as pellet_module
 from mros1_reasoner.pellet.owlready import OwlreadyReasoner
-from mros1_reasoner.pellet.process import ChildLostError, NoJavaError, PelletReasoner, PelletWithFallback, make_reasoner
+from mros1_reasoner.pellet.process import ChildLostError, PelletReasoner, PelletWithFallback, make_reasoner
+from mros1_reasoner.pellet.spawning import NoJavaError
 from ontology_text import APP, OWL, typed
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
 
@@ -95,7 +97,7 @@ def test_no_java_is_told_with_the_remedy(monkeypatch, tmp_path):
 
 
 def test_child_that_can_not_run_gives_way_to_owlready2_with_a_warning(monkeypatch, caplog):
-    monkeypatch.setattr(pellet_module.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     assert isinstance(make_reasoner(), OwlreadyReasoner)
     assert "JPype1 is missing" in caplog.text
 

@@ -17,7 +17,8 @@ from mros1_reasoner.knowledge.loading import renamed
 from mros1_reasoner.knowledge.reasoner import Assertion, ReasonerError
 from mros1_reasoner.knowledge.triples import write_ntriples
 from mros1_reasoner.pellet.child import RECORDING
-from mros1_reasoner.pellet.process import ARCHIVE, PelletReasoner
+from mros1_reasoner.pellet.process import PelletReasoner
+from mros1_reasoner.pellet.spawning import ARCHIVE
 
 DEADLINE = 60.0  # s, wall, for the JVM to write the archive
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import logging
 import math
 import os
 import select
-import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from itertools import groupby
-from pathlib import Path
 from typing import Any, TypeVar
 
 from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, Reasoner, ReasonerError
@@ -22,42 +18,19 @@ from mros1_reasoner.knowledge.triples import Triple, TripleError, parse_ntriples
 from mros1_reasoner.pellet.equivalence import EquivalentIndividuals
 from mros1_reasoner.pellet.owlready import OwlreadyReasoner
 from mros1_reasoner.pellet.slices import SliceError, Slices
+from mros1_reasoner.pellet.spawning import HEAP_MB, NoJavaError, archive_options, end, find_jvm, jar_folder, spawn
 
 _log = logging.getLogger(__name__)
 
 _Answer = TypeVar("_Answer")
 
 START_DEADLINE = 20.0  # s, wall: a JVM and its jars, on a loaded machine
-HEAP_MB = 256  # of the JVM; with it, node and child stay below 500 MB
-ARCHIVE = "mros1_reasoner.jsa"  # of Pellet's classes, beside the jars; `class_archive` makes it
 RETRY_AFTER = 300.0  # s, wall, until the child is tried again; until then owlready2 calls Pellet
-NO_JAVA = "no Java runtime found: install openjdk-17-jre-headless, or set ~reasoner to rules"
 _WHOLE, _COMMON = "whole", "common"  # names of the child's ontologies
-
-
-class NoJavaError(ReasonerError):
-    """There is no Java runtime."""
 
 
 class ChildLostError(ReasonerError):
     """The child failed again after a restart."""
-
-
-def find_jvm() -> Path:
-    """Return the path of libjvm.so: of JAVA_HOME, else of the `java` on PATH.
-
-    Raises:
-        NoJavaError: there is none.
-    """
-    homes = [Path(os.environ["JAVA_HOME"])] if os.environ.get("JAVA_HOME") else []
-    java = shutil.which("java")
-    if java:
-        homes.append(Path(java).resolve().parents[1])
-    for home in homes:
-        for library in (home / "lib/server/libjvm.so", home / "jre/lib/server/libjvm.so"):
-            if library.is_file():
-                return library
-    raise NoJavaError(NO_JAVA)
 
 
 class PelletReasoner:
@@ -67,12 +40,15 @@ class PelletReasoner:
     the kernel ends the child with the thread that started it.
     """
 
-    def __init__(self, deadline: float = 20.0, heap_mb: int = HEAP_MB) -> None:
+    def __init__(
+        self, deadline: float = 20.0, heap_mb: int = HEAP_MB, child: subprocess.Popen[bytes] | None = None
+    ) -> None:
         """Start the child; it loads while the caller continues.
 
         Args:
             deadline: s, wall, for an answer; a child that takes longer is replaced.
             heap_mb: memory of the JVM; a child that needs more ends, and is replaced.
+            child: one that has been started already.
 
         Raises:
             NoJavaError: there is no Java runtime.
@@ -80,18 +56,17 @@ class PelletReasoner:
         """
         self._deadline, self._heap_mb = deadline, heap_mb
         self._jvm = find_jvm()
-        if importlib.util.find_spec("jpype") is None:
-            raise ReasonerError("the Python package JPype1 is missing: install requirements/python.txt")
-        self._jars = _jar_folder()
+        self._jars = jar_folder()
         self._triples: list[Triple] = []
         self._loaded: dict[str, str] = {}  # what the child has, by name
         self._equivalent: EquivalentIndividuals | None = None
         self._slices: Slices | None = None
         self._always: dict[str, list[Assertion]] = {}  # what follows without facts, by property
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process = child
         self._buffer = bytearray()
         self._greeted = False
-        self._start()
+        if child is None:
+            self._start()
 
     @property
     def pid(self) -> int | None:
@@ -133,11 +108,7 @@ class PelletReasoner:
         process, self._process = self._process, None
         if process is None:
             return
-        process.kill()
-        for stream in (process.stdin, process.stdout):
-            if stream:
-                stream.close()
-        process.wait()
+        end(process)
 
     def _infer(
         self, name: str, individuals: EquivalentIndividuals, facts: Sequence[Assertion], properties: Sequence[str]
@@ -170,24 +141,13 @@ class PelletReasoner:
 
     def _jvm_options(self) -> list[str]:
         """Return further options; the JVM goes without an archive that is not of its version and of these jars."""
-        archive = self._jars / ARCHIVE
-        return [f"-XX:SharedArchiveFile={archive}"] if archive.is_file() else []
+        return archive_options(self._jars)
 
     def _start(self) -> None:
-        child = Path(__file__).with_name("child.py")
         self._buffer.clear()
         self._greeted = False
-        self._process = subprocess.Popen(
-            [
-                *(sys.executable, "-P", str(child)),
-                *(str(os.getpid()), str(self._jvm), str(self._jars), str(self._heap_mb), *self._jvm_options()),
-            ],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL if not _log.isEnabledFor(logging.DEBUG) else None,
-            bufsize=0,
-        )
-        os.set_blocking(self._process.stdin.fileno(), False)  # type: ignore[union-attr]
+        is_quiet = not _log.isEnabledFor(logging.DEBUG)
+        self._process = spawn(self._jvm, self._jars, self._jvm_options(), self._heap_mb, is_quiet=is_quiet)
 
     def _ask_twice(self, request: dict[str, Any]) -> dict[str, Any]:
         """Ask the child. If it dies or hangs, start a new one and ask again."""
@@ -315,14 +275,17 @@ class PelletWithFallback:
         return otherwise(slow)
 
 
-def make_reasoner() -> Reasoner:
+def make_reasoner(child: subprocess.Popen[bytes] | None = None) -> Reasoner:
     """Return Pellet in a child process. If the child can't run, warn, and return owlready2's slow call.
+
+    Args:
+        child: a process that has been started already.
 
     Raises:
         NoJavaError: there is no Java runtime, without which neither runs.
     """
     try:
-        return PelletWithFallback(PelletReasoner())
+        return PelletWithFallback(PelletReasoner(child=child))
     except NoJavaError:
         raise
     except (ReasonerError, OSError) as error:
@@ -332,11 +295,3 @@ def make_reasoner() -> Reasoner:
 
 class _ChildError(Exception):
     """The child has failed; the text continues a sentence that begins with "Pellet's process"."""
-
-
-def _jar_folder() -> Path:
-    spec = importlib.util.find_spec("owlready2")
-    folder = Path(spec.origin).parent / "pellet" if spec and spec.origin else Path()
-    if not any(folder.glob("pellet-*.jar")):
-        raise ReasonerError(f"owlready2's jars of Pellet are not in {folder}: install owlready2 0.49")
-    return folder

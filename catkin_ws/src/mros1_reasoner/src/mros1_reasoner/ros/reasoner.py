@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from functools import partial
+from subprocess import Popen
 from typing import TypeVar
 
 import rospy
@@ -282,13 +283,17 @@ class ReasonerNode:
         self._inbox.put(lambda: None)  # look at once at what happened meanwhile
 
 
-def run() -> None:
-    """Run the node; exit status 2 when it can't start."""
+def run(early: Popen[bytes] | None) -> None:
+    """Run the node; exit status 2 when it can't start.
+
+    Args:
+        early: Pellet's process, if it has been started already.
+    """
     with Lifetime("reasoner", ParameterError, KnowledgeBaseError, ReasonerError, ModelError) as life:
         life.start()
         log_core()
         parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
-        reasoner = make_reasoner(parameters.reasoner)  # its process gets ready while this one reads models
+        reasoner = make_reasoner(parameters.reasoner, early)  # its process gets ready while this one reads models
         ReasonerNode(parameters, reasoner).run()
 
 

@@ -6,11 +6,18 @@ import sys
 
 
 def main() -> None:
-    """Run the node; exit status 2 when it can't start."""
+    """Run the node; exit status 2 when it can't start.
+
+    Pellet's process starts while this one imports the rest. It asks nobody whether it is needed: a master that hangs
+    must not hold up the node's end.
+    """
+    from mros1_reasoner.pellet.spawning import spawn_early
+
+    early = spawn_early()
     _import_genpy_without_numpy()
     from mros1_reasoner.ros.reasoner import run
 
-    run()
+    run(early)
 
 
 def _import_genpy_without_numpy() -> None:
