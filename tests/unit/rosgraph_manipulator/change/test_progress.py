@@ -175,6 +175,7 @@ def test_of_several_functions_each_has_a_report_of_its_own(progress):
 def test_nodes_that_run_for_other_functions_are_shared(progress):
     assert progress.shared("f") == {"/b", "/c"}
     assert progress.shared("g") == {"/a", "/b"}
+    assert progress.shared("f", yielding=["g"]) == frozenset()
     progress.take([report(FAILED, function="g"), report()])
     assert progress.shared("f") == frozenset()
 

@@ -3,9 +3,11 @@
 import pytest
 from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_launcher.launching.report import STABLE, LauncherReport
+from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.progress import ChangeProgress
-from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
+from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions, Repair
 from rosgraph_manipulator.io.launch_files import LaunchFile
+from rosgraph_manipulator.ros import running_system
 from rosgraph_manipulator.ros.running_system import RunningSystem
 
 LEVEL = "/qa_performance"
@@ -27,3 +29,31 @@ def running():
 def test_node_that_starts_again_gets_its_parameters_back_but_no_expected_level(running):
     assert running.parameters_of("f_arm", ["/arm"]) == {"/robot": "r", "/arm/rate": 1}
     assert running.parameters_of("f_arm", ["/drive"]) == {}
+
+
+@pytest.fixture
+def read(monkeypatch):
+    """Launch files by name, in place of those on the disk: nodes of any package, on another host."""
+    files = {}
+    monkeypatch.setattr(running_system, "read_launch_file", lambda path, _args: LaunchFile(files[path]))
+    return files
+
+
+def test_drivers_yield_to_functions_and_to_one_another(read):
+    look = Configuration("look", "f_look", "look")
+    driver, twin = (Configuration(f"repair_of_{name}", f"repair_of_{name}", name) for name in ("eye", "twin"))
+    progress = ChangeProgress()
+    progress.take(LauncherReport(one.function, one.name, nodes=(f"/{one.name}",)) for one in (look, driver))
+    repairs = {"eye": Repair("eye", driver=driver), "twin": Repair("twin", driver=twin)}
+    options = ManipulatorOptions({"look": look}, repairs=repairs)
+    system = RunningSystem(options, progress, lambda _node: False)
+    read["look"] = SystemDescription({"/look": NodeDescription("/look", "/", "p", "x")}, {"/gain": 1})
+    read["eye"] = SystemDescription({"/eye": NodeDescription("/eye", "/", "p", "x")}, {"/gain": 2})
+    assert system.describe_beside_others(look) == read["look"]
+    read["twin"] = SystemDescription({"/eye": NodeDescription("/eye", "/", "p", "x", args="twice")}, {"/focus": 3})
+    assert system.describe_beside_others(twin) == read["twin"]
+    with pytest.raises(DeploymentError, match="parameter /gain is 2 for repair_of_eye and 1 for f_look, which runs"):
+        system.describe_beside_others(driver)
+    read["look"] = SystemDescription({"/eye": NodeDescription("/eye", "/", "p", "another")})
+    with pytest.raises(DeploymentError, match="node /eye belongs to f_look and repair_of_eye, which runs"):
+        system.describe_beside_others(look)

@@ -83,12 +83,12 @@ class ChangeProgress:
         report = self.report(function)
         return report.nodes if report else ()
 
-    def shared(self, function: str) -> frozenset[str]:
-        """Return the nodes that run for other functions."""
+    def shared(self, function: str, yielding: Collection[str] = ()) -> frozenset[str]:
+        """Return the nodes that run for other functions than one and those that yield to it."""
         return frozenset(
             node
             for other, report in (self._reports or {}).items()
-            if other != function and report.state != FAILED
+            if other != function and other not in yielding and report.state != FAILED
             for node in report.nodes
             if node not in report.dead
         )

@@ -14,13 +14,14 @@ KEYS = (
     "configurations",
     "configs",
     "functions",
+    "repairs",
     "kill_nodes",
     "save_action",
     "goal_msg_type",
     "reconfiguration_action_name",
 )
+"""The parameters that `parse_options` reads, and `parse_repairs`."""
 FUNCTION_KEYS = ("kill_nodes", "save_action", "goal_msg_type")
-"""The parameters that `parse_options` reads."""
 
 _OLDER = {
     "kill_nodes": ["/move_base"],
@@ -61,6 +62,21 @@ class Configuration:
 
 
 @dataclass(frozen=True)
+class Repair:
+    """By what a component is repaired: by a service, or by a launch file that starts its driver again.
+
+    Attributes:
+        component: its name.
+        service: name of the service; empty: it is repaired by the driver.
+        driver: the configuration that starts the driver, of a function of its own; None: it is repaired by the service.
+    """
+
+    component: str
+    service: str = ""
+    driver: Configuration | None = None
+
+
+@dataclass(frozen=True)
 class FunctionOptions:
     """What holds for all configurations of one function.
 
@@ -83,11 +99,13 @@ class ManipulatorOptions:
         configurations: by name.
         functions: the options of those functions that have any, by name.
         reconfiguration_action_name: the action that takes requests.
+        repairs: by component.
     """
 
     configurations: Mapping[str, Configuration]
     functions: Mapping[str, FunctionOptions] = field(default_factory=dict)
     reconfiguration_action_name: str = "rosgraph_manipulator_action_server"
+    repairs: Mapping[str, Repair] = field(default_factory=dict)
 
     def of(self, function: str) -> FunctionOptions:
         """Return the options of a function."""
@@ -122,6 +140,11 @@ class ManipulatorOptions:
     def all_functions(self) -> tuple[str, ...]:
         """The names of all functions."""
         return tuple(dict.fromkeys(configuration.function for configuration in self.configurations.values()))
+
+    @property
+    def drivers(self) -> dict[str, Configuration]:
+        """The configurations that start drivers again, by name, which is also that of the function of each."""
+        return {repair.driver.name: repair.driver for repair in self.repairs.values() if repair.driver}
 
 
 def parse_options(parameters: Mapping[str, Any], find_launch_file: FindLaunchFile) -> ManipulatorOptions:

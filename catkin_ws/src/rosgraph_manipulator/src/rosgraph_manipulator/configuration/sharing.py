@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from rosgraph_launcher.description import SystemDescription
 
@@ -28,11 +28,22 @@ def seen_by(
     return SystemDescription({**own, **found}, running.parameters)
 
 
-def disagreement(function: str, wanted: SystemDescription, others: Mapping[str, SystemDescription]) -> str:
+def disagreement(
+    function: str,
+    wanted: SystemDescription,
+    others: Mapping[str, SystemDescription],
+    yielding: Collection[str] = (),
+) -> str:
     """Return why a configuration can't run beside other functions, with the remedy; empty where it can.
 
     A node or a parameter of two functions must be the same in both. Expected quality levels are an exception: no node
     reads them.
+
+    Args:
+        function: the function that changes.
+        wanted: its configuration to deploy.
+        others: what runs for each other function, by its name.
+        yielding: those among them whose parameters may be overwritten, because their nodes have read them.
     """
     parameters = read_by_nodes(wanted)
     for other, system in others.items():
@@ -46,7 +57,7 @@ def disagreement(function: str, wanted: SystemDescription, others: Mapping[str, 
                     f"node {name} belongs to {function} and {other}, which runs, and differs in "
                     f"{', '.join(difference)}: make it the same in both, or give it another name in one"
                 )
-        for name, value in read_by_nodes(system).items():
+        for name, value in () if other in yielding else read_by_nodes(system).items():
             if name in parameters and not same_value(parameters[name], value):
                 return (
                     f"parameter {name} is {parameters[name]!r} for {function} and {value!r} for {other}, which runs: "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from ros_model.errors import ModelError
 from ros_model.io.files import resolve
 
 from rosgraph_manipulator.configuration.configurations import ConfigurationError, ManipulatorOptions, parse_options
+from rosgraph_manipulator.configuration.repairs import parse_repairs
 
 
 def options_from(parameters: Mapping[str, Any]) -> ManipulatorOptions:
@@ -20,7 +22,9 @@ def options_from(parameters: Mapping[str, Any]) -> ManipulatorOptions:
     Raises:
         ConfigurationError: a key is missing or has a value that cannot be used.
     """
-    return parse_options(parameters, find_launch_file)
+    options = parse_options(parameters, find_launch_file)
+    repairs = parse_repairs(parameters.get("repairs"), options.configurations, find_launch_file)
+    return replace(options, repairs=repairs)
 
 
 def find_launch_file(uri: str, anywhere: bool) -> str:

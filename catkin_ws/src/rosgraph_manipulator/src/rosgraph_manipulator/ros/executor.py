@@ -7,14 +7,16 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import rospy
 from geometry_msgs.msg import Twist
 from node_kit.io.xml_rpc import CallError
+from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io.master import NodeApi, advertised
 from rosgraph_launcher.launching.contested import HOLD
-from rosgraph_launcher.launching.report import LauncherReport
+from rosgraph_launcher.launching.report import CHANGING, LauncherReport
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.parameters import OverwrittenParameters
@@ -22,6 +24,7 @@ from rosgraph_manipulator.change.progress import ChangeProgress
 from rosgraph_manipulator.change.tactics import Plan
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
 from rosgraph_manipulator.configuration.difference import same_value
+from rosgraph_manipulator.io.foreign_nodes import end_node
 from rosgraph_manipulator.io.launch_files import LaunchFile
 from rosgraph_manipulator.io.master import get_parameters, publishers, set_parameters
 from rosgraph_manipulator.ros.goal import PendingGoal
@@ -35,6 +38,21 @@ STATE_TIMEOUT = 2.0  # s, wall, for the launcher's state to follow its answer
 DELIVERY_TIMEOUT = 5.0  # s, wall, for the new server to have the pending goal
 COMMAND_TIMEOUT = 5.0  # s, wall, for a `rosparam` call of a launch file
 ASK_THREADS = 8  # nodes are asked side by side whether they hang
+
+
+@dataclass(frozen=True)
+class DriverStart:
+    """A driver whose processes have begun.
+
+    Attributes:
+        nodes: those that were started.
+        number: of the launcher's change.
+        names: tells whether they answer under their names.
+    """
+
+    nodes: tuple[str, ...]
+    number: int
+    names: NodeNames
 
 
 class RosExecutor:
@@ -71,7 +89,7 @@ class RosExecutor:
         self._progress = ChangeProgress()
         self._launchers = launchers
         self.system = RunningSystem(options, self._progress, launchers.is_here)
-        self._names = NodeNames(self.system, self._progress, launchers)
+        self._names = NodeNames(launchers, self._description, self._progress.has_finished)
         self._servers_died: dict[str, bool] = {}  # by function: whether the kept action's server died
         self._news = threading.Condition()
         self._follows = False  # whether the reports of the launcher that made the last change arrive
@@ -272,6 +290,47 @@ class RosExecutor:
             self.wait_until_ready()
             self._servers_died.pop(function, None)
 
+    # -- repairs --------------------------------------------------------------------------------------------------
+
+    def start_driver(self, driver: Configuration) -> DriverStart:
+        """Start the nodes of a driver, also where they run; functions keep theirs. Do not wait until they are up.
+
+        Two components may have a node in common, which each of their repairs restarts. Nodes of the same names that
+        somebody else has started end first.
+
+        Raises:
+            DeploymentError: nothing can be started.
+        """
+        function = driver.function
+        system = self.system.describe_beside_others(driver)
+        launch = self.system.launch_file(driver)
+        shared = self._progress.shared(function, yielding=self._options.drivers)
+        start = tuple(node for node in system.nodes if node not in shared)
+        if not start:
+            raise DeploymentError(
+                f"functions that run have its nodes, {', '.join(system.nodes)}: request their configurations again, "
+                "which restarts nodes that hang"
+            )
+        names = NodeNames(
+            self._launchers, system.nodes.get, lambda node: node not in self._progress.launched_for(function)
+        )
+        for node in set(start) - self._progress.at_work:
+            end_node(node)
+        names.see_takers(set(start) - self._progress.at_work)
+        self._store_parameters(function, launch)
+        stop = tuple(node for node in self._progress.launched_for(function) if node not in shared)
+        nodes = launch.system.nodes.values()
+        number = self._launchers.change(function, driver.name, nodes, stop, start, found=lambda: None).number
+        self.system.deployed(driver, launch)
+
+        def is_reported() -> bool:
+            report = self._progress.report(function)
+            return report is not None and report.change == number and report.state != CHANGING
+
+        with self._news:
+            self._news.wait_for(is_reported, STATE_TIMEOUT)
+        return DriverStart(start, number, names)
+
     # -- helpers --------------------------------------------------------------------------------------------------
 
     def _store_parameters(self, function: str, launch: LaunchFile | None) -> None:
@@ -318,6 +377,10 @@ class RosExecutor:
         self._progress.answered(made.number)
         with self._news:
             self._follows = self._news.wait_for(lambda: self._progress.is_reported(made.number), STATE_TIMEOUT)
+
+    def _description(self, node: str) -> NodeDescription | None:
+        wanted = self._progress.wanted
+        return self.system.launch_file(wanted).system.nodes.get(node) if wanted else None
 
     def _end_foreign_nodes(self, function: str) -> None:
         """End nodes of the same function that somebody else started."""

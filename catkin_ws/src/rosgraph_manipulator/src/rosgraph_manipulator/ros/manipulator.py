@@ -46,6 +46,7 @@ from rosgraph_manipulator.ros.announcer import Announcer
 from rosgraph_manipulator.ros.executor import RosExecutor
 from rosgraph_manipulator.ros.goal import PendingGoal
 from rosgraph_manipulator.ros.launchers import Launchers
+from rosgraph_manipulator.ros.repairs import RepairServer
 from rosgraph_manipulator.ros.requests import Order, RequestServer
 from rosgraph_manipulator.ros.running_system import Comparison
 
@@ -90,6 +91,8 @@ class Manipulator:
         )
         self._requests = RequestServer(options, Policy(policy), self._inbox, self._carry_out)
         self._executor.check = self._requests.check
+        repair_timeout = parameters.number("repair_timeout", 15.0, low=0.1)
+        self._repairs = RepairServer(options, self._inbox, self._executor, repair_timeout)
 
     def _resume(
         self, journal: Journal, reports: Mapping[str, LauncherReport], initial: Mapping[str, str]
@@ -143,6 +146,7 @@ class Manipulator:
             if refused:
                 self._refuse(refused, resumption.reason)
         self._requests.start()
+        self._repairs.start()
         while not rospy.is_shutdown():
             self._inbox.do_next(wait_s=0.2)
 
@@ -268,6 +272,7 @@ class Manipulator:
             if deaths is not None:
                 self._follow_function(function, deaths)
             self._follow_function(function, self._executor.report(function))
+        self._repairs.follow_launcher()
 
     def _follow_function(self, function: str, report: LauncherReport | None) -> None:
         deployments = self._deployments[function]
@@ -357,7 +362,7 @@ def main() -> None:
     with Lifetime("rosgraph_manipulator", ConfigurationError, ParameterError, PluginError) as life:
         life.start()
         options = options_from(read_parameters(rospy.myargv()[1:]))
-        for configuration in options.configurations.values():
+        for configuration in (*options.configurations.values(), *options.drivers.values()):
             if configuration.problem:
                 rospy.logwarn("%s is refused when it is requested: %s", configuration.name, configuration.problem)
         initial = options.one_per_function(rospy.get_param("~initial_configuration", ""), "~initial_configuration")

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io.ownership import look_up
 from rosgraph_launcher.io.scripts import script_is_at_work
 
-from rosgraph_manipulator.change.progress import ChangeProgress
 from rosgraph_manipulator.ros.launchers import Launchers
-from rosgraph_manipulator.ros.running_system import RunningSystem
 
 
 class NodeNames:
-    """The names of the nodes of the configuration that is being deployed."""
+    """The names of the nodes of a configuration that is being deployed."""
 
-    def __init__(self, system: RunningSystem, progress: ChangeProgress, launchers: Launchers) -> None:
-        self._system, self._progress, self._launchers = system, progress, launchers
+    def __init__(
+        self,
+        launchers: Launchers,
+        describe: Callable[[str], NodeDescription | None],
+        has_finished: Callable[[str], bool],
+    ) -> None:
+        """Begin without a node.
+
+        Args:
+            launchers: those of all hosts.
+            describe: returns how a node of the configuration is started; None: it has no such node.
+            has_finished: tells whether a node has done its work and ended.
+        """
+        self._launchers, self._description, self._has_finished = launchers, describe, has_finished
         self._takers: dict[str, str] = {}  # who had the name of a node that was to be started
 
     @property
@@ -44,11 +54,11 @@ class NodeNames:
         """Tell whether a node is up, or has done its work."""
         description = self._description(node)
         if description and not self._launchers.is_here(description):
-            return self._launchers.check(description)[0] or self._progress.has_finished(node)
+            return self._launchers.check(description)[0] or self._has_finished(node)
         mark, answer = self._launchers.mark(description), look_up(node)
         return (
             (answer.is_own(mark, self._takers[node]) if node in self._takers else answer.is_up(mark))
-            or self._progress.has_finished(node)
+            or self._has_finished(node)
             or (description is not None and script_is_at_work(description, mark))
         )
 
@@ -63,7 +73,3 @@ class NodeNames:
             if answer.answers and node in self._takers and not answer.is_own(mark, self._takers[node]):
                 conflict = answer.successor(mark)
         return conflict and f" ({conflict})"
-
-    def _description(self, node: str) -> NodeDescription | None:
-        wanted = self._progress.wanted
-        return self._system.launch_file(wanted).system.nodes.get(node) if wanted else None

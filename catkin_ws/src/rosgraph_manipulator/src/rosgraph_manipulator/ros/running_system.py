@@ -82,11 +82,8 @@ class RunningSystem:
             DeploymentError: the wanted configuration can't be read, or can't run beside the other functions.
         """
         function = wanted.function
-        system = self.describe(wanted)
+        system = self.describe_beside_others(wanted)
         others = self.others(function)
-        reason = disagreement(function, system, others)
-        if reason:
-            raise DeploymentError(f"{wanted.name}: {reason}")
         lost = set(restart)
         is_repair = self._progress.running(function) == wanted.name
         if is_repair:
@@ -114,6 +111,23 @@ class RunningSystem:
             raise DeploymentError(f"{configuration.launch_file}: {error}") from error
         self._described = (configuration, launch)
         return launch.system
+
+    def describe_beside_others(self, configuration: Configuration) -> SystemDescription:
+        """Return what a configuration's launch file starts, where it can run beside what runs for other functions.
+
+        Drivers of components yield: their parameters keep no function from its change, and none keeps another driver.
+
+        Raises:
+            DeploymentError: it can't, or can't be read.
+        """
+        system = self.describe(configuration)
+        others, drivers = self.others(configuration.function), self._options.drivers
+        if configuration.name in drivers:
+            others = {name: other for name, other in others.items() if name not in drivers}
+        reason = disagreement(configuration.function, system, others, yielding=drivers)
+        if reason:
+            raise DeploymentError(f"{configuration.name}: {reason}")
+        return system
 
     def ask_for_adjustable(self) -> None:
         """Ask the running nodes what they take by dynamic_reconfigure, so that the next plan need not wait for that."""
@@ -161,7 +175,8 @@ class RunningSystem:
 
     def _runs(self, function: str) -> SystemDescription:
         """Return what runs for a function, by the launcher's reports and the launch file as it was when deployed."""
-        configuration = self._options.configurations.get(self._progress.running(function))
+        name = self._progress.running(function)
+        configuration = self._options.configurations.get(name, self._options.drivers.get(name))
         if configuration is None:
             return SystemDescription()
         if function not in self._deployed or self._deployed[function][0] != configuration:
