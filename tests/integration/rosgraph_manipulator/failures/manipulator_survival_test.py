@@ -2,6 +2,7 @@
 """Nodes, launcher, manipulator and master die in the middle of everything; the mission comes back, nothing is left."""
 
 import base64
+import io
 import os
 import signal
 import socket
@@ -21,6 +22,7 @@ from helpers.ports import QUIET_HOST, reserved_port
 from helpers.waiting import DEADLINE_S, wait_for
 from integration.rosgraph_manipulator.manipulator_harness import Node, PairTest, is_alive, later, pid_of
 from metacontrol_msgs.msg import MvpReconfigurationGoal
+from metacontrol_msgs.srv import ChangeNodes
 
 
 class SurvivalTest(PairTest):
@@ -178,27 +180,52 @@ class SurvivalTest(PairTest):
         self.restart_launcher()
         self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
         self.assertEqual(self.client.get_result().result, 0, self.text)
-        # "failed": it dies after it has told of the change, and before it has answered the request.
-        self.assertRegex(self.text, "rosgraph_launcher has (died|failed)")
+        # "not up": it dies after it has told of the change, and before it has answered; then its successor is asked.
+        self.assertRegex(self.text, "rosgraph_launcher has died|is not up within")
         self.wait_for_state("slow")
 
     def test_launcher_that_dies_just_when_it_is_asked_is_waited_for(self):
         """The kernel closes a dying launcher's sockets one by one: it may be found, and then refuse the request."""
         self.launcher.end(signal.SIGKILL)
-        dying = socket.create_server((QUIET_HOST, 0))
-        found = threading.Thread(target=accept_one, args=(dying,), daemon=True)
-        found.start()
-        port = dying.getsockname()[1]
-        service = rospy.resolve_name("rosgraph_launcher/change")
-        rosgraph.Master("/dying_launcher").registerService(
-            service, f"rosrpc://{QUIET_HOST}:{port}", "http://localhost:1"
-        )
+        found = self.pretend_to_be_launcher(accept_one)
         self.client.send_goal(MvpReconfigurationGoal("fast"))
         found.join(DEADLINE_S)
         self.assertFalse(found.is_alive(), self.manipulator.said())
         self.restart_launcher()
         self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
         self.assertEqual(self.client.get_result().result, 1, self.text)
+
+    def test_launcher_that_dies_before_it_answers_leaves_the_request_for_its_successor(self):
+        self.launcher.end(signal.SIGKILL)
+        asked = self.pretend_to_be_launcher(break_off_one)
+        self.client.send_goal(MvpReconfigurationGoal("fast"))
+        asked.join(DEADLINE_S)
+        self.assertFalse(asked.is_alive(), self.manipulator.said())
+        self.restart_launcher()
+        self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
+        self.assertEqual(self.client.get_result().result, 1, self.text)
+
+    def test_launcher_that_breaks_a_request_off_and_lives_on_has_failed(self):
+        service, master = rospy.resolve_name("rosgraph_launcher/change"), rosgraph.Master("/rosgraph_launcher")
+        uri, api = master.lookupService(service), master.lookupNode("/rosgraph_launcher")
+
+        def break_off_one_and_leave(server):
+            break_off_one(server, then=accept_one)  # that comes next is asked to restore: the failure is noticed
+            master.registerService(service, uri, api)
+
+        self.pretend_to_be_launcher(break_off_one_and_leave)
+        self.assertEqual(self.request("fast"), 0)
+        self.assertRegex(self.text, "rosgraph_launcher has failed .*: check that it runs; slow was restored")
+
+    def pretend_to_be_launcher(self, serve):
+        """Let a function serve the requests to the launcher, in a thread; return that."""
+        server = socket.create_server((QUIET_HOST, 0))
+        thread = threading.Thread(target=serve, args=(server,), daemon=True)
+        thread.start()
+        address = f"rosrpc://{QUIET_HOST}:{server.getsockname()[1]}"
+        service = rospy.resolve_name("rosgraph_launcher/change")
+        rosgraph.Master("/dying_launcher").registerService(service, address, "http://localhost:1")
+        return thread
 
     def test_launcher_that_ends_leaves_the_request_for_its_successor(self):
         self.assertEqual(self.request("stubborn"), 1, self.text)  # the launcher waits for its end
@@ -246,6 +273,22 @@ def accept_one(server):
     connection, _ = server.accept()
     server.close()
     connection.close()
+
+
+def break_off_one(server, then=socket.socket.close):
+    """Accept connections until one has a request, read that, and break it off."""
+    asked = False
+    while not asked:
+        connection, _ = server.accept()
+        with connection:
+            rest = io.BytesIO()
+            header = rosgraph.network.read_ros_handshake_header(connection, rest, 4096)
+            asked = "probe" not in header
+            if asked:
+                answer = {"md5sum": ChangeNodes._md5sum, "type": ChangeNodes._type, "callerid": "/dying_launcher"}
+                rosgraph.network.write_ros_handshake_header(connection, answer)
+                rest.getvalue() or connection.recv(4096)
+    then(server)
 
 
 def answers(api):

@@ -27,6 +27,9 @@ from rosgraph_manipulator.ros.launcher_reports import ASKING, REPEAT_PERIOD, Lau
 _NOT_REACHED = (TransportInitError, rosgraph.MasterError)
 """What rospy has caught when it raises a ServiceException and has sent no request: no registration, no connection."""
 
+_FAILURES = (rospy.ServiceException, rospy.ROSException, TransportException, OSError)
+"""What a call of a launcher's service raises."""
+
 
 @dataclass(frozen=True)
 class Changed:
@@ -51,7 +54,7 @@ class Launchers(LauncherReports):
             return False, ""
         try:
             answer = self._wait_for(name, lambda: rospy.ServiceProxy(f"{name}/check", CheckNodes)([node.name]))
-        except (DeploymentError, rospy.ServiceException, rospy.ROSException, TransportException, OSError):
+        except (DeploymentError, *_FAILURES):
             return False, ""
         return answer.up[0], answer.conflicts[0]
 
@@ -170,7 +173,7 @@ class Launchers(LauncherReports):
                     failures.append(answer.message if len(parts) == 1 else f"{self._host(name)}: {answer.message}")
             except DeploymentError as error:
                 failures.append(str(error))
-            except (rospy.ServiceException, rospy.ROSException, TransportException, OSError) as error:
+            except _FAILURES as error:
                 failures.append(f"{name.rpartition('/')[2]} has failed ({error}): check that it runs")
         if failures:
             raise DeploymentError("; ".join(failures))
@@ -180,9 +183,10 @@ class Launchers(LauncherReports):
         """Return a launcher's answer to a request, which is made as soon as the launcher is there.
 
         A launcher that is being killed may accept the connection by which `wait_for_service` finds it and refuse the
-        next one, because the kernel closes its sockets one after the other. A request that reached no launcher is
-        repeated, and one that reached a launcher that ends is left for its successor. Any other is not repeated,
-        because a part of it may be done.
+        next one, because the kernel closes its sockets one after the other. One that ends by itself may close a
+        connection without an answer, until rospy has unregistered its services. A request that reached no launcher is
+        repeated. One that reached a launcher that ends or has died is left for its successor, because all nodes end
+        with it. Any other is not repeated, because a part of it may be done.
         """
         service = rospy.ServiceProxy(f"{name}/change", ChangeNodes)
         deadline = time.monotonic() + self._timeout
@@ -191,11 +195,32 @@ class Launchers(LauncherReports):
             found()
             try:
                 return service(request)
-            except rospy.ServiceException as error:
-                is_undone = isinstance(error.__context__, _NOT_REACHED) or ENDING in str(error)
-                if not is_undone or time.monotonic() > deadline:
+            except (rospy.ServiceException, TransportException, OSError) as error:
+                if time.monotonic() > deadline or not self._is_undone(error, name, service.uri):
                     raise
                 time.sleep(REPEAT_PERIOD)
+
+    def _is_undone(self, error: Exception, name: str, uri: str) -> bool:
+        """Tell whether nothing is left of a request that has failed: it reached no launcher, or that one has ended.
+
+        Args:
+            error: how it failed.
+            name: the launcher's name.
+            uri: address of the service that was asked.
+        """
+        cause = error.__context__ if isinstance(error, rospy.ServiceException) else error
+        if isinstance(cause, _NOT_REACHED) or ENDING in str(error):
+            return True
+        return isinstance(cause, (TransportException, OSError)) and not self._serves(name, uri)
+
+    def _serves(self, name: str, uri: str) -> bool:
+        """Tell whether a launcher still serves under an address; one that ends closes all connections."""
+        try:
+            rospy.ServiceProxy(f"{name}/check", CheckNodes)([])
+            # After the check, which a successor may have answered: it registers this service before that one.
+            return bool(rosgraph.Master(rospy.get_name()).lookupService(f"{name}/change") == uri)
+        except (*_FAILURES, rosgraph.MasterException):
+            return False
 
     def _wait_for(self, name: str, work: Callable[[], Any]) -> Any:
         """Do work that waits for a launcher, until its host is lost."""
