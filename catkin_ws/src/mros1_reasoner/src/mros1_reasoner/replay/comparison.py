@@ -16,6 +16,7 @@ _NOT_COMPARED = (  # what depends on when and how fast it is computed
     "stamp",
     "stamp_monitored",
     "reasons",
+    "repair",  # no message has it
     "stamp_analysed",
     "stamp_planned",
     "stamp_executed",

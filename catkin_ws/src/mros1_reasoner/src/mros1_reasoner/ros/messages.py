@@ -8,6 +8,8 @@ from typing import Any
 
 from metacontrol_bags.decision import Candidate, Cause, Decision
 
+_NOT_IN_MESSAGE = ("stamp", "repair")
+
 
 def fill_decision(message: Any, decision: Decision, time_of: Callable[[float], Any], types: Any) -> Any:
     """Fill a metacontrol_msgs/Decision, but for its header, and return it.
@@ -20,7 +22,7 @@ def fill_decision(message: Any, decision: Decision, time_of: Callable[[float], A
     """
     for item in fields(decision):
         value = getattr(decision, item.name)
-        if item.name == "stamp":
+        if item.name in _NOT_IN_MESSAGE:
             continue
         if item.name.startswith("stamp_"):
             value = time_of(max(0.0, value))
