@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import time
 
 import rospy
@@ -12,9 +11,9 @@ from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.diagnostics import Remark
 from mros1_reasoner.loop.entries import LevelFact
 from mros1_reasoner.planning.log_line import line
+from mros1_reasoner.ros.core_log import PREFIX
 from mros1_reasoner.ros.log_throttle import LogThrottle
 
-_PREFIX = "[RosReasoner] -- %s"  # as the published reasoner's
 _LONGEST = 1000  # remarks that are told once
 
 
@@ -28,14 +27,14 @@ class Log:
 
     def tell(self, text: str) -> None:
         """Tell something."""
-        rospy.loginfo(_PREFIX, text)
+        rospy.loginfo(PREFIX, text)
 
     def warn(self, kind: str, text: str) -> None:
         """Warn of a problem, unless many problems of the same kind were just logged."""
         said = self._warnings.admit(time.monotonic(), kind, text)
         if said:
             is_published = text.startswith("Unsupported QA TYPE received: ")  # tools wait for that line as it is
-            rospy.logwarn(said) if is_published else rospy.logwarn(_PREFIX, said)
+            rospy.logwarn(said) if is_published else rospy.logwarn(PREFIX, said)
 
     def tell_objective(self, objective: Objective) -> None:
         """Tell that an objective is asked for."""
@@ -64,21 +63,6 @@ class Log:
             took = f"{decision.objective} has {decision.to_configuration} after {decision.execute_wall_s:.2f} s"
             self.tell(f"executed: {took} ({decision.id})")
         elif decision.state == FAILED and decision.to_configuration:
-            rospy.logwarn(_PREFIX, f"failed: {decision.explanation} ({decision.id})")
+            rospy.logwarn(PREFIX, f"failed: {decision.explanation} ({decision.id})")
         else:
-            (rospy.loginfo if decision.to_configuration else rospy.logwarn)(_PREFIX, line(decision))
-
-
-def log_core() -> None:
-    """Pass the core's log on to rosout, as the node's own."""
-    logger = logging.getLogger("mros1_reasoner")
-    logger.setLevel(logging.INFO)
-    logger.propagate = False
-    logger.addHandler(_RosLog())
-
-
-class _RosLog(logging.Handler):
-    def emit(self, record: logging.LogRecord) -> None:
-        """Log a record as the node's own."""
-        log = rospy.logwarn if record.levelno >= logging.WARNING else rospy.loginfo
-        log(_PREFIX, record.getMessage())
+            (rospy.loginfo if decision.to_configuration else rospy.logwarn)(PREFIX, line(decision))

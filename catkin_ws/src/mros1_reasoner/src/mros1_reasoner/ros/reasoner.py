@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable
 from functools import partial
-from subprocess import Popen
 from typing import TypeVar
 
 import rospy
@@ -16,16 +15,11 @@ from metacontrol_bags import ownership
 from metacontrol_bags.decision import DECIDED, Decision
 from metacontrol_msgs import msg as messages
 from node_kit.io.inbox import Inbox
-from node_kit.parameters import ParameterError
-from node_kit.ros.lifetime import Lifetime
-from ros_model.errors import ModelError
 from std_msgs.msg import Bool
 
 from mros1_reasoner.io.parameters import Parameters
-from mros1_reasoner.io.reasoners import make_reasoner
-from mros1_reasoner.knowledge import vocabulary
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
-from mros1_reasoner.knowledge.model import Facts, Objective
+from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.loop import entries, journal
@@ -37,7 +31,7 @@ from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic
-from mros1_reasoner.ros.log import Log, log_core
+from mros1_reasoner.ros.log import Log
 from mros1_reasoner.ros.objectives import ObjectiveAction
 from mros1_reasoner.ros.repairs import RepairRequests
 from mros1_reasoner.ros.requests import Requests, Wanted
@@ -46,7 +40,6 @@ from mros1_reasoner.ros.services import Services
 _TIMER_PERIOD = 0.02  # s, wall, the shortest between two looks at ROS time while the core waits for a moment
 _FASTEST = 10.0  # ROS time may run so much faster than wall time
 _LONGEST_WAIT = 1.0  # s, wall, until it is seen that somebody has asked the node to end
-_WARM_UP = 4  # analyses before the node is ready: the JVM compiles what it has run
 _QUEUE = 1000  # diagnostics that wait at most
 _ANSWER_DEADLINE = 60.0  # s, wall, for a service; an analysis may have to start Pellet again
 
@@ -59,20 +52,27 @@ class ReasonerNode:
     Callbacks only queue what they get; everything else happens in the thread that calls `run`.
     """
 
-    def __init__(self, parameters: Parameters, reasoner: Reasoner) -> None:
-        """Read models, warm the reasoner up, offer and listen to all topics and services.
+    def __init__(
+        self,
+        parameters: Parameters,
+        knowledge_base: KnowledgeBase,
+        objectives: tuple[Objective, ...],
+        reasoner: Reasoner,
+    ) -> None:
+        """Offer and listen to all topics and services.
+
+        Args:
+            parameters: the node's.
+            knowledge_base: of its models.
+            objectives: those asked for from the start.
+            reasoner: one that has loaded the knowledge base.
 
         Raises:
-            ParameterError, KnowledgeBaseError, ModelError, ReasonerError: the node can't work.
+            ParameterError, KnowledgeBaseError, ReasonerError: the node can't work.
         """
         self._period = parameters.period
-        self.knowledge_base = knowledge_base = parameters.knowledge_base()
-        objectives = parameters.objectives(knowledge_base)
+        self.knowledge_base = knowledge_base
         settings = parameters.settings(knowledge_base)
-        reasoner.load(knowledge_base.ontology)
-        for path in knowledge_base.files:
-            rospy.loginfo(f"Loaded ontology: {path}")
-        _warm_up(knowledge_base, reasoner, objectives)
         name = f"{rospy.get_name().strip('/')}-{int(time.time())}"
         self.core = Mape(knowledge_base, reasoner, objectives, settings, clock=rospy.get_time, name=name)
         self._inbox = Inbox()
@@ -281,29 +281,3 @@ class ReasonerNode:
         """Note the outcome of a decision."""
         self._take(Result(decision, ok, message, blame))
         self._inbox.put(lambda: None)  # look at once at what happened meanwhile
-
-
-def run(early: Popen[bytes] | None) -> None:
-    """Run the node; exit status 2 when it can't start.
-
-    Args:
-        early: Pellet's process, if it has been started already.
-    """
-    with Lifetime("reasoner", ParameterError, KnowledgeBaseError, ReasonerError, ModelError) as life:
-        life.start()
-        log_core()
-        parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
-        reasoner = make_reasoner(parameters.reasoner, early)  # its process gets ready while this one reads models
-        ReasonerNode(parameters, reasoner).run()
-
-
-def _warm_up(knowledge_base: KnowledgeBase, reasoner: Reasoner, objectives: tuple[Objective, ...]) -> None:
-    """Make the JVM compile the code of an analysis, by one with every kind of fact."""
-    facts = Facts(
-        objectives=objectives,
-        groundings={o.name: d.name for o in objectives for d in knowledge_base.solving(o.function)[:1]},
-        levels={(o.name, quality): limit for o in objectives for quality, limit in o.limits.items()},
-        components=dict.fromkeys(knowledge_base.components, vocabulary.FAILED),
-    )
-    for _ in range(_WARM_UP):
-        knowledge_base.analyse(facts, reasoner)

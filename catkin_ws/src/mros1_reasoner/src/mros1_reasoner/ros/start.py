@@ -15,7 +15,7 @@ def main() -> None:
 
     early = spawn_early()
     _import_genpy_without_numpy()
-    from mros1_reasoner.ros.reasoner import run
+    from mros1_reasoner.ros.run import run
 
     run(early)
 
