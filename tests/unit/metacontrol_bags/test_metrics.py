@@ -100,6 +100,17 @@ def test_success_needs_all_four_conditions(summary, mission_bag, tmp_path):
     assert risky["goal_reached"] and not risky["success"]
 
 
+def test_cause_stamped_by_a_clock_ahead_of_the_reasoners_is_found(bag, tmp_path):
+    bag.event(10.0, "MISSION_START", "r1")
+    bag.diagnostic(12.0, "Component status", "front_laser", "FALSE")
+    bag.decision(12.05, "DECIDED", "component:front_laser", change=("f1_v3_r1", "f1_v1_r1_k"))
+    bag.event(12.2, "PERTURBATION", "component:front_laser")
+    bag.decision(14.5, "EXECUTED", "component:front_laser", change=("f1_v3_r1", "f1_v1_r1_k"))
+    bag.event(16.0, "MISSION_END", "r1", outcome="reached")
+    (entry,) = summarise(read_record(bag.write(tmp_path / "ahead.bag")))["reconfigurations"]
+    assert (entry["detect_s"], entry["decide_s"]) == (0.0, pytest.approx(0.05))
+
+
 def test_qa_trigger_is_timed_from_the_true_rise(bag, tmp_path):
     bag.event(10.0, "MISSION_START", "r1")
     for stamp, level in ((9.0, 0.2), (12.0, 0.7), (12.5, 0.75), (15.0, 0.1)):

@@ -59,7 +59,7 @@ _SAME_MOMENT_S = 0.05
 """Stamps of different nodes may differ by a few periods of `/clock` (0.01 s) for what happened in the same moment."""
 
 _CLOCK_LAG_S = 0.5
-"""s by which the clock of a node may lag behind another one on a loaded machine; the mission ends by its own."""
+"""s by which the clock of a node may lag behind another on a loaded machine: effects may be stamped before causes."""
 
 
 def summarise(record: MissionRecord) -> dict[str, Any]:
@@ -192,18 +192,17 @@ def _cause(record: MissionRecord, decided: Decision) -> tuple[float | None, floa
 
 
 def _component_cause(record: MissionRecord, name: str, decided: Decision) -> tuple[float | None, float | None]:
+    until = decided.stamp + _CLOCK_LAG_S
     strikes = [
         event.stamp
         for event in record.events
-        if event.kind == MissionEvent.PERTURBATION and event.name == decided.trigger and event.stamp <= decided.stamp
+        if event.kind == MissionEvent.PERTURBATION and event.name == decided.trigger and event.stamp <= until
     ]
     struck = strikes[-1] if strikes else None
-    reports = [r for r in record.components if r.component == name and r.stamp <= decided.stamp + _SAME_MOMENT_S]
+    reports = [r for r in record.components if r.component == name and r.stamp <= until]
     if struck is not None:
         after = (
-            r.stamp
-            for r in reports
-            if r.status == DiagnosticWords.COMPONENT_FALSE and r.stamp >= struck - _SAME_MOMENT_S
+            r.stamp for r in reports if r.status == DiagnosticWords.COMPONENT_FALSE and r.stamp >= struck - _CLOCK_LAG_S
         )
         return struck, next(after, None)
     return None, start_of_run([(r.stamp, r.status == DiagnosticWords.COMPONENT_FALSE) for r in reports])

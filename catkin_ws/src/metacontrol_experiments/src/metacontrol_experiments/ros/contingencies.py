@@ -105,10 +105,10 @@ class ContingencyNode:
     def _inject(self, contingency: Contingency) -> None:
         pose = self._pose
         way = None if pose is None else (pose, self._goal or pose)
-        values = self._injector.inject(contingency, way)
+        injected = self._injector.inject(contingency, way)
         message = MissionEvent(kind=MissionEvent.PERTURBATION, name=contingency.event)
-        message.header.stamp = rospy.Time.now()
-        message.values = [KeyValue(key, value) for key, value in values.items()]
+        message.header.stamp = injected.stamp
+        message.values = [KeyValue(key, value) for key, value in injected.values.items()]
         self._events.publish(message)
         rospy.loginfo(f"contingency: {contingency.event}")
 

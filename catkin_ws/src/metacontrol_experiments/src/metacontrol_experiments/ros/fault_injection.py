@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import rosgraph
 import rospy
@@ -49,6 +49,15 @@ _CALL_S = 2.0
 """Wall seconds for a service or the map to be there, and for a call to a node's own API."""
 
 
+class Injected(NamedTuple):
+    """What an event tells of a contingency that has happened."""
+
+    stamp: rospy.Time
+    """Just before it happened: the system may answer before the call that made it happen returns."""
+    values: dict[str, str]
+    """What is worth telling of it."""
+
+
 class FaultInjector:
     """Knows which node is behind a component, and how each kind of contingency is made."""
 
@@ -63,8 +72,8 @@ class FaultInjector:
         self._owns = owns
         self._pids: dict[str, int] = {}  # of frozen nodes, which no longer tell theirs
 
-    def inject(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> dict[str, str]:
-        """Let a contingency happen now; return what is worth telling of it.
+    def inject(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> Injected:
+        """Let a contingency happen now; return when it did, and what is worth telling of it.
 
         Args:
             contingency: what is to happen.
@@ -90,7 +99,7 @@ class FaultInjector:
             raise InjectionError(f"{contingency}: {error}") from error
         raise InjectionError(f"{contingency}: no injector knows contingencies of kind {contingency.kind.value}")
 
-    def _signal(self, contingency: Contingency) -> dict[str, str]:
+    def _signal(self, contingency: Contingency) -> Injected:
         """Send a component's node the signal of a kind."""
         node = rospy.resolve_name(node_of(contingency.target, self._components))
         pid = self._pids.get(node) or self._pid_of(node)
@@ -101,12 +110,13 @@ class FaultInjector:
             raise InjectionError(f"{node} (pid {pid}) is not a driver that can simulate wrong data")
         if contingency.kind is Kind.UNPLUG:
             rospy.set_param(f"{node}/{UNPLUGGED}", True)  # whoever starts the driver again
+        stamp = rospy.Time.now()
         os.kill(pid, number)
         if contingency.kind is Kind.FREEZE:
             self._pids[node] = pid
         else:
             self._pids.pop(node, None)
-        return {"node": node, "pid": str(pid), "how": contingency.kind.value}
+        return Injected(stamp, {"node": node, "pid": str(pid), "how": contingency.kind.value})
 
     def _pid_of(self, node: str) -> int:
         """Return the process of a node, as its own API tells."""
@@ -116,7 +126,7 @@ class FaultInjector:
         with Client(uri, caller, _CALL_S, peer=f"node {node} at") as api:
             return int(api.call("getPid"))
 
-    def _clutter(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> dict[str, str]:
+    def _clutter(self, contingency: Contingency, way: tuple[Pose, Pose] | None) -> Injected:
         """Put obstacles on the floor: the listed ones, or random ones off the ends of the way."""
         places = tuple(Pose(x, y, 0.0) for x, y in contingency.places)
         if not places and contingency.count:
@@ -125,20 +135,22 @@ class FaultInjector:
             grid = read_grid(rospy.wait_for_message("map", OccupancyGrid, _WAIT_S))
             places = scatter(grid, *way, contingency.count, contingency.seed or 0)
         spawn = self._call("simulator/spawn_obstacle", SpawnObstacle)
+        stamp = rospy.Time.now()
         for place in places:
             spawn(x=place.x, y=place.y, yaw=place.yaw)
-        return {"places": " ".join(f"{place.x:.3f},{place.y:.3f}" for place in places)}
+        return Injected(stamp, {"places": " ".join(f"{place.x:.3f},{place.y:.3f}" for place in places)})
 
-    def _call(self, service: str, kind: type, **told: str) -> Callable[..., dict[str, str]]:
-        """Return a call of a service that raises where it is refused, and returns what is told."""
+    def _call(self, service: str, kind: type, **told: str) -> Callable[..., Injected]:
+        """Return a call of a service that raises where it is refused, and returns its moment and what is told."""
         rospy.wait_for_service(service, _WAIT_S)
         proxy = rospy.ServiceProxy(service, kind)
 
-        def call(*arguments: float, **fields: float) -> dict[str, str]:
+        def call(*arguments: float, **fields: float) -> Injected:
+            stamp = rospy.Time.now()
             answer = proxy(*arguments, **fields)
             if not answer.success:
                 raise InjectionError(f"{service} refused: {getattr(answer, 'message', '') or arguments}")
-            return told
+            return Injected(stamp, told)
 
         return call
 

@@ -28,7 +28,7 @@ from metacontrol_experiments.io.processes import wait_until
 from metacontrol_experiments.mission import mission
 from metacontrol_experiments.mission.mission import Action, Inject
 from metacontrol_experiments.mission.readiness import Readiness
-from metacontrol_experiments.ros.fault_injection import FaultInjector, serve
+from metacontrol_experiments.ros.fault_injection import FaultInjector, Injected, serve
 from metacontrol_experiments.ros.goal import MissionGoal
 from metacontrol_experiments.ros.startup import DECISION_TOPIC, StartError, Startup
 
@@ -157,8 +157,8 @@ class MissionNode:
     def _begin(self) -> None:
         if self._position is None:
             raise RuntimeError("the robot's pose is not known yet")
+        now = rospy.Time.now()  # before what happens at the start: the system may adapt to it at once
         injected = self._inject_at_start()
-        now = rospy.Time.now()
         self._state = mission.start(self._plan, now.to_sec(), *self._position)
         self._goal.make(self._settings.route.goal, now)
         self._began_wall = time.monotonic()
@@ -166,8 +166,8 @@ class MissionNode:
         values = self._settings.describe() | {"goal_id": self._goal.id}
         values["controller_hz"] = str(rospy.get_param("move_base/controller_frequency", 0.0))
         self._publish_event(now, MissionEvent.MISSION_START, self._settings.route.name, values)
-        for name, told in injected:
-            self._publish_event(now, MissionEvent.PERTURBATION, name, {"share": "0.0000"} | told)
+        for contingency, told in injected:
+            self._publish_perturbation(contingency, told, 0.0)
         self._goal.send()
 
     def _loop(self) -> None:
@@ -216,25 +216,29 @@ class MissionNode:
             self._state = mission.abort(self._mission, rospy.get_time(), f"a contingency could not strike: {error}")
 
     def _inject_now(self, contingency: Contingency) -> None:
-        values = self._injector.inject(contingency, self._way())
-        share = {"share": f"{self._state.share if self._state else 0.0:.4f}"}
-        self._publish_event(rospy.Time.now(), MissionEvent.PERTURBATION, contingency.event, share | values)
+        injected = self._injector.inject(contingency, self._way())
+        self._publish_perturbation(contingency, injected, self._mission.share)
 
     def _way(self) -> tuple[Pose, Pose]:
         """Return the ends of the route; where the robot is now differs a little from run to run."""
         return self._settings.route.start, self._settings.route.goal
 
-    def _inject_at_start(self) -> list[tuple[str, dict[str, str]]]:
-        """Inject the contingencies of the start, and return names and values of their events.
+    def _inject_at_start(self) -> list[tuple[Contingency, Injected]]:
+        """Inject the contingencies of the start, and return them with what their events tell.
 
         Raises:
             StartError: something could not happen.
         """
         due = [entry for entry in self._plan.contingencies if entry.when.at_start]
         try:
-            return [(entry.event, self._injector.inject(entry, self._way())) for entry in due]
+            return [(entry, self._injector.inject(entry, self._way())) for entry in due]
         except InjectionError as error:
             raise StartError(f"a contingency could not strike: {error}") from error
+
+    def _publish_perturbation(self, contingency: Contingency, injected: Injected, share: float) -> None:
+        """Publish that a contingency happened, at a share of the way."""
+        values = {"share": f"{share:.4f}"} | injected.values
+        self._publish_event(injected.stamp, MissionEvent.PERTURBATION, contingency.event, values)
 
     def _publish_event(self, stamp: rospy.Time, kind: str, name: str, values: dict[str, str]) -> None:
         message = MissionEvent(kind=kind, name=name, values=[KeyValue(key, value) for key, value in values.items()])
