@@ -143,7 +143,7 @@ def test_lost_child_that_works_again_gets_its_ontology_back(knowledge_base, pell
 
 
 def test_child_that_runs_out_of_memory_is_replaced_and_then_given_up(load, caplog):
-    designs = {f"d{i}": ({}, ["laser"]) for i in range(3000)}
+    designs = {f"d{i}": ({}, ["laser", f"sensor{i}"]) for i in range(3000)}  # no two alike
     knowledge_base = load(application(designs))
     reasoner = PelletReasoner(heap_mb=16)
     try:

@@ -230,16 +230,19 @@ class KnowledgeBase:
         others = {*self._model.function_iris.values(), *self._model.environment_iris.values(), *self._fills}
         by_rule = (iri for iri, values in found[v.FD_REALISABILITY].items() if "false" in values)
         by_binding = (self._model.design_iris[name] for name, own in bindings.of_designs.items() if lost & {*own})
+        alike: dict[tuple[frozenset[str], frozenset[str]], tuple[str, ...]] = {}  # many designs miss the same
         result = {}
         for iri in dict.fromkeys([*found[v.FD_UNREALISABLE_BY], *by_rule, *by_binding]):
-            name, missing = self._design_name.get(iri), found[v.FD_UNREALISABLE_BY][iri]
+            name = self._design_name.get(iri)
             if name is None:
                 continue
-            own = set(bindings.of_designs.get(name, ()))
-            filling = {frozenset() if own & all_of_it else all_of_it for all_of_it in map(self._filling, missing)}
-            broken = {bindings.components[binding] for binding in lost & own.union(*filling)}
-            names = {self._component_name.get(what, local_name(what)) for what in missing - others}
-            result[name] = tuple(sorted(names | broken))
+            missing, own = frozenset(found[v.FD_UNREALISABLE_BY][iri]), frozenset(bindings.of_designs.get(name, ()))
+            if (missing, own) not in alike:
+                filling = {frozenset() if own & all_of_it else all_of_it for all_of_it in map(self._filling, missing)}
+                broken = {bindings.components[binding] for binding in lost & own.union(*filling)}
+                names = {self._component_name.get(what, local_name(what)) for what in missing - others}
+                alike[missing, own] = tuple(sorted(names | broken))
+            result[name] = alike[missing, own]
         return result
 
     def _filling(self, what: str) -> frozenset[str]:

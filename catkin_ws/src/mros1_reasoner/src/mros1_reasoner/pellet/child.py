@@ -22,10 +22,10 @@ PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 MAX_FRAME = 256 * 1024 * 1024  # bytes; an ontology of 1,000 designs has about 1 MB
 # -Xrs: signals stay with Python. The first stage of compilation is enough: analyses are rare and hardly get hot
 # enough for the second. So measured at 30 designs, the JVM is ready in half the time, and compiles nothing while idle.
-# The heap starts small, because the JVM keeps what it has once filled.
+# The heap starts small, because the JVM keeps what it has once filled. Its figures for other programs go to no file.
 JVM_OPTIONS = (
     *("-Xrs", "-XX:+UseSerialGC", "-XX:+ExitOnOutOfMemoryError", "-Xshare:auto", "-XX:TieredStopAtLevel=1"),
-    "-XX:NewSize=8m",
+    *("-XX:NewSize=8m", "-XX:-UsePerfData", "-XX:+DisableExplicitGC"),
 )
 # Those of owlready2's jars that Pellet needs. Without a jar to write logs by, and without ARQ, Jena starts in half the
 # time: log4j alone loads 600 classes.

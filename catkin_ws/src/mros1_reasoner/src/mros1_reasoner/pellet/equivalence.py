@@ -83,7 +83,9 @@ class EquivalentIndividuals:
             shape = sorted({tuple("" if part == term else part for part in triple) for triple in about[term]})
             shapes[tuple(shape)].append(term)
         self._groups = [group for group in shapes.values() if len(group) > 1]
-        self._about = {term: about[term] for group in self._groups for term in group}
+        self._iris = [tuple(map(iri_of, group)) for group in self._groups]
+        self._number = {term: number for number, group in enumerate(self._groups) for term in group}
+        self._about = {term: about[term] for term in self._number}
         dropped = {term for group in self._groups for term in group[1:]}
         self.reduced = [triple for triple in triples if dropped.isdisjoint(triple)]
 
@@ -98,15 +100,18 @@ class EquivalentIndividuals:
             deputies: number for each group. Two of them show whether a member has itself or another member as value.
         """
         mentioned = {f"<{fact.subject}>" for fact in facts} | {f"<{f.value}>" for f in facts if not f.datatype}
-        left_out: set[str] = set()
+        there = {term for term in mentioned if term in self._number}
+        touched = {self._number[term] for term in there}
         present: list[str] = []
         members: dict[str, tuple[str, ...]] = {}
-        for group in self._groups:
-            rest = [term for term in group if term not in mentioned]
-            left_out.update(rest[deputies:])
-            present += [term for term in group[1:] if term in mentioned or term in rest[:deputies]]
+        for number, (group, iris) in enumerate(zip(self._groups, self._iris, strict=True)):
+            rest = [term for term in group if term not in there] if number in touched else group
+            chosen = rest[:deputies]
+            there.update(chosen)
+            present += [term for term in (group if number in touched else chosen) if term in there and term != group[0]]
             if len(rest) > deputies:
-                members |= dict.fromkeys(map(iri_of, rest[:deputies]), tuple(map(iri_of, rest)))
+                members |= dict.fromkeys(map(iri_of, chosen), iris if rest is group else tuple(map(iri_of, rest)))
+        left_out = self._number.keys() - there if present else set()
         added = {t: None for term in present for t in self._about[term] if left_out.isdisjoint(t)}  # each one once
         return [*facts, *map(assertion_of, added)], Expansion(members)
 

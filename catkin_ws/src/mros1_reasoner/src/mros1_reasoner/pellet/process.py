@@ -80,20 +80,20 @@ class PelletReasoner:
             self._triples = list(parse_ntriples(ontology))
         except TripleError as error:
             raise ReasonerError(f"the ontology is no N-Triples: {error}") from error
-        self._load(_WHOLE, ontology)  # the whole of it must be free of contradiction
         try:
             slices = Slices(self._triples)
-            always = self._ask_child(_WHOLE, (), slices.properties)
         except SliceError as error:
             _log.debug("Pellet gets the whole ontology for each analysis: %s", error)
-        else:
-            if slices.implies(always):
-                self._load(_COMMON, write_ntriples(slices.common))
-                self._slices = slices
-                self._always = {name: list(values) for name, values in groupby(always, key=lambda a: a.property)}
-                self._forget(_WHOLE)
-                return
-        self._load_whole()
+            self._load_whole()
+            return
+        whole = self._load_whole()
+        always = sorted(self._infer(_WHOLE, whole, (), slices.properties), key=lambda value: value.property)
+        if slices.implies(always):
+            self._load(_COMMON, write_ntriples(slices.common))
+            self._slices = slices
+            self._always = {name: list(values) for name, values in groupby(always, key=lambda a: a.property)}
+            self._forget(_WHOLE)
+            self._equivalent = None
 
     def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
         """See Reasoner.infer."""
@@ -121,7 +121,7 @@ class PelletReasoner:
         return expand(values)
 
     def _load_whole(self) -> EquivalentIndividuals:
-        """Have the child know the whole ontology, and return its individuals."""
+        """Have the child know the whole ontology, without a contradiction, and return its individuals."""
         if self._equivalent is None:
             self._equivalent = EquivalentIndividuals(self._triples)
             self._load(_WHOLE, write_ntriples(self._equivalent.reduced))

@@ -23,7 +23,7 @@ from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.ros.core_log import log_core
 
-_WARM_UP = 4  # analyses before the node is ready: the JVM compiles what it has run
+_WARM_UP = 2  # analyses before the node is ready: the JVM compiles what it has run
 _REST = "mros1_reasoner.ros.reasoner"
 
 
