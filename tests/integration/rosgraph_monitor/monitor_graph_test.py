@@ -3,6 +3,7 @@
 
 import rospy
 import rostest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from monitor_common import GraphTest, value_of
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import String
@@ -104,6 +105,23 @@ class MonitorGraphTest(GraphTest):
         battery.publish(BatteryState(percentage=0.4))
         self.seen.wait_status("battery", "Component status", "RECOVERED")
         battery.unregister()
+
+    def test_driver_that_says_that_it_does_not_work(self):
+        diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=1, latch=True)
+
+        def say(level, name="hand_driver: fingers"):
+            diagnostics.publish(DiagnosticArray(status=[DiagnosticStatus(level=level, name=name)]))
+
+        say(DiagnosticStatus.OK)
+        self.seen.wait_status("gripper", "Component status", "TRUE")
+        say(DiagnosticStatus.ERROR)
+        self.seen.wait_status("gripper", "Component status", "FALSE")
+        self.seen.forget()
+        say(DiagnosticStatus.OK, "hand_driver_2: fingers")
+        self.seen.wait_status("gripper", "Component status", "FALSE")
+        say(DiagnosticStatus.OK)
+        self.seen.wait_status("gripper", "Component status", "RECOVERED")
+        diagnostics.unregister()
 
 
 if __name__ == "__main__":

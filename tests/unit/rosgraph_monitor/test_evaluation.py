@@ -1,5 +1,6 @@
 """Evaluations of the monitor, one after the other."""
 
+import pytest
 from ros_model.graph.snapshot import GraphSnapshot, NodeState, build_snapshot
 from ros_model.language.metamodel import Component, Port, PortKind, Reference, RosParameter, RosSystem
 from rosgraph_monitor.evaluation import GraphEvaluator, Patience
@@ -223,6 +224,23 @@ def test_topics_of_nodes_under_reconfiguration_are_excused():
     in_change = Desired(SYSTEM, frozenset({"front_laser"}), excused=frozenset({"front_laser"}))
     assert monitor().excused_topics(PUBLISHED, in_change, ["front/scan", "odom"]) == {"front/scan"}
     assert monitor().excused_topics(PUBLISHED, DESIRED, ["front/scan"]) == frozenset()
+
+
+@pytest.mark.parametrize(
+    ("life", "driver", "status"),
+    [
+        (Life.ALIVE, NodeCondition.UNKNOWN, "TRUE"),
+        (Life.ALIVE, NodeCondition.ALIVE, "TRUE"),
+        (Life.ALIVE, NodeCondition.FAILED, "FALSE"),
+        (Life.DEAD, NodeCondition.ALIVE, "FALSE"),
+    ],
+)
+def test_component_with_a_node_and_a_drivers_status_needs_both(life, driver, status):
+    watched = monitor()
+    watched.evaluate(BOTH, ALIVE, DESIRED, 0.0)
+    others = {"laser_resender": driver}
+    told = said(watched.evaluate(BOTH, ALIVE | lives(front_laser=life), DESIRED, 1.0, others=others))
+    assert ("laser_resender", "Component status", status) in told
 
 
 def test_battery_is_a_component():

@@ -92,7 +92,7 @@ class GraphEvaluator:
             desired: what should run.
             now: wall seconds.
             topics: what is wrong with topics.
-            others: conditions of components that are no nodes, by name of the component.
+            others: conditions of components that other things than nodes and topics tell, by name of the component.
             is_fresh: whether the snapshot is newer than what is known of the nodes. Else a node that seems dead may
                 have unregistered since, so that the next evaluation says that it has ended.
 
@@ -100,7 +100,8 @@ class GraphEvaluator:
             The statuses of components, then the findings, or "running OK" where there are none.
         """
         life = {name: lives.get((name, node.uri), Life.UNKNOWN) for name, node in snapshot.nodes.items()}
-        conditions = {**self._conditions(life, desired), **(others or {})}
+        conditions = self._conditions(life, desired)
+        self._add_others(conditions, others or {})
         self._add_topics(conditions, snapshot, life, topics)
         for idle in desired.idle_nodes:
             conditions.pop(idle, None)
@@ -193,6 +194,18 @@ class GraphEvaluator:
                 self._gone.pop(name, None)
         return conditions
 
+    def _add_others(self, conditions: dict[str, NodeCondition], others: Mapping[str, NodeCondition]) -> None:
+        """Add components that have no node. One that has has failed if either says so."""
+        for component, condition in others.items():
+            key = self._key_of(component)
+            is_worse = condition is NodeCondition.FAILED and conditions.get(key) is not NodeCondition.GONE
+            if key not in conditions or is_worse:
+                conditions[key] = condition
+
+    def _key_of(self, component: str) -> str:
+        """Return the node of a component, or the component itself where it has none."""
+        return next((node for node, name in self._component_of.items() if name == component), component)
+
     def _add_topics(
         self,
         conditions: dict[str, NodeCondition],
@@ -207,7 +220,7 @@ class GraphEvaluator:
             if len(nodes) == 1:
                 self._publisher[topic] = self._relative(nodes[0])
             if component:
-                key = next((n for n, c in self._component_of.items() if c == component), component)
+                key = self._key_of(component)
                 conditions.setdefault(key, NodeCondition.ALIVE if verdict.heard else NodeCondition.UNKNOWN)
             elif topic in self._publisher:
                 key = self._publisher[topic]

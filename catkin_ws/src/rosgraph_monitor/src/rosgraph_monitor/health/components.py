@@ -66,30 +66,36 @@ class ComponentMap:
         of_node: component by name of the node, relative to the system's namespace.
         topics: what is expected of topics that stand for components, by name of the topic.
         batteries: batteries that stand for components.
+        driver_statuses: component -> name of its driver's status on /diagnostics.
     """
 
     of_node: dict[str, str] = field(default_factory=dict)
     topics: dict[str, TopicSpec] = field(default_factory=dict)
     batteries: tuple[BatterySpec, ...] = ()
+    driver_statuses: dict[str, str] = field(default_factory=dict)
 
 
 def parse_components(value: Any) -> ComponentMap:
     """Return what stands for each component.
 
-    An entry is `{node: NAME}`, `{topic: NAME, max_age: S, min_rate: HZ, stuck_after: N}` (limits as one likes), both
-    in one, or `{topic: NAME, below: CHARGE, above: CHARGE}` for a battery.
+    An entry is `{node: NAME}`, `{topic: NAME, max_age: S, min_rate: HZ, stuck_after: N}` (limits as one likes),
+    `{diagnostic: NAME}`, several of these in one, or `{topic: NAME, below: CHARGE, above: CHARGE}` for a battery.
 
     Raises:
         ValueError: the value has another shape; the message names the entry.
     """
     if not isinstance(value, dict):
         raise ValueError(f"components: must map each component to {{node: NAME}} or {{topic: NAME}}, not {value!r}")
-    of_node, topics, batteries = {}, {}, []
+    of_node, topics, batteries, driver_statuses = {}, {}, [], {}
     for component, entry in named_entries(value):
         settings = dict(entry) if isinstance(entry, dict) else {}
-        node, topic = settings.pop("node", None), settings.pop("topic", None)
-        if not (node or topic) or not all(isinstance(n, str) and n.strip("/") for n in (node, topic) if n is not None):
-            raise ValueError(f"components/{component}: must be {{node: NAME}} or {{topic: NAME}}, not {entry!r}")
+        node, topic, diagnostic = (settings.pop(key, None) for key in ("node", "topic", "diagnostic"))
+        names = [name for name in (node, topic, diagnostic) if name is not None]
+        if not names or not all(isinstance(name, str) and name.strip("/ ") for name in names):
+            kinds = "{node: NAME}, {topic: NAME} or {diagnostic: NAME}"
+            raise ValueError(f"components/{component}: must be {kinds}, not {entry!r}")
+        if diagnostic:
+            driver_statuses[str(component)] = diagnostic.strip().lstrip("/")
         if node:
             of_node[node.strip("/")] = str(component)
         if topic and settings.keys() & {"below", "above"}:
@@ -105,7 +111,7 @@ def parse_components(value: Any) -> ComponentMap:
             )
         elif settings:
             raise ValueError(f"components/{component}: {', '.join(settings)} need a topic")
-    return ComponentMap(of_node, topics, tuple(batteries))
+    return ComponentMap(of_node, topics, tuple(batteries), driver_statuses)
 
 
 def _battery(component: str, topic: str, settings: dict[str, Any]) -> BatterySpec:

@@ -30,6 +30,7 @@ from rosgraph_monitor.io.graph_poller import GraphPoller, PolledGraph
 from rosgraph_monitor.io.node_connections import NodeConnections
 from rosgraph_monitor.ros import parameters as parameters_node
 from rosgraph_monitor.ros.diagnostics import DiagnosticsTopic
+from rosgraph_monitor.ros.driver_status import DriverStatusListener
 from rosgraph_monitor.ros.observers import ObserverHost
 from rosgraph_monitor.ros.topics import BatteryListener, TopicListener
 from rosgraph_monitor.ros.usage import UsageWatch
@@ -112,6 +113,7 @@ class MonitorNode:
         self._topic_states: dict[str, str] = {}
         self._follow_topics()
         self._batteries = BatteryListener(components.batteries, self._events.set)
+        self._drivers = DriverStatusListener(components.driver_statuses, self._events.set)
         self._usage = UsageWatch(
             parameters_node.names("metacontrol_nodes", _METACONTROL_NODES),
             self._snapshot,
@@ -181,7 +183,7 @@ class MonitorNode:
             self._model.current,
             now,
             topics=verdicts,
-            others=self._batteries.conditions,
+            others={**self._batteries.conditions, **self._drivers.conditions},
             is_fresh=is_fresh,
         )
         if now >= self._observers_due:

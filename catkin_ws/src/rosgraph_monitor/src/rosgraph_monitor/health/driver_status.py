@@ -1,0 +1,55 @@
+"""Components whose drivers tell on /diagnostics how they are. Pure.
+
+A driver by diagnostic_updater publishes statuses named `NODE: TASK`. A component follows one of them, or all of a node.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from rosgraph_monitor.diagnostics.status import Level
+from rosgraph_monitor.health.components import NodeCondition
+
+_CONDITIONS = {Level.OK: NodeCondition.ALIVE, Level.WARN: NodeCondition.ALIVE, Level.ERROR: NodeCondition.FAILED}
+
+
+class DriverStatuses:
+    """What drivers say of components: a component has failed while one of its statuses is an error."""
+
+    def __init__(self, names: Mapping[str, str]) -> None:
+        """Start with nothing heard.
+
+        Args:
+            names: component -> name of a status, or what stands before its colon.
+        """
+        self._names = dict(names)
+        self._heard: dict[str, dict[str, NodeCondition]] = {component: {} for component in names}
+
+    @property
+    def conditions(self) -> dict[str, NodeCondition]:
+        """The condition of each component; UNKNOWN until something was heard."""
+        return {component: _worst(heard.values()) for component, heard in self._heard.items()}
+
+    def take(self, name: str, level: int) -> bool:
+        """Take a status; return whether the condition of a component has changed.
+
+        A stale status changes nothing: whoever says so knows no more either.
+        """
+        name = name.lstrip("/")
+        condition = _CONDITIONS.get(Level(level)) if level in Level.__members__.values() else None
+        if condition is None:
+            return False
+        changed = False
+        for component, wanted in self._names.items():
+            if name == wanted or name.partition(":")[0].rstrip() == wanted:
+                before = _worst(self._heard[component].values())
+                self._heard[component][name] = condition
+                changed |= _worst(self._heard[component].values()) is not before
+        return changed
+
+
+def _worst(conditions: Iterable[NodeCondition]) -> NodeCondition:
+    known = set(conditions)
+    if not known:
+        return NodeCondition.UNKNOWN
+    return NodeCondition.FAILED if NodeCondition.FAILED in known else NodeCondition.ALIVE
