@@ -11,6 +11,7 @@ from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.pellet.owlready import run_pellet
+from reasoner_helpers import value
 
 
 class Robot:
@@ -87,6 +88,50 @@ def test_design_without_requirements_is_grounded_alone(make):
     robot = make()
     assert robot.run() == [("o_build", "FD2", EXECUTED)]
     assert set(robot.core.objectives) == {"o_build"}
+
+
+FIND = Objective("o_find", "F2", {"error": 0.5}, when_required=True)
+
+
+def test_objective_in_reserve_waits_until_a_design_requires_its_function(make):
+    robot = make(objectives=(PICK_AND_PLACE, FIND))
+    assert robot.run() == [("o_build", "FD2", EXECUTED)]
+    assert set(robot.core.objectives) == {"o_build"}
+    robot.core.observe_component(1.0, "left_arm", "FALSE")
+    assert [name for name, _, _ in robot.run(seconds=1.0)] == ["o_find", "o_F1", "o_build"]
+    robot.core.observe_component(2.0, "left_arm", "RECOVERED")
+    robot.run(seconds=60.0)
+    assert set(robot.core.objectives) == {"o_build"}
+    assert robot.groundings == {"o_build": "FD2"}
+
+
+def test_limits_of_an_objective_in_reserve_hold_while_its_function_is_required(make):
+    robot = make(objectives=(PICK_AND_PLACE, FIND), desired="FD1", violation_window=1.0)
+    robot.run()
+    for _ in range(8):
+        robot.core.observe_level(robot.now, "error", 0.9)
+        done = robot.run(seconds=0.5)
+        if done:
+            break
+    assert done[0][:2] == ("o_find", "FD2.2")
+
+
+def test_model_tells_which_objectives_are_in_reserve(make):
+    limit = value("o_find_error", "error", 0.5)
+    text = model(
+        extra='<t:Objective rdf:about="#o_build"><t:typeF rdf:resource="#F0"/></t:Objective>'
+        '<t:Objective rdf:about="#o_find"><t:typeF rdf:resource="#F2"/>'
+        f'<t:hasNFR>{limit}</t:hasNFR><t:o_when_required rdf:datatype="&xsd;boolean">true</t:o_when_required>'
+        "</t:Objective>".replace("&xsd;", "http://www.w3.org/2001/XMLSchema#")
+    )
+    robot = make(objectives=(), text=text, desired="FD1")
+    assert robot.knowledge_base.objectives == (Objective("o_build", "F0"), FIND)
+
+
+def test_root_objective_of_the_same_function_takes_the_place_of_one_in_reserve(make):
+    robot = make(objectives=(PICK_AND_PLACE, FIND, Objective("o_see", "F2")), desired="FD1")
+    robot.run()
+    assert set(robot.core.objectives) == {"o_build", "o_F1", "o_see"}
 
 
 def test_scenario_1_tag_is_not_found_under_the_present_light(one_arm):

@@ -124,16 +124,16 @@ class Parameters:
     def objectives(self, knowledge_base: KnowledgeBase) -> tuple[Objective, ...]:
         """Return the model's objectives with the given NFRs.
 
-        Where the model has none, there is one for each function that no design requires, unless tasks ask for them.
+        Where it asks for none, there is one for each function that no design requires, unless tasks ask for them.
         """
         objectives = knowledge_base.objectives
-        if not objectives and self._tree.flag("default_objectives", True):
+        if all(objective.when_required for objective in objectives) and self._tree.flag("default_objectives", True):
             required = {function for design in knowledge_base.designs.values() for function in design.requires}
             given = ParameterTree(dict(_leaves(self._tree.mapping("default_nfrs", "QA -> limit"))), "~default_nfrs")
             known: dict[str, float] = {}
             for quality in sorted(given.values):
                 known |= _limits(given, quality, quality, knowledge_base)
-            objectives = tuple(
+            objectives += tuple(
                 Objective(f"o_{function.removeprefix('f_')}A", function, known)
                 for function in knowledge_base.functions
                 if function not in required

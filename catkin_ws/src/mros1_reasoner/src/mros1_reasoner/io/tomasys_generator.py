@@ -96,8 +96,8 @@ def application_model(project: Project, iri: str) -> str:
         limits, operators = _both_ends(objective.get("nfrs", {}), directions)
         values = [f"{name}_{quality}" for quality in limits]
         links = {"tomasys:typeF": [objective["function"]], "tomasys:hasNFR": values}
-        improves = {"o_always_improve": objective["always_improve"]} if "always_improve" in objective else {}
-        parts.append(_individual("Objective", name, links, flags=improves))
+        flags = {f"o_{key}": objective[key] for key in ("always_improve", "when_required") if key in objective}
+        parts.append(_individual("Objective", name, links, flags=flags))
         parts += _limits(name, limits, operators)
     return "\n".join([*parts, "</rdf:RDF>", ""])
 

@@ -193,12 +193,14 @@ class Objective:
         limits: the limit that each quality attribute must keep; with `_min` or `_max` behind the name, the limit on the
             other side of a band.
         always_improve: adapt also when a clearly better design has become available; None: as the settings say.
+        when_required: pursued only while a deployed design requires the function.
     """
 
     name: str
     function: str
     limits: Mapping[str, float] = field(default_factory=dict)
     always_improve: bool | None = None
+    when_required: bool = False
 
 
 @dataclass(frozen=True)

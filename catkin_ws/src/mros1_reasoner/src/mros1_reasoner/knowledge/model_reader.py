@@ -347,8 +347,12 @@ class _Reader:
         if len(functions) != 1:
             raise KnowledgeBaseError(f"{self._where}: Objective {name} must have one Function: give it one typeF")
         limits = self._read_levels(iri, v.HAS_NFR)
-        improves = {text in ("true", "1") for text in self._graph.literals_of(iri, v.O_ALWAYS_IMPROVE)}
-        return Objective(name, self._function_name[functions.pop()], limits, improves.pop() if improves else None)
+        improves, waits = (
+            {text in ("true", "1") for text in self._graph.literals_of(iri, predicate)}
+            for predicate in (v.O_ALWAYS_IMPROVE, v.O_WHEN_REQUIRED)
+        )
+        function, improve = self._function_name[functions.pop()], improves.pop() if improves else None
+        return Objective(name, function, limits, improve, when_required=True in waits)
 
     def _read_levels(self, owner: str, predicate: str) -> dict[str, float]:
         levels: dict[str, float] = {}

@@ -390,7 +390,7 @@ class Deliberation:
 
     def _plan(self, name: str, now: float, function: str = "", only: tuple[Design, ...] = ()) -> Plan:
         """Return what to deploy for an objective, or for a function that none needs yet; of all designs, or of some."""
-        objective = self._state.objectives.get(name) or Objective(name, function)
+        objective = self._state.objectives.get(name) or self._state.objective_of(function)
         running = self._state.running.get(name) or Running()
         designs: tuple[Design, ...] = only or self._state.kb.solving(objective.function)
         unfulfilled: dict[str, list[str]] = {}

@@ -132,6 +132,7 @@ class View:
         settings: how the loop behaves.
         objectives: every objective by name, those included that designs require.
         roots: names of the objectives that were asked for.
+        in_reserve: objectives of the models that are pursued only while a design requires their function, by function.
         running: what runs, by objective.
         active: configuration and state of each function, as the manipulator says.
         wanted: by objective, the design that waits for what it requires.
@@ -160,6 +161,7 @@ class View:
     settings: Settings
     objectives: Mapping[str, Objective]
     roots: Collection[str]
+    in_reserve: Mapping[str, Objective]
     running: Mapping[str, Running]
     active: Mapping[str, tuple[str, str]]
     wanted: Mapping[str, str]
@@ -218,8 +220,15 @@ class View:
         root = next((name for name in self.roots if self.objectives[name].function == function), None)
         if root:
             return root
-        name = f"o_{function.removeprefix('f_')}"
+        reserve = self.in_reserve.get(function)
+        name = reserve.name if reserve else f"o_{function.removeprefix('f_')}"
         return name if name not in self.roots else f"o_{function}"
+
+    def objective_of(self, function: str) -> Objective:
+        """Return the objective that provides a function to the designs that require it, as it is at its start."""
+        name = self.provider(function)
+        known = self.objectives.get(name)
+        return known or replace(self.in_reserve.get(function) or Objective(name, function), name=name)
 
     def required(self, design: str | None) -> tuple[str, ...]:
         """Return the objectives that a design requires."""

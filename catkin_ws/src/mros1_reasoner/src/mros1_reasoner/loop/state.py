@@ -40,7 +40,9 @@ class State(View):
         """Know the objectives, and that nothing runs."""
         self.kb, self.settings, self._utility = knowledge_base, settings, utility
         self._better: dict[tuple[str, str], float | None] = {}
-        self.objectives: dict[str, Objective] = {objective.name: objective for objective in objectives}
+        objectives = tuple(objectives)
+        self.objectives: dict[str, Objective] = {o.name: o for o in objectives if not o.when_required}
+        self.in_reserve = {o.function: o for o in objectives if o.when_required}
         self.roots: dict[str, None] = dict.fromkeys(self.objectives)
         self.running: dict[str, Running] = {objective: Running() for objective in self.objectives}
         self.active: dict[str, tuple[str, str]] = {}
@@ -257,8 +259,8 @@ class State(View):
             missing = {name: function for name, function in needed.items() if name not in self.objectives}
             if not missing:
                 break
-            for name, function in missing.items():
-                self._add(Objective(name, function))
+            for function in missing.values():
+                self._add(self.objective_of(function))
         for name in self._from_the_top([name for name in self.objectives if name not in needed]):
             self._drop(name)
 
