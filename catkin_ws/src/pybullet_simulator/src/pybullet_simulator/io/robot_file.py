@@ -43,6 +43,17 @@ def planar_urdf(path: Path) -> str:
     Raises:
         RobotFileError: the file cannot be read, is no URDF with the link base_link, or declares entities.
     """
+    robot = read_robot(path)
+    put_on_planar_joints(robot)
+    return ET.tostring(robot, encoding="unicode")
+
+
+def read_robot(path: Path) -> ET.Element:
+    """Return the URDF of a robot whose root is base_link.
+
+    Raises:
+        RobotFileError: the file cannot be read, is no URDF with the link base_link, or declares entities.
+    """
     try:
         text = read_text(path)
         if "<!DOCTYPE" in text:
@@ -54,11 +65,15 @@ def planar_urdf(path: Path) -> str:
         raise RobotFileError(f"{path}: is not XML: {error}") from error
     if ROOT not in {link.get("name") for link in robot.iter("link")}:
         raise RobotFileError(f"{path}: has no link {ROOT}")
+    return robot
+
+
+def put_on_planar_joints(robot: ET.Element) -> None:
+    """Let the root of a URDF slide and turn in the plane; links for looks get a mass as good as none."""
     for link in robot.findall("link"):
         if link.find("inertial") is None:
             link.append(_inertial(_LOOKS_MASS, "1e-6"))
     robot.extend(_slides())
-    return ET.tostring(robot, encoding="unicode")
 
 
 def _slides() -> Iterator[ET.Element]:

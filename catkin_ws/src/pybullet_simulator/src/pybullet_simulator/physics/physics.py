@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
-import tempfile
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pybullet
-from robot_formulas.geometry import Pose, quaternion_of, wrap, yaw_of
+from robot_formulas.geometry import Pose, quaternion_of, yaw_of
 
-from pybullet_simulator.io.robot_file import JOINTS, planar_urdf, robot_file
+from pybullet_simulator.io.robot_file import planar_urdf, robot_file
+from pybullet_simulator.physics.connection import connect, disconnect
+from pybullet_simulator.physics.sliding_base import SlidingBase, links_of, load_urdf
 from pybullet_simulator.world.walking import HEIGHT, RADIUS
 from pybullet_simulator.world.world import box_mesh
 
@@ -43,10 +43,6 @@ _PERSON = (0.20, 0.60, 0.30, 1.0)
 _FLOOR = (0.40, 0.42, 0.40, 1.0)
 
 
-class PhysicsError(RuntimeError):
-    """PyBullet cannot start with the requested settings."""
-
-
 class Physics:
     """One PyBullet world. Poses are in the map frame; bodies are PyBullet's numbers."""
 
@@ -64,7 +60,7 @@ class Physics:
             PhysicsError: the window cannot open.
             RobotFileError: the robot's URDF cannot be used.
         """
-        self.client = _connect(gui)
+        self.client = connect(gui)
         if gui:
             self._look_at(world)
         pybullet.setTimeStep(step, physicsClientId=self.client)
@@ -72,37 +68,21 @@ class Physics:
         pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=self.client)
         self._floor = self._add_floor(world)
         self.map_bodies = self._add_map([box for box in world.boxes if box.mapped])
-        self._robot = self._add_robot(start)
+        self._robot = self._add_robot()
         self._unseen = (self._floor, self._robot)  # by rays
         # Twice what the acceleration limits need: the motors follow, but are too weak to push through an obstacle.
         inertia = robot.mass * (robot.length**2 + robot.width**2) / 12.0
         push = 2.0 * robot.mass * robot.max_acceleration
-        self._forces = (push, push, 2.0 * inertia * robot.max_turn_acceleration)
+        forces = (push, push, 2.0 * inertia * robot.max_turn_acceleration)
+        self.base = SlidingBase(self._robot, start, forces, self.client)
 
     def close(self) -> None:
         """Free the world; it cannot be used any more."""
-        if pybullet.isConnected(self.client):
-            pybullet.disconnect(self.client)
+        disconnect(self.client)
 
     def step(self) -> None:
         """Advance by one step."""
         pybullet.stepSimulation(physicsClientId=self.client)
-
-    def drive(self, velocity_x: float, velocity_y: float, turn: float) -> None:
-        """Let the robot's motors aim at a velocity (map frame, m/s and rad/s)."""
-        pybullet.setJointMotorControlArray(
-            self._robot,
-            self._joints,
-            pybullet.VELOCITY_CONTROL,
-            targetVelocities=(velocity_x, velocity_y, turn),
-            forces=self._forces,
-            physicsClientId=self.client,
-        )
-
-    def motion(self) -> tuple[Pose, tuple[float, float, float]]:
-        """Return the robot's pose and velocity (map frame, m/s and rad/s)."""
-        slide_x, slide_y, turn = pybullet.getJointStates(self._robot, self._joints, physicsClientId=self.client)
-        return Pose(slide_x[0], slide_y[0], wrap(turn[0])), (slide_x[1], slide_y[1], turn[1])
 
     def pressing(self) -> set[int]:
         """Return the bodies that press on the robot now."""
@@ -245,47 +225,16 @@ class Physics:
             bodies.append(body)
         return tuple(bodies)
 
-    def _add_robot(self, start: Pose) -> int:
-        """Load the robot on two sliding joints and a turning one, driven by their velocity motors."""
+    def _add_robot(self) -> int:
+        """Load the robot."""
         client = self.client
-        with tempfile.NamedTemporaryFile("w", suffix=".urdf", encoding="utf-8") as file:
-            file.write(planar_urdf(robot_file()))
-            file.flush()
-            flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_MATERIAL_COLORS_FROM_MTL
-            body = pybullet.loadURDF(file.name, useFixedBase=True, flags=flags, physicsClientId=client)
-        links = range(pybullet.getNumJoints(body, physicsClientId=client))
-        names = [pybullet.getJointInfo(body, link, physicsClientId=client)[1].decode() for link in links]
-        self._joints = tuple(names.index(name) for name in JOINTS)
-        for link in links:
+        flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_MATERIAL_COLORS_FROM_MTL
+        body = load_urdf(planar_urdf(robot_file()), flags, client)
+        for link in links_of(body, client).values():
             pybullet.setCollisionFilterGroupMask(
                 body, link, _ROBOT_GROUP, _WORLD_GROUP | _MAP_GROUP, physicsClientId=client
             )
             pybullet.changeDynamics(
                 body, link, linearDamping=0.0, angularDamping=0.0, jointDamping=0.0, physicsClientId=client
             )
-        for joint, value in zip(self._joints, (start.x, start.y, start.yaw), strict=True):
-            pybullet.resetJointState(body, joint, value, physicsClientId=client)
-        return int(body)
-
-
-def _connect(gui: bool) -> int:
-    """Return a PyBullet client, with a window or without."""
-    if gui:
-        _check_display()
-    client = int(pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT))
-    if client < 0:
-        raise PhysicsError("PyBullet does not start; run without its window (gui:=false)")
-    return client
-
-
-def _check_display() -> None:
-    """Raise PhysicsError where no X display answers; PyBullet itself would end the process."""
-    try:
-        x11 = ctypes.CDLL("libX11.so.6")
-    except OSError as error:
-        raise PhysicsError("PyBullet's window needs libX11: ./mros setup --gui, or gui:=false") from error
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    display = x11.XOpenDisplay(None)
-    if not display:
-        raise PhysicsError("PyBullet's window needs a display, and none answers: set DISPLAY, or use gui:=false")
-    x11.XCloseDisplay(ctypes.c_void_p(display))
+        return body

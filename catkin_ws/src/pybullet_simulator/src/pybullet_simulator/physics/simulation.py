@@ -15,8 +15,9 @@ from robot_formulas.power import BACKING_SPEED, Battery, PowerMeter, check_facto
 from robot_formulas.safety import braking_distance, closest_in_direction, safety_risk
 
 from pybullet_simulator.io.robot_file import RobotFileError
-from pybullet_simulator.physics.physics import Physics, PhysicsError
-from pybullet_simulator.robot.drive import Drive
+from pybullet_simulator.physics.connection import PhysicsError
+from pybullet_simulator.physics.physics import Physics
+from pybullet_simulator.robot.drive import Drive, turned
 from pybullet_simulator.robot.light_sensor import LightSensor
 from pybullet_simulator.robot.motion_sensors import PERFECT, Errors, Imu, Localisation, Odometry, Slip
 from pybullet_simulator.robot.robot import Robot
@@ -255,15 +256,13 @@ class Simulation:
         """Give the motors the velocity of the wheels, changed by their slip."""
         wheels, grip = self._base.advance(self.time_ns, STEP), self._slip.factors
         forward, left = wheels[0] * grip[0], wheels[1] * grip[1]
-        cos, sin = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
-        self.physics.drive(cos * forward - sin * left, sin * forward + cos * left, wheels[2] * grip[2])
+        self.physics.base.drive(*turned(forward, left, self.pose.yaw), wheels[2] * grip[2])
 
     def _read_motion(self) -> None:
         """Take over pose and velocity."""
-        self.pose, (velocity_x, velocity_y, turn) = self.physics.motion()
-        cos, sin = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
+        self.pose, (velocity_x, velocity_y, turn) = self.physics.base.motion()
         self._world_velocity = (velocity_x, velocity_y)
-        self.velocity = (cos * velocity_x + sin * velocity_y, cos * velocity_y - sin * velocity_x, turn)
+        self.velocity = (*turned(velocity_x, velocity_y, -self.pose.yaw), turn)
         self._meter.add_speed(self.velocity[0])
 
     def _measure_motion(self) -> None:
@@ -272,9 +271,7 @@ class Simulation:
         last_pose, (last_x, last_y) = self._measured
         velocity_x, velocity_y = self._world_velocity
         self._measured = (self.pose, self._world_velocity)
-        cos, sin = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
-        change_x, change_y = velocity_x - last_x, velocity_y - last_y
-        change = (cos * change_x + sin * change_y, cos * change_y - sin * change_x)
+        change = turned(velocity_x - last_x, velocity_y - last_y, -self.pose.yaw)
         self.smooth_acceleration = change[0] / duration
         self.acceleration = self._imu.measure(change, math.hypot(velocity_x, velocity_y), duration)
         self._meter.add_acceleration(self.acceleration[0])

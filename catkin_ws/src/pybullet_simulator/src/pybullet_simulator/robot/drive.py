@@ -45,3 +45,9 @@ class Drive:
             change_turn = min(max(target[2] - turn, -limit), limit)
             self._setpoint = (forward + share * change_x, left + share * change_y, turn + change_turn)
         return self._setpoint
+
+
+def turned(x: float, y: float, yaw: float) -> tuple[float, float]:
+    """Return a vector of the plane, turned by an angle in rad: one of base_link in the map, for base_link's yaw."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return cos * x - sin * y, sin * x + cos * y
