@@ -1,0 +1,114 @@
+"""Grasps of cubes from above."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from arm_motion.panda import HOME
+from arm_motion.planning import NoPathError, line
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from arm_motion.scene import Box, Scene
+    from arm_motion.vectors import Array, Vector
+
+APPROACH = 0.10
+"""m; how far above a grasp its way down begins."""
+
+_ALONG = np.radians(46.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Grasp:
+    """A way to take or put a cube from above.
+
+    Attributes:
+        yaw: direction in which the fingers close, rad.
+        position: of the TCP.
+        quaternion: of the TCP.
+        down: path from the posture above to the grasp; backwards it is the way up.
+    """
+
+    yaw: float
+    position: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+    down: tuple[Array, ...]
+
+    @property
+    def above(self) -> Array:
+        """Return the posture above the cube."""
+        return self.down[0]
+
+    @property
+    def joints(self) -> Array:
+        """Return the posture at the cube."""
+        return self.down[-1]
+
+
+def top_down(yaw: float) -> tuple[float, float, float, float]:
+    """Return the orientation of a TCP that points down and whose fingers close in the direction of a yaw."""
+    half = (yaw - np.pi / 2.0) / 2.0  # a hand turned by half a turn about x has its fingers along -y
+    return float(np.cos(half)), float(np.sin(half)), 0.0, 0.0
+
+
+def yaws(yaw: float, along: float | None = None) -> list[float]:
+    """Return the four directions in which fingers can close on a cube, or those two that are near a direction.
+
+    Args:
+        yaw: of the cube.
+        along: a direction; the fingers close within 45 degrees of it or of its opposite.
+    """
+    four = [float(np.remainder(yaw + turn * np.pi / 2.0 + np.pi, 2.0 * np.pi) - np.pi) for turn in range(4)]
+    if along is None:
+        return four
+    return [one for one in four if abs(np.cos(one - along)) >= np.cos(_ALONG)]
+
+
+def grasp(
+    scene: Scene,
+    position: Sequence[float],
+    yaw: float,
+    near: Vector,
+    *,
+    along: float | None = None,
+    held: Box | None = None,
+    approach: float = APPROACH,
+) -> Grasp | None:
+    """Return the free grasp of a cube from above that is nearest to a posture, or None.
+
+    Args:
+        scene: what is in the way. The cube may be part of it unless it is held.
+        position: of the cube's centre.
+        yaw: of the cube.
+        near: the present posture.
+        along: direction in which the fingers have to close, see `yaws`.
+        held: the cube, if it is put there.
+        approach: m, length of the way down.
+    """
+    x, y, z = position
+    found = []
+    for direction in yaws(yaw, along):
+        quaternion = top_down(direction)
+        above = scene.free_inverse((x, y, z + approach), quaternion, near, held)
+        if above is not None:
+            found.append((float(np.linalg.norm(above - np.asarray(near))), direction, quaternion, above))
+    for _, direction, quaternion, above in sorted(found, key=lambda one: one[0]):
+        try:
+            down = line(scene, above, (x, y, z), quaternion, held)
+        except NoPathError:
+            continue
+        return Grasp(direction, (x, y, z), quaternion, tuple(down))
+    return None
+
+
+def reachable(scene: Scene, x: float, y: float, z: float, near: Vector = HOME) -> bool:
+    """Say whether the arm can take a cube there from above, in one of eight directions of the fingers."""
+    return any(
+        grasp(scene, (x, y, z), yaw, near, along=along) is not None
+        for yaw in (0.0, np.pi / 4.0)
+        for along in (yaw, yaw + np.pi / 2.0)
+    )
