@@ -28,7 +28,8 @@ apt-get update >/dev/null
 generic=()
 for file in "$folder"/*.deb; do
   case $(dpkg-deb -f "$file" Package) in
-    mros-demo | mros-move-base | mros-metacontrol-sim | mros-metacontrol-experiments | mros-pybullet-simulator | mros-simulator-msgs) ;;
+    mros-demo | mros-move-base | mros-metacontrol-sim | mros-metacontrol-experiments | mros-pybullet-simulator | mros-simulator-msgs | \
+    mros-control-msgs) ;;
     *) generic+=("$file") ;;
   esac
 done
