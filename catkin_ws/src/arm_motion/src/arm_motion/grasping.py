@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from arm_motion import kinematics
 from arm_motion.panda import HOME
 from arm_motion.planning import NoPathError, line
 
@@ -20,6 +21,7 @@ APPROACH = 0.10
 """m; how far above a grasp its way down begins."""
 
 _ALONG = np.radians(46.0)
+_DIFFERENT = 0.4  # rad, the norm of the difference
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,25 +92,31 @@ def grasp(
         approach: m, length of the way down.
     """
     x, y, z = position
-    found = []
-    for direction in yaws(yaw, along):
-        quaternion = top_down(direction)
-        above = scene.free_inverse((x, y, z + approach), quaternion, near, held)
-        if above is not None:
-            found.append((float(np.linalg.norm(above - np.asarray(near))), direction, quaternion, above))
-    for _, direction, quaternion, above in sorted(found, key=lambda one: one[0]):
-        try:
-            down = line(scene, above, (x, y, z), quaternion, held)
-        except NoPathError:
-            continue
-        return Grasp(direction, (x, y, z), quaternion, tuple(down))
+    near = np.asarray(near, float)
+    found = [
+        (float(np.linalg.norm(above - near)), number, direction, above)
+        for number, direction in enumerate(yaws(yaw, along))
+        for above in _distinct(kinematics.inverse((x, y, z + approach), top_down(direction), near))
+    ]
+    for _, _, direction, above in sorted(found, key=lambda one: one[:2]):
+        if scene.is_free(above, held):
+            try:
+                down = line(scene, above, (x, y, z), top_down(direction), held)
+            except NoPathError:
+                continue
+            return Grasp(direction, (x, y, z), top_down(direction), tuple(down))
     return None
 
 
 def reachable(scene: Scene, x: float, y: float, z: float, near: Vector = HOME) -> bool:
     """Say whether the arm can take a cube there from above, in one of eight directions of the fingers."""
-    return any(
-        grasp(scene, (x, y, z), yaw, near, along=along) is not None
-        for yaw in (0.0, np.pi / 4.0)
-        for along in (yaw, yaw + np.pi / 2.0)
-    )
+    return any(grasp(scene, (x, y, z), yaw, near) is not None for yaw in (0.0, np.pi / 4.0))
+
+
+def _distinct(postures: Array) -> list[Array]:
+    """Return postures that differ from those before."""
+    kept: list[Array] = []
+    for posture in postures:
+        if not kept or np.linalg.norm(np.array(kept) - posture, axis=1).min() >= _DIFFERENT:
+            kept.append(posture)
+    return kept

@@ -25,6 +25,8 @@ FINE = 0.01
 
 _COARSE = 0.04  # rad, steps while planning; halved if the finished path is not free at fine steps
 _ATTEMPTS = 3
+_DEPARTURES, _DEPARTURE_TRIALS = (0.02, 0.05, 0.1, 0.2), 25  # rad of each joint
+_SHORTCUTS = 30  # tries to cut a corner
 _LINE_STEP = 0.005  # m
 _TURN_STEP = 0.05  # rad
 _LARGEST_STEP = 0.2  # rad of a joint from one point of a line to the next: more is a leap
@@ -46,6 +48,8 @@ def plan(
 ) -> list[Array]:
     """Return a short path between two postures that hits nothing.
 
+    An arm that stands nearer to something than the scene's clearance, but does not touch it, leaves first.
+
     The same arguments give the same path if the search ends before its deadline, since nothing else depends on clocks;
     a search that ends by its deadline may succeed on a faster computer. OMPL has one generator of seeds in a process,
     which each call sets anew: calls in several threads at once would disturb each other.
@@ -55,22 +59,27 @@ def plan(
         start: joints, rad.
         goal: joints, rad.
         seed: of the random search.
-        deadline: s of wall time for each of at most three searches.
+        deadline: s of wall time for the search.
         held: what the arm holds, in the TCP's frame.
 
     Raises:
         NoPathError: start or goal is not free, or the search found nothing.
     """
     start, goal = np.asarray(start, float), np.asarray(goal, float)
-    for name, joints in (("start", start), ("goal", goal)):
-        if not scene.is_free(joints, held):
-            raise NoPathError(f"the {name} {_text(joints)} hits something or is beyond a limit: choose another posture")
+    if not scene.is_free(goal, held):
+        raise NoPathError(f"the goal {_text(goal)} hits something or is beyond a limit: choose another posture")
+    before, start = _departure(scene, start, held, seed)
     if is_free(scene, [start, goal], held):
-        return [start, goal]
+        return [*before, start, goal]
+    end = base.timedPlannerTerminationCondition(deadline)
     for attempt in range(_ATTEMPTS):
-        path = _search(scene, start, goal, seed + attempt, deadline, held, _COARSE / 2**attempt)
+        path = _search(scene, start, goal, seed + attempt, end, held, _COARSE / 2**attempt)
+        if path is None:
+            raise NoPathError(
+                f"no path from {_text(start)} to {_text(goal)} in {deadline} s: allow more time, or choose another goal"
+            )
         if is_free(scene, path, held):
-            return path
+            return [*before, *path]
     raise NoPathError(f"no path from {_text(start)} to {_text(goal)} is free at fine steps: use another seed or goal")
 
 
@@ -89,11 +98,8 @@ def line(
         NoPathError: the pose, or part of the line, is out of reach or hits something.
     """
     start = np.asarray(start, float)
-    positions, quaternions = _straight(*kinematics.forward(start), np.asarray(position), np.asarray(quaternion))
-    share = np.linspace(0.0, 1.0, len(positions))
     reason = "is out of reach"
-    tried = [_followed(start, positions, quaternions, start[6] + turn * share) for turn in _LAST_JOINT]
-    ways = [way for way in tried if way is not None]
+    ways = _ways(start, *_straight(*kinematics.forward(start), np.asarray(position), np.asarray(quaternion)))
     for way in sorted(ways, key=_travel):
         path = list(way)
         if is_free(scene, path, held):
@@ -102,13 +108,25 @@ def line(
     raise NoPathError(f"the line to {_text(position)} from {_text(start)} {reason}: choose another posture or pose")
 
 
-def is_free(scene: Scene, path: Sequence[Array], held: Box | None = None) -> bool:
-    """Say whether a path is free at steps of at most 0.01 rad."""
-    return scene.is_free(path[0], held) and all(
-        scene.is_free(first + share * (second - first), held)
+def is_free(scene: Scene, path: Sequence[Array], held: Box | None = None, clearance: float | None = None) -> bool:
+    """Say whether a path is free at steps of at most 0.01 rad, see `Scene.is_free`."""
+    return scene.is_free(path[0], held, clearance) and all(
+        scene.is_free(first + share * (second - first), held, clearance)
         for first, second in pairwise(path)
         for share in _shares(first, second)
     )
+
+
+def _departure(scene: Scene, start: Array, held: Box | None, seed: int) -> tuple[list[Array], Array]:
+    """Return the path to where a search can begin, and that posture: the start itself, or a free one beside it."""
+    if scene.is_free(start, held):
+        return [], start
+    random = np.random.default_rng(seed)
+    for distance in np.repeat(_DEPARTURES, _DEPARTURE_TRIALS):
+        beside = start + random.uniform(-distance, distance, JOINTS)
+        if scene.is_free(beside, held) and is_free(scene, [start, beside], held, clearance=0.0):
+            return [start], beside
+    raise NoPathError(f"the start {_text(start)} hits something or is beyond a limit: move the arm away first")
 
 
 def _shares(first: Array, second: Array) -> Array:
@@ -119,8 +137,14 @@ def _shares(first: Array, second: Array) -> Array:
 
 
 def _search(
-    scene: Scene, start: Array, goal: Array, seed: int, deadline: float, held: Box | None, step: float
-) -> list[Array]:
+    scene: Scene,
+    start: Array,
+    goal: Array,
+    seed: int,
+    end: base.PlannerTerminationCondition,
+    held: Box | None,
+    step: float,
+) -> list[Array] | None:
     util.setLogLevel(util.LOG_NONE)
     util.RNG.setSeed(1 + seed % (2**31 - 2))
     space = base.RealVectorStateSpace(JOINTS)
@@ -139,15 +163,13 @@ def _search(
     setup.setStartAndGoalStates(*states)
     planner = geometric.RRTConnect(setup.getSpaceInformation())
     setup.setPlanner(planner)
-    setup.solve(deadline)
+    setup.solve(end)
     if not setup.haveExactSolutionPath():
-        raise NoPathError(
-            f"no path from {_text(start)} to {_text(goal)} in {deadline} s: allow more time or another goal"
-        )
+        return None
     path = setup.getSolutionPath()
     simplifier = setup.getPathSimplifier()
     simplifier.reduceVertices(path)
-    simplifier.partialShortcutPath(path)
+    simplifier.partialShortcutPath(path, _SHORTCUTS, _SHORTCUTS)
     simplifier.reduceVertices(path)
     simplifier.smoothBSpline(path, 3)
     found = [np.array([path.getState(i)[joint] for joint in range(JOINTS)]) for i in range(path.getStateCount())]
@@ -168,16 +190,19 @@ def _straight(position: Array, quaternion: Array, to: Array, turned: Array) -> t
     return position + share * (to - position), quaternions
 
 
-def _followed(start: Array, positions: Array, quaternions: Array, last: Array) -> Array | None:
-    """Return the way through poses that begins at a posture, or None if it leaps or ends on the way."""
-    choices = kinematics.postures(positions, quaternions, last)
-    way = [start]
-    for options in choices[1:]:
-        steps = np.abs(options - way[-1]).max(axis=1)
-        if np.isnan(steps).all() or np.nanmin(steps) > _LARGEST_STEP:
-            return None
-        way.append(options[int(np.nanargmin(steps))])
-    return np.array(way)
+def _ways(start: Array, positions: Array, quaternions: Array) -> list[Array]:
+    """Return the ways (n, 7) through n poses that begin at a posture and do not leap, by how far joint 7 turns."""
+    count, turns = len(positions), len(_LAST_JOINT)
+    last = start[6] + np.outer(np.linspace(0.0, 1.0, count), _LAST_JOINT).ravel()
+    choices = kinematics.postures(np.repeat(positions, turns, axis=0), np.repeat(quaternions, turns, axis=0), last)
+    way = [np.broadcast_to(start, (turns, JOINTS))]
+    for options in choices.reshape(count, turns, 4, JOINTS)[1:]:
+        steps = np.nan_to_num(np.abs(options - way[-1][:, None]).max(axis=2), nan=np.inf)
+        best = steps.argmin(axis=1)
+        following = options[np.arange(turns), best]
+        following[steps[np.arange(turns), best] > _LARGEST_STEP] = np.nan
+        way.append(following)
+    return [one for one in np.stack(way, axis=1) if not np.isnan(one[-1]).any()]
 
 
 def _travel(way: Array) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 import pybullet
 
 from arm_motion import kinematics
-from arm_motion.panda import FINGERS, JOINTS, LOWER, OPEN, UPPER, URDF
+from arm_motion.panda import FINGERS, JOINTS, LOWER, OPEN, TCP_LINK, UPPER, URDF
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -133,19 +133,26 @@ class Scene:
         found = kinematics.inverse(position, quaternion, near)
         return next((joints for joints in found if self.is_free(joints, held)), None)
 
-    def is_free(self, joints: Vector, held: Box | None = None) -> bool:
-        """Say whether a posture is within the limits, and neither the arm nor what it holds hits anything."""
+    def is_free(self, joints: Vector, held: Box | None = None, clearance: float | None = None) -> bool:
+        """Say whether a posture is within the limits, and neither the arm nor what it holds hits anything.
+
+        Args:
+            joints: rad.
+            held: what the arm holds, in the TCP's frame.
+            clearance: in place of the scene's.
+        """
+        clearance = self.clearance if clearance is None else clearance
         joints = np.asarray(joints, float)
         if (joints < LOWER).any() or (joints > UPPER).any():
             return False
         self._pose(self._arm, joints)
         others = [*self._obstacles, *([] if self._other is None else [self._other])]
-        if any(self._hits(other) for other in others) or self._hits_itself():
+        if any(self._hits(other, clearance) for other in others) or self._hits_itself():
             return False
-        return held is None or not self._held_hits(held, joints, others)
+        return held is None or not self._held_hits(held, others)
 
-    def _hits(self, other: int) -> bool:
-        near = pybullet.getClosestPoints(self._arm, other, self.clearance, physicsClientId=self._client)
+    def _hits(self, other: int, clearance: float) -> bool:
+        near = pybullet.getClosestPoints(self._arm, other, clearance, physicsClientId=self._client)
         return any(point[3] in _MOVING for point in near)
 
     def _hits_itself(self) -> bool:
@@ -154,13 +161,14 @@ class Scene:
             pybullet.getClosestPoints(arm, arm, 0.0, link, other, physicsClientId=client) for link, other in _SELF
         )
 
-    def _held_hits(self, held: Box, joints: Array, others: list[int]) -> bool:
+    def _held_hits(self, held: Box, others: list[int]) -> bool:
         if self._held is None or self._held[0] != held:
             if self._held is not None:
                 pybullet.removeBody(self._held[1], physicsClientId=self._client)
             self._held = held, self._body(Box(_FAR, held.size))
         body = self._held[1]
-        pose = pybullet.multiplyTransforms(*kinematics.forward(joints), held.position, held.quaternion)
+        tcp = pybullet.getLinkState(self._arm, TCP_LINK, computeForwardKinematics=True, physicsClientId=self._client)
+        pose = pybullet.multiplyTransforms(tcp[4], tcp[5], held.position, held.quaternion)
         pybullet.resetBasePositionAndOrientation(body, *pose, self._client)
         if any(pybullet.getClosestPoints(body, other, -TOUCH, physicsClientId=self._client) for other in others):
             return True
