@@ -14,6 +14,7 @@ from pybullet_simulator.world.cell import (
     BLOCK_SIZE,
     BOARD_SIZE,
     BOARD_THICKNESS,
+    FLOOR_SIZE,
     TABLE_SIZE,
     TAGS,
 )
@@ -31,6 +32,7 @@ _TABLE = (0.62, 0.64, 0.66, 1.0)
 _BLOCK = (0.80, 0.62, 0.40, 1.0)
 _OBSTACLE = (0.75, 0.15, 0.15, 1.0)
 _BOARD = (0.30, 0.30, 0.30, 1.0)
+_SPECK = 1e-4
 _FRICTION = 0.7
 """Of every thing; two of them have a coefficient of 0.5, wood on wood."""
 
@@ -38,18 +40,23 @@ _FRICTION = 0.7
 class CellBodies:
     """What is in the cell beside the robot. Bodies are PyBullet's numbers."""
 
-    def __init__(self, blocks: Mapping[str, BodyPose], client: int) -> None:
-        """Build floor, table, tag boards and blocks."""
+    def __init__(self, blocks: Mapping[str, BodyPose], client: int, *, see_floor: bool) -> None:
+        """Build blocks, tag boards, table and floor: what an earlier body hides is not shaded.
+
+        Args:
+            blocks: where they lie.
+            client: PyBullet's.
+            see_floor: draw the floor; it takes time in each image.
+        """
         self._client = client
-        half = TABLE_SIZE[2] / 2.0
-        self._add((6.0, 6.0, 1.0), (0.0, 0.0, -0.5), _UPRIGHT, _FLOOR)
-        self._add(TABLE_SIZE, (0.0, 0.0, half), _UPRIGHT, _TABLE)
-        for tag in TAGS:
-            self._add_tag(tag)
         self.blocks = {
             name: self._add(BLOCK_SIZE, position, quaternion, _BLOCK, BLOCK_MASS)
             for name, (position, quaternion) in blocks.items()
         }
+        for tag in TAGS:
+            self._add_tag(tag)
+        self._add(TABLE_SIZE, (0.0, 0.0, TABLE_SIZE[2] / 2.0), _UPRIGHT, _TABLE)
+        self._add(FLOOR_SIZE, (0.0, 0.0, -FLOOR_SIZE[2] / 2.0), _UPRIGHT, _FLOOR if see_floor else None)
         self.obstacles: dict[str, int] = {}
 
     def pose(self, body: int) -> BodyPose:
@@ -70,15 +77,17 @@ class CellBodies:
         size: Vector3,
         position: Vector3,
         quaternion: Quaternion,
-        colour: tuple[float, float, float, float],
+        colour: tuple[float, float, float, float] | None,
         mass: float = 0.0,
     ) -> int:
+        """Add a box; without a colour it cannot be seen."""
         half = [edge / 2.0 for edge in size]
         client = self._client
+        seen = half if colour else [_SPECK] * 3  # without a visual shape, PyBullet draws the other one
         body = pybullet.createMultiBody(
             mass,
             pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client),
-            pybullet.createVisualShape(pybullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client),
+            pybullet.createVisualShape(pybullet.GEOM_BOX, halfExtents=seen, rgbaColor=colour, physicsClientId=client),
             position,
             quaternion,
             physicsClientId=client,
@@ -89,19 +98,22 @@ class CellBodies:
     def _add_tag(self, tag: Tag) -> None:
         """Put a board up, and its picture on the board's face."""
         client = self._client
-        half = BOARD_SIZE / 2.0
+        half, depth = BOARD_SIZE / 2.0, BOARD_THICKNESS
         collision = pybullet.createCollisionShape(
             pybullet.GEOM_BOX,
-            halfExtents=(BOARD_THICKNESS / 2.0, half, half),
-            collisionFramePosition=(BOARD_THICKNESS / 2.0, 0.0, 0.0),
+            halfExtents=(depth / 2.0, half, half),
+            collisionFramePosition=(depth / 2.0, 0.0, 0.0),
             physicsClientId=client,
         )
+        corners = ((half, half), (-half, half), (-half, -half), (half, -half))  # y, z of the face, from the upper left
+        front = [(0.0, y, z) for y, z in corners]
+        back = [(depth, y, z) for y, z in corners]
         face = pybullet.createVisualShape(
             pybullet.GEOM_MESH,
-            vertices=[(0.0, half, half), (0.0, -half, half), (0.0, -half, -half), (0.0, half, -half)],
-            indices=[0, 2, 1, 0, 3, 2],
-            uvs=[(0.0, 1.0), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0)],
-            normals=[(-1.0, 0.0, 0.0)] * 4,
+            vertices=front + back,
+            indices=[0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7],
+            uvs=[(0.0, 1.0), (1.0, 1.0), (1.0, 0.0), (0.0, 0.0), *[(0.01, 0.01)] * 4],  # the back is blank paper
+            normals=[(-1.0, 0.0, 0.0)] * 4 + [(1.0, 0.0, 0.0)] * 4,
             rgbaColor=(1.0, 1.0, 1.0, 1.0),
             physicsClientId=client,
         )

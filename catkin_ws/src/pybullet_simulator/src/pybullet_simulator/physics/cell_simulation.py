@@ -15,7 +15,7 @@ from pybullet_simulator.io.manipulator_file import planar_manipulator_urdf
 from pybullet_simulator.physics.arm import Arm, Contact
 from pybullet_simulator.physics.cell_bodies import CellBodies
 from pybullet_simulator.physics.connection import connect, disconnect
-from pybullet_simulator.physics.mast_view import render
+from pybullet_simulator.physics.mast_view import MastView
 from pybullet_simulator.physics.physics import GRAVITY
 from pybullet_simulator.physics.sliding_base import SlidingBase, links_of, load_urdf
 from pybullet_simulator.robot.drive import Drive, turned
@@ -74,9 +74,10 @@ class CellSimulation:
         pybullet.setTimeStep(STEP, physicsClientId=client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
         pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=client)
-        self._bodies = CellBodies(scatter_blocks(seed), client)
-        self._blocks = frozenset(self._bodies.blocks.values())
         self._robot = load_urdf(planar_manipulator_urdf(), pybullet.URDF_USE_SELF_COLLISION, client)
+        self._bodies = CellBodies(scatter_blocks(seed), client, see_floor=gui)
+        self._blocks = frozenset(self._bodies.blocks.values())
+        self._view = MastView(MAST_CAMERA, client)
         links = links_of(self._robot, client)
         self._base = SlidingBase(self._robot, HOME, _base_forces(), client)
         self.arms: Mapping[str, Arm] = {mount.name: Arm(mount, self._robot, links, client) for mount in ARMS}
@@ -184,7 +185,7 @@ class CellSimulation:
             Linear light, (480, 640, 3) with 1 for white paper in full light, and depth along the optical axis,
             (480, 640) in m with noise, 0 where there is none.
         """
-        light, depth = render(MAST_CAMERA, self._pose, self.client)
+        light, depth = self._view.render(self._pose)
         within = (depth >= MAST_CAMERA.range_min) & (depth <= MAST_CAMERA.range_max)
         measured = measure_depth(np.where(within, depth, np.float32(0.0)), 1.0, DEPTH_NOISE, self._rng)
         return light * np.float32(self._light), np.where(within, measured, np.float32(0.0))

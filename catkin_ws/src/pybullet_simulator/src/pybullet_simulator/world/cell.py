@@ -21,6 +21,7 @@ Quaternion = tuple[float, float, float, float]
 """x, y, z, w."""
 BodyPose = tuple[Vector3, Quaternion]
 
+FLOOR_SIZE: Vector3 = (20.0, 20.0, 1.0)
 TABLE_SIZE: Vector3 = (0.8, 1.6, 0.40)
 """m; an arm on the base reaches the near half of its top."""
 TABLE_TOP = TABLE_SIZE[2]
