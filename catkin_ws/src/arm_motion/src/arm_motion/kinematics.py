@@ -6,7 +6,7 @@ So all postures of a pose are found by a scan of the last joint: nothing is iter
 bad first guess, and the result is exact.
 
 PyBullet's own solver is no substitute: of 300 poses of a hand downwards over a table, it reached 227 within 1 mm and
-the joint limits in up to four attempts.
+the joint limits in up to four attempts; the closed form reaches all 300 (decision 35).
 
 Poses are those of the tool centre point (TCP, panda_grasptarget between the fingertips) in the arm's base frame
 (link0). Lengths are in m, angles in rad, quaternions are (x, y, z, w).

@@ -5,8 +5,7 @@ each corner becomes a parabola that stays within 0.01 rad of it. Along the round
 limited by the velocity of each joint, by its acceleration where the path bends, and by the acceleration that the bend
 leaves to become faster and slower.
 
-The library toppra does the same and is a little faster at corners. It is not used because it imports matplotlib's
-pyplot and scipy's interpolation: 2.2 s on a loaded machine, on which OMPL takes 0.1 s.
+The library toppra finds the same times, but its import takes 1.2 s of CPU, and that of OMPL 0.04 s (decision 35).
 """
 
 from __future__ import annotations
