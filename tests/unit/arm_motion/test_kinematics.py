@@ -3,7 +3,7 @@
 import numpy as np
 import pybullet
 import pytest
-from arm_motion.kinematics import forward, inverse, matrix_of, quaternion_of
+from arm_motion.kinematics import UPRIGHT, forward, inverse, matrix_of, quaternion_of
 from arm_motion.panda import HOME, JOINTS, LOWER, TCP_LINK, UPPER, URDF
 from hypothesis import given
 from hypothesis import strategies as st
@@ -46,14 +46,17 @@ def test_every_posture_found_reaches_the_pose_within_the_limits(joints, near):
         assert (found >= LOWER).all() and (found <= UPPER).all()
 
 
-@given(joints=postures.filter(lambda joints: joints[3] < -0.5 and abs(joints[1]) > 0.01))
+@given(
+    joints=postures.map(lambda joints: 0.98 * joints + 0.02 * HOME).filter(lambda q: q[3] < -0.5 and abs(q[1]) > 0.01)
+)
 def test_a_bent_arm_finds_its_own_posture(joints):
     assert np.allclose(inverse(*forward(joints), joints)[0], joints, atol=1e-4)
 
 
 @given(near=postures, joints=postures)
 def test_nearest_postures_come_first(near, joints):
-    distances = np.linalg.norm(inverse(*forward(joints), near) - near, axis=1)
+    found = inverse(*forward(joints), near)
+    distances = np.linalg.norm(found[np.abs(found[:, 1]) > UPRIGHT] - near, axis=1)
     assert (np.diff(distances) >= 0.0).all()
 
 

@@ -53,7 +53,7 @@ class Grasp:
 
 def top_down(yaw: float) -> tuple[float, float, float, float]:
     """Return the orientation of a TCP that points down and whose fingers close in the direction of a yaw."""
-    half = (yaw - np.pi / 2.0) / 2.0  # a hand turned by half a turn about x has its fingers along -y
+    half = (yaw + np.pi / 2.0) / 2.0  # half a turn about an axis mirrors the fingers' direction, y, in that axis
     return float(np.cos(half)), float(np.sin(half)), 0.0, 0.0
 
 
@@ -96,6 +96,7 @@ def grasp(
     found = [
         (float(np.linalg.norm(above - near)), number, direction, above)
         for number, direction in enumerate(yaws(yaw, along))
+        if scene.free_inverse((x, y, z), top_down(direction), near, held) is not None
         for above in _distinct(kinematics.inverse((x, y, z + approach), top_down(direction), near))
     ]
     for _, _, direction, above in sorted(found, key=lambda one: one[:2]):

@@ -6,7 +6,7 @@ So all postures of a pose are found by a scan of the last joint: nothing is iter
 bad first guess, and the result is exact.
 
 PyBullet's own solver is no substitute: of 300 poses of a hand downwards over a table, it reached 227 within 1 mm and
-the joint limits in up to four attempts.
+the joint limits in up to four attempts; the closed form reaches all 300 (decision 35).
 
 Poses are those of the tool centre point (TCP, panda_grasptarget between the fingertips) in the arm's base frame
 (link0). Lengths are in m, angles in rad, quaternions are (x, y, z, w).
@@ -22,6 +22,9 @@ from arm_motion.panda import LOWER, UPPER
 
 if TYPE_CHECKING:
     from arm_motion.vectors import Array, Vector
+
+UPRIGHT = 0.1
+"""rad of joint 2; less is an upright upper arm."""
 
 _SHOULDER_HEIGHT = 0.333
 _UPPER_ARM, _FOREARM, _ELBOW = 0.316, 0.384, 0.0825  # the elbow's axis is beside both
@@ -64,7 +67,9 @@ def forward(joints: Vector) -> tuple[Array, Array]:
 def inverse(position: Vector, quaternion: Vector, near: Vector) -> Array:
     """Return the postures of a pose, those nearest to the posture `near` first.
 
-    Joint 7 is scanned in steps of 0.05 rad from its angle in `near`. All limits of joints are kept.
+    Joint 7 is scanned in steps of 0.05 rad from its angle in `near`. All limits of joints are kept. Where the upper arm
+    is upright, joints 1 and 3 have the same axis, and the arm hardly moves on from there: such a posture counts as
+    twice as far.
 
     Returns:
         joints (n, 7); none if the pose is out of reach.
@@ -72,7 +77,8 @@ def inverse(position: Vector, quaternion: Vector, near: Vector) -> Array:
     last = near[6] + _STEP * np.arange(np.ceil((LOWER[6] - near[6]) / _STEP), (UPPER[6] - near[6]) / _STEP)
     found = postures(np.asarray(position)[None], np.asarray(quaternion)[None], last).reshape(-1, 7)
     found = found[~np.isnan(found[:, 0])]
-    return found[np.argsort(np.linalg.norm(found - np.asarray(near), axis=1), kind="stable")]
+    distances = np.linalg.norm(found - np.asarray(near), axis=1) * np.where(np.abs(found[:, 1]) < UPRIGHT, 2.0, 1.0)
+    return found[np.argsort(distances, kind="stable")]
 
 
 def postures(positions: Array, quaternions: Array, last: Array) -> Array:
@@ -105,7 +111,7 @@ def _postures(positions: Array, quaternions: Array, last: Array) -> Array:
     at_wrist = (np.pi / 2.0 - _FORE_ANGLE) + _angle(_ELBOW_TO_WRIST, distance, _SHOULDER_TO_ELBOW)
     along, across = (to_shoulder * x6).sum(1), (to_shoulder * y6).sum(1)
     middle = np.arctan2(along, across)
-    half = np.arccos(-distance * np.cos(at_wrist) / np.hypot(along, across))
+    half = _arccos(-distance * np.cos(at_wrist) / np.hypot(along, across))
     frame6 = np.stack([x6, y6, np.cross(x6, y6)], axis=-1)
     found = []
     for q6 in (middle + half, middle - half):
@@ -167,7 +173,12 @@ def _turn(angles: Array) -> Array:
 
 def _angle(side: Array | float, other: Array | float, opposite: Array | float) -> Array:
     """Return the angle between two sides of a triangle, NaN if there is no such triangle."""
-    return np.arccos((side**2 + other**2 - opposite**2) / (2.0 * side * other))
+    return _arccos((side**2 + other**2 - opposite**2) / (2.0 * side * other))
+
+
+def _arccos(cosine: Array | float) -> Array:
+    """Return the angle of a cosine, NaN if it is larger than 1 by more than rounding."""
+    return np.arccos(np.where(np.abs(cosine) < 1.0 + _ROUNDING**2, np.clip(cosine, -1.0, 1.0), np.nan))
 
 
 def _wrapped(angle: Array) -> Array:

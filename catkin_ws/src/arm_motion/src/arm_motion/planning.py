@@ -29,7 +29,7 @@ _DEPARTURES, _DEPARTURE_TRIALS = (0.02, 0.05, 0.1, 0.2), 25  # rad of each joint
 _SHORTCUTS = 30  # tries to cut a corner
 _LINE_STEP = 0.005  # m
 _TURN_STEP = 0.05  # rad
-_LARGEST_STEP = 0.2  # rad of a joint from one point of a line to the next: more is a leap
+_LARGEST_STEP = 0.12  # rad of a joint from one point of a line to the next: more is a leap
 _LAST_JOINT = np.array(sorted((step * 0.1 for step in range(-12, 13)), key=abs))  # rad
 
 
@@ -73,7 +73,7 @@ def plan(
         return [*before, start, goal]
     end = base.timedPlannerTerminationCondition(deadline)
     for attempt in range(_ATTEMPTS):
-        path = _search(scene, start, goal, seed + attempt, end, held, _COARSE / 2**attempt)
+        path = _search(scene, start, goal, seed * _ATTEMPTS + attempt, end, held, _COARSE / 2**attempt)
         if path is None:
             raise NoPathError(
                 f"no path from {_text(start)} to {_text(goal)} in {deadline} s: allow more time, or choose another goal"
@@ -92,17 +92,18 @@ def line(
 ) -> list[Array]:
     """Return a path along which the TCP moves straight, and turns evenly, to a pose.
 
-    Joint 7 turns evenly, too; its angle at the end is chosen so that the joints move little.
+    Joint 7 turns evenly, too; its angle at the end is chosen so that the joints move little. From a few postures, such
+    as one with an upright upper arm, joints would have to leap: that counts as out of reach.
 
     Raises:
         NoPathError: the pose, or part of the line, is out of reach or hits something.
     """
     start = np.asarray(start, float)
-    reason = "is out of reach"
-    ways = _ways(start, *_straight(*kinematics.forward(start), np.asarray(position), np.asarray(quaternion)))
-    for way in sorted(ways, key=_travel):
+    reason = "is out of reach, or beyond the limits of the joints"
+    poses = _straight(*kinematics.forward(start), np.asarray(position, float), np.asarray(quaternion, float))
+    for way in sorted(_ways(start, *poses), key=_travel):
         path = list(way)
-        if is_free(scene, path, held):
+        if scene.is_free(path[-1], held) and is_free(scene, path, held):
             return path
         reason = "hits something"
     raise NoPathError(f"the line to {_text(position)} from {_text(start)} {reason}: choose another posture or pose")
