@@ -1,0 +1,136 @@
+"""Builds the pyramid: looks, decides, acts, until it stands or nothing can be done. It knows its robot by a protocol.
+
+Nothing is remembered that could not be seen: whoever begins anew, on the same table, goes on with the work.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+from metacontrol_manipulation.handling.handler import Handler, HandlingError
+from metacontrol_manipulation.perception.blocks import find_blocks
+from metacontrol_manipulation.pick_place.actions import Done, Look, MoveBase, Open, Pick, Place, PutDown, Stuck
+from metacontrol_manipulation.pick_place.next_step import Situation, next_step
+from metacontrol_manipulation.pick_place.progress import Progress, acted, perceived
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+    from robot_formulas.geometry import Pose
+
+    from metacontrol_manipulation.handling.deeds import Deed
+    from metacontrol_manipulation.perception.camera import Camera
+    from metacontrol_manipulation.pick_place.actions import Action
+    from metacontrol_manipulation.pick_place.next_step import Design
+
+
+class Robot(Protocol):
+    """What builds: two arms, a base, a camera."""
+
+    @property
+    def joints(self) -> Mapping[str, Sequence[float]]:
+        """The joints of each arm, rad."""
+
+    @property
+    def held(self) -> frozenset[str]:
+        """Arms whose grippers hold a block."""
+
+    @property
+    def working(self) -> frozenset[str]:
+        """Arms that work."""
+
+    @property
+    def cell(self) -> Pose:
+        """Pose of the cell frame in base_link."""
+
+    def depth(self) -> tuple[NDArray[np.float32], Camera]:
+        """Take a depth image, and tell by which camera."""
+
+    def do(self, arm: str, deeds: Sequence[Deed]) -> bool:
+        """Have an arm do something; return whether it has."""
+
+    def move_base(self, y: float) -> bool:
+        """Drive along the table, to y in m of the cell frame; return whether the base is there."""
+
+
+class Building:
+    """One program's work on the pyramid."""
+
+    def __init__(self, robot: Robot, handler: Handler, design: Design, tell: Callable[[Action], None]) -> None:
+        """Begin without knowing anything of the table.
+
+        Args:
+            robot: that builds.
+            handler: plans its motions.
+            design: by which arms, and where the base stands.
+            tell: is called with each action before it begins.
+        """
+        self._robot, self._handler, self._design, self._tell = robot, handler, design, tell
+        self.progress = Progress()
+
+    def run(self, is_wanted: Callable[[], bool] = lambda: True) -> Done | Stuck | None:
+        """Build; return how it ended, None if it is not wanted any more.
+
+        Args:
+            is_wanted: is asked before each action.
+        """
+        self.look(clear=False)
+        while is_wanted():
+            action = next_step(self._situation(), self._design, self._reach)
+            if action is None:
+                return Stuck("nothing is under way, and there is nothing to begin")
+            self._tell(action)
+            if isinstance(action, Done | Stuck):
+                return action
+            self._act(action)
+        return None
+
+    def look(self, *, clear: bool) -> None:
+        """See where the blocks are; `clear`: the arms are out of the way."""
+        depth, camera = self._robot.depth()
+        view = find_blocks(depth, camera, self._robot.cell)
+        self.progress = perceived(self.progress, view, self._base_y(), clear=clear)
+
+    def _act(self, action: Action) -> None:
+        """Do what was decided, and look what came of it."""
+        succeeded = True
+        try:
+            if isinstance(action, Pick | Place | PutDown):
+                deeds = self._handler.deeds(action, self._robot.joints, self._robot.cell, self.progress)
+                succeeded = self._robot.do(action.arm, deeds)
+                if isinstance(action, Pick):
+                    succeeded = succeeded and action.arm in self._robot.held
+            elif isinstance(action, Open):
+                succeeded = self._robot.do(action.arm, self._handler.release(action))
+            elif isinstance(action, MoveBase):
+                succeeded = self._robot.move_base(action.y)
+        except HandlingError:
+            succeeded = False
+        self.progress = acted(self.progress, action, succeeded=succeeded)
+        clear = False
+        if isinstance(action, Look) or not isinstance(action, Pick):
+            clear = self._clear_the_view()
+        self.look(clear=clear)
+
+    def _clear_the_view(self) -> bool:
+        """Have the arms that work go out of the way; return whether they have."""
+        cleared = True
+        for arm in sorted(self._robot.working):
+            try:
+                holds = arm in self._robot.held
+                way = self._handler.away(arm, self._robot.joints, self._robot.cell, self.progress, holds=holds)
+                cleared &= self._robot.do(arm, way)
+            except HandlingError:
+                cleared = False
+        return cleared
+
+    def _situation(self) -> Situation:
+        return Situation(self.progress, self._robot.held, self._robot.working, self._base_y())
+
+    def _base_y(self) -> float:
+        return self._robot.cell.inverse().y
+
+    def _reach(self, arm: str, position: tuple[float, float, float], base_y: float) -> bool:
+        return self._handler.reach(arm, position, base_y, self._robot.cell.inverse().x)

@@ -1,0 +1,206 @@
+"""The robot over ROS, as a program that builds sees it: drivers of arms and grippers, camera, base."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+import actionlib
+import numpy as np
+import rospy
+from control_msgs.msg import (
+    FollowJointTrajectoryAction,
+    FollowJointTrajectoryGoal,
+    GripperCommand,
+    GripperCommandAction,
+    GripperCommandGoal,
+)
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from node_kit.ros.action_server import wait_for_server
+from pybullet_simulator.messages.arms import FINGERS, joint_names
+from pybullet_simulator.messages.cell import ImageError, read_floats
+from pybullet_simulator.robot.manipulator import ARMS, MAST_CAMERA
+from sensor_msgs.msg import CameraInfo, Image, JointState
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from metacontrol_manipulation.handling.deeds import Move
+from metacontrol_manipulation.perception.camera import Camera, mounted
+from metacontrol_manipulation.pick_place.pyramid import SIDE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from arm_motion.timing import Trajectory
+    from numpy.typing import NDArray
+    from robot_formulas.geometry import Pose
+
+    from metacontrol_manipulation.handling.deeds import Deed
+
+_HELD = 0.008
+"""m by which the fingers may be nearer or farther than a block's edge while they hold it."""
+_LARGE = 1 << 23
+_PATIENCE = 10.0
+"""s of ROS time for an image, and for an arm's driver after the end of its motion."""
+
+
+class RobotError(RuntimeError):
+    """The robot does not answer; the message says which part."""
+
+
+class RosRobot:
+    """A Robot (see `pick_place.building`). Where the cell is, and how the base moves, the program says."""
+
+    def __init__(self, cell: Callable[[], Pose], move_base: Callable[[float], bool]) -> None:
+        """Connect to the drivers.
+
+        Args:
+            cell: returns the pose of the cell frame in base_link.
+            move_base: drives to y in m along the table; returns whether the base is there.
+
+        Raises:
+            RobotError: a driver is not there.
+        """
+        self._cell, self._move_base = cell, move_base
+        self._news = threading.Condition()
+        self._joints: dict[str, tuple[float, ...]] = {}
+        self._widths: dict[str, float] = {}
+        self._stopped: set[str] = set()
+        self._image: Image | None = None
+        self._camera: Camera | None = None
+        self._arms = {mount.name: _Clients(mount.name) for mount in ARMS}
+        self._inputs = (
+            rospy.Subscriber("joint_states", JointState, self._on_joints, queue_size=10),
+            rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=50),
+            rospy.Subscriber("camera/camera_info", CameraInfo, self._on_info, queue_size=1),
+        )
+        self._camera = Camera.with_field_of_view(
+            MAST_CAMERA.width, MAST_CAMERA.height, MAST_CAMERA.field_of_view, _camera_pose()
+        )
+        self._wait(lambda: len(self._joints) == len(ARMS), "no driver of an arm tells its joints")
+
+    @property
+    def joints(self) -> Mapping[str, Sequence[float]]:
+        """The joints of each arm, rad."""
+        return dict(self._joints)
+
+    @property
+    def held(self) -> frozenset[str]:
+        """Arms whose fingers are as far apart as a block is wide."""
+        return frozenset(name for name, width in self._widths.items() if abs(width - SIDE) <= _HELD)
+
+    @property
+    def working(self) -> frozenset[str]:
+        """Arms that are not stopped, as their drivers say."""
+        return frozenset(self._arms) - self._stopped
+
+    @property
+    def cell(self) -> Pose:
+        """Pose of the cell frame in base_link."""
+        return self._cell()
+
+    def depth(self) -> tuple[NDArray[np.float32], Camera]:
+        """Take a depth image that is newer than this call.
+
+        Raises:
+            RobotError: none comes.
+        """
+        since = rospy.Time.now()
+        self._image = None
+        images = rospy.Subscriber("camera/depth/image_raw", Image, self._on_image, queue_size=1, buff_size=_LARGE)
+        try:
+            self._wait(lambda: self._image is not None and self._image.header.stamp >= since, "no depth image comes")
+            return read_floats(self._image, 1), self._camera  # type: ignore[arg-type, return-value]
+        except ImageError as error:
+            raise RobotError(str(error)) from error
+        finally:
+            images.unregister()
+
+    def do(self, arm: str, deeds: Sequence[Deed]) -> bool:
+        """Have an arm do something; return whether it has."""
+        clients = self._arms[arm]
+        for deed in deeds:
+            done = clients.follow(deed.trajectory) if isinstance(deed, Move) else clients.grip(deed.width, deed.force)
+            if not done:
+                return False
+        rospy.sleep(0.1)  # ROS time, for the joints' last state to arrive
+        return True
+
+    def move_base(self, y: float) -> bool:
+        """Drive along the table."""
+        return self._move_base(y)
+
+    # Callbacks
+
+    def _on_joints(self, message: JointState) -> None:
+        known = dict(zip(message.name, message.position, strict=False))
+        for arm in self._arms:
+            names = joint_names(arm)
+            if all(name in known for name in names):
+                with self._news:
+                    self._joints[arm] = tuple(known[name] for name in names)
+                    self._widths[arm] = sum(known[f"{arm}_panda_finger_joint{i}"] for i in range(1, FINGERS + 1))
+                    self._news.notify_all()
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            arm, _, task = status.name.lstrip("/").partition("_arm: ")
+            if task == "safety" and arm in self._arms:
+                (self._stopped.add if status.level == DiagnosticStatus.ERROR else self._stopped.discard)(arm)
+
+    def _on_image(self, message: Image) -> None:
+        with self._news:
+            self._image = message
+            self._news.notify_all()
+
+    def _on_info(self, message: CameraInfo) -> None:
+        self._camera = Camera.from_info(message.width, message.height, message.K, _camera_pose())
+
+    def _wait(self, condition: Callable[[], bool], problem: str) -> None:
+        """Wait in ROS time for something that a callback tells."""
+        end = rospy.get_time() + _PATIENCE
+        with self._news:
+            while not condition():
+                if rospy.is_shutdown() or rospy.get_time() > end:
+                    raise RobotError(f"{problem} for {_PATIENCE:g} s: see whether its driver runs")
+                self._news.wait(0.1)
+
+
+class _Clients:
+    """The actions of one arm's driver."""
+
+    def __init__(self, arm: str) -> None:
+        self._arm = arm
+        self._motion = actionlib.SimpleActionClient(
+            f"{arm}_arm/follow_joint_trajectory", FollowJointTrajectoryAction
+        )
+        self._gripper = actionlib.SimpleActionClient(f"{arm}_arm/gripper_command", GripperCommandAction)
+        for client in (self._motion, self._gripper):
+            if not wait_for_server(client, _PATIENCE):
+                raise RobotError(f"the driver of the {arm} arm is not there: start it")
+
+    def follow(self, trajectory: Trajectory) -> bool:
+        goal = FollowJointTrajectoryGoal()
+        goal.trajectory.joint_names = joint_names(self._arm)
+        goal.trajectory.points = [
+            JointTrajectoryPoint(positions=p, velocities=v, time_from_start=rospy.Duration.from_sec(t))
+            for t, p, v in zip(
+                trajectory.times.tolist(), trajectory.positions.tolist(), trajectory.velocities.tolist(), strict=True
+            )
+        ]
+        return self._send(self._motion, goal, trajectory.duration)
+
+    def grip(self, width: float, force: float) -> bool:
+        return self._send(self._gripper, GripperCommandGoal(GripperCommand(width, force)), 2.0)
+
+    @staticmethod
+    def _send(client: Any, goal: Any, duration: float) -> bool:
+        client.send_goal(goal)
+        if not client.wait_for_result(rospy.Duration.from_sec(duration + _PATIENCE)):
+            client.cancel_goal()
+            return False
+        return bool(client.get_state() == actionlib.GoalStatus.SUCCEEDED)
+
+
+def _camera_pose() -> NDArray[np.float64]:
+    view = MAST_CAMERA
+    return mounted(view.x, view.y, view.z, view.pitch)

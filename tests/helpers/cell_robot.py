@@ -1,0 +1,96 @@
+"""The simulated mobile manipulator without ROS, as a program that builds the pyramid sees it."""
+
+import math
+from functools import cached_property
+
+from arm_motion.timing import Trajectory
+from metacontrol_manipulation.handling.deeds import Move
+from metacontrol_manipulation.perception.camera import Camera, mounted
+from pybullet_simulator.physics.cell_simulation import STEP, CellSimulation
+from pybullet_simulator.robot.manipulator import MAST_CAMERA
+from robot_formulas.geometry import Pose
+
+FORCE_LIMIT = 60.0
+
+
+class CellRobot:
+    """Steps the simulation while it acts. It knows by the truth where the cell is."""
+
+    def __init__(self, seed=0):
+        self.simulation = CellSimulation(seed)
+        self.blocked = set()
+        self.on_step = lambda: None
+        for _ in range(40):
+            self.step()
+
+    def close(self):
+        self.simulation.close()
+
+    def step(self):
+        self.on_step()
+        self.simulation.step()
+
+    @property
+    def joints(self):
+        return {name: arm.positions for name, arm in self.simulation.arms.items()}
+
+    @property
+    def held(self):
+        return frozenset(name for name, arm in self.simulation.arms.items() if arm.is_holding)
+
+    @property
+    def working(self):
+        return frozenset(self.simulation.arms) - self.blocked
+
+    @property
+    def cell(self):
+        return Pose(*self.simulation.base_pose).inverse()
+
+    @cached_property
+    def camera(self):
+        view = MAST_CAMERA
+        pose = mounted(view.x, view.y, view.z, view.pitch)
+        return Camera.with_field_of_view(view.width, view.height, view.field_of_view, pose)
+
+    def depth(self):
+        return self.simulation.look()[1], self.camera
+
+    def do(self, arm, deeds):
+        for deed in deeds:
+            if isinstance(deed, Move):
+                if not self._follow(arm, deed.trajectory):
+                    return False
+            else:
+                self.simulation.arms[arm].command_gripper(deed.width, deed.force)
+                for _ in range(round(0.5 / STEP)):
+                    self.step()
+        return True
+
+    def move_base(self, y):
+        until = self.simulation.time + 30.0
+        while self.simulation.time < until:
+            cell = self.cell.inverse()
+            error = y - cell.y
+            if abs(error) < 0.003 and abs(self.simulation.base_velocity[1]) < 0.01:
+                return True
+            self.simulation.drive(0.0, max(-0.3, min(0.3, 1.5 * error)), -cell.yaw)
+            self.step()
+        return False
+
+    def _follow(self, name, trajectory: Trajectory):
+        if name in self.blocked:
+            return False
+        arm, began = self.simulation.arms[name], self.simulation.time
+        while (elapsed := self.simulation.time - began) < trajectory.duration + 0.15:
+            arm.command(trajectory.at(elapsed)[0])
+            self.step()
+            if arm.contact_force > FORCE_LIMIT:
+                arm.command(arm.positions)
+                self.blocked.add(name)
+                return False
+        return True
+
+
+def errors(simulation, slots):
+    """Return, for each slot, how far in m the nearest block is from it."""
+    return {slot: min(math.dist(slot.position, position) for position, _ in simulation.blocks.values()) for slot in slots}
