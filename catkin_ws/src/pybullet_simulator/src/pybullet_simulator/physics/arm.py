@@ -67,7 +67,7 @@ class Arm:
         velocities: rad/s.
         efforts: Nm, of the servos.
         gripper_width: m between the fingers.
-        contact_force: N that the arm's links feel from anything but a held block, averaged over 20 ms.
+        contact_force: N, see below.
     """
 
     def __init__(self, mount: ArmMount, body: int, links: Mapping[str, int], client: int) -> None:
@@ -106,7 +106,7 @@ class Arm:
 
     @property
     def contact_force(self) -> float:
-        """N that the arm's links feel from anything but a held block, averaged over 20 ms."""
+        """N by which anything else presses on the arm's links and on a held block, averaged over 20 ms."""
         return sum(self._forces) / len(self._forces)
 
     def command(self, positions: Sequence[float]) -> None:
@@ -147,7 +147,14 @@ class Arm:
         own = [contact for contact in contacts if contact.link in self.links]
         touched = [{contact.body for contact in own if contact.link == finger} & blocks for finger in self.fingers]
         self.held = min(touched[0] & touched[1], default=None)
-        self._forces.append(sum(contact.force for contact in own if contact.body != self.held))
+        self._forces.append(sum(contact.force for contact in own if contact.body != self.held) + self._on_held())
+
+    def _on_held(self) -> float:
+        """Return the forces on a held block from anything but this arm, N."""
+        if self.held is None:
+            return 0.0
+        points = pybullet.getContactPoints(self.held, physicsClientId=self._client)
+        return sum(point[9] for point in points if point[2] != self._body or point[4] not in self.links)
 
     def _aim(self, joint: int, limit: _Limit, position: float, effort: float) -> None:
         pybullet.setJointMotorControl2(

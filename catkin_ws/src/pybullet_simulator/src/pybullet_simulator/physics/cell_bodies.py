@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from pybullet_simulator.world.cell import BodyPose, Quaternion, Tag, Vector3
 
-OBSTACLE_MASS = 50.0
+OBSTACLE_MASS = 200.0
 """kg; more than an arm can push aside."""
 _UPRIGHT: Quaternion = (0.0, 0.0, 0.0, 1.0)
 _FLOOR = (0.45, 0.47, 0.45, 1.0)
@@ -35,6 +35,7 @@ _BOARD = (0.30, 0.30, 0.30, 1.0)
 _SPECK = 1e-4
 _FRICTION = 0.7
 """Of every thing; two of them have a coefficient of 0.5, wood on wood."""
+_SPINNING_FRICTION = 0.001
 
 
 class CellBodies:
@@ -92,7 +93,15 @@ class CellBodies:
             quaternion,
             physicsClientId=client,
         )
-        pybullet.changeDynamics(body, -1, lateralFriction=_FRICTION, spinningFriction=0.001, physicsClientId=client)
+        # Without anchors, the solver's small errors let a pyramid creep by 2 mm in a minute.
+        pybullet.changeDynamics(
+            body,
+            -1,
+            lateralFriction=_FRICTION,
+            spinningFriction=_SPINNING_FRICTION,
+            frictionAnchor=1,
+            physicsClientId=client,
+        )
         return int(body)
 
     def _add_tag(self, tag: Tag) -> None:

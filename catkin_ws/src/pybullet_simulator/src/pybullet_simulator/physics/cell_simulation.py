@@ -14,7 +14,7 @@ import pybullet
 from pybullet_simulator.io.manipulator_file import planar_manipulator_urdf
 from pybullet_simulator.physics.arm import Arm, Contact
 from pybullet_simulator.physics.cell_bodies import CellBodies
-from pybullet_simulator.physics.connection import connect, disconnect
+from pybullet_simulator.physics.connection import connect, disconnect, look_at
 from pybullet_simulator.physics.mast_view import MastView
 from pybullet_simulator.physics.physics import GRAVITY
 from pybullet_simulator.physics.sliding_base import SlidingBase, links_of, load_urdf
@@ -40,6 +40,8 @@ START_NS = 1_000_000_000
 MOTION_STEPS = 4
 """Steps between two updates of odometry and slip: 50 Hz."""
 _DEPTH_STREAM = 21
+_WINDOW = (2.0, -50.0, -30.0, (-0.4, 0.0, 0.5))
+"""From where the window shows the cell: from behind the robot and from its right."""
 _GRIP = 0.5
 """Coefficient of friction of the wheels: with it they hold the base against its arms."""
 _THINGS, _BASE, _FOOT, _LEFT, _RIGHT = 1 | 2, 4, 8, 16, 32
@@ -71,6 +73,8 @@ class CellSimulation:
         """
         self.client = connect(gui)
         client = self.client
+        if gui:
+            look_at(client, *_WINDOW)
         pybullet.setTimeStep(STEP, physicsClientId=client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
         pybullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=client)

@@ -25,6 +25,21 @@ def connect(gui: bool) -> int:
     return client
 
 
+def look_at(client: int, distance: float, yaw: float, pitch: float, middle: tuple[float, float, float]) -> None:
+    """Let the window show a place.
+
+    Args:
+        client: one with a window.
+        distance: m from the place.
+        yaw: deg; 0 looks north.
+        pitch: deg; negative looks down.
+        middle: the place.
+    """
+    pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=client)
+    pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_SHADOWS, 0, physicsClientId=client)
+    pybullet.resetDebugVisualizerCamera(distance, yaw, pitch, middle, physicsClientId=client)
+
+
 def disconnect(client: int) -> None:
     """Free a client's world; it cannot be used any more."""
     if pybullet.isConnected(client):

@@ -10,7 +10,7 @@ import pybullet
 from robot_formulas.geometry import Pose, quaternion_of, yaw_of
 
 from pybullet_simulator.io.robot_file import planar_urdf, robot_file
-from pybullet_simulator.physics.connection import connect, disconnect
+from pybullet_simulator.physics.connection import connect, disconnect, look_at
 from pybullet_simulator.physics.sliding_base import SlidingBase, links_of, load_urdf
 from pybullet_simulator.world.walking import HEIGHT, RADIUS
 from pybullet_simulator.world.world import box_mesh
@@ -195,12 +195,10 @@ class Physics:
 
     def _look_at(self, world: World) -> None:
         """Let the window show the whole floor, seen from above and a little from the south."""
-        pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_GUI, 0, physicsClientId=self.client)
-        pybullet.configureDebugVisualizer(pybullet.COV_ENABLE_SHADOWS, 0, physicsClientId=self.client)
         length, width = world.x_max - world.x_min, world.y_max - world.y_min
         middle = ((world.x_max + world.x_min) / 2.0, (world.y_max + world.y_min) / 2.0 - 0.1 * width, 0.0)
         distance = 0.72 * max(0.75 * length, width)  # the window is 4:3
-        pybullet.resetDebugVisualizerCamera(distance, 0.0, -65.0, middle, physicsClientId=self.client)
+        look_at(self.client, distance, 0.0, -65.0, middle)
 
     def _add_floor(self, world: World) -> int:
         half = ((world.x_max - world.x_min) / 2.0 + 2.0, (world.y_max - world.y_min) / 2.0 + 2.0, 0.5)

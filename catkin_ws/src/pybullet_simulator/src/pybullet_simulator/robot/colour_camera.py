@@ -15,12 +15,12 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-FULL_WELL = 6000.0
-"""Electrons that a pixel holds: a small one, of 2 to 3 um (estimate after data sheets of rolling-shutter sensors)."""
-READ_NOISE = 8.0
-"""Electrons, standard deviation of a reading (the same data sheets)."""
-SENSITIVITY = 1.5e6
-"""Electrons per s that white paper in full light gives a pixel: 3000 in 2 ms, half a well."""
+FULL_WELL = 4000.0
+"""Electrons that a pixel holds: one of 1.4 um, as in the colour cameras of depth sensors (estimate)."""
+READ_NOISE = 25.0
+"""Electrons, standard deviation of a reading: 1.6 steps of the converter at a gain of 1 (estimate, a cheap sensor)."""
+SENSITIVITY = 8e5
+"""Electrons per s that white paper in full light gives a pixel: 1600 in 2 ms."""
 GLARE = 0.01
 """Share of the image's mean light that lens and housing scatter over the whole image (estimate)."""
 _STEPS = 255.0
@@ -40,7 +40,7 @@ class CameraSettings:
 
 
 BRIGHT = CameraSettings(exposure=0.002, gain=1.0)
-"""For a light of 1: white paper is half a well."""
+"""For a light of 1: white paper fills 40 % of a well."""
 DIM = CameraSettings(exposure=0.03, gain=4.0)
 """For a light of 0.03: sixty times as sensitive, as long as 30 images a second leave time for."""
 
