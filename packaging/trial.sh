@@ -29,7 +29,7 @@ generic=()
 for file in "$folder"/*.deb; do
   case $(dpkg-deb -f "$file" Package) in
     mros-demo | mros-move-base | mros-metacontrol-sim | mros-metacontrol-experiments | mros-pybullet-simulator | mros-simulator-msgs | \
-    mros-control-msgs) ;;
+    mros-control-msgs | mros-metacontrol-manipulation) ;;
     *) generic+=("$file") ;;
   esac
 done

@@ -1,0 +1,1 @@
+"""Demonstrator D1: a mobile base with two arms builds a pyramid of blocks."""

@@ -1,0 +1,1 @@
+"""Which block goes where next, by which arm, from what is perceived. Pure."""
