@@ -93,4 +93,6 @@ class CellRobot:
 
 def errors(simulation, slots):
     """Return, for each slot, how far in m the nearest block is from it."""
-    return {slot: min(math.dist(slot.position, position) for position, _ in simulation.blocks.values()) for slot in slots}
+    return {
+        slot: min(math.dist(slot.position, position) for position, _ in simulation.blocks.values()) for slot in slots
+    }

@@ -66,15 +66,14 @@ class RosRobot:
         self._widths: dict[str, float] = {}
         self._stopped: set[str] = set()
         self._image: Image | None = None
-        self._camera: Camera | None = None
         self._arms = {mount.name: _Clients(mount.name) for mount in ARMS}
+        self._camera = Camera.with_field_of_view(
+            MAST_CAMERA.width, MAST_CAMERA.height, MAST_CAMERA.field_of_view, _camera_pose()
+        )
         self._inputs = (
             rospy.Subscriber("joint_states", JointState, self._on_joints, queue_size=10),
             rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=50),
             rospy.Subscriber("camera/camera_info", CameraInfo, self._on_info, queue_size=1),
-        )
-        self._camera = Camera.with_field_of_view(
-            MAST_CAMERA.width, MAST_CAMERA.height, MAST_CAMERA.field_of_view, _camera_pose()
         )
         self._wait(lambda: len(self._joints) == len(ARMS), "no driver of an arm tells its joints")
 
@@ -109,7 +108,7 @@ class RosRobot:
         images = rospy.Subscriber("camera/depth/image_raw", Image, self._on_image, queue_size=1, buff_size=_LARGE)
         try:
             self._wait(lambda: self._image is not None and self._image.header.stamp >= since, "no depth image comes")
-            return read_floats(self._image, 1), self._camera  # type: ignore[arg-type, return-value]
+            return read_floats(self._image, 1), self._camera
         except ImageError as error:
             raise RobotError(str(error)) from error
         finally:
@@ -170,9 +169,7 @@ class _Clients:
 
     def __init__(self, arm: str) -> None:
         self._arm = arm
-        self._motion = actionlib.SimpleActionClient(
-            f"{arm}_arm/follow_joint_trajectory", FollowJointTrajectoryAction
-        )
+        self._motion = actionlib.SimpleActionClient(f"{arm}_arm/follow_joint_trajectory", FollowJointTrajectoryAction)
         self._gripper = actionlib.SimpleActionClient(f"{arm}_arm/gripper_command", GripperCommandAction)
         for client in (self._motion, self._gripper):
             if not wait_for_server(client, _PATIENCE):

@@ -28,7 +28,9 @@ class TwoArmProgram:
             RobotError: a part of the robot is not there.
         """
         parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
-        cell = Pose(*(parameters.number(f"cell_{key}", usual) for key, usual in (("x", 0.95), ("y", 0.0), ("yaw", 0.0))))
+        cell = Pose(
+            *(parameters.number(f"cell_{key}", usual) for key, usual in (("x", 0.95), ("y", 0.0), ("yaw", 0.0)))
+        )
         self._robot = RosRobot(lambda: cell, lambda _: False)
         self._handler = Handler(ARMS)
         self._placed = 0
@@ -42,7 +44,9 @@ class TwoArmProgram:
         except RobotError as error:
             ending = Stuck(str(error))
         placed = len(building.progress.filled)
-        result = BuildPyramidResult(isinstance(ending, Done), placed, ending.reason if isinstance(ending, Stuck) else "")
+        result = BuildPyramidResult(
+            isinstance(ending, Done), placed, ending.reason if isinstance(ending, Stuck) else ""
+        )
         if ending is None:
             self._server.set_preempted(result)
         elif isinstance(ending, Done):
