@@ -55,6 +55,7 @@ def test_loose_blocks_and_filled_slots_of_a_drawn_cell(seed):
     assert_found(view, *cubes)
     assert view.filled == set(SLOTS[:count])
     assert not view.hidden
+    assert not view.unclear
     assert view.seen > 0.85
 
 
@@ -115,7 +116,9 @@ def test_an_arm_is_no_block_and_hides_none_that_is_seen_in_part():
 @pytest.mark.parametrize("height", [0.41, 0.45, 0.50, 0.575, 0.65])
 def test_an_empty_gripper_is_no_block_at_any_height(height):
     tip = (-0.2, 0.4, height)
-    assert not seen(*arm(SHOULDER, (-0.4, 0.35, 0.85), (-0.22, 0.42, height + 0.25), tip)).blocks
+    view = seen(*arm(SHOULDER, (-0.4, 0.35, 0.85), (-0.22, 0.42, height + 0.25), tip))
+    assert not view.blocks
+    assert not view.unclear
 
 
 @pytest.mark.parametrize("height", [0.475, 0.49, 0.525, 0.575, 0.65])
@@ -141,6 +144,20 @@ def test_slots_behind_an_arm_are_hidden_not_empty():
     assert view.hidden == set(SLOTS)
 
 
+def test_a_block_that_leans_on_another_is_unclear():
+    leaning = Box((-0.2, 0.4, 0.4335), (0.05, 0.05, 0.05), 0.0, (0.5, 0.0))
+    for boxes in (
+        [leaning],
+        [cube(-0.145, 0.4), leaning],
+        [*PLACED[:3], Box((-0.255, 0.0, 0.4335), leaning.size, 0.0, leaning.tilt)],
+    ):
+        view = seen(*boxes)
+        assert not view.blocks or len(boxes) == 2
+        assert len(view.unclear) == 1, boxes
+        place = view.unclear[0]
+        assert math.dist((place.x, place.y), boxes[-1].centre[:2]) < 0.04
+
+
 def test_obstacles_are_no_blocks():
     boxes = [Box((-0.2, 0.4, 0.5), (0.1, 0.1, 0.2), 0.3), Box((-0.2, -0.4, 0.43), (0.06, 0.06, 0.06))]
     assert not seen(*boxes).blocks
@@ -148,7 +165,8 @@ def test_obstacles_are_no_blocks():
 
 def test_an_image_without_depth_shows_nothing_and_hides_everything():
     view = find_blocks(np.zeros((480, 640), np.float32), CAMERA, HOME)
-    assert (view.blocks, view.filled, view.hidden, view.seen) == ((), frozenset(), frozenset(SLOTS), 0.0)
+    assert (view.blocks, view.unclear, view.filled, view.seen) == ((), (), frozenset(), 0.0)
+    assert view.hidden == frozenset(SLOTS)
 
 
 def test_yaws_are_within_an_eighth_turn():

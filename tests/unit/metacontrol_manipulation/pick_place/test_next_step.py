@@ -123,6 +123,15 @@ def test_the_base_looks_from_elsewhere_for_blocks_that_an_arm_hides():
     assert isinstance(decide(situation(working=["left"]), one_arm("left")), MoveBase)
 
 
+def test_what_may_be_a_block_is_tried_when_no_other_is_left():
+    leaning = lying(-0.25, 0.3)
+    now = situation()
+    for block, found in ((RIGHT_BLOCK, [RIGHT_BLOCK]), (leaning, [])):
+        view = BlockView(tuple(found), frozenset(), frozenset(), 1.0, (leaning,))
+        progress = perceived(Progress(), view, 0.0, clear=True)
+        assert decide(Situation(progress, now.held, now.working, 0.0)).block == block
+
+
 def test_done_when_all_slots_are_filled():
     assert decide(situation(filled=SLOTS)) == Done()
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from metacontrol_manipulation.perception.clumps import clumps_in
 from metacontrol_manipulation.perception.fitting import DIFFERENCE, Evidence, evidence_for, fitted
 from metacontrol_manipulation.perception.scene import TABLE_HALF, Cube, DepthView, cube_depth, depth_view
 from metacontrol_manipulation.perception.squares import RESOLUTION, Plane, Square, plane_at, squares_in
@@ -65,12 +66,14 @@ class BlockView:
         filled: slots with a block within `IN_SLOT`, and those that carry them.
         hidden: slots of which it can't be told, because something is before them.
         seen: share of the table's part for blocks that is not hidden.
+        unclear: where something small is that may be a block which leans on something, its place about.
     """
 
     blocks: tuple[Block, ...]
     filled: frozenset[Slot]
     hidden: frozenset[Slot]
     seen: float
+    unclear: tuple[Block, ...] = ()
 
 
 def find_blocks(
@@ -95,7 +98,8 @@ def find_blocks(
         slot for slot in SLOTS if slot not in filled and (_is_held(_in(slot), held) or _is_hidden(slot, known, view))
     }
     blocks = sorted((Block(cube.x, cube.y, cube.z, _quarter(cube.yaw)) for cube in loose), key=lambda block: block.y)
-    return BlockView(tuple(blocks), filled, frozenset(hidden), _seen(planes[0]))
+    unclear = tuple(Block(clump.x, clump.y, clump.top - SIDE / 2.0, clump.yaw) for clump in clumps_in(view, known))
+    return BlockView(tuple(blocks), filled, frozenset(hidden), _seen(planes[0]), unclear)
 
 
 def _candidates(planes: Sequence[Plane]) -> list[Cube]:

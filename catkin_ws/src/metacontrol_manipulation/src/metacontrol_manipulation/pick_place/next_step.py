@@ -131,7 +131,9 @@ class _Decision:
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        return self.progress.blocks
+        """The loose blocks; where there are none and no arm is in the way, whatever may be one."""
+        progress = self.progress
+        return progress.unclear if progress.clear and not progress.blocks else progress.blocks
 
     # -- what can begin at once ---------------------------------------------------------------------------------------
 

@@ -33,6 +33,7 @@ class Progress:
         filled: slots with a block in place.
         hidden: slots of which it is not known whether they are filled: all, before the first look.
         blocks: loose blocks that were seen last.
+        unclear: where something was seen then that may be a block.
         clear: whether the arms were out of the camera's way then.
         looked_from: m along the table, where the base stood for looks with clear sight since blocks last moved.
         driven_to: m along the table, where the base was sent since then.
@@ -42,6 +43,7 @@ class Progress:
     filled: frozenset[Slot] = frozenset()
     hidden: frozenset[Slot] = frozenset(SLOTS)
     blocks: tuple[Block, ...] = ()
+    unclear: tuple[Block, ...] = ()
     clear: bool = False
     looked_from: tuple[float, ...] = ()
     driven_to: tuple[float, ...] = ()
@@ -59,6 +61,7 @@ def perceived(progress: Progress, view: BlockView, base_y: float, *, clear: bool
         progress: what was known.
         view: what was seen.
         base_y: m, where the base stood along the table.
+        unclear: where something was seen then that may be a block.
         clear: whether the arms were out of the way, as far as they can go.
     """
     unknown = view.hidden & progress.hidden
@@ -69,6 +72,7 @@ def perceived(progress: Progress, view: BlockView, base_y: float, *, clear: bool
         filled=filled,
         hidden=frozenset(unknown) - filled,
         blocks=view.blocks,
+        unclear=view.unclear,
         clear=clear,
         looked_from=looked_from,
     )
