@@ -153,5 +153,6 @@ def run(table, disturb, luck, steps=300, forget=lambda: False, side_by_side=lamb
                 break
         number = side_by_side(len(under_way)) or 0
         action = under_way.pop(number % len(under_way))
-        progress = acted(progress, action, succeeded=table.do(action, luck(action)))
+        began_at = table.base_y
+        progress = acted(progress, action, began_at, succeeded=table.do(action, luck(action)))
     raise AssertionError(f"no end after {steps} steps: {sorted(map(str, table.filled))}, {table.loose}, {table.held}")

@@ -115,7 +115,7 @@ def test_what_was_seen_once_is_known_while_it_is_hidden():
     before = situation(LEFT_BLOCK, filled=SLOTS[:2]).progress
     after = perceived(before, BlockView((LEFT_BLOCK,), frozenset(), frozenset(SLOTS), 0.5), 0.0, clear=False)
     assert (after.filled, after.hidden) == (frozenset(SLOTS[:2]), frozenset())
-    placed = acted(after, Place("left", SLOTS[2]), succeeded=True)
+    placed = acted(after, Place("left", SLOTS[2]), 0.0, succeeded=True)
     assert perceived(placed, BlockView((), frozenset(), frozenset(SLOTS), 0.5), 0.0, clear=False).hidden == {SLOTS[2]}
 
 
@@ -158,7 +158,7 @@ def test_what_fails_again_and_again_is_given_up():
     for _ in range(TRIES):
         action = next_step(Situation(progress, now.held, now.working, 0.0), BOTH_ARMS, reach)
         assert action == Pick("left", LEFT_BLOCK)
-        progress = perceived(acted(progress, action, succeeded=False), view_of(LEFT_BLOCK), 0.0, clear=True)
+        progress = perceived(acted(progress, action, 0.0, succeeded=False), view_of(LEFT_BLOCK), 0.0, clear=True)
     said = next_step(Situation(progress, now.held, now.working, 0.0), BOTH_ARMS, reach)
     assert isinstance(said, Stuck)
     assert "in vain" in said.reason

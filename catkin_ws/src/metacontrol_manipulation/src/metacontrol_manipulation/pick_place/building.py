@@ -95,7 +95,7 @@ class Building:
 
     def _act(self, action: Action) -> None:
         """Do what was decided, and look what came of it."""
-        succeeded = True
+        succeeded, base_y = True, self._base_y()
         try:
             if isinstance(action, Pick | Place | PutDown):
                 deeds = self._handler.deeds(action, self._robot.joints, self._robot.cell, self.progress)
@@ -108,7 +108,7 @@ class Building:
                 succeeded = self._robot.move_base(action.y)
         except HandlingError:
             succeeded = False
-        self.progress = acted(self.progress, action, succeeded=succeeded)
+        self.progress = acted(self.progress, action, base_y, succeeded=succeeded)
         clear = False
         if isinstance(action, Look) or not isinstance(action, Pick):
             clear = self._clear_the_view()

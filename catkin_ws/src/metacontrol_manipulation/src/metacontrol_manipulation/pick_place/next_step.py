@@ -222,7 +222,7 @@ class _Decision:
         return not others or (block.y >= self.base_y) == (arm == "left")
 
     def _can_take(self, arm: str, block: Block, base_y: float) -> bool:
-        if self._is_given_up(Pick(arm, block)) or not self.reach(arm, (block.x, block.y, block.z), base_y):
+        if self._is_given_up(Pick(arm, block), base_y) or not self.reach(arm, (block.x, block.y, block.z), base_y):
             return False
         return self.design.home is None or any(self._reaches(arm, slot) for slot in self.empty)
 
@@ -242,7 +242,7 @@ class _Decision:
 
     def _drive_to_slot(self) -> Action | None:
         places = [Place(arm, slot) for arm in self._holding() for slot in self.free]
-        return self._drive([(place.arm, place.slot.position) for place in places if not self._is_given_up(place)])
+        return self._drive([(place, place.slot.position) for place in places])
 
     def _look_for_what_is_missing(self) -> Action | None:
         return self._look() if self.progress.hidden or not self.blocks else None
@@ -254,13 +254,10 @@ class _Decision:
         if self._missing() <= 0:
             return None
         idle = [arm for arm in self.arms if arm not in self.held]
-        wanted = [(arm, block) for arm in idle for block in self._wanted()]
-        places = [
-            (arm, (block.x, block.y, block.z)) for arm, block in wanted if not self._is_given_up(Pick(arm, block))
-        ]
-        return self._drive(places)
+        picks = [Pick(arm, block) for arm in idle for block in self._wanted()]
+        return self._drive([(pick, (pick.block.x, pick.block.y, pick.block.z)) for pick in picks])
 
-    def _drive(self, places: Sequence[tuple[str, tuple[float, float, float]]]) -> Action | None:
+    def _drive(self, aims: Sequence[tuple[Pick | Place, tuple[float, float, float]]]) -> Action | None:
         """Return the shortest drive to where an arm reaches one of the places, also if the base stops a little off."""
         if self.design.home is not None:
             return None
@@ -268,8 +265,9 @@ class _Decision:
             for y in sorted(_PLACES_OF_BASE, key=lambda y: (abs(y - self.base_y), y)):
                 if abs(y - self.base_y) < _STANDING_ERROR / 2.0 or self._is_given_up(MoveBase(y)):
                     continue
-                for arm, place in places:
-                    if all(self.reach(arm, place, y + off) for off in {-error, 0.0, error}):
+                for action, place in aims:
+                    is_reached = all(self.reach(action.arm, place, y + off) for off in {-error, 0.0, error})
+                    if is_reached and not self._is_given_up(action, y):
                         return MoveBase(y)
         return None
 
@@ -320,12 +318,13 @@ class _Decision:
         """Return the first action that has not been given up."""
         return next((action for action in actions if action is not None and not self._is_given_up(action)), None)
 
-    def _is_given_up(self, action: Action) -> bool:
+    def _is_given_up(self, action: Action, base_y: float | None = None) -> bool:
+        """Return whether an action was tried in vain too often, from where the base stands or would stand."""
         if isinstance(action, MoveBase):
             # What was to be done there can't be done: a broken arm hides the block, say, which drives along.
             near = [y for y in self.progress.driven_to if abs(y - action.y) < _SAME_PLACE]
             return len(near) >= DRIVES
-        return self.progress.failed(action) >= TRIES
+        return self.progress.failed(action, self.base_y if base_y is None else base_y) >= TRIES
 
     def _holding(self) -> list[str]:
         return [arm for arm in self.arms if arm in self.held]

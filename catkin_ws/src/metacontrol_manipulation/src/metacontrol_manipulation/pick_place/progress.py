@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _HANDLING = Pick | Place | PutDown | Open
 """Actions that move blocks, or try to."""
+_SAME_BASE = 0.1
+"""m within which the base stands where it stood."""
 _SAME_PLACE = 0.02
 """m within which a block that was not taken is still the same."""
 
@@ -49,9 +51,9 @@ class Progress:
     driven_to: tuple[float, ...] = ()
     failures: Mapping[object, int] = field(default_factory=dict)
 
-    def failed(self, action: Action) -> int:
-        """Return how often an action was tried in vain."""
-        return self.failures.get(key_of(action), 0)
+    def failed(self, action: Action, base_y: float) -> int:
+        """Return how often an action was tried in vain from where the base stands, m along the table."""
+        return self.failures.get(key_of(action, base_y), 0)
 
 
 def perceived(progress: Progress, view: BlockView, base_y: float, *, clear: bool) -> Progress:
@@ -78,11 +80,18 @@ def perceived(progress: Progress, view: BlockView, base_y: float, *, clear: bool
     )
 
 
-def acted(progress: Progress, action: Action, *, succeeded: bool) -> Progress:
-    """Return what is known after an action has ended."""
+def acted(progress: Progress, action: Action, base_y: float, *, succeeded: bool) -> Progress:
+    """Return what is known after an action has ended.
+
+    Args:
+        progress: what was known.
+        action: that has ended.
+        base_y: m, where the base stood along the table when it began.
+        succeeded: whether it has done what it was to do.
+    """
     if not succeeded:
         failures = Counter(progress.failures)
-        failures[key_of(action)] += 1
+        failures[key_of(action, base_y)] += 1
         progress = replace(progress, failures=dict(failures))
     elif isinstance(action, Place):  # what is in the way of one block may not be in that of the next
         progress = replace(progress, failures={})
@@ -95,13 +104,19 @@ def acted(progress: Progress, action: Action, *, succeeded: bool) -> Progress:
     return progress
 
 
-def key_of(action: Action) -> object:
-    """Return what makes two actions the same: a block that has hardly moved is the same block."""
+def key_of(action: Action, base_y: float) -> object:
+    """Return what makes two actions the same: a block that has hardly moved is the same block.
+
+    What an arm can't do from one place of the base, it may do from another one.
+    """
+    base = round(base_y / _SAME_BASE)
     if isinstance(action, Pick):
         block = action.block
-        return Pick, action.arm, round(block.x / _SAME_PLACE), round(block.y / _SAME_PLACE)
+        return Pick, action.arm, round(block.x / _SAME_PLACE), round(block.y / _SAME_PLACE), base
+    if isinstance(action, Place):
+        return Place, action.arm, action.slot, base
     if isinstance(action, PutDown):
-        return PutDown, action.arm
+        return PutDown, action.arm, base
     if isinstance(action, MoveBase):
         return MoveBase, round(action.y / _SAME_PLACE)
     return action
