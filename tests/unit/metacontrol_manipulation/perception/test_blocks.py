@@ -129,6 +129,11 @@ def test_a_block_in_a_gripper_lies_nowhere(height):
     assert not seen(*boxes, held=[tip]).blocks
 
 
+def test_a_block_with_nothing_below_it_lies_nowhere():
+    """A block between fingers that are too thin to be seen."""
+    assert not seen(cube(-0.2, 0.4, 0.3, layer=1)).blocks
+
+
 def test_a_block_that_is_being_placed_fills_no_slot_yet():
     tip = SLOTS[2].position
     boxes = [*arm(SHOULDER, (-0.4, 0.25, 0.85), (-0.2, 0.0, 0.7), tip), *PLACED[:3]]

@@ -164,6 +164,18 @@ def test_what_fails_again_and_again_is_given_up():
     assert "in vain" in said.reason
 
 
+def test_the_base_is_not_sent_to_and_fro_for_ever():
+    """A broken arm that drives along hides each block just when the other arm would reach it."""
+    now = situation(RIGHT_BLOCK)
+    progress = now.progress
+    for _ in range(40):
+        action = next_step(Situation(progress, now.held, now.working, 0.0), one_arm("left"), reach)
+        if not isinstance(action, MoveBase):
+            break
+        progress = acted(progress, action, succeeded=True)
+    assert isinstance(action, Stuck)
+
+
 def test_a_gripper_that_does_not_open_is_given_up_and_named():
     table = Table(working={"left"}, held={"right"}, jammed={"right"}, loose=[])
     said, _ = run(table, lambda table: None, lambda action: True)
