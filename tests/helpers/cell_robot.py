@@ -10,7 +10,7 @@ from pybullet_simulator.physics.cell_simulation import STEP, CellSimulation
 from pybullet_simulator.robot.manipulator import MAST_CAMERA
 from robot_formulas.geometry import Pose
 
-FORCE_LIMIT = 60.0
+FORCE_LIMIT = 25.0
 
 
 class CellRobot:
@@ -50,7 +50,7 @@ class CellRobot:
     def camera(self):
         view = MAST_CAMERA
         pose = mounted(view.x, view.y, view.z, view.pitch)
-        return Camera.with_field_of_view(view.width, view.height, view.field_of_view, pose)
+        return Camera(view.width, view.height, view.focal_length, view.focal_length, *view.principal_point, pose)
 
     def depth(self):
         return self.simulation.look()[1], self.camera

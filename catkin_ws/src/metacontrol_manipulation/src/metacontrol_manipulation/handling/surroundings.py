@@ -63,7 +63,7 @@ class Surroundings:
         """Return table, body of the robot, and blocks."""
         table = self._box(BlockPose(0.0, 0.0, TABLE_SIZE[2] / 2.0), TABLE_SIZE)
         body = self._in_base((0.0, 0.0, _PLATE[2] / 2.0), _PLATE)
-        mast = self._in_base((0.05, 0.0, self._mount.z + MAST[2] / 2.0), MAST)
+        mast = self._in_base((0.0, 0.0, self._mount.z + MAST[2] / 2.0), MAST)
         return [table, body, mast, *(self._box(block, (SIDE - _SLACK,) * 3) for block in blocks)]
 
     def other_arm(self, other: ArmMount, joints: Sequence[float]) -> tuple[tuple[float, float, float], Sequence[float]]:

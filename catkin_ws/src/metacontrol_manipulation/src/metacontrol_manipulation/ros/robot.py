@@ -67,13 +67,10 @@ class RosRobot:
         self._stopped: set[str] = set()
         self._image: Image | None = None
         self._arms = {mount.name: _Clients(mount.name) for mount in ARMS}
-        self._camera = Camera.with_field_of_view(
-            MAST_CAMERA.width, MAST_CAMERA.height, MAST_CAMERA.field_of_view, _camera_pose()
-        )
+        self._camera: Camera | None = None
         self._inputs = (
             rospy.Subscriber("joint_states", JointState, self._on_joints, queue_size=10),
             rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=50),
-            rospy.Subscriber("camera/camera_info", CameraInfo, self._on_info, queue_size=1),
         )
         self._wait(lambda: len(self._joints) == len(ARMS), "no driver of an arm tells its joints")
 
@@ -104,15 +101,19 @@ class RosRobot:
             RobotError: none comes.
         """
         since = rospy.Time.now()
-        self._image = None
-        images = rospy.Subscriber("camera/depth/image_raw", Image, self._on_image, queue_size=1, buff_size=_LARGE)
+        self._image = self._camera = None
+        inputs = (
+            rospy.Subscriber("camera/camera_info", CameraInfo, self._on_info, queue_size=1),
+            rospy.Subscriber("camera/depth/image_raw", Image, self._on_image, queue_size=1, buff_size=_LARGE),
+        )
         try:
-            self._wait(lambda: self._image is not None and self._image.header.stamp >= since, "no depth image comes")
-            return read_floats(self._image, 1), self._camera
+            self._wait(lambda: self._camera is not None and self._is_newer(since), "no depth image comes")
+            return read_floats(self._image, 1), self._camera  # type: ignore[return-value]
         except ImageError as error:
             raise RobotError(str(error)) from error
         finally:
-            images.unregister()
+            for subscriber in inputs:
+                subscriber.unregister()
 
     def do(self, arm: str, deeds: Sequence[Deed]) -> bool:
         """Have an arm do something; return whether it has."""
@@ -145,6 +146,9 @@ class RosRobot:
             arm, _, task = status.name.lstrip("/").partition("_arm: ")
             if task == "safety" and arm in self._arms:
                 (self._stopped.add if status.level == DiagnosticStatus.ERROR else self._stopped.discard)(arm)
+
+    def _is_newer(self, since: rospy.Time) -> bool:
+        return self._image is not None and self._image.header.stamp >= since
 
     def _on_image(self, message: Image) -> None:
         with self._news:

@@ -69,8 +69,7 @@ def camera_info(camera: MastCamera, now: genpy.Time) -> CameraInfo:
     """Return the calibration of a camera without distortion."""
     message = CameraInfo(height=camera.height, width=camera.width, distortion_model="plumb_bob", D=[0.0] * 5)
     message.header.stamp, message.header.frame_id = now, OPTICAL
-    # The centre of the first pixel is at 0, as in OpenCV.
-    focal, x, y = camera.focal_length, (camera.width - 1) / 2.0, (camera.height - 1) / 2.0
+    focal, (x, y) = camera.focal_length, camera.principal_point
     message.K = [focal, 0.0, x, 0.0, focal, y, 0.0, 0.0, 1.0]
     message.R = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
     message.P = [focal, 0.0, x, 0.0, 0.0, focal, y, 0.0, 0.0, 0.0, 1.0, 0.0]

@@ -70,5 +70,13 @@ class MastCamera:
         """Focal length in pixels, the same along both axes."""
         return self.height / 2.0 / math.tan(self.field_of_view / 2.0)
 
+    @property
+    def principal_point(self) -> tuple[float, float]:
+        """Where the optical axis meets the image; the centre of the first pixel is (0, 0).
+
+        PyBullet's TinyRenderer has it half a pixel right of and above the middle (measured by tags at known places).
+        """
+        return self.width / 2.0, self.height / 2.0 - 1.0
+
 
 MAST_CAMERA = MastCamera()

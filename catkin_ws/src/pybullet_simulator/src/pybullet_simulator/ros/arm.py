@@ -28,8 +28,8 @@ from pybullet_simulator.ros.device import DeviceError, check_device
 if TYPE_CHECKING:
     from actionlib.server_goal_handle import ServerGoalHandle
 
-FORCE_LIMIT = 60.0
-"""N: well above what a block brings about that is placed or pushed."""
+FORCE_LIMIT = 25.0
+"""N: above what a block brings about that is put 5 mm too low (18 N), below what an obstacle does at once (200 N)."""
 _REPORT = 0.5
 """s of ROS time between two reports on /diagnostics; a change is reported at once."""
 _CODES = {

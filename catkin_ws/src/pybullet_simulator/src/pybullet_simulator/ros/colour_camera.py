@@ -63,6 +63,7 @@ class ColourCameraNode:
     def _on_depth(self, message: Image) -> None:
         if self._depth.get_num_connections():
             self._depth.publish(self._outlet.pass_on(message))
+            self._info.publish(camera_info(MAST_CAMERA, message.header.stamp))
 
 
 def main() -> None:
