@@ -21,6 +21,7 @@ from control_msgs.msg import (
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from helpers.waiting import wait_for
 from node_kit.ros.action_server import wait_for_server
+from node_kit.ros.goals import send_and_wait
 from pybullet_simulator.messages.arms import joint_names
 from sensor_msgs.msg import Image
 from simulator_msgs.msg import ArmState
@@ -57,8 +58,8 @@ class CellTest(unittest.TestCase):
         cls.state = Newest("simulator/left_arm/state", ArmState)
         cls.levels = {}
         cls.diagnostics = rospy.Subscriber("/diagnostics", DiagnosticArray, cls.take_statuses, queue_size=50)
-        cls.arm = actionlib.SimpleActionClient("left_arm/follow_joint_trajectory", FollowJointTrajectoryAction)
-        cls.gripper = actionlib.SimpleActionClient("left_arm/gripper_command", GripperCommandAction)
+        cls.arm = actionlib.ActionClient("left_arm/follow_joint_trajectory", FollowJointTrajectoryAction)
+        cls.gripper = actionlib.ActionClient("left_arm/gripper_command", GripperCommandAction)
         for client in (cls.arm, cls.gripper):
             assert wait_for_server(client, DEADLINE)
         cls.state.next()
@@ -79,9 +80,7 @@ class CellTest(unittest.TestCase):
                 positions=there, velocities=[0.0] * 7, time_from_start=rospy.Duration.from_sec(seconds)
             ),
         ]
-        self.arm.send_goal(goal)
-        wait_for(lambda: self.arm.simple_state == actionlib.SimpleGoalState.DONE, "the trajectory ends", DEADLINE)
-        return self.arm.get_result()
+        return send_and_wait(self.arm, goal, DEADLINE).get_result()
 
     def test_arm_stops_at_an_obstacle_until_it_is_released(self):
         begin = self.state.next().positions
@@ -111,14 +110,11 @@ class CellTest(unittest.TestCase):
 
     def test_gripper_closes_and_opens(self):
         for width in (0.02, 0.08):
-            self.gripper.send_goal(GripperCommandGoal(GripperCommand(width, 20.0)))
-            done = actionlib.SimpleGoalState.DONE
-            wait_for(lambda: self.gripper.simple_state == done, "the gripper arrives", DEADLINE)  # noqa: B023
-            self.assertTrue(self.gripper.get_result().reached_goal)
+            ended = send_and_wait(self.gripper, GripperCommandGoal(GripperCommand(width, 20.0)), DEADLINE)
+            self.assertTrue(ended.get_result().reached_goal)
             self.assertAlmostEqual(self.state.next().gripper_width, width, delta=0.004)
-        self.gripper.send_goal(GripperCommandGoal(GripperCommand(0.5, 20.0)))
-        rejected = actionlib.GoalStatus.REJECTED
-        wait_for(lambda: self.gripper.get_state() == rejected, "the width is refused", DEADLINE)
+        ended = send_and_wait(self.gripper, GripperCommandGoal(GripperCommand(0.5, 20.0)), DEADLINE)
+        self.assertEqual(ended.get_goal_status(), actionlib.GoalStatus.REJECTED)
 
     def test_tags_are_seen_by_the_settings_that_suit_the_light(self):
         images = Newest("camera/image_raw", Image, buff_size=1 << 22)

@@ -17,6 +17,7 @@ from control_msgs.msg import (
 )
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from node_kit.ros.action_server import wait_for_server
+from node_kit.ros.goals import send_and_wait
 from pybullet_simulator.messages.arms import FINGERS, joint_names
 from pybullet_simulator.messages.cell import ImageError, read_floats
 from pybullet_simulator.robot.manipulator import ARMS, MAST_CAMERA
@@ -173,8 +174,8 @@ class _Clients:
 
     def __init__(self, arm: str) -> None:
         self._arm = arm
-        self._motion = actionlib.SimpleActionClient(f"{arm}_arm/follow_joint_trajectory", FollowJointTrajectoryAction)
-        self._gripper = actionlib.SimpleActionClient(f"{arm}_arm/gripper_command", GripperCommandAction)
+        self._motion = actionlib.ActionClient(f"{arm}_arm/follow_joint_trajectory", FollowJointTrajectoryAction)
+        self._gripper = actionlib.ActionClient(f"{arm}_arm/gripper_command", GripperCommandAction)
         for client in (self._motion, self._gripper):
             if not wait_for_server(client, _PATIENCE):
                 raise RobotError(f"the driver of the {arm} arm is not there: start it")
@@ -194,12 +195,9 @@ class _Clients:
         return self._send(self._gripper, GripperCommandGoal(GripperCommand(width, force)), 2.0)
 
     @staticmethod
-    def _send(client: Any, goal: Any, duration: float) -> bool:
-        client.send_goal(goal)
-        if not client.wait_for_result(rospy.Duration.from_sec(duration + _PATIENCE)):
-            client.cancel_goal()
-            return False
-        return bool(client.get_state() == actionlib.GoalStatus.SUCCEEDED)
+    def _send(client: actionlib.ActionClient, goal: Any, duration: float) -> bool:
+        ended = send_and_wait(client, goal, duration + _PATIENCE)
+        return bool(ended and ended.get_goal_status() == actionlib.GoalStatus.SUCCEEDED)
 
 
 def _camera_pose() -> NDArray[np.float64]:

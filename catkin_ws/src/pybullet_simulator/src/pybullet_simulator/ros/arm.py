@@ -83,6 +83,13 @@ class ArmNode:
     # Callbacks
 
     def _on_state(self, state: ArmState) -> None:
+        try:
+            self._take(state)
+        except rospy.ROSException:  # the node's topics are closed while it ends
+            if not rospy.is_shutdown():
+                raise
+
+    def _take(self, state: ArmState) -> None:
         with self._lock:
             self._state = state
             now = state.stamp.to_sec()
