@@ -172,7 +172,7 @@ def test_the_base_is_not_sent_to_and_fro_for_ever():
         action = next_step(Situation(progress, now.held, now.working, 0.0), one_arm("left"), reach)
         if not isinstance(action, MoveBase):
             break
-        progress = acted(progress, action, succeeded=True)
+        progress = acted(progress, action, 0.0, succeeded=True)
     assert isinstance(action, Stuck)
 
 

@@ -145,7 +145,7 @@ def test_lost_child_that_works_again_gets_its_ontology_back(knowledge_base, pell
 def test_child_that_runs_out_of_memory_is_replaced_and_then_given_up(load, caplog):
     designs = {f"d{i}": ({}, ["laser", f"sensor{i}"]) for i in range(3000)}  # no two alike
     knowledge_base = load(application(designs))
-    reasoner = PelletReasoner(heap_mb=16)
+    reasoner = PelletReasoner(deadline=120.0, heap_mb=16)  # it takes its time to run out on a loaded machine
     try:
         with pytest.raises(ChildLostError, match="has died, twice in a row"):
             reasoner.load(knowledge_base.ontology)
