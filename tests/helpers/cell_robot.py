@@ -19,7 +19,6 @@ class CellRobot:
     def __init__(self, seed=0):
         self.simulation = CellSimulation(seed)
         self.blocked = set()
-        self.on_step = lambda: None
         for _ in range(40):
             self.step()
 
@@ -27,7 +26,6 @@ class CellRobot:
         self.simulation.close()
 
     def step(self):
-        self.on_step()
         self.simulation.step()
 
     @property

@@ -3,7 +3,8 @@
 import math
 
 import pytest
-from pybullet_simulator.robot.gripper_controller import MAX_FORCE, MAX_WIDTH, GripperController, GripperError
+from pybullet_simulator.robot.gripper_controller import MAX_FORCE, GripperController, GripperError
+from pybullet_simulator.robot.manipulator import MAX_WIDTH
 
 
 def run(controller, width, narrowest=0.0, speed=0.1):

@@ -61,7 +61,7 @@ TOPICS: dict[str, Topic] = {
     "odometry/filtered": Topic(Odometry, MOTION_STEPS, _filtered),
     "amcl_pose": Topic(PoseWithCovarianceStamped, LOCALISATION_STEPS, _localised),
     "battery_state": Topic(BatteryState, ENERGY_STEPS, battery_state),
-    "illuminance": Topic(Illuminance, LIGHT_STEPS, illuminance),
+    "illuminance": Topic(Illuminance, LIGHT_STEPS, lambda simulation, now: illuminance(simulation.illuminance, now)),
     "power_load": Topic(Float32, ENERGY_STEPS, lambda simulation, _now: Float32(simulation.load)),
 }
 """The topics with a rate, by name without a leading slash. Frames that never move are told once (`static_frames`)."""

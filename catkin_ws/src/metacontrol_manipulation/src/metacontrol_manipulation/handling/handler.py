@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from arm_motion.grasping import reachable
 from arm_motion.scene import Scene
 
-from metacontrol_manipulation.handling.deeds import OPEN, Deed, Grip, HandlingError, go, put, take
+from metacontrol_manipulation.handling.deeds import go, put, take
 from metacontrol_manipulation.handling.surroundings import BlockPose, Surroundings
-from metacontrol_manipulation.pick_place.actions import Open, Pick, Place, PutDown
+from metacontrol_manipulation.pick_place.actions import Pick, Place, PutDown
 from metacontrol_manipulation.pick_place.pyramid import SIDE, TABLE_HEIGHT
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pybullet_simulator.robot.manipulator import ArmMount
     from robot_formulas.geometry import Pose
 
+    from metacontrol_manipulation.handling.deeds import Deed
     from metacontrol_manipulation.pick_place.progress import Progress
 
 _CELL = 0.02
@@ -80,11 +81,6 @@ class Handler:
         self._look_around(arm, joints, cell, progress, None)
         return go(self._scene, joints[arm], self._mounts[arm].home, self._seed, holds=holds)
 
-    @staticmethod
-    def release(_action: Open) -> list[Deed]:
-        """Return how an arm that does not work lets go what it holds."""
-        return [Grip(OPEN)]
-
     def reach(self, arm: str, position: tuple[float, float, float], base_y: float, home_x: float) -> bool:
         """Return whether an arm reaches a place from above, when nothing is in the way.
 
@@ -124,6 +120,3 @@ class Handler:
 
 def _distance(one: BlockPose, place: tuple[float, float, float]) -> float:
     return float(((one.x - place[0]) ** 2 + (one.y - place[1]) ** 2 + (one.z - place[2]) ** 2) ** 0.5)
-
-
-__all__ = ["Handler", "HandlingError"]

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from metacontrol_manipulation.handling.handler import Handler, HandlingError
+from metacontrol_manipulation.handling.deeds import OPEN, Grip, HandlingError
 from metacontrol_manipulation.perception.blocks import find_blocks
-from metacontrol_manipulation.pick_place.actions import Done, Look, MoveBase, Open, Pick, Place, PutDown, Stuck
+from metacontrol_manipulation.pick_place.actions import Done, MoveBase, Open, Pick, Place, PutDown, Stuck
 from metacontrol_manipulation.pick_place.next_step import Situation, next_step
 from metacontrol_manipulation.pick_place.progress import Progress, acted, perceived
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from robot_formulas.geometry import Pose
 
     from metacontrol_manipulation.handling.deeds import Deed
+    from metacontrol_manipulation.handling.handler import Handler
     from metacontrol_manipulation.perception.camera import Camera
     from metacontrol_manipulation.pick_place.actions import Action
     from metacontrol_manipulation.pick_place.next_step import Design
@@ -103,16 +104,13 @@ class Building:
                 if isinstance(action, Pick):
                     succeeded = succeeded and action.arm in self._robot.held
             elif isinstance(action, Open):
-                succeeded = self._robot.do(action.arm, self._handler.release(action))
+                succeeded = self._robot.do(action.arm, [Grip(OPEN)])
             elif isinstance(action, MoveBase):
                 succeeded = self._robot.move_base(action.y)
         except HandlingError:
             succeeded = False
         self.progress = acted(self.progress, action, base_y, succeeded=succeeded)
-        clear = False
-        if isinstance(action, Look) or not isinstance(action, Pick):
-            clear = self._clear_the_view()
-        self.look(clear=clear)
+        self.look(clear=not isinstance(action, Pick) and self._clear_the_view())
 
     def _clear_the_view(self) -> bool:
         """Have the arms that work go out of the way; return whether they have."""

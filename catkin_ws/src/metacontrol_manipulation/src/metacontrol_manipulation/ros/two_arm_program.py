@@ -6,7 +6,7 @@ import actionlib
 import rospy
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import Lifetime
-from pybullet_simulator.robot.manipulator import ARMS
+from pybullet_simulator.robot.manipulator import ARMS, HOME
 from robot_formulas.geometry import Pose
 
 from metacontrol_manipulation.handling.handler import Handler
@@ -28,12 +28,10 @@ class TwoArmProgram:
             RobotError: a part of the robot is not there.
         """
         parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
-        cell = Pose(
-            *(parameters.number(f"cell_{key}", usual) for key, usual in (("x", 0.95), ("y", 0.0), ("yaw", 0.0)))
-        )
+        usual = {"x": -HOME.x, "y": 0.0, "yaw": 0.0}
+        cell = Pose(*(parameters.number(f"cell_{key}", value) for key, value in usual.items()))
         self._robot = RosRobot(lambda: cell, lambda _: False)
         self._handler = Handler(ARMS)
-        self._placed = 0
         self._server = actionlib.SimpleActionServer("build", BuildPyramidAction, self._build, auto_start=False)
         self._server.start()
 

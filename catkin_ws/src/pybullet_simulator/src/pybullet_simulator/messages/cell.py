@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import Point, Pose, PoseArray, Quaternion
-from sensor_msgs.msg import CameraInfo, Illuminance, Image
+from sensor_msgs.msg import CameraInfo, Image
 from simulator_msgs.msg import ArmState
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from pybullet_simulator.robot.light_sensor import NOISE
 from pybullet_simulator.world.cell import BLOCK_SIZE, TABLE_SIZE
 
 if TYPE_CHECKING:
@@ -87,13 +86,6 @@ def arm_state(arm: Arm, now: genpy.Time) -> ArmState:
         is_holding=arm.is_holding,
         contact_force=arm.contact_force,
     )
-
-
-def illuminance(lux: float, now: genpy.Time) -> Illuminance:
-    """Return what the light sensor measures, in lx, with its variance."""
-    message = Illuminance(illuminance=lux, variance=max((NOISE * lux) ** 2, 1e-6))
-    message.header.stamp, message.header.frame_id = now, "base_link"
-    return message
 
 
 def block_poses(blocks: Mapping[str, BodyPose], now: genpy.Time) -> PoseArray:

@@ -119,13 +119,13 @@ def localised_pose(pose: Pose, noise: float, now: genpy.Time) -> PoseWithCovaria
     return message
 
 
-def illuminance(simulation: Simulation, now: genpy.Time) -> Illuminance:
+def illuminance(lux: float, now: genpy.Time) -> Illuminance:
     """Return what the light sensor measures, in lx, with its variance."""
     message = Illuminance()
     message.header.stamp = now
     message.header.frame_id = BASE
-    message.illuminance = simulation.illuminance
-    message.variance = max((NOISE * simulation.illuminance) ** 2, _SMALL)
+    message.illuminance = lux
+    message.variance = max((NOISE * lux) ** 2, _SMALL)
     return message
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-MAX_WIDTH = 0.08
-"""m between the open fingers (Franka Emika's data sheet of the hand)."""
-MAX_FORCE = 70.0
-"""N that the hand can hold for long (the same data sheet)."""
-USUAL_FORCE = 40.0
+from pybullet_simulator.robot.manipulator import MAX_WIDTH
+
+MAX_FORCE = 20.0
+"""N of a finger (effort of its joint in pybullet_data's panda.urdf)."""
+USUAL_FORCE = MAX_FORCE
 """N where a command asks for none."""
 WIDTH_TOLERANCE = 0.002
 """m: how near to the wanted width the fingers must come."""

@@ -146,7 +146,7 @@ class CellSimulatorNode:
             self._tf.publish(self._transform_writer.write(now, true @ odometry.inverse(), odometry))
             self._state.publish(self._state_writer.write(now, true, simulation.base_velocity))
         if step % _SLOW_STEPS == 0:
-            self._illuminance.publish(messages.illuminance(self._light_sensor.measure(simulation.light), now))
+            self._illuminance.publish(state.illuminance(self._light_sensor.measure(simulation.light), now))
             blocks = simulation.blocks
             self._blocks.publish(messages.block_poses(blocks, now))
             shown = [(name, *box) for name, box in sorted(self._obstacles.items())]

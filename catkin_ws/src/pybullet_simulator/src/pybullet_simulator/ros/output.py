@@ -93,7 +93,7 @@ class Output:
             deviation = simulation.settings.errors.localisation
             self._localised.publish(state.localised_pose(simulation.localised, deviation, now))
         if step % LIGHT_STEPS == 0:
-            self._illuminance.publish(state.illuminance(simulation, now))
+            self._illuminance.publish(state.illuminance(simulation.illuminance, now))
         if step % ENERGY_STEPS == 0:
             self._energy.publish(simulation.energy)
             self._battery.publish(state.battery_state(simulation, now))
