@@ -10,7 +10,11 @@ from collections.abc import Iterable, Mapping
 from rosgraph_monitor.diagnostics.status import Level
 from rosgraph_monitor.health.components import NodeCondition
 
-_CONDITIONS = {Level.OK: NodeCondition.ALIVE, Level.WARN: NodeCondition.ALIVE, Level.ERROR: NodeCondition.FAILED}
+_CONDITIONS: dict[int, NodeCondition] = {
+    Level.OK: NodeCondition.ALIVE,
+    Level.WARN: NodeCondition.ALIVE,
+    Level.ERROR: NodeCondition.FAILED,
+}
 
 
 class DriverStatuses:
@@ -36,7 +40,7 @@ class DriverStatuses:
         A stale status changes nothing: whoever says so knows no more either.
         """
         name = name.lstrip("/")
-        condition = _CONDITIONS.get(Level(level)) if level in Level.__members__.values() else None
+        condition = _CONDITIONS.get(level)
         if condition is None:
             return False
         changed = False
