@@ -12,6 +12,7 @@ import inspect
 import math
 import re
 from collections import deque
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -117,8 +118,7 @@ class Observer:
     def evaluate(self, now: float) -> list[DiagnosticStatus]:
         """Evaluate at ROS time `now` in s. Stale input, or a value that is not a number, becomes "QA stale"."""
         try:
-            timed = inspect.signature(self.generate_diagnostics).parameters
-            statuses = self.generate_diagnostics(now) if timed else self.generate_diagnostics()  # type: ignore[call-arg]
+            statuses = self.generate_diagnostics(now) if self._timed else self.generate_diagnostics()  # type: ignore[call-arg]
             if isinstance(statuses, DiagnosticArray):  # as some published observers return
                 statuses = statuses.status
             return [self._checked(status) for status in statuses or []]
@@ -147,6 +147,11 @@ class Observer:
             hardware_id=self._name,
             values=[KeyValue(self.qa_name or _qa_name(self._name), repr(self._reported))],
         )
+
+    @cached_property
+    def _timed(self) -> bool:
+        """Whether the observer asks for the time; one in the published form does not."""
+        return bool(inspect.signature(self.generate_diagnostics).parameters)
 
     def _checked(self, status: object) -> DiagnosticStatus:
         if not isinstance(status, DiagnosticStatus):

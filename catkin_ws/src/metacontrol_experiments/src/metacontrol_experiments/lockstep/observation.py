@@ -8,7 +8,13 @@ from pybullet_simulator.physics.simulation import STEP
 from rosgraph_monitor.observer import ServiceObserver
 from tf2_msgs.msg import TFMessage
 
-from metacontrol_experiments.lockstep.robot_topics import STATIC_FRAMES, TOPICS, due_messages, static_frames
+from metacontrol_experiments.lockstep.robot_topics import (
+    MESSAGE_STEPS,
+    STATIC_FRAMES,
+    TOPICS,
+    due_messages,
+    static_frames,
+)
 from metacontrol_experiments.lockstep.system import LockstepError
 
 if TYPE_CHECKING:
@@ -72,7 +78,7 @@ class Observers:
         if not self._observers:
             return
         self._tell_frames(simulation, now)
-        if any(step % topic.steps == 0 for topic in TOPICS.values()):
+        if step % MESSAGE_STEPS == 0:
             for topic, message in due_messages(simulation, step, self.wanted_topics):
                 self.receive(topic, message, now)
 
@@ -96,7 +102,9 @@ class Observers:
     def _tell_frames(self, simulation: Simulation, now: float) -> None:
         """Hand the latched static frames to those that have not had them."""
         for observer in self._observers:
-            for topic, _ in observer.topics:
-                if topic.strip("/") == STATIC_FRAMES and observer.name not in self._told_frames:
-                    self._told_frames.add(observer.name)
-                    observer.receive(topic, static_frames(simulation.robot), now)
+            if observer.name in self._told_frames:
+                continue
+            topic = next((topic for topic, _ in observer.topics if topic.strip("/") == STATIC_FRAMES), None)
+            if topic is not None:
+                self._told_frames.add(observer.name)
+                observer.receive(topic, static_frames(simulation.robot), now)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -65,6 +66,8 @@ TOPICS: dict[str, Topic] = {
     "power_load": Topic(Float32, ENERGY_STEPS, lambda simulation, _now: Float32(simulation.load)),
 }
 """The topics with a rate, by name without a leading slash. Frames that never move are told once (`static_frames`)."""
+MESSAGE_STEPS = math.gcd(*(topic.steps for topic in TOPICS.values()))
+"""No topic has a message in a step that this does not divide."""
 
 
 def due_messages(simulation: Simulation, step: int, wanted: Collection[str]) -> Iterator[tuple[str, Any]]:

@@ -6,6 +6,7 @@ none of these is free, because the sensors look ahead.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -217,7 +218,7 @@ class DwaController:
 
     def _steps(self, horizon: float) -> int:
         p = self.parameters
-        return int(np.clip(np.ceil(p.max_vel_x * horizon / p.sim_granularity), MIN_STEPS, MAX_STEPS))
+        return min(max(math.ceil(p.max_vel_x * horizon / p.sim_granularity), MIN_STEPS), MAX_STEPS)
 
     def _score(self, rollout: Rollout, path: NDArray[np.float64], snapshot: Snapshot) -> NDArray[np.float64]:
         """Return the cost of each trajectory (C,) in metres: off the path, short of its end, near obstacles, jerky."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,8 +56,10 @@ class Rollout:
 
 def roll_out(velocities: NDArray[np.float64], robot: Pose, horizon: float, steps: int) -> Rollout:
     """Integrate constant velocities (C, 3) in closed form over the horizon (s), to so many poses."""
-    times = np.linspace(horizon / steps, horizon, steps)
-    rates, which = np.unique(velocities[:, 2], return_inverse=True)  # few: many velocities turn alike
+    times = _times(horizon, steps)
+    turns = velocities[:, 2].tolist()
+    rates = np.array(sorted(set(turns)))  # few: many velocities turn alike
+    which = rates.searchsorted(turns)
     turned = rates[:, None] * times
     # sin(a)/a and (1 - cos(a))/a, whose limits at a = 0 are 1 and 0
     sinc = np.sinc(turned / np.pi).take(which, axis=0)
@@ -83,6 +86,7 @@ class Footprint:
             fractions = np.arange(count)[:, None] / count
             pieces.append(corner + fractions * (following - corner))
         self.edge = np.concatenate(pieces)
+        self._edge_x, self._edge_y = self.edge.T.copy()  # each in one piece
         self.inscribed = inscribed_radius(corners)
         self.circumscribed = float(np.hypot(*corners.T).max())
 
@@ -103,8 +107,9 @@ class Footprint:
         blocked: NDArray[np.bool_] = np.any(clearance <= self.inscribed + margin, axis=1)
         unsure = (clearance <= self.circumscribed + margin) & ~blocked[:, None]
         if unsure.any():
-            which, step = np.nonzero(unsure)
-            x, y, yaw = (axis[which, step, None] for axis in (rollout.x, rollout.y, rollout.yaw))
+            cells = np.flatnonzero(unsure)
+            which = cells // unsure.shape[1]
+            x, y, yaw = (axis.take(cells)[:, None] for axis in (rollout.x, rollout.y, rollout.yaw))
             columns, rows = self._edge_cells(x, y, yaw, g)
             if not amid:
                 np.clip(columns, 0, g.width - 1, out=columns)
@@ -116,9 +121,8 @@ class Footprint:
     def is_free_at(self, robot: Pose, snapshot: Snapshot) -> bool:
         """Whether the footprint is free of obstacles at one pose, as `is_free` has it."""
         g = snapshot.geometry
-        x, y = np.array([[robot.x]]), np.array([[robot.y]])
-        rows, columns = g.cells_at(x, y)
-        row, column = int(rows[0, 0]), int(columns[0, 0])
+        scale = 1.0 / g.resolution
+        row, column = math.floor((robot.y - g.origin_y) * scale), math.floor((robot.x - g.origin_x) * scale)
         if 0 <= row < g.height and 0 <= column < g.width:
             part = snapshot.part((row, row), (column, column))
             clearance = part.clearance[row - part.row, column - part.column]
@@ -127,7 +131,8 @@ class Footprint:
                 return False
             if clearance > self.circumscribed + margin:
                 return True
-        return bool(self.is_free(Rollout(np.zeros((1, 3)), x, y, np.array([[robot.yaw]])), snapshot)[0])
+        pose = (np.array([[value]]) for value in (robot.x, robot.y, robot.yaw))
+        return bool(self.is_free(Rollout(np.zeros((1, 3)), *pose), snapshot)[0])
 
     def _edge_cells(
         self, x: NDArray[np.float64], y: NDArray[np.float64], yaw: NDArray[np.float64], g: Geometry
@@ -135,16 +140,22 @@ class Footprint:
         """Return columns and rows (P, N) of the edge at poses, three arrays (P, 1)."""
         cos, sin = np.cos(yaw), np.sin(yaw)
         # In place: new arrays of this size would cost more than the numbers in them.
-        edge_x, edge_y = cos * self.edge[:, 0], sin * self.edge[:, 0]
+        edge_x, edge_y = cos * self._edge_x, sin * self._edge_x
         edge_x += x
-        edge_x -= sin * self.edge[:, 1]
+        edge_x -= sin * self._edge_y
         edge_y += y
-        edge_y += cos * self.edge[:, 1]
+        edge_y += cos * self._edge_y
         edge_x -= g.origin_x
         edge_x *= 1.0 / g.resolution
         edge_y -= g.origin_y
         edge_y *= 1.0 / g.resolution
         return edge_x.astype(np.intp), edge_y.astype(np.intp)
+
+
+@lru_cache(maxsize=64)
+def _times(horizon: float, steps: int) -> NDArray[np.float64]:
+    """Return the moments of a roll-out (steps,), s."""
+    return np.linspace(horizon / steps, horizon, steps)
 
 
 def _clearance(part: Part, rows: NDArray[np.intp], columns: NDArray[np.intp], g: Geometry) -> NDArray[np.float32]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -130,7 +131,7 @@ class CostmapParameters:
         """Return the layers of these kinds that are enabled."""
         return tuple(layer for layer in self.layers if layer.kind in kinds and layer.enabled)
 
-    @property
+    @cached_property
     def sources(self) -> tuple[ObservationSource, ...]:
         """The observation sources of the layers that are enabled."""
         return tuple(source for layer in self.layers_of(*OBSTACLE_KINDS) for source in layer.sources)

@@ -61,7 +61,7 @@ class FollowedPlan:
         ahead = points[: count + 1 : PATH_STEP]
         if len(points) <= count or len(ahead) < 2:
             ahead = np.vstack([ahead, points[-1:]])
-        return ahead, float(np.hypot(*np.diff(points, axis=0).T).sum())
+        return ahead, float(self.plan.lengths[self.progress :].sum())
 
     def _rest(self, robot: Pose) -> NDArray[np.float64]:
         """Move on to the nearest point within the next few metres, and return what is left from there."""

@@ -7,7 +7,7 @@ only choose the way around the obstacles: dynamic programming over straight shor
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -73,6 +73,11 @@ class Plan:
 
     points: NDArray[np.float64]
     goal: Pose
+
+    @cached_property
+    def lengths(self) -> NDArray[np.float64]:
+        """The distances between neighbouring points (N - 1,), m."""
+        return np.asarray(np.hypot(*np.diff(self.points, axis=0).T))
 
     def headings(self) -> NDArray[np.float64]:
         """Return the direction of travel at each point, the goal's yaw at the last (N,)."""

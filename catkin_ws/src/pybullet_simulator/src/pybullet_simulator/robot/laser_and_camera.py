@@ -92,10 +92,11 @@ class DepthProjector:
         focal_length = width / 2.0 / np.tan(field_of_view / 2.0)
         left = ((width - 1) / 2.0 - np.arange(width)) / focal_length
         up = ((height - 1) / 2.0 - np.arange(height)) / focal_length
-        self._directions = np.empty((height, width, 3), dtype=np.float32)
-        self._directions[..., 0] = 1.0
-        self._directions[..., 1] = left[np.newaxis, :]
-        self._directions[..., 2] = up[:, np.newaxis]
+        directions = np.empty((height, width, 3), dtype=np.float32)
+        directions[..., 0] = 1.0
+        directions[..., 1] = left[np.newaxis, :]
+        directions[..., 2] = up[:, np.newaxis]
+        self._directions = directions.reshape(-1, 3)
 
     def points(self, depth: NDArray[np.float32], range_min: float, range_max: float) -> NDArray[np.float32]:
         """Return the points of a depth image in the camera's frame: x forward, y left, z up.
@@ -114,5 +115,7 @@ class DepthProjector:
         if depth.shape != self.shape:
             raise SensorError(f"depth image of {depth.shape[::-1]} pixels, expected {self.shape[::-1]}")
         with np.errstate(invalid="ignore"):
-            valid = (depth >= range_min) & (depth <= range_max)
-        return self._directions[valid] * depth[valid][:, np.newaxis]
+            valid = np.flatnonzero((depth >= range_min) & (depth <= range_max))
+        points = self._directions.take(valid, axis=0)
+        points *= depth.take(valid)[:, np.newaxis]
+        return points

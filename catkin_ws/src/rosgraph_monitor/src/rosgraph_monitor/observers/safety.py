@@ -237,7 +237,7 @@ def cloud_points(cloud: PointCloud2) -> tuple[NDArray[np.float64], NDArray[np.fl
         raise StaleInputError(f"point cloud is malformed: {error}") from error
     x, y, z = (points[axis].astype(float) for axis in "xyz")
     finite = np.isfinite(x) & np.isfinite(y) & np.isfinite(z)
-    return x[finite], y[finite], z[finite]
+    return (x, y, z) if finite.all() else (x[finite], y[finite], z[finite])
 
 
 def _moved(
