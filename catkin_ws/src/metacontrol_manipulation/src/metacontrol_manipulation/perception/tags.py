@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
-from robot_formulas.geometry import Pose
+from robot_formulas.geometry import Pose, wrap
 from scipy.optimize import least_squares
 
 if TYPE_CHECKING:
@@ -22,11 +22,14 @@ SIDE = 0.14
 """m, the black square of a tag."""
 TILT = math.radians(45.0)
 """rad by which a tag's board leans back from upright."""
-TAGS = {0: (0.15, 0.60, 0.47), 1: (0.15, -0.60, 0.47)}
+TAGS = {0: (0.15, 0.40, 0.47), 1: (0.15, -0.40, 0.47)}
 """m, centres of the tags in the cell frame by id."""
 WORST_ERROR = 3.0
 """pixels between seen and expected corners beyond which they are not those of the cell: a corner is found to 0.3 pixels
 (measured in tests), the rest is left to a base that does not stand level."""
+
+CORNER_ERROR = 0.4
+"""Pixels, the error of a corner: what tests find is 0.3, and the errors of a tag's corners go together."""
 
 _DETECTOR = cv2.aruco.DetectorParameters()
 _DETECTOR.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
@@ -37,6 +40,21 @@ _DETECTOR.relativeCornerRefinmentWinSize = 0.6
 
 
 @dataclass(frozen=True, slots=True)
+class Expected:
+    """Where the cell is expected before one looks.
+
+    Attributes:
+        cell: pose of the cell frame in base_link.
+        deviation: m, the standard deviation of x and y.
+        turn: rad, that of yaw.
+    """
+
+    cell: Pose
+    deviation: float
+    turn: float
+
+
+@dataclass(frozen=True, slots=True)
 class TagView:
     """The cell as its tags show it.
 
@@ -44,21 +62,26 @@ class TagView:
         ids: of the tags that were found, in order.
         cell: pose of the cell frame in base_link.
         error: pixels, the root mean square between seen and expected corners.
+        deviation: m, the standard deviation of the cell's x and y.
+        turn: rad, that of its yaw.
         corners: pixels of the corners by id, clockwise from the upper left one.
     """
 
     ids: tuple[int, ...]
     cell: Pose
     error: float
+    deviation: float
+    turn: float
     corners: Mapping[int, tuple[tuple[float, float], ...]]
 
 
-def find_cell(image: NDArray[np.uint8], camera: Camera) -> TagView | None:
+def find_cell(image: NDArray[np.uint8], camera: Camera, expected: Expected | None = None) -> TagView | None:
     """Return where the cell is, or None where no tag of the cell is found or those that are do not fit the cell.
 
     Args:
         image: (height, width, 3) or grey (height, width).
         camera: that took it.
+        expected: where the cell is, as far as it is known; a single tag tells little of the yaw, for example.
     """
     found = find_tags(image)
     if not found:
@@ -66,10 +89,12 @@ def find_cell(image: NDArray[np.uint8], camera: Camera) -> TagView | None:
     ids = tuple(sorted(found))
     seen = np.concatenate([found[tag] for tag in ids])
     places = np.concatenate([corners_of(tag) for tag in ids])
-    cell, error = _fit(seen, places, camera)
+    cell, error, (deviation, turn) = _fit(seen, places, camera, expected)
     if error > WORST_ERROR:
         return None
-    return TagView(ids, cell, error, {tag: tuple((float(u), float(v)) for u, v in found[tag]) for tag in ids})
+    return TagView(
+        ids, cell, error, deviation, turn, {tag: tuple((float(u), float(v)) for u, v in found[tag]) for tag in ids}
+    )
 
 
 def find_tags(image: NDArray[np.uint8]) -> dict[int, NDArray[np.float64]]:
@@ -93,21 +118,34 @@ def corners_of(tag: int) -> NDArray[np.float64]:
     return np.array(TAGS[tag]) + np.array((left + up, up - left, -left - up, left - up))
 
 
-def _fit(seen: NDArray[np.float64], places: NDArray[np.float64], camera: Camera) -> tuple[Pose, float]:
-    """Return the pose of the cell that fits best, with the root mean square error in pixels.
+def _fit(
+    seen: NDArray[np.float64], places: NDArray[np.float64], camera: Camera, expected: Expected | None
+) -> tuple[Pose, float, tuple[float, float]]:
+    """Return the pose of the cell that fits best, the root mean square error in pixels, and the pose's deviations.
 
     The floor is flat, so the cell has three unknowns: x, y and yaw. With them, a single square has no second solution.
     """
 
-    def errors(cell: NDArray[np.float64]) -> NDArray[np.float64]:
+    def misses(cell: NDArray[np.float64]) -> NDArray[np.float64]:
         points = np.column_stack((Pose(*cell).apply(places[:, :2]), places[:, 2]))
         return np.nan_to_num(camera.project(points) - seen, nan=1e3).ravel()
 
+    def errors(cell: NDArray[np.float64]) -> NDArray[np.float64]:
+        off = misses(cell) / CORNER_ERROR
+        if expected is None:
+            return off
+        there, (deviation, turn) = expected.cell, (expected.deviation, expected.turn)
+        yaw = wrap(cell[2] - there.yaw)
+        return np.append(off, ((cell[0] - there.x) / deviation, (cell[1] - there.y) / deviation, yaw / turn))
+
     start = _start(seen, places, camera)
     if not np.isfinite(start).all():
-        return Pose(0.0, 0.0), math.inf
+        return Pose(0.0, 0.0), math.inf, (math.inf, math.inf)
     solution = least_squares(errors, start, method="lm")
-    return Pose(*(float(value) for value in solution.x)), float(np.sqrt((solution.fun**2).sum() / len(seen)))
+    covariance = np.linalg.inv(solution.jac.T @ solution.jac)
+    error = float(np.sqrt((misses(solution.x) ** 2).sum() / len(seen)))
+    deviations = float(np.sqrt(max(covariance[0, 0], covariance[1, 1]))), float(np.sqrt(covariance[2, 2]))
+    return Pose(*(float(value) for value in solution.x)), error, deviations
 
 
 def _start(seen: NDArray[np.float64], places: NDArray[np.float64], camera: Camera) -> tuple[float, float, float]:

@@ -6,7 +6,6 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 import actionlib
-import numpy as np
 import rospy
 from control_msgs.msg import (
     FollowJointTrajectoryAction,
@@ -20,55 +19,52 @@ from node_kit.ros.action_server import wait_for_server
 from node_kit.ros.goals import send_and_wait
 from pybullet_simulator.messages.arms import FINGERS, joint_names
 from pybullet_simulator.messages.cell import ImageError, read_floats
-from pybullet_simulator.robot.manipulator import ARMS, MAST_CAMERA
-from sensor_msgs.msg import CameraInfo, Image, JointState
+from pybullet_simulator.robot.manipulator import ARMS
+from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from metacontrol_manipulation.handling.deeds import Move
-from metacontrol_manipulation.perception.camera import Camera, mounted
 from metacontrol_manipulation.pick_place.pyramid import SIDE
+from metacontrol_manipulation.ros.errors import RobotError
+from metacontrol_manipulation.ros.images import take_images
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    import numpy as np
     from arm_motion.timing import Trajectory
     from numpy.typing import NDArray
     from robot_formulas.geometry import Pose
 
     from metacontrol_manipulation.handling.deeds import Deed
+    from metacontrol_manipulation.perception.camera import Camera
+    from metacontrol_manipulation.ros.places import Place
 
 _HELD = 0.008
 """m by which the fingers may be nearer or farther than a block's edge while they hold it."""
-_LARGE = 1 << 23
 _PATIENCE = 10.0
 """s of ROS time for an image, and for an arm's driver after the end of its motion."""
 
 
-class RobotError(RuntimeError):
-    """The robot does not answer; the message says which part."""
-
-
 class RosRobot:
-    """A Robot (see `pick_place.building`). Where the cell is, and how the base moves, the program says."""
+    """A Robot (see `pick_place.building`). The program says where the cell is and how the base moves."""
 
-    def __init__(self, cell: Callable[[], Pose], move_base: Callable[[float], bool]) -> None:
+    def __init__(self, place: Place, move_base: Callable[[float], bool]) -> None:
         """Connect to the drivers.
 
         Args:
-            cell: returns the pose of the cell frame in base_link.
+            place: where the cell is.
             move_base: drives to y in m along the table; returns whether the base is there.
 
         Raises:
             RobotError: a driver is not there.
         """
-        self._cell, self._move_base = cell, move_base
+        self._place, self._move_base = place, move_base
         self._news = threading.Condition()
         self._joints: dict[str, tuple[float, ...]] = {}
         self._widths: dict[str, float] = {}
         self._stopped: set[str] = set()
-        self._image: Image | None = None
         self._arms = {mount.name: _Clients(mount.name) for mount in ARMS}
-        self._camera: Camera | None = None
         self._inputs = (
             rospy.Subscriber("joint_states", JointState, self._on_joints, queue_size=10),
             rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=50),
@@ -93,28 +89,20 @@ class RosRobot:
     @property
     def cell(self) -> Pose:
         """Pose of the cell frame in base_link."""
-        return self._cell()
+        return self._place.cell()
 
     def depth(self) -> tuple[NDArray[np.float32], Camera]:
-        """Take a depth image that is newer than this call.
+        """See anew where the cell is, then take a depth image.
 
         Raises:
-            RobotError: none comes.
+            RobotError: there is no image, or it is not known where the cell is.
         """
-        since = rospy.Time.now()
-        self._image = self._camera = None
-        inputs = (
-            rospy.Subscriber("camera/camera_info", CameraInfo, self._on_info, queue_size=1),
-            rospy.Subscriber("camera/depth/image_raw", Image, self._on_image, queue_size=1, buff_size=_LARGE),
-        )
+        self._place.renew()
+        (image,), camera = take_images(("camera/depth/image_raw",), _PATIENCE)
         try:
-            self._wait(lambda: self._camera is not None and self._is_newer(since), "no depth image comes")
-            return read_floats(self._image, 1), self._camera  # type: ignore[return-value]
+            return read_floats(image, 1), camera
         except ImageError as error:
             raise RobotError(str(error)) from error
-        finally:
-            for subscriber in inputs:
-                subscriber.unregister()
 
     def do(self, arm: str, deeds: Sequence[Deed]) -> bool:
         """Have an arm do something; return whether it has."""
@@ -147,17 +135,6 @@ class RosRobot:
             arm, _, task = status.name.lstrip("/").partition("_arm: ")
             if task == "safety" and arm in self._arms:
                 (self._stopped.add if status.level == DiagnosticStatus.ERROR else self._stopped.discard)(arm)
-
-    def _is_newer(self, since: rospy.Time) -> bool:
-        return self._image is not None and self._image.header.stamp >= since
-
-    def _on_image(self, message: Image) -> None:
-        with self._news:
-            self._image = message
-            self._news.notify_all()
-
-    def _on_info(self, message: CameraInfo) -> None:
-        self._camera = Camera.from_info(message.width, message.height, message.K, _camera_pose())
 
     def _wait(self, condition: Callable[[], bool], problem: str) -> None:
         """Wait in ROS time for something that a callback tells."""
@@ -198,8 +175,3 @@ class _Clients:
     def _send(client: actionlib.ActionClient, goal: Any, duration: float) -> bool:
         ended = send_and_wait(client, goal, duration + _PATIENCE)
         return bool(ended and ended.get_goal_status() == actionlib.GoalStatus.SUCCEEDED)
-
-
-def _camera_pose() -> NDArray[np.float64]:
-    view = MAST_CAMERA
-    return mounted(view.x, view.y, view.z, view.pitch)

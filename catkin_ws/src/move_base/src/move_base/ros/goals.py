@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import actionlib
-import genpy
 import rospy
 from actionlib.goal_id_generator import GoalIDGenerator
 from geometry_msgs.msg import PoseStamped
@@ -21,10 +19,10 @@ from move_base_msgs.msg import (
 )
 from node_kit.io.inbox import Inbox
 from node_kit.ros.action_server import EndsQuietly
+from node_kit.ros.resumed_goal import start_with
 from robot_formulas.geometry import Pose
 
 from move_base.navigation.result import Outcome
-from move_base.navigation.takeover import TakeoverError, decode_parameter
 from move_base.ros.messages import goal_problem, matrix_of, pose_stamped
 
 if TYPE_CHECKING:
@@ -44,21 +42,8 @@ FEEDBACK_PERIOD = 0.2
 """s; the action's status has the same rate."""
 
 
-class _TakingOverActionServer(EndsQuietly, actionlib.ActionServer):
-    """An action server that may start with an active goal."""
-
-    def __init__(self, *arguments: Any, resumed: MoveBaseActionGoal | None = None, **options: Any) -> None:
-        super().__init__(*arguments, auto_start=False, **options)
-        self._resumed = resumed
-
-    def start(self) -> None:
-        """Start like the base class, but the first status message already holds the resumed goal."""
-        with self.lock:
-            self.initialize()
-            self.started = True
-            if self._resumed is not None:
-                self.internal_goal_callback(self._resumed)
-            self.publish_status()
+class _Server(EndsQuietly, actionlib.ActionServer):
+    """An action server that may end at any time."""
 
 
 class GoalServer:
@@ -92,14 +77,13 @@ class GoalServer:
         self._sent_on = rospy.Publisher(f"{ACTION}/goal", MoveBaseActionGoal, queue_size=5)
         self._recovery = rospy.Publisher(f"{ACTION}/recovery_status", RecoveryStatus, queue_size=1)
         self._current_goal = rospy.Publisher("~current_goal", PoseStamped, queue_size=1)
-        self._server = _TakingOverActionServer(
-            ACTION, MoveBaseAction, goal_cb=self._on_goal, cancel_cb=self._on_cancel, resumed=resumed
-        )
+        self._resumed = resumed
+        self._server = _Server(ACTION, MoveBaseAction, self._on_goal, self._on_cancel, auto_start=False)
         rospy.Subscriber(f"{ACTION}_simple/goal", PoseStamped, self._on_simple_goal, queue_size=5)
 
     def start(self) -> None:
         """Begin to take goals."""
-        self._server.start()
+        start_with(self._server, self._resumed)
 
     def take_requests(self, now: float) -> None:
         """Process the goals and cancellations that have arrived; `now` in s."""
@@ -206,21 +190,6 @@ class GoalServer:
         if handle is not None:
             rospy.loginfo("Goal %s", reason)
             handle.set_canceled(MoveBaseResult(), reason)
-
-
-def resumed_goal(value: object) -> MoveBaseActionGoal | None:
-    """Return the goal to take over; delete the parameter `~resume_goal`, which is meant for this start only."""
-    if value is None:
-        return None
-    with contextlib.suppress(KeyError):
-        rospy.delete_param("~resume_goal")
-    try:
-        goal = MoveBaseActionGoal().deserialize(decode_parameter(value))
-    except (TakeoverError, genpy.DeserializationError) as error:
-        rospy.logwarn("%s ignored: %s", rospy.resolve_name("~resume_goal"), error)
-        return None
-    rospy.loginfo("Taking over goal %s", goal.goal_id.id)
-    return goal
 
 
 def _is_same(one: ServerGoalHandle, other: ServerGoalHandle | None) -> bool:

@@ -12,10 +12,12 @@ import cv2
 import rospy
 from geometry_msgs.msg import Polygon, PoseStamped, Twist
 from map_msgs.msg import OccupancyGridUpdate
+from move_base_msgs.msg import MoveBaseActionGoal
 from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.srv import GetPlan, GetPlanResponse
 from node_kit.parameters import ParameterError
 from node_kit.ros.lifetime import Lifetime
+from node_kit.ros.resumed_goal import take_resumed_goal
 from robot_formulas.geometry import STOP, Pose, Velocity
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan, PointCloud, PointCloud2
@@ -30,13 +32,11 @@ from move_base.parameters.reconfiguration import changed, present_values, server
 from move_base.planning.global_planner import PlanningError
 from move_base.ros.display import CostmapDisplay, PathDisplay, in_costmap
 from move_base.ros.frames import TfTransformer
-from move_base.ros.goals import GoalServer, resumed_goal
+from move_base.ros.goals import ACTION, GoalServer
 from move_base.ros.messages import goal_problem, matrix_of, path_of, pose_stamped, twist_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-    from move_base_msgs.msg import MoveBaseActionGoal
 
     from move_base.parameters.parameters import MoveBaseParameters, ObservationSource
     from move_base.parameters.reconfiguration import ServerDescription
@@ -298,6 +298,7 @@ def main() -> None:
         cv2.setNumThreads(1)  # the grids are small: threads cost more than they give
         tree = rospy.get_param("~", {})
         tree = tree if isinstance(tree, dict) else {}
+        tree.pop("resume_goal", None)
         for name in sought_above(tree):
             above = rospy.search_param(name)
             if above:
@@ -305,4 +306,4 @@ def main() -> None:
         parameters = read_parameters(tree)
         for note in parameters.notes:
             rospy.logwarn("%s", note)
-        MoveBaseNode(parameters, tree, resumed_goal(tree.pop("resume_goal", None))).run()
+        MoveBaseNode(parameters, tree, take_resumed_goal(ACTION, MoveBaseActionGoal)).run()

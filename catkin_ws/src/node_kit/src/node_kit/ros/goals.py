@@ -12,6 +12,7 @@ from typing import Any
 
 import rospy
 
+_DONE = 7  # actionlib.CommState.DONE
 _LOOK_PERIOD = 0.05  # s, wall, between two looks at the ROS clock
 
 
@@ -26,12 +27,10 @@ def send_and_wait(client: Any, goal: Any, patience_s: float) -> Any:
     Returns:
         The goal's handle, with `get_goal_status()` and `get_result()`; None if it has not ended in time.
     """
-    from actionlib import CommState
-
     ended = threading.Event()
 
     def look(handle: Any) -> None:
-        if handle.get_comm_state() == CommState.DONE:
+        if handle.get_comm_state() == _DONE:
             ended.set()
 
     handle = client.send_goal(goal, transition_cb=look)

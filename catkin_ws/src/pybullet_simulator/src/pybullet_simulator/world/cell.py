@@ -71,7 +71,7 @@ class Tag:
         return np.where(np.pad(tag, _PIXELS, constant_values=255) > 0, _PAPER, _INK).astype(np.uint8)
 
 
-TAGS = (Tag(0, (0.15, 0.60, 0.47)), Tag(1, (0.15, -0.60, 0.47)))
+TAGS = (Tag(0, (0.15, 0.40, 0.47)), Tag(1, (0.15, -0.40, 0.47)))
 
 
 def scatter_blocks(seed: int) -> Mapping[str, BodyPose]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ros_model.checks.families import check_family
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from ros_model.language.library import Library
+    from ros_model.language.metamodel import RosSystem
     from ros_model.project.project import Project
 
 
@@ -33,7 +35,7 @@ def check_project(project: Project, library: Library, sources: Library | None = 
     yield from check_system(project.whole_base, library=library, installed=library.installed, sources=sources)
     for variant in project.variants:
         # Where nothing is known of packages, the base has told so.
-        whole = compose(project.base, variant)
+        whole = compose(_with_other_functions(project, variant), variant)
         yield from check_system(variant, whole, library or None, library.installed, sources)
     solving = {design.name for function in project.settings["functions"] for design in project.designs(function)}
     for variant in project.variants:
@@ -46,6 +48,16 @@ def check_project(project: Project, library: Library, sources: Library | None = 
     yield from wrong_arguments(project)
     yield from wrong_launch_files(project, library)
     yield from unknown_observed_types(project, library)
+
+
+def _with_other_functions(project: Project, variant: RosSystem) -> RosSystem:
+    """Return the base with the components that other functions deploy beside a variant: it may be connected to them."""
+    families = [project.designs(function) for function in project.settings["functions"]]
+    others = [design for designs in families if variant not in designs for design in designs]
+    known = {
+        component.name: component for system in (*reversed(others), project.base) for component in system.components
+    }
+    return replace(project.base, components=tuple(known.values()))
 
 
 def wrong_arguments(project: Project) -> Iterator[Finding]:

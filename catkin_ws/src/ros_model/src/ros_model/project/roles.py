@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from ros_model.project.requirements import REQUIRED, words
+
 if TYPE_CHECKING:
     from ros_model.errors import ModelError
     from ros_model.project.project import Project
@@ -61,9 +63,11 @@ def roles_of(project: Project) -> Roles:
 
     A design that the wiring feeds by several components of a role needs as many of them as the role says. A design that
     it feeds by one is deployed with this one; those of its spares that are fed by another one are the same design with
-    other components in its roles. Without spares, a component of several is required like any other.
+    other components in its roles. Without spares, a component of several is required like any other. So are components
+    by whose `required_by` a design needs more of a role than the role says: it is the design that knows better.
     """
     required = project.required_components()
+    demanded = words(project, REQUIRED)
     given: Mapping[str, Mapping[str, Any]] = project.settings.get("roles", {})
     spares: Mapping[str, str] = project.settings.get("spares", {})
     parts = {
@@ -79,6 +83,8 @@ def roles_of(project: Project) -> Roles:
             groups[design].append(spare)
 
     def fed_by(name: str, role: str) -> list[str]:
+        if len(set(parts[role]).intersection(demanded.get(name, ()))) > max(1, given[role].get("least", 1)):
+            return []
         return [part for part in parts[role] if role in required[name] or part in required[name]]
 
     def shares(name: str, role: str) -> bool:

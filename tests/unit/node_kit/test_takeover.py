@@ -5,12 +5,14 @@ import base64
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from move_base.navigation.takeover import GOAL_TYPE, TakeoverError, decode_parameter
+from node_kit.takeover import TakeoverError, decode_parameter
+
+GOAL_TYPE = "move_base_msgs/MoveBaseActionGoal"
 
 
 @given(st.binary(min_size=1))
 def test_data_come_back(data):
-    assert decode_parameter({"type": GOAL_TYPE, "data": base64.b64encode(data).decode()}) == data
+    assert decode_parameter({"type": GOAL_TYPE, "data": base64.b64encode(data).decode()}, GOAL_TYPE) == data
 
 
 @pytest.mark.parametrize(
@@ -27,4 +29,4 @@ def test_data_come_back(data):
 )
 def test_other_values_are_refused(value):
     with pytest.raises(TakeoverError):
-        decode_parameter(value)
+        decode_parameter(value, GOAL_TYPE)

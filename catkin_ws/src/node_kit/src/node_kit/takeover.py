@@ -1,16 +1,14 @@
-"""Takes over the goal of an earlier instance of the node.
+"""The parameter by which an action's server takes over the goal of an earlier one.
 
-The program that restarts move_base sets the parameter `~resume_goal` to `{type: "move_base_msgs/MoveBaseActionGoal",
-data: BASE64}`, the serialised action goal. The new server then knows the goal before its first status message; the
-client sees no gap.
+The program that restarts the server of ACTION sets the parameter `ACTION/resume_goal` to `{type:
+"move_base_msgs/MoveBaseActionGoal", data: BASE64}`, the serialised action goal. The new server then knows the goal
+before its first status message; the client sees no gap.
 """
 
 from __future__ import annotations
 
 import base64
 import binascii
-
-GOAL_TYPE = "move_base_msgs/MoveBaseActionGoal"
 
 MAX_LENGTH = 100_000
 """Longest accepted text; a goal takes about 300 characters."""
@@ -20,16 +18,20 @@ class TakeoverError(ValueError):
     """The parameter does not hold a goal; the message says why."""
 
 
-def decode_parameter(value: object) -> bytes:
+def decode_parameter(value: object, goal_type: str) -> bytes:
     """Return the serialised action goal in the parameter's value.
+
+    Args:
+        value: of the parameter.
+        goal_type: of the action goal that is expected, such as "move_base_msgs/MoveBaseActionGoal".
 
     Raises:
         TakeoverError: the value has another form.
     """
     if not isinstance(value, dict):
         raise TakeoverError(f"must have type and data, is {type(value).__name__}")
-    if value.get("type") != GOAL_TYPE:
-        raise TakeoverError(f"type must be {GOAL_TYPE}, is {value.get('type')!r}")
+    if value.get("type") != goal_type:
+        raise TakeoverError(f"type must be {goal_type}, is {value.get('type')!r}")
     data = value.get("data")
     if not isinstance(data, str) or not data or len(data) > MAX_LENGTH:
         raise TakeoverError("data must be a base64 text")

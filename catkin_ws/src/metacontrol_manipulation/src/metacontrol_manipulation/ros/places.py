@@ -1,0 +1,197 @@
+"""Where the base is, by its odometry, and where the cell is: by tags that a program finds itself, or as it is told."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Protocol
+
+import rospy
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from pybullet_simulator.robot.manipulator import HOME
+from robot_formulas.geometry import Pose, yaw_of
+
+from metacontrol_manipulation.perception.localisation import CellTracker, Localisation, Track
+from metacontrol_manipulation.ros.errors import RobotError
+from metacontrol_manipulation.ros.images import read_pixels, take_images
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from node_kit.parameters import ParameterTree
+
+GOOD = 0.008
+"""m: with a larger error, a block that is in its place would look as if it were not."""
+_PATIENCE = 10.0
+"""s of ROS time for the first odometry, and for an image."""
+
+
+class Place(Protocol):
+    """Where the cell is."""
+
+    def cell(self) -> Pose:
+        """Return the pose of the cell frame in base_link, now."""
+
+    def renew(self) -> None:
+        """Look again while the base stands.
+
+        Raises:
+            RobotError: it is not known well enough where the cell is.
+        """
+
+
+class BaseOdometry:
+    """Where the base is in odom, and how fast it moves."""
+
+    def __init__(self) -> None:
+        """Begin to listen."""
+        self._lock = threading.Lock()
+        self._track = Track()
+        self.velocity = (0.0, 0.0, 0.0)
+        """Forward and left in m/s, turn in rad/s."""
+        self._input = rospy.Subscriber("odom", Odometry, self._on_odometry, queue_size=10, tcp_nodelay=True)
+
+    def pose(self) -> Pose:
+        """Return the newest pose; wait for the first one.
+
+        Raises:
+            RobotError: there is none.
+        """
+        end = rospy.get_time() + _PATIENCE
+        while True:
+            with self._lock:
+                latest = self._track.latest
+            if latest is not None:
+                return latest
+            if rospy.is_shutdown() or rospy.get_time() > end:
+                raise RobotError(f"nothing comes on odom for {_PATIENCE:g} s: see whether the base's driver runs")
+            rospy.rostime.wallsleep(0.02)
+
+    def at(self, stamp: rospy.Time) -> Pose | None:
+        """Return the pose at a time of the last seconds; None before the first one."""
+        with self._lock:
+            return self._track.at(stamp.to_sec())
+
+    def _on_odometry(self, message: Odometry) -> None:
+        twist = message.twist.twist
+        with self._lock:
+            self._track.add(message.header.stamp.to_sec(), pose_of(message.pose.pose))
+            self.velocity = twist.linear.x, twist.linear.y, twist.angular.z
+
+
+class OwnTags:
+    """The cell as the program itself finds it. At the start it knows where the base stands when it is at home."""
+
+    def __init__(self, odometry: BaseOdometry, home: Pose) -> None:
+        """Begin.
+
+        Args:
+            odometry: of the base; the frame odom begins where the base stood at home.
+            home: pose of the base in the cell frame when it is at home.
+        """
+        self._odometry = odometry
+        self._tracker = CellTracker(at_home(home))
+
+    def cell(self) -> Pose:
+        """Return the pose of the cell frame in base_link, now."""
+        return self._known(self._odometry.pose()).seen_from(self._odometry.pose())
+
+    def renew(self) -> None:
+        """Take an image, and find the tags in it.
+
+        Raises:
+            RobotError: there is no image, or no tag is found and the base has moved.
+        """
+        (image,), camera = take_images(("camera/image_raw",), _PATIENCE)
+        base = self._odometry.at(image.header.stamp) or self._odometry.pose()
+        self._tracker.look(read_pixels(image), camera, base)
+        if self._known(self._odometry.pose()).deviation > GOOD:
+            raise RobotError("the base has moved, and no tag of the cell is found: see light and camera")
+
+    def _known(self, base: Pose) -> Localisation:
+        known = self._tracker.known
+        assert known is not None  # noqa: S101 (it began with what is known)
+        return known.moved(base)
+
+
+class GivenCell:
+    """The cell as another node tells it on `cell_pose`."""
+
+    def __init__(self, odometry: BaseOdometry, patience: float) -> None:
+        """Begin to listen.
+
+        Args:
+            odometry: of the base.
+            patience: s of ROS time to wait for a pose.
+        """
+        self._odometry, self._patience = odometry, patience
+        self._news = threading.Condition()
+        self._known: Localisation | None = None
+        self._stamp = 0.0
+        self._input = rospy.Subscriber("cell_pose", PoseWithCovarianceStamped, self._on_pose, queue_size=1)
+
+    @property
+    def age(self) -> float:
+        """Time since a tag was seen last, s."""
+        return rospy.get_time() - self._stamp
+
+    def cell(self) -> Pose:
+        """Return the pose of the cell frame in base_link, now.
+
+        Raises:
+            RobotError: it was never told.
+        """
+        known = self._wait(lambda: self._known)
+        return known.seen_from(self._odometry.pose())
+
+    def renew(self) -> None:
+        """Wait until it is well known where the cell is.
+
+        Raises:
+            RobotError: it is not, for some time.
+        """
+        self._wait(lambda: self._known if self._is_good() else None)
+
+    def _is_good(self) -> bool:
+        return self._known is not None and self._known.moved(self._odometry.pose()).deviation <= GOOD
+
+    def _wait(self, known: Callable[[], Localisation | None]) -> Localisation:
+        end = rospy.get_time() + self._patience
+        with self._news:
+            while (found := known()) is None:
+                if rospy.is_shutdown() or rospy.get_time() > end:
+                    raise RobotError(
+                        f"no tag of the cell is seen for {self._patience:g} s: see light, camera and localizer"
+                    )
+                self._news.wait(0.1)
+        return found
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        base = self._odometry.at(message.header.stamp)
+        if base is None:
+            return
+        covariance = message.pose.covariance
+        with self._news:
+            self._known = Localisation(pose_of(message.pose.pose), base, covariance[0] ** 0.5, covariance[35] ** 0.5)
+            self._stamp = message.header.stamp.to_sec()
+            self._news.notify_all()
+
+
+def at_home(home: Pose) -> Localisation:
+    """Return what is known while the base stands at home (its pose in the cell frame), where the frame odom begins."""
+    return Localisation(home.inverse(), Pose(0.0, 0.0), 0.002, 0.002)
+
+
+def home_of(parameters: ParameterTree) -> Pose:
+    """Return where the base is at home, from the parameters `~home_x`, `~home_y` (m) and `~home_yaw` (rad).
+
+    Raises:
+        ParameterError: one is no number.
+    """
+    usual = {"x": HOME.x, "y": HOME.y, "yaw": HOME.yaw}
+    return Pose(*(parameters.number(f"home_{key}", value) for key, value in usual.items()))
+
+
+def pose_of(pose: object) -> Pose:
+    """Return the plane part of a geometry_msgs/Pose."""
+    return Pose(pose.position.x, pose.position.y, yaw_of(pose.orientation.z, pose.orientation.w))  # type: ignore[attr-defined]
