@@ -19,6 +19,8 @@ class CellRobot:
     def __init__(self, seed=0):
         self.simulation = CellSimulation(seed)
         self.blocked = set()
+        self.ways = {"left": [], "right": []}
+        """Targets of each arm's trajectories; the last one leads to where the arm is."""
         for _ in range(40):
             self.step()
 
@@ -64,6 +66,19 @@ class CellRobot:
                     self.step()
         return True
 
+    def retreat(self, arm):
+        if not self.ways[arm]:
+            return False
+        for target in reversed(self.ways[arm].pop()):
+            self.simulation.arms[arm].command(target)
+            for _ in range(2):
+                self.step()
+        return True
+
+    def wait(self, duration):
+        for _ in range(round(duration / STEP)):
+            self.step()
+
     def move_base(self, y):
         until = self.simulation.time + 30.0
         while self.simulation.time < until:
@@ -79,8 +94,11 @@ class CellRobot:
         if name in self.blocked:
             return False
         arm, began = self.simulation.arms[name], self.simulation.time
+        self.ways[name].append([])
         while (elapsed := self.simulation.time - began) < trajectory.duration + 0.15:
-            arm.command(trajectory.at(elapsed)[0])
+            target = trajectory.at(elapsed)[0]
+            self.ways[name][-1].append(target)
+            arm.command(target)
             self.step()
             if arm.contact_force > FORCE_LIMIT:
                 arm.command(arm.positions)

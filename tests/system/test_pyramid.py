@@ -52,4 +52,20 @@ def test_without_a_working_arm_it_says_why(robot, handler):
     robot.blocked = {"left", "right"}
     ending = Building(robot, handler, BOTH_ARMS, lambda action: None).run()
     assert isinstance(ending, Stuck)
-    assert "no arm of the design works" in ending.reason
+    assert "the left and the right arm is stopped" in ending.reason
+
+
+def test_both_arms_wait_for_one_that_is_stopped_for_a_while(robot, handler):
+    robot.blocked = {"left"}
+    stopped_until, done = robot.simulation.time + 5.0, []
+
+    def step():
+        CellRobot.step(robot)
+        if robot.simulation.time > stopped_until:
+            robot.blocked = set()
+
+    robot.step = step
+    building = Building(robot, handler, BOTH_ARMS, lambda action: done.append((robot.simulation.time, action)))
+    building.run(lambda: not done)
+    assert done[0][0] > stopped_until
+    assert isinstance(done[0][1], Pick)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from arm_motion.grasping import reachable
 from arm_motion.scene import Scene
+from robot_formulas.geometry import Pose
 
 from metacontrol_manipulation.handling.deeds import go, put, take
 from metacontrol_manipulation.handling.surroundings import BlockPose, Surroundings
@@ -16,13 +17,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from pybullet_simulator.robot.manipulator import ArmMount
-    from robot_formulas.geometry import Pose
 
     from metacontrol_manipulation.handling.deeds import Deed
     from metacontrol_manipulation.pick_place.progress import Progress
 
 _CELL = 0.02
 """m; places within it count as the same when it is asked what is in reach."""
+_AT_HOME = 0.1
+"""rad within which all joints of an arm are at home."""
 _NEAR = 0.045
 """m: a known block that is nearer to a place than this is the one that is meant."""
 
@@ -80,6 +82,23 @@ class Handler:
         """
         self._look_around(arm, joints, cell, progress, None)
         return go(self._scene, joints[arm], self._mounts[arm].home, self._seed, holds=holds)
+
+    def is_away(self, arm: str, joints: Sequence[float]) -> bool:
+        """Return whether an arm is not where it is out of the way."""
+        return max(abs(one - other) for one, other in zip(joints, self._mounts[arm].home, strict=True)) > _AT_HOME
+
+    def hand(self, arm: str, joints: Sequence[float], cell: Pose) -> tuple[float, float]:
+        """Return x and y of an arm's hand in the cell frame, m.
+
+        Args:
+            arm: which one.
+            joints: rad.
+            cell: pose of the cell frame in base_link.
+        """
+        (x, y, _), _ = self._bare.forward(joints)
+        mount = self._mounts[arm]
+        place = cell.inverse() @ Pose(mount.x + x, mount.y + y)
+        return place.x, place.y
 
     def reach(self, arm: str, position: tuple[float, float, float], base_y: float, home_x: float) -> bool:
         """Return whether an arm reaches a place from above, when nothing is in the way.

@@ -43,6 +43,13 @@ class Open:
 
 
 @dataclass(frozen=True, slots=True)
+class Retreat:
+    """An arm that does not work goes back along the way by which it came, a part of it at a time."""
+
+    arm: str
+
+
+@dataclass(frozen=True, slots=True)
 class MoveBase:
     """The base drives along the table to y in m, cell frame."""
 
@@ -66,4 +73,4 @@ class Stuck:
     reason: str
 
 
-Action = Pick | Place | PutDown | Open | MoveBase | Look | Done | Stuck
+Action = Pick | Place | PutDown | Open | Retreat | MoveBase | Look | Done | Stuck

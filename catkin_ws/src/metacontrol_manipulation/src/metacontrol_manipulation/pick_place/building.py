@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Protocol
 
 from metacontrol_manipulation.handling.deeds import OPEN, Grip, HandlingError
 from metacontrol_manipulation.perception.blocks import find_blocks
-from metacontrol_manipulation.pick_place.actions import Done, MoveBase, Open, Pick, Place, PutDown, Stuck
-from metacontrol_manipulation.pick_place.next_step import Situation, next_step
+from metacontrol_manipulation.pick_place.actions import Done, MoveBase, Open, Pick, Place, PutDown, Retreat, Stuck
+from metacontrol_manipulation.pick_place.next_step import OVER_PYRAMID, Situation, next_step
 from metacontrol_manipulation.pick_place.progress import Progress, acted, perceived
 
 if TYPE_CHECKING:
@@ -25,6 +25,12 @@ if TYPE_CHECKING:
     from metacontrol_manipulation.perception.camera import Camera
     from metacontrol_manipulation.pick_place.actions import Action
     from metacontrol_manipulation.pick_place.next_step import Design
+
+
+PATIENCE = 10.0
+"""s for which a program that needs all of its arms waits for one that does not work."""
+_PAUSE = 0.1
+"""s between two looks at whether it works again."""
 
 
 class Robot(Protocol):
@@ -51,6 +57,12 @@ class Robot(Protocol):
 
     def do(self, arm: str, deeds: Sequence[Deed]) -> bool:
         """Have an arm do something; return whether it has."""
+
+    def retreat(self, arm: str) -> bool:
+        """Have an arm that does not work go back to where its last motion began; return whether it has."""
+
+    def wait(self, duration: float) -> None:
+        """Let time (s) pass."""
 
     def move_base(self, y: float) -> bool:
         """Drive along the table, to y in m of the cell frame; return whether the base is there."""
@@ -79,6 +91,11 @@ class Building:
         """
         self.look(clear=False)
         while is_wanted():
+            missing = self._missing_arms(is_wanted)
+            if missing:
+                return Stuck(f"the {' and the '.join(missing)} arm is stopped: free it, or take a design without it")
+            if not is_wanted():
+                break
             action = next_step(self._situation(), self._design, self._reach)
             if action is None:
                 return Stuck("nothing is under way, and there is nothing to begin")
@@ -87,6 +104,15 @@ class Building:
                 return action
             self._act(action)
         return None
+
+    def _missing_arms(self, is_wanted: Callable[[], bool]) -> list[str]:
+        """Return the arms without which nothing can be done, after some patience."""
+        waited, missing = 0.0, sorted(self._design.arms - self._robot.working)
+        while self._design.needs_all and missing and waited < PATIENCE and is_wanted():
+            self._robot.wait(_PAUSE)
+            waited += _PAUSE
+            missing = sorted(self._design.arms - self._robot.working)
+        return missing if self._design.needs_all else []
 
     def look(self, *, clear: bool) -> None:
         """See where the blocks are; `clear`: the arms are out of the way."""
@@ -101,10 +127,11 @@ class Building:
             if isinstance(action, Pick | Place | PutDown):
                 deeds = self._handler.deeds(action, self._robot.joints, self._robot.cell, self.progress)
                 succeeded = self._robot.do(action.arm, deeds)
-                if isinstance(action, Pick):
-                    succeeded = succeeded and action.arm in self._robot.held
+                succeeded = succeeded and (action.arm in self._robot.held) == isinstance(action, Pick)
             elif isinstance(action, Open):
                 succeeded = self._robot.do(action.arm, [Grip(OPEN)])
+            elif isinstance(action, Retreat):
+                succeeded = self._robot.retreat(action.arm)
             elif isinstance(action, MoveBase):
                 succeeded = self._robot.move_base(action.y)
         except HandlingError:
@@ -125,7 +152,10 @@ class Building:
         return cleared
 
     def _situation(self) -> Situation:
-        return Situation(self.progress, self._robot.held, self._robot.working, self._base_y())
+        joints, cell = self._robot.joints, self._robot.cell
+        away = frozenset(arm for arm in joints if self._handler.is_away(arm, joints[arm]))
+        over = frozenset(arm for arm in joints if abs(self._handler.hand(arm, joints[arm], cell)[1]) < OVER_PYRAMID)
+        return Situation(self.progress, self._robot.held, self._robot.working, self._base_y(), away, over)
 
     def _base_y(self) -> float:
         return self._robot.cell.inverse().y

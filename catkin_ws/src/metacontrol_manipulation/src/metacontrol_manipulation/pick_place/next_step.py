@@ -16,6 +16,7 @@ from metacontrol_manipulation.pick_place.actions import (
     Pick,
     Place,
     PutDown,
+    Retreat,
     Stuck,
 )
 from metacontrol_manipulation.pick_place.pyramid import ROW_X, SIDE, SLOTS, TABLE_HEIGHT, Slot, can_be_filled
@@ -60,13 +61,15 @@ class Design:
     Attributes:
         arms: that build.
         home: m, where along the table the base stands; None where it drives to what is out of reach.
+        needs_all: nothing is done while one of the arms does not work.
     """
 
     arms: frozenset[str]
     home: float | None = None
+    needs_all: bool = False
 
 
-BOTH_ARMS = Design(frozenset(("left", "right")), 0.0)
+BOTH_ARMS = Design(frozenset(("left", "right")), 0.0, needs_all=True)
 """Both arms, the base stands at home."""
 
 
@@ -84,12 +87,16 @@ class Situation:
         held: arms whose grippers hold a block.
         working: arms that work.
         base_y: m, where the base stands along the table.
+        away: arms that are not at home.
+        over_pyramid: arms whose hand is near the pyramid.
     """
 
     progress: Progress
     held: frozenset[str]
     working: frozenset[str]
     base_y: float
+    away: frozenset[str] = frozenset()
+    over_pyramid: frozenset[str] = frozenset()
 
 
 def next_step(situation: Situation, design: Design, reach: Reach, under_way: Sequence[Action] = ()) -> Action | None:
@@ -119,10 +126,11 @@ class _Decision:
         self.held = situation.held
         self.working = situation.working
         self.base_y = situation.base_y
+        self.away, self.over_pyramid = situation.away, situation.over_pyramid
         self.design = design
         self.reach = reach
         self.under_way = under_way
-        self.busy = {action.arm for action in under_way if isinstance(action, Pick | Place | PutDown | Open)}
+        self.busy = {action.arm for action in under_way if isinstance(action, Pick | Place | PutDown | Open | Retreat)}
         self.arms = sorted(design.arms & situation.working)
         # Before everything was seen once, a slot that is hidden may be free or not.
         self.empty = [slot for slot in SLOTS if slot not in self.progress.filled and slot not in self.progress.hidden]
@@ -148,8 +156,20 @@ class _Decision:
         return None
 
     def _let_go(self) -> Action | None:
-        """Let arms that do not work drop their blocks."""
-        return self._first(Open(arm) for arm in sorted(self.held - self.working - self.busy))
+        """Have arms that do not work drop their blocks, not on the pyramid, and go out of the way."""
+        return self._first(
+            action for arm in sorted((self.held | self.away) - self.working) for action in self._free(arm)
+        )
+
+    def _free(self, arm: str) -> Iterator[Action]:
+        if arm in self.busy:
+            return
+        if arm in self.held and arm not in self.over_pyramid:
+            yield Open(arm)
+        if arm in self.away:
+            yield Retreat(arm)
+        if arm in self.held:
+            yield Open(arm)
 
     def _end(self) -> Action | None:
         if self.under_way:

@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from metacontrol_manipulation.pick_place.actions import MoveBase, Open, Pick, Place, PutDown
+from metacontrol_manipulation.pick_place.actions import MoveBase, Open, Pick, Place, PutDown, Retreat
 from metacontrol_manipulation.pick_place.pyramid import SLOTS, Slot, carrying
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from metacontrol_manipulation.perception.blocks import Block, BlockView
     from metacontrol_manipulation.pick_place.actions import Action
 
-_HANDLING = Pick | Place | PutDown | Open
+_HANDLING = Pick | Place | PutDown | Open | Retreat
 """Actions that move blocks, or try to."""
 _SAME_BASE = 0.1
 """m within which the base stands where it stood."""

@@ -21,6 +21,7 @@ from pybullet_simulator.messages.arms import FINGERS, joint_names
 from pybullet_simulator.messages.cell import ImageError, read_floats
 from pybullet_simulator.robot.manipulator import ARMS
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from metacontrol_manipulation.handling.deeds import Move
@@ -113,6 +114,24 @@ class RosRobot:
                 return False
         rospy.sleep(0.1)  # ROS time, for the joints' last state to arrive
         return True
+
+    def retreat(self, arm: str) -> bool:
+        """Have an arm that is stopped go back to where its last trajectory began; return whether it has."""
+        service = rospy.resolve_name(f"{arm}_arm/retreat")
+        try:
+            rospy.wait_for_service(service, _PATIENCE)
+            answer = rospy.ServiceProxy(service, Trigger)()
+        except (rospy.ROSException, rospy.ServiceException) as error:
+            rospy.logwarn(f"{service}: {error}")
+            return False
+        if not answer.success:
+            rospy.logwarn(f"{service}: {answer.message}")
+        rospy.sleep(0.1)
+        return bool(answer.success)
+
+    def wait(self, duration: float) -> None:
+        """Let ROS time (s) pass."""
+        rospy.sleep(duration)
 
     def move_base(self, y: float) -> bool:
         """Drive along the table."""

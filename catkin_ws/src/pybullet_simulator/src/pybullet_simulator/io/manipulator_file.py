@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 
 _PACKAGE = "package://"
 _MAST = 0.04  # m, its thickness
+_PAD, _PAD_HEIGHT = (0.0176, 0.0143, 0.0176), 0.0362
+"""m: what of a finger touches a block, and how far it is from the hand."""
+_FINGER, _PAD_RISE = (0.0208, 0.0215, 0.0362), 0.004
+"""m: the rest of a finger, and how far it is behind the pad's face."""
 
 
 def manipulator_urdf() -> str:
@@ -68,6 +72,8 @@ def _arm(panda: ET.Element, folder: Path, mount: ArmMount) -> Iterator[ET.Elemen
     prefix = mount.name + "_"
     for link in arm.findall("link"):
         link.set("name", prefix + link.get("name", ""))
+        if link.get("name", "").endswith("finger"):
+            _box_finger(link)
         _look_simple(link)
         for mesh in link.iter("mesh"):
             mesh.set("filename", (folder / mesh.get("filename", "").removeprefix(_PACKAGE)).as_uri())
@@ -84,6 +90,17 @@ def _arm(panda: ET.Element, folder: Path, mount: ArmMount) -> Iterator[ET.Elemen
         _limit(joint)
         yield joint
     yield _fixed(prefix + "panda_link0", ROOT, (mount.x, mount.y, mount.z))
+
+
+def _box_finger(link: ET.Element) -> None:
+    """Let a finger collide as boxes, by the measures of its mesh. A block's edge can get caught in the mesh."""
+    side = -1.0 if "rightfinger" in link.get("name", "") else 1.0
+    for collision in link.findall("collision"):
+        link.remove(collision)
+    for (x, y, z), distance, height in ((_PAD, 0.0, _PAD_HEIGHT), (_FINGER, _PAD_RISE, 0.0)):
+        collision = ET.SubElement(link, "collision")
+        ET.SubElement(collision, "origin", xyz=_text((0.0, side * (distance + y / 2.0), height + z / 2.0)))
+        ET.SubElement(ET.SubElement(collision, "geometry"), "box", size=_text((x, y, z)))
 
 
 def _look_simple(link: ET.Element) -> None:

@@ -52,6 +52,10 @@ class CellError(ValueError):
     """The cell refuses a value."""
 
 
+_CLEAR = 0.005
+"""m between the robot and an obstacle that is put beside it."""
+
+
 class CellSimulation:
     """A mobile manipulator in the work cell. Poses are in the map frame, which is the cell's.
 
@@ -143,13 +147,17 @@ class CellSimulation:
         """Put an obstacle into the cell: a heavy box, by its centre and edges in m.
 
         Raises:
-            CellError: the name is taken, or a number makes no sense.
+            CellError: the name is taken, a number makes no sense, or the robot is in its place.
         """
         if name in self._bodies.obstacles:
             raise CellError(f"obstacle {name!r} is there already; delete it, or choose another name")
         if not all(map(math.isfinite, (*position, *size))) or min(size) <= 0.0:
             raise CellError(f"obstacle {name!r} refused: it needs a finite position and a size above 0")
         self._bodies.spawn(name, position, size)
+        body = self._bodies.obstacles[name]
+        if pybullet.getClosestPoints(self._robot, body, _CLEAR, physicsClientId=self.client):
+            self._bodies.delete(name)
+            raise CellError(f"obstacle {name!r} refused: the robot is where it would be")
 
     def delete(self, name: str) -> None:
         """Take an obstacle away.

@@ -1,7 +1,8 @@
 """The controller in an arm's driver: follows trajectories, and stops the arm when it meets resistance.
 
 It holds the arm where it is until it is given a trajectory. A contact force above the limit is a safety stop: the arm
-stays where it is, and no trajectory is taken, until somebody releases it, as on an industrial arm.
+stays where it is, and no trajectory is taken, until somebody releases it, as on an industrial arm. It can only be sent
+back along the way that it came.
 """
 
 from __future__ import annotations
@@ -23,6 +24,18 @@ GOAL_TIME = 2.0
 """s after the end of a trajectory until the goal's tolerance is due, where the goal says none."""
 FORCE_READINGS = 2
 """Readings in a row above the limit that are a contact; a single one may be a touch between steps of the physics."""
+
+
+BACK_SPEED = 0.6
+"""rad/s of the fastest joint on the way back."""
+BACK_BLIND = 0.5
+"""s from the begin of the way back, in which the arm may still press on what stopped it."""
+_WAY_STEP = 0.02
+"""rad between two places that are remembered of the way."""
+_SAME_PLACE = 0.03
+"""rad within which the arm is at a place of its way again, as after it has gone down to take something."""
+_WAY_LENGTH = 2000
+"""Places that are remembered at most."""
 
 
 class Outcome(Enum):
@@ -116,6 +129,10 @@ class ArmController:
         self._began = 0.0
         self._goal_time = GOAL_TIME
         self._above = 0
+        self._way: list[tuple[float, ...]] = []  # by which the arm came
+        self._starts: list[int] = []  # places on it where a trajectory began
+        self._is_going_back = False
+        self._blind_until = 0.0
 
     @property
     def is_moving(self) -> bool:
@@ -141,6 +158,53 @@ class ArmController:
         if min(_distance(trajectory.at(0.0), place) for place in here) > START_TOLERANCE:
             raise TrajectoryError(f"the trajectory begins more than {START_TOLERANCE:g} rad from where the arm is")
         self._trajectory, self._began, self._goal_time = trajectory, now, goal_time or GOAL_TIME
+        if self._way and _distance(self._way[0], positions) < _WAY_STEP:  # back where it came from
+            self._way, self._starts = [], []
+        self._starts.append(len(self._way))
+        self._remember(tuple(positions))
+
+    def go_back(self, now: float, positions: Sequence[float]) -> str:
+        """Send an arm that is stopped back to where its last trajectory began; return why not, or an empty text.
+
+        The way was free when the arm came. If it meets something after the first half second, it stops again.
+
+        Args:
+            now: s.
+            positions: rad, where the arm is.
+        """
+        if not self.is_stopped or self.is_moving:
+            return "the arm is not stopped" if not self.is_stopped else "the arm is on its way back"
+        if not self._starts:
+            return "the arm does not know the way by which it came any further"
+        start = self._starts[-1]
+        back = [tuple(positions), *reversed(self._way[start:])]
+        times, places = [0.0], [back[0]]
+        for place in back[1:]:
+            step = _distance(place, places[-1])
+            if step > 1e-3:
+                times.append(times[-1] + step / BACK_SPEED)
+                places.append(place)
+        speeds = [_slope(places, times, index) for index in range(len(times))]
+        self._trajectory = Trajectory(tuple(times), tuple(places), tuple(speeds))
+        self._began, self._goal_time = now, GOAL_TIME
+        self._is_going_back, self._blind_until = True, now + BACK_BLIND
+        return ""
+
+    def _remember(self, place: tuple[float, ...]) -> None:
+        """Remember a place of the way. Where the arm has been there before, the detour in between is forgotten."""
+        if self._way and _distance(place, self._way[-1]) < _WAY_STEP:
+            return
+        recent = next(
+            (i for i in range(len(self._way) - 1, -1, -1) if _distance(place, self._way[i]) > _SAME_PLACE), -1
+        )
+        before = next((i for i in range(recent) if _distance(place, self._way[i]) < _SAME_PLACE), None)
+        if before is not None:
+            del self._way[before + 1 :]
+            self._starts = [start for start in self._starts if start <= before] + [before]
+            return
+        self._way.append(place)
+        if len(self._way) > _WAY_LENGTH:
+            self._way, self._starts = [place], [0]
 
     def cancel(self, positions: Sequence[float]) -> None:
         """Stop where the arm is, by order."""
@@ -158,10 +222,12 @@ class ArmController:
         """Take a reading; return how the trajectory ended, if it did now."""
         if self._target is None:
             self._target = tuple(positions)
-        self._above = self._above + 1 if contact_force > self.force_limit else 0
-        if self._above >= FORCE_READINGS and not self.is_stopped:
+        is_above = contact_force > self.force_limit and now >= self._blind_until
+        self._above = self._above + 1 if is_above else 0
+        if self._above >= FORCE_READINGS and (self._is_going_back or not self.is_stopped):
             was_moving = self.is_moving
             self.cancel(positions)
+            self._is_going_back = False
             self.is_stopped, self.resistance = True, contact_force
             return Outcome.STOPPED if was_moving else None
         trajectory = self._trajectory
@@ -169,11 +235,17 @@ class ArmController:
             return None
         elapsed = now - self._began
         self._target = trajectory.at(elapsed)
+        if not self._is_going_back:
+            self._remember(self._target)
         outcome = self._outcome(trajectory, elapsed, positions)
         if outcome is Outcome.BEHIND:
             self.cancel(positions)
         elif outcome is not None:
             self._trajectory = None
+        if self._is_going_back and outcome is not None:
+            self._is_going_back = False
+            if outcome is Outcome.DONE:
+                del self._way[self._starts.pop() :]
         return outcome
 
     @property
@@ -187,6 +259,14 @@ class ArmController:
         if _distance(trajectory.positions[-1], positions) <= GOAL_TOLERANCE:
             return Outcome.DONE
         return Outcome.NOT_REACHED if elapsed > trajectory.duration + self._goal_time else None
+
+
+def _slope(places: Sequence[Sequence[float]], times: Sequence[float], index: int) -> tuple[float, ...]:
+    """Return the speeds at a place of a way, rad/s; none at its ends."""
+    if index in (0, len(times) - 1):
+        return (0.0,) * len(places[0])
+    span = times[index + 1] - times[index - 1]
+    return tuple((b - a) / span for a, b in zip(places[index - 1], places[index + 1], strict=True))
 
 
 def _distance(one: Sequence[float], other: Sequence[float]) -> float:

@@ -47,7 +47,10 @@ _WORDS = {
 
 
 class ArmNode:
-    """Actions `~follow_joint_trajectory`, `~gripper_command`; service `~release`. Each state of the arm is a turn."""
+    """Actions `~follow_joint_trajectory`, `~gripper_command`; services `~release`, `~retreat`.
+
+    Each state of the arm is a turn.
+    """
 
     def __init__(self) -> None:
         """Read the parameters and connect.
@@ -69,7 +72,10 @@ class ArmNode:
         self._command = rospy.Publisher(f"{raw}/command", ArmCommand, queue_size=1, tcp_nodelay=True)
         self._joints = rospy.Publisher("joint_states", JointState, queue_size=1)
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=5)
+        self._ended = threading.Condition(self._lock)
+        self._last_outcome: Outcome | None = None
         self._release = rospy.Service("~release", Trigger, self._on_release)
+        self._retreat = rospy.Service("~retreat", Trigger, self._on_retreat)
         self._motions = actionlib.ActionServer(
             "~follow_joint_trajectory", FollowJointTrajectoryAction, self._on_motion, self._on_cancel, auto_start=False
         )
@@ -156,6 +162,19 @@ class ArmNode:
                 self._report(rospy.get_time())
         return TriggerResponse(not problem, problem or "released")
 
+    def _on_retreat(self, _request: TriggerRequest) -> TriggerResponse:
+        with self._lock:
+            if self._state is None:
+                return TriggerResponse(False, "the arm has not told yet where it is")
+            self._last_outcome = None
+            problem = self._controller.go_back(self._state.stamp.to_sec(), self._state.positions)
+            if problem:
+                return TriggerResponse(False, problem)
+            while self._controller.is_moving and not rospy.is_shutdown():
+                self._ended.wait(0.1)
+            outcome = self._last_outcome
+        return TriggerResponse(outcome is Outcome.DONE, _WORDS[outcome] if outcome else "the node ends")
+
     # Output
 
     def _send(self) -> None:
@@ -164,6 +183,8 @@ class ArmNode:
             self._command.publish(ArmCommand(target, width, self._gripper.force))
 
     def _end_motion(self, outcome: Outcome) -> None:
+        self._last_outcome = outcome
+        self._ended.notify_all()
         words = _WORDS[outcome]
         if outcome is Outcome.STOPPED:
             words = f"{words}: the arm met {self._controller.resistance:.0f} N"
