@@ -1,11 +1,13 @@
 """What to do next: single decisions, and whole runs with failures and takeovers on a simulated table."""
 
+from dataclasses import replace
+
 import pytest
 from helpers.simulated_table import ARMS, Table, lying, reach, run
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 from metacontrol_manipulation.perception.blocks import BlockView
-from metacontrol_manipulation.pick_place.actions import Done, Look, MoveBase, Open, Pick, Place, PutDown, Stuck
+from metacontrol_manipulation.pick_place.actions import Done, Look, MoveBase, Open, Pick, Place, PutDown, Retreat, Stuck
 from metacontrol_manipulation.pick_place.next_step import BOTH_ARMS, TRIES, Situation, next_step, one_arm
 from metacontrol_manipulation.pick_place.progress import Progress, acted, perceived
 from metacontrol_manipulation.pick_place.pyramid import SLOTS, Slot
@@ -63,6 +65,20 @@ def test_layers_are_built_from_below():
 def test_an_arm_that_does_not_work_lets_go():
     assert decide(situation(held=["right"], working=["left"])) == Open("right")
     assert decide(situation(held=["right"], working=["left"]), one_arm("left")) == Open("right")
+
+
+def test_an_arm_that_does_not_work_goes_out_of_the_way_and_drops_nothing_on_the_pyramid():
+    now = situation(held=["right"], working=["left"])
+    over = replace(now, away=frozenset(["right"]), over_pyramid=frozenset(["right"]))
+    beside = replace(now, away=frozenset(["right"]))
+    empty = replace(situation(working=["left"]), away=frozenset(["left", "right"]))
+    assert decide(over, one_arm("left")) == Retreat("right")
+    assert decide(beside, one_arm("left")) == Open("right")
+    assert decide(empty, one_arm("left")) == Retreat("right")
+    progress = over.progress
+    for _ in range(TRIES):
+        progress = acted(progress, Retreat("right"), 0.0, succeeded=False)
+    assert decide(replace(over, progress=progress), one_arm("left")) == Open("right")
 
 
 def test_an_arm_that_works_but_is_not_of_the_design_puts_its_block_down():

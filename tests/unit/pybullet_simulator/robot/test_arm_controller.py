@@ -147,3 +147,73 @@ def test_cancelled_arm_stays_where_it_is():
 def test_bad_trajectory_is_refused(times, positions, velocities):
     with pytest.raises(TrajectoryError):
         Trajectory(times, positions, velocities)
+
+
+# -- back along the way -----------------------------------------------------------------------------------------------
+
+DOWN = (0.5, 0.4, *HERE[2:])
+ABOVE = (0.5, *HERE[1:])
+OVER_THERE = (-0.5, -0.4, *HERE[2:])
+
+
+def go(controller, start, end, now, force=lambda now: 0.0):
+    """Move an obedient arm from one place to another; return (time, outcome, place)."""
+    controller.follow(Trajectory((0.0, 1.0), (start, end), (HERE, HERE)), now, start)
+    return follow_on(controller, start, now, force)
+
+
+def follow_on(controller, place, now, force=lambda now: 0.0):
+    for _ in range(500):
+        outcome = controller.update(now, place, force(now))
+        if outcome:
+            return now, outcome, place
+        now, place = now + 0.02, controller.target
+    raise AssertionError("the motion does not end")
+
+
+def stopped_on_the_way():
+    """An arm that went down to take something, came up again, and met resistance half way to the next place."""
+    controller = ArmController(LIMIT)
+    now = 0.0
+    for start, end in ((HERE, ABOVE), (ABOVE, DOWN), (DOWN, ABOVE)):
+        now, outcome, _ = go(controller, start, end, now)
+        assert outcome is Outcome.DONE
+    met = now + 0.5
+    now, outcome, place = go(controller, ABOVE, OVER_THERE, now, lambda time: 100.0 if time > met else 0.0)
+    assert outcome is Outcome.STOPPED
+    return controller, now, place
+
+
+def test_a_stopped_arm_goes_back_part_by_part_without_the_detour():
+    controller, now, place = stopped_on_the_way()
+    lowest = []
+    for goal in (ABOVE, HERE):
+        while max(abs(a - b) for a, b in zip(place, goal, strict=True)) > 0.06:
+            assert controller.go_back(now, place) == ""
+            assert controller.is_stopped
+            now, outcome, place = follow_on(controller, place, now)
+            lowest.append(place[1])
+            assert outcome is Outcome.DONE
+    assert max(lowest) < 0.1  # it has not gone down again
+    assert controller.is_stopped
+    with pytest.raises(TrajectoryError, match="stopped"):
+        controller.follow(Trajectory((0.0,), (place,), (HERE,)), now, place)
+
+
+def test_the_way_back_is_left_where_it_is_blocked_and_can_be_tried_again():
+    controller, now, place = stopped_on_the_way()
+    assert controller.go_back(now, place) == ""
+    blocked_from = now + 0.6  # what stopped the arm may press on it at the begin
+    now, outcome, place = follow_on(controller, place, now, lambda time: 100.0 if time > blocked_from else 0.0)
+    assert outcome is Outcome.STOPPED
+    assert controller.go_back(now, place) == ""
+    now, outcome, place = follow_on(controller, place, now)
+    assert outcome is Outcome.DONE
+    assert place == pytest.approx(ABOVE, abs=0.06)
+
+
+def test_an_arm_that_works_or_has_come_no_way_does_not_go_back():
+    controller = ArmController(LIMIT)
+    assert "not stopped" in controller.go_back(0.0, HERE)
+    controller.is_stopped = True
+    assert "any further" in controller.go_back(0.0, HERE)

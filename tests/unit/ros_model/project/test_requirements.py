@@ -4,9 +4,11 @@ import pytest
 import yaml
 from mros1_reasoner.io.ontology_files import read_knowledge_base
 from ros_model.checks.projects import needless_words
+from ros_model.checks.whole_projects import check_project
 from ros_model.errors import ModelError
 from ros_model.generators.deployment import monitor, reasoner
 from ros_model.io.project import load_project
+from ros_model.language.library import Library
 from ros_model.project.requirements import requirement_lines
 
 
@@ -250,3 +252,38 @@ def test_init_shows_what_its_first_variant_requires(load, run, tmp_path):
     status, out, _ = run("init", tmp_path / "cell.rossystem", "--component", "packer")
     assert status == 0
     assert "cell_default requires:\n  touch -> wrench -> packer\n" in out
+
+
+# -- roles, and what other functions deploy ---------------------------------------------------------------------------
+
+
+def test_a_design_that_names_more_components_than_its_role_needs_requires_them_all(load, settings):
+    settings["roles"] = {"sense": {"of": ["touch", "eye"]}}
+    feel_and_see = {"touch": {"node": "touch", "required_by": ["firm"]}, "eye": {"node": "head/eye"}}
+    assert load(**feel_and_see).roles.components["firm"] == {"touch"}  # one alone is a filler like any other
+    both = {name: {**entry, "required_by": ["firm"]} for name, entry in feel_and_see.items()}
+    project = load(**both)
+    assert project.roles.components["firm"] == {"touch", "eye"}
+    assert "sense" not in project.roles.of_designs["firm"]
+
+
+CROSSED = """RosSystem { Name handwritten RosComponents (
+    ComponentInterface { name follower FromRosNode 'gripper_drivers.follower.py.follower'
+        RosSubscribers { RosSubscriber 'grip' { RefSubscriber 'gripper_drivers.follower.py.follower.grip' } } } )
+    TopicConnections { TopicConnection grip { From ( 'PACKER.grip' ) To ( 'follower.grip' ) } } }"""
+
+
+@pytest.mark.parametrize(("source", "problems"), [("packer", 0), ("nobody", 1)])
+def test_a_variant_may_be_connected_to_what_another_function_deploys(load, settings, tmp_path, source, problems):
+    (tmp_path / "crossed.rossystem").write_text(CROSSED.replace("PACKER", source))
+    (tmp_path / "pack.rossystem").write_text(
+        "RosSystem { Name pack RosComponents ( ComponentInterface { name packer "
+        "FromRosNode 'gripper_drivers.packer.py.packer' "
+        "RosPublishers { RosPublisher 'grip' { RefPublisher 'gripper_drivers.packer.py.packer.grip' } } } ) }"
+    )
+    base = "RosSystem { Name cell RosComponents ( " + component("touch", "wrench") + " ) }"
+    settings["variants"] = {"files": ["crossed.rossystem", "pack.rossystem"]}
+    settings["functions"] = {"f_pack": {"designs": ["pack"]}, "f_follow": {"designs": ["handwritten"]}}
+    project = load(base)
+    found = [finding for finding in check_project(project, Library()) if finding.rule == "connection"]
+    assert len(found) == problems

@@ -156,6 +156,12 @@ class Mape:
                 if limit == quality or limit in self._state.objectives[name].limits:
                     self._state.note_level(now, name, limit, level, stamp)
 
+    def is_in_reserve(self, quality: str) -> bool:
+        """Return whether only objectives that are not pursued now have limits of a quality."""
+        limits = set(self._kb.limits_by(quality))
+        reserve, pursued = self._state.in_reserve.values(), self._state.objectives.values()
+        return any(limits & set(o.limits) for o in reserve) and not any(limits & set(o.limits) for o in pursued)
+
     def observe_stale(self, quality: str) -> None:
         """Note that a quality can't be observed at present, and forget its levels."""
         for limit in self._kb.limits_by(quality):

@@ -223,7 +223,7 @@ class ReasonerNode:
             taken = self._take(fact)
             if isinstance(fact, LevelFact) and taken:
                 self._log.tell_level(fact)
-            elif isinstance(fact, StaleFact):
+            elif isinstance(fact, StaleFact) and not self.core.is_in_reserve(fact.quality):
                 self._log.warn("stale", f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
 
     def _take_active(self, active: messages.ActiveConfiguration) -> None:

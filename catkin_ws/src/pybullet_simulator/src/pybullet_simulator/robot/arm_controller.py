@@ -197,7 +197,7 @@ class ArmController:
         recent = next(
             (i for i in range(len(self._way) - 1, -1, -1) if _distance(place, self._way[i]) > _SAME_PLACE), -1
         )
-        before = next((i for i in range(recent) if _distance(place, self._way[i]) < _SAME_PLACE), None)
+        before = next((i for i in range(recent - 1, -1, -1) if _distance(place, self._way[i]) < _SAME_PLACE), None)
         if before is not None:
             del self._way[before + 1 :]
             self._starts = [start for start in self._starts if start <= before] + [before]

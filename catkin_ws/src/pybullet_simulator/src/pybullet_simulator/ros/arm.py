@@ -61,6 +61,7 @@ class ArmNode:
         parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
         self._arm = parameters.choice("arm", "left", ("left", "right"))
         self._controller = ArmController(parameters.number("force_limit", FORCE_LIMIT, low=1.0, high=1000.0))
+        self._controller.is_stopped = parameters.flag("stopped", False)
         self._gripper = GripperController()
         self._state: ArmState | None = None
         self._lock = threading.RLock()  # actionlib's callbacks and the arm's state come in threads of their own
