@@ -97,8 +97,10 @@ def test_objective_in_reserve_waits_until_a_design_requires_its_function(make):
     robot = make(objectives=(PICK_AND_PLACE, FIND))
     assert robot.run() == [("o_build", "FD2", EXECUTED)]
     assert set(robot.core.objectives) == {"o_build"}
+    assert robot.core.is_in_reserve("error")
     robot.core.observe_component(1.0, "left_arm", "FALSE")
     assert [name for name, _, _ in robot.run(seconds=1.0)] == ["o_find", "o_F1", "o_build"]
+    assert not robot.core.is_in_reserve("error")
     robot.core.observe_component(2.0, "left_arm", "RECOVERED")
     robot.run(seconds=60.0)
     assert set(robot.core.objectives) == {"o_build"}

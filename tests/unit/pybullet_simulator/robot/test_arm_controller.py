@@ -217,3 +217,15 @@ def test_an_arm_that_works_or_has_come_no_way_does_not_go_back():
     assert "not stopped" in controller.go_back(0.0, HERE)
     controller.is_stopped = True
     assert "any further" in controller.go_back(0.0, HERE)
+
+
+def test_the_blind_time_ends_with_the_way_back():
+    controller, now, place = stopped_on_the_way()
+    assert controller.go_back(now, place) == ""
+    controller.update(now, place, 100.0)
+    assert controller.is_moving  # what stopped it may still press on it
+    controller.cancel(place)
+    assert controller.release(0.0) == ""
+    time, outcome, _ = go(controller, place, ABOVE, now + 0.02, lambda _: 100.0)
+    assert outcome is Outcome.STOPPED
+    assert time - now < 0.1

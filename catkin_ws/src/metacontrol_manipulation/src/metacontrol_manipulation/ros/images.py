@@ -32,7 +32,7 @@ def camera_of(info: CameraInfo) -> Camera:
 
 
 def read_pixels(image: Image) -> NDArray[np.uint8]:
-    """Return the pixels of an image of 8 bits: (height, width, 3), or (height, width) of a grey one.
+    """Return the pixels of an image of 8 bits: (height, width, 3) in RGB, or (height, width) of a grey one.
 
     Raises:
         RobotError: it is of another kind, or not whole.
@@ -46,43 +46,45 @@ def read_pixels(image: Image) -> NDArray[np.uint8]:
     if not image.width or image.step < row or len(image.data) < image.height * image.step:
         raise RobotError(f"an image of {image.width} x {image.height} has {len(image.data)} bytes: see its driver")
     rows = np.frombuffer(image.data, np.uint8, image.height * image.step).reshape(image.height, image.step)[:, :row]
-    return rows if channels == 1 else rows.reshape(image.height, image.width, channels)
+    if channels == 1:
+        return rows
+    pixels = rows.reshape(image.height, image.width, channels)
+    return pixels[..., ::-1] if image.encoding == "bgr8" else pixels
 
 
-def take_images(topics: tuple[str, ...], patience: float) -> tuple[list[Image], Camera]:
-    """Return the next image of each topic, and the camera that took them.
+def take_image(topic: str, patience: float) -> tuple[Image, Camera]:
+    """Return the next image of a topic, and the camera that took it.
 
     Args:
-        topics: of sensor_msgs/Image, of the same camera.
+        topic: of sensor_msgs/Image.
         patience: s of ROS time.
 
     Raises:
-        RobotError: an image does not come in time, or the camera is none.
+        RobotError: the image does not come in time, or the camera is none.
     """
     since, end = rospy.Time.now(), rospy.get_time() + patience
     news = threading.Condition()
-    images: dict[str, Image] = {}
+    images: list[Image] = []
     infos: list[CameraInfo] = []
 
-    def keep(message: Any, topic: str) -> None:
-        with news:
-            if topic:
-                if message.header.stamp >= since:
-                    images.setdefault(topic, message)
-            else:
-                infos[:] = [message]
-            news.notify_all()
+    def keep(message: Any, kept: list[Any]) -> None:
+        if message.header.stamp >= since:
+            with news:
+                kept.append(message)
+                news.notify_all()
 
-    inputs = [rospy.Subscriber("camera/camera_info", CameraInfo, keep, "", queue_size=1)]
-    inputs += [rospy.Subscriber(topic, Image, keep, topic, queue_size=1, buff_size=LARGE) for topic in topics]
+    inputs = (
+        rospy.Subscriber("camera/camera_info", CameraInfo, keep, infos, queue_size=1),
+        rospy.Subscriber(topic, Image, keep, images, queue_size=1, buff_size=LARGE),
+    )
     try:
         with news:
-            while not (infos and len(images) == len(topics)):
+            while not (images and infos):
                 if rospy.is_shutdown() or rospy.get_time() > end:
-                    missing = [topic for topic in topics if topic not in images] or ["camera/camera_info"]
-                    raise RobotError(f"nothing comes on {missing[0]} for {patience:g} s: see whether its driver runs")
+                    missing = "camera/camera_info" if images else topic
+                    raise RobotError(f"nothing comes on {missing} for {patience:g} s: see whether its driver runs")
                 news.wait(0.1)
-        return [images[topic] for topic in topics], camera_of(infos[0])
+        return images[0], camera_of(infos[0])
     except CameraError as error:
         raise RobotError(str(error)) from error
     finally:

@@ -13,7 +13,7 @@ from robot_formulas.geometry import Pose, yaw_of
 
 from metacontrol_manipulation.perception.localisation import CellTracker, Localisation, Track
 from metacontrol_manipulation.ros.errors import RobotError
-from metacontrol_manipulation.ros.images import read_pixels, take_images
+from metacontrol_manipulation.ros.images import read_pixels, take_image
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -102,7 +102,7 @@ class OwnTags:
         Raises:
             RobotError: there is no image, or no tag is found and the base has moved.
         """
-        (image,), camera = take_images(("camera/image_raw",), _PATIENCE)
+        image, camera = take_image("camera/image_raw", _PATIENCE)
         base = self._odometry.at(image.header.stamp) or self._odometry.pose()
         self._tracker.look(read_pixels(image), camera, base)
         if self._known(self._odometry.pose()).deviation > GOOD:

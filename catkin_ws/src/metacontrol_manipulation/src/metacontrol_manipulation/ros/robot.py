@@ -27,7 +27,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 from metacontrol_manipulation.handling.deeds import Move
 from metacontrol_manipulation.pick_place.pyramid import SIDE
 from metacontrol_manipulation.ros.errors import RobotError
-from metacontrol_manipulation.ros.images import take_images
+from metacontrol_manipulation.ros.images import take_image
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -99,7 +99,7 @@ class RosRobot:
             RobotError: there is no image, or it is not known where the cell is.
         """
         self._place.renew()
-        (image,), camera = take_images(("camera/depth/image_raw",), _PATIENCE)
+        image, camera = take_image("camera/depth/image_raw", _PATIENCE)
         try:
             return read_floats(image, 1), camera
         except ImageError as error:

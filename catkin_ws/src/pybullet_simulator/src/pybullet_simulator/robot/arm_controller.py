@@ -208,7 +208,7 @@ class ArmController:
 
     def cancel(self, positions: Sequence[float]) -> None:
         """Stop where the arm is, by order."""
-        self._trajectory = None
+        self._trajectory, self._is_going_back = None, False
         self._target = tuple(positions)
 
     def release(self, contact_force: float) -> str:
@@ -222,12 +222,12 @@ class ArmController:
         """Take a reading; return how the trajectory ended, if it did now."""
         if self._target is None:
             self._target = tuple(positions)
-        is_above = contact_force > self.force_limit and now >= self._blind_until
+        is_blind = self._is_going_back and now < self._blind_until
+        is_above = contact_force > self.force_limit and not is_blind
         self._above = self._above + 1 if is_above else 0
         if self._above >= FORCE_READINGS and (self._is_going_back or not self.is_stopped):
             was_moving = self.is_moving
             self.cancel(positions)
-            self._is_going_back = False
             self.is_stopped, self.resistance = True, contact_force
             return Outcome.STOPPED if was_moving else None
         trajectory = self._trajectory
