@@ -31,7 +31,7 @@ class SurroundingsTest(unittest.TestCase):
         rospy.init_node("surroundings_test")
         self.manipulator = Manipulator(ROBOT, function="f_climb")
         self.listener = Listener(ROBOT)
-        self.measured = {"raw/tilt": 3.0, "dust/density": 0.5, "motor/current": 1.0}
+        self.measured = {"raw/tilt": 3.0, "dust/density": 0.5, "motor/current": 1.0, "eye/image": 1.0}
         self.topics = {name: rospy.Publisher(f"{ROBOT}/{name}", Float32, queue_size=1) for name in self.measured}
         timer = rospy.Timer(rospy.Duration(PERIOD_S), self.publish)
         self.addCleanup(timer.shutdown)
