@@ -269,6 +269,17 @@ def test_missing_part_of_the_journal_is_refused(life, tmp_path):
     assert "part of the reasoner's journal is missing" in result.output
 
 
+def test_beginning_of_the_journal_may_come_after_what_was_published_meanwhile(life, tmp_path):
+    lived = life(BUSY)
+    path = tmp_path / "crossed.bag"
+    with Bag(path) as bag:
+        bag.journal(START, lived.entries[5:8], 5, NAME)
+        bag.journal(START, lived.entries[:7], 0, NAME, PARAMETERS)
+        bag.journal(START + 1, lived.entries[8:], 8, NAME)
+    (recorded,) = read_recording(path).runs
+    assert (recorded.first, recorded.entries) == (0, list(lived.entries))
+
+
 @pytest.mark.parametrize(("kind", "values"), [("explode", []), ("level", ["safety"])])
 def test_nonsense_in_a_journal_is_refused(tmp_path, model, kind, values):
     path = tmp_path / "strange.bag"

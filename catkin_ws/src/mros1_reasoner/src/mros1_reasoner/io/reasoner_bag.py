@@ -113,7 +113,7 @@ def _active(_connection: Connection, _now: float, message: Any) -> list[ActiveFa
 
 
 def _add(path: Path, recording: Recording, part: _Part) -> None:
-    """Add a part of the journal.
+    """Add a part of the journal. The beginning may come second: a subscriber also hears what is published meanwhile.
 
     Raises:
         RecordingError: an earlier part is missing, or this one makes no sense.
@@ -130,12 +130,14 @@ def _add(path: Path, recording: Recording, part: _Part) -> None:
         run.parameters = parameters if isinstance(parameters, dict) else {}
         run.files = part.files
     held = run.first + len(run.entries)
-    if part.first > held:
+    if part.first > held or part.first + len(part.entries) < run.first:
         raise RecordingError(f"{path}: a part of the reasoner's journal is missing: it can't be replayed")
     try:
+        run.entries[:0] = [read_entry(*entry) for entry in part.entries[: max(0, run.first - part.first)]]
         run.entries += [read_entry(*entry) for entry in part.entries[held - part.first :]]
     except ValueError as error:
         raise RecordingError(f"{path}: {error}: it can't be replayed") from error
+    run.first = min(run.first, part.first)
 
 
 def _contents(path: Path) -> tuple[frozenset[str], float]:
