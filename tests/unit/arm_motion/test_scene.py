@@ -1,9 +1,10 @@
 """Postures that hit something, and postures that do not."""
 
 import numpy as np
+import pybullet
 import pytest
 from arm_motion.grasping import top_down
-from arm_motion.panda import HOME, LOWER, UPPER
+from arm_motion.panda import HOME, LOWER, TCP_LINK, UPPER
 from arm_motion.scene import Box, Scene
 
 TABLE = Box((0.70, 0.0, -0.10), (0.80, 1.60, 0.40))
@@ -26,6 +27,15 @@ def at(scene, x, y, z, yaw=0.0):
 def test_home_is_free_beside_another_arm_and_a_table():
     with Scene([TABLE], ((0.0, -0.6, 0.0), HOME)) as scene:
         assert scene.is_free(HOME)
+
+
+def test_the_other_arm_stands_where_it_is_told(scene):
+    for offset in ((0.0, 0.6, 0.0), (0.1, -0.6, 0.2)):
+        scene.set(other_arm=(offset, HOME))
+        place = pybullet.getLinkState(
+            scene._other, TCP_LINK, computeForwardKinematics=True, physicsClientId=scene._client
+        )[4]
+        assert place == pytest.approx(scene.forward(HOME)[0] + np.array(offset), abs=1e-6)
 
 
 def test_fingers_in_a_box_are_not_free(scene):

@@ -3,6 +3,7 @@
 import pytest
 from click.testing import CliRunner
 from helpers.office import write_office
+from metacontrol_experiments.cli import build
 from metacontrol_experiments.cli import run as cli
 from metacontrol_experiments.cli.main import metacontrol
 from metacontrol_experiments.lockstep.system import private_parameters
@@ -14,7 +15,7 @@ def settings_of(monkeypatch, *arguments):
     """The settings that the command makes of its options."""
     made = []
 
-    def stop(settings, _display):
+    def stop(settings, _display, _make):
         made.append(settings)
         raise cli.RunError("enough")
 
@@ -22,6 +23,42 @@ def settings_of(monkeypatch, *arguments):
     result = CliRunner().invoke(metacontrol, ["run", "--output", "out", *arguments])
     assert result.output.strip() == "metacontrol: enough"
     return made[0]
+
+
+def test_kind_of_mission_has_options_of_its_own(monkeypatch):
+    made = []
+
+    def stop(settings, _display, _make):
+        made.append(settings)
+        raise cli.RunError("enough")
+
+    monkeypatch.setattr(build, "run_mission", stop)
+    for words in (["--mission", "manipulation", "--scenario", "3"], ["--scenario=3", "--mission=manipulation"]):
+        result = CliRunner().invoke(metacontrol, ["run", "--output", "out", "--no-metacontrol", *words])
+        assert result.output.splitlines()[-1] == "metacontrol: enough"
+    assert [(settings.scenario, settings.metacontrol) for settings in made] == [(3, False)] * 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--mission", "manipulation", "--route", "r1"], "--route"),
+        (["--scenario", "1"], "--scenario"),
+        (["--mission", "dancing"], "'dancing' is not one of 'navigation', 'manipulation'"),
+        (["--mission", "manipulation", "--scenario", "7"], "7 is not in the range"),
+    ],
+)
+def test_option_of_another_kind_of_mission_is_refused(words, said):
+    result = CliRunner().invoke(metacontrol, ["run", *words])
+    assert result.exit_code == 2
+    assert said in result.output
+
+
+@pytest.mark.parametrize(("mission", "option"), [("navigation", "--route"), ("manipulation", "--scenario")])
+def test_help_is_that_of_the_kind_of_mission(mission, option):
+    result = CliRunner().invoke(metacontrol, ["run", "--mission", mission, "--help"])
+    assert result.exit_code == 0
+    assert option in result.output and "--mission" in result.output
 
 
 def test_without_options_the_laser_is_killed_on_the_way(monkeypatch):

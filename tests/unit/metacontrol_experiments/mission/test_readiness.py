@@ -5,12 +5,15 @@ from metacontrol_experiments.mission.readiness import Readiness
 
 
 def missing(readiness):
-    return [what for condition, what in readiness.conditions(["safety"]) if not condition()]
+    return [
+        what
+        for condition, what in readiness.conditions(["safety"], "the action server of move_base")
+        if not condition()
+    ]
 
 
 def test_everything_is_missing_at_first():
     assert missing(Readiness()) == [
-        "the robot's pose on amcl_pose",
         "a STABLE configuration on rosgraph_manipulator/active_configuration",
         "the action server of move_base",
         "the monitor's first look at the graph, on /diagnostics",
@@ -19,7 +22,7 @@ def test_everything_is_missing_at_first():
 
 
 def test_nothing_is_missing_once_all_was_heard():
-    readiness = Readiness(located=True, has_server=True, has_graph=True, observed={"safety", "energy"})
+    readiness = Readiness(has_server=True, has_graph=True, observed={"safety", "energy"})
     readiness.take_configurations([ConfigurationReport(1.0, "f_navigate", "a", "STABLE")])
     assert missing(readiness) == []
 

@@ -108,6 +108,24 @@ def test_processes_that_stand_by_are_started_one_by_one(nodes, prepared, begun):
     assert prepared[1].status is not None
 
 
+def test_processes_stand_by_for_nodes_that_do_not_run_after_those_that_do(nodes, prepared, begun, command):
+    nodes.expect([command("a"), command("c"), command("d")])  # a runs
+    assert [nodes.stand_by(begun, may_start=True) for _ in range(5)] == [True, True, True, True, False]
+    assert [process.status for process in prepared] == [None] * 4
+    nodes.begin("/c", command("c"), nodes.prepare(command("c")))
+    assert len(prepared) == 4  # it has taken the one that stood by
+    nodes.expect([])
+    nodes.stand_by(begun, may_start=False)
+    assert prepared[3].status is not None
+
+
+def test_only_so_many_processes_stand_by_for_nodes_that_do_not_run(tmp_path, said, prepared, command):
+    owner = NodeProcesses(LauncherOptions(mark=f"test {tmp_path}", standby_others=1), said.append)
+    owner.expect([command("c"), command("d")])
+    assert [owner.stand_by((), may_start=True) for _ in range(2)] == [True, False]
+    owner.close()
+
+
 def test_process_that_stands_by_is_replaced_only_so_often(nodes, prepared, begun):
     for _ in range(MOST_LOST_WARM):
         assert nodes.stand_by(begun[:1], may_start=True)

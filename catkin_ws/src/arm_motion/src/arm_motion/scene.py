@@ -71,6 +71,7 @@ class Scene:
         self._client = pybullet.connect(pybullet.DIRECT)
         self._arm = self._load((0.0, 0.0, 0.0))
         self._other: int | None = None
+        self._offset: tuple[float, ...] | None = None
         self._obstacles: list[int] = []
         self._held: tuple[Box, int] | None = None
         self.set(boxes, other_arm)
@@ -80,16 +81,14 @@ class Scene:
         for body in self._obstacles:
             pybullet.removeBody(body, physicsClientId=self._client)
         self._obstacles = [self._body(box) for box in boxes]
-        if other_arm is None:
+        offset = None if other_arm is None else tuple(other_arm[0])
+        if offset != self._offset:
             if self._other is not None:
                 pybullet.removeBody(self._other, physicsClientId=self._client)
-                self._other = None
-            return
-        offset, joints = other_arm
-        if self._other is None:
-            self._other = self._load(offset)
-        pybullet.resetBasePositionAndOrientation(self._other, offset, (0.0, 0.0, 0.0, 1.0), self._client)
-        self._pose(self._other, joints)
+            # Loaded anew: what PyBullet moves is not link0, but its centre of mass, 5 cm above.
+            self._offset, self._other = offset, None if offset is None else self._load(offset)
+        if other_arm is not None and self._other is not None:
+            self._pose(self._other, other_arm[1])
 
     def __enter__(self) -> Scene:
         return self

@@ -118,6 +118,7 @@ def _event(report: Event) -> tuple[Entry, ...]:
         pid = f", pid {values['pid']}: {values.get('how', 'kill')}" if "pid" in values else ""
         return (Entry(report.stamp, "!", f"{report.name} struck{share}{pid}", True),)
     if report.kind == MissionEvent.MISSION_START:
-        return (Entry(report.stamp, "-", f"goal sent, route {values.get('route', '?')}"),)
+        route = f", route {values['route']}" if "route" in values else ""
+        return (Entry(report.stamp, "-", f"goal sent{route}"),)
     outcome = values.get("outcome", "?")
     return (Entry(report.stamp, "-", f"mission over: {values.get('reason') or outcome}", outcome != "reached"),)

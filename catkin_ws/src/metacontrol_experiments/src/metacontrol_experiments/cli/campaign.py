@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 from mros1_reasoner.loop.settings import setting_names
@@ -16,6 +16,7 @@ from rich.text import Text
 from metacontrol_experiments.campaign.matrix import CampaignError, Known, ground_files, parse_campaign
 from metacontrol_experiments.campaign.progress import Status, check_same, remaining
 from metacontrol_experiments.cli.options import ground_options
+from metacontrol_experiments.cli.pyramid_campaign import drive_pyramids
 from metacontrol_experiments.io.campaign_folder import RUNS, read_results, results_of, write_result, write_table
 from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.display import CONSOLE, refusing, tell
@@ -25,6 +26,7 @@ from metacontrol_experiments.io.processes import RunError, alone_in, signals_as_
 from metacontrol_experiments.managers.manager import PACKAGE
 from metacontrol_experiments.mission.routes import RouteError
 from metacontrol_experiments.mission.settings import ENGINES
+from metacontrol_experiments.pyramid.campaign import asks_for_pyramids
 
 if TYPE_CHECKING:
     from rich.progress import Task
@@ -66,14 +68,22 @@ def campaign(
 ) -> None:
     """Drive the missions that a FILE asks for, and leave a table of their results.
 
+    For a FILE of missions of D1 (mission: manipulation), --output is the only option that counts.
+
     What is there already is not driven again: after an interruption, the same command goes on. --world and --routes
     take the place of what FILE names.
 
     Exit status: 0 all missions were driven, 1 some crashed or hung twice, 2 bad input, 130 interrupted.
     """
     with refusing(CampaignError, PackageError, RouteError, RunError):
-        asked = _read(file, engine, ground)
+        content = _content(file)
         folder = output or Path("results/campaign") / file.stem
+        if asks_for_pyramids(content):
+            folder.mkdir(parents=True, exist_ok=True)
+            with alone_in(folder), signals_as_interrupts():
+                is_complete = drive_pyramids(content, file, folder)
+            raise click.exceptions.Exit(0 if is_complete else _FAILED)
+        asked = _read(content, file, engine, ground)
         folder.mkdir(parents=True, exist_ok=True)
         with alone_in(folder), signals_as_interrupts():
             results = _known(asked, folder, tables)
@@ -87,23 +97,32 @@ def campaign(
     raise click.exceptions.Exit(0 if all(result.status is Status.DONE for result in results.values()) else _FAILED)
 
 
-def _read(file: Path, engine: str | None, given: dict[str, Path | None]) -> Campaign:
+def _content(file: Path) -> Any:
+    """Return the content of a campaign's file.
+
+    Raises:
+        CampaignError: it cannot be read.
+    """
+    try:
+        return read_yaml(file)
+    except InputFileError as error:
+        raise CampaignError(str(error)) from error
+
+
+def _read(content: Any, file: Path, engine: str | None, given: dict[str, Path | None]) -> Campaign:
     """Return the campaign of a file.
 
     Args:
+        content: of the file.
         file: of the campaign.
         engine: takes the place of what the file names.
         given: files of `world` and `routes` that take the place of those that it names.
 
     Raises:
-        CampaignError: it cannot be read, or makes no sense.
+        CampaignError: it makes no sense.
         RouteError: a world or a route of it cannot be used.
     """
     package = simulation_package()
-    try:
-        content = read_yaml(file)
-    except InputFileError as error:
-        raise CampaignError(str(error)) from error
     named = [None if name is None else file.parent / name for name in ground_files(content, str(file))]
     files = [given[option] or path for option, path in zip(("world", "routes"), named, strict=True)]
     ground = read_ground(*(path and path.absolute() for path in files))

@@ -2,13 +2,46 @@
 
 from __future__ import annotations
 
+import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from node_kit.yaml_text import YamlError, parse_yaml
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+
+class Number(click.FloatRange):
+    """A finite number within a range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number.", param, ctx)
+        return float(number)
+
+
+class _Mapping(click.ParamType):
+    """A YAML mapping; its value is JSON."""
+
+    name = "mapping"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the mapping as JSON; empty for an empty one."""
+        try:
+            content = parse_yaml(str(value)) or {}
+        except YamlError as error:
+            self.fail(f"is no YAML: {error}", param, ctx)
+        if not isinstance(content, dict):
+            self.fail(f"{value!r} is no mapping of names to values.", param, ctx)
+        return json.dumps(content, sort_keys=True) if content else ""
+
+
+MAPPING = _Mapping()
 
 
 def ground_options(command: Callable[..., Any]) -> Callable[..., Any]:

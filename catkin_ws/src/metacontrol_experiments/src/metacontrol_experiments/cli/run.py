@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +13,10 @@ from metacontrol_bags.decision import DECIDED
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S, MetricsError, summarise
 from metacontrol_bags.timeline import Timeline
 from mros1_reasoner.loop.settings import setting_names
-from node_kit.yaml_text import YamlError, parse_yaml
 
 from metacontrol_experiments.cli.figure import draw_figure
-from metacontrol_experiments.cli.options import ground_options
+from metacontrol_experiments.cli.missions import ByMission
+from metacontrol_experiments.cli.options import MAPPING, Number, ground_options
 from metacontrol_experiments.cli.summary import write_summary
 from metacontrol_experiments.contingency.contingency import Contingency, Kind, Moment
 from metacontrol_experiments.contingency.parsing import (
@@ -53,10 +52,14 @@ from metacontrol_experiments.mission.settings import (
 from metacontrol_experiments.ros.runner import run_mission
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from metacontrol_bags.record import MissionRecord
     from metacontrol_bags.timeline import Report
 
+    from metacontrol_experiments.io.processes import ProcessTree
     from metacontrol_experiments.mission.mission import State
+    from metacontrol_experiments.ros.mission import NavigationMission
 
 _BAD_INPUT = (
     BagError,
@@ -72,33 +75,7 @@ _FAILED = 1
 """Exit status of a mission that did not reach its goal."""
 
 
-class _Number(click.FloatRange):
-    """A finite number within a range."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        number = super().convert(value, param, ctx)
-        if not math.isfinite(number):
-            self.fail(f"{value!r} is not a finite number.", param, ctx)
-        return float(number)
-
-
-class _Mapping(click.ParamType):
-    """A YAML mapping; its value is JSON."""
-
-    name = "mapping"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the mapping as JSON; empty for an empty one."""
-        try:
-            content = parse_yaml(str(value)) or {}
-        except YamlError as error:
-            self.fail(f"is no YAML: {error}", param, ctx)
-        if not isinstance(content, dict):
-            self.fail(f"{value!r} is no mapping of names to values.", param, ctx)
-        return json.dumps(content, sort_keys=True) if content else ""
-
-
-@click.command()
+@click.command(cls=ByMission)
 @click.option(
     "--engine",
     type=click.Choice(ENGINES),
@@ -114,7 +91,7 @@ class _Mapping(click.ParamType):
 )
 @click.option(
     "--parameters",
-    type=_Mapping(),
+    type=MAPPING,
     default="",
     help="YAML mapping of parameters of the reasoner, in place of those that it has, e.g. '{cool_down: 3}'.",
 )
@@ -138,40 +115,38 @@ class _Mapping(click.ParamType):
 )
 @click.option(
     "--failure-at",
-    type=_Number(0, 1),
+    type=Number(0, 1),
     default=DEFAULT_SHARE,
     show_default=True,
     help="Share of the way done at which --failure and --power-factor strike.",
 )
-@click.option(
-    "--power-factor", type=_Number(0), default=1.0, show_default=True, help="Of the power load, from then on."
-)
+@click.option("--power-factor", type=Number(0), default=1.0, show_default=True, help="Of the power load, from then on.")
 @click.option(
     "--contingency",
     "contingencies",
     multiple=True,
     metavar="KIND:WHAT[@WHEN]",
     help="What goes wrong, any number of times: kill:, stop:, unplug:, freeze:, thaw:, repeat: or jump:COMPONENT, "
-    "power:FACTOR, clutter:NUMBER, light:0..1; at share:0..1 of the way, time:SECONDS or place:X,Y. Clutter is there "
+    "power:FACTOR, clutter:Number, light:0..1; at share:0..1 of the way, time:SECONDS or place:X,Y. Clutter is there "
     "from the start.",
 )
 @click.option("--timeline", type=click.Path(path_type=Path), help="YAML file of contingencies.")
 @ground_options
 @click.option(
     "--real-time-factor",
-    type=_Number(0),
+    type=Number(0),
     default=1.0,
     show_default=True,
     help="Simulated per wall second; 0: as fast as it can.",
 )
 @click.option(
-    "--timeout", type=_Number(0, min_open=True), default=TIMEOUT_S, show_default=True, help="Simulated seconds."
+    "--timeout", type=Number(0, min_open=True), default=TIMEOUT_S, show_default=True, help="Simulated seconds."
 )
 @click.option(
-    "--nfr-safety", type=_Number(0, 1), default=DEFAULT_THRESHOLDS["safety"], show_default=True, help="Required level."
+    "--nfr-safety", type=Number(0, 1), default=DEFAULT_THRESHOLDS["safety"], show_default=True, help="Required level."
 )
 @click.option(
-    "--nfr-energy", type=_Number(0, 1), default=DEFAULT_THRESHOLDS["energy"], show_default=True, help="Required level."
+    "--nfr-energy", type=Number(0, 1), default=DEFAULT_THRESHOLDS["energy"], show_default=True, help="Required level."
 )
 @click.option(
     "--output", type=click.Path(file_okay=False, path_type=Path), default=Path("results/mission"), show_default=True
@@ -182,6 +157,8 @@ class _Mapping(click.ParamType):
 @click.option("--quiet", is_flag=True, help="Say nothing but errors.")
 def run(quiet: bool, output: Path, **options: Any) -> None:
     """Run a mission and leave its bag, summary and figure in a folder.
+
+    For the options of another kind of mission: run --mission manipulation --help.
 
     Exit status: 0 the goal was reached, 1 it was not, 2 bad input or a system that did not start, 130 interrupted.
     """
@@ -196,7 +173,7 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
                     raise RunError("--engine lockstep has no window; leave --gui and --rviz out")
                 state, record = _run_lockstep(settings, display)
             else:
-                state = run_mission(settings, display)
+                state = _run_on_ros(settings, display)
                 record = read_record(output / BAG_NAME)
         summary = summarise(record)
         write_summary(summary, output / SUMMARY_NAME)
@@ -274,6 +251,21 @@ def _check_parameters(text: str, manager: str) -> None:
     for name in json.loads(text or "{}"):
         if name not in known:
             raise RunError(f"--parameters: no parameter {name!r}; there are {', '.join(known)}")
+
+
+def _run_on_ros(settings: Settings, display: Display) -> State:
+    """Run a mission on ROS and leave its bag.
+
+    Raises:
+        RunError: the system did not come up, or the mission cannot be run as asked for.
+    """
+
+    def make(tree: ProcessTree, display: Display, check: Callable[[], None]) -> NavigationMission:
+        from metacontrol_experiments.ros.mission import NavigationMission  # rospy reads the environment when imported
+
+        return NavigationMission(settings, tree, display, check)
+
+    return run_mission(settings, display, make).state
 
 
 def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionRecord]:

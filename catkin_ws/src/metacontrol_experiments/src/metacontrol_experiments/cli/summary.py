@@ -11,6 +11,8 @@ from metacontrol_bags.bag import BagError, read_record
 from metacontrol_bags.metrics import MetricsError, summarise
 
 from metacontrol_experiments.io.display import refusing
+from metacontrol_experiments.pyramid.record import is_of_pyramid, read_pyramid
+from metacontrol_experiments.pyramid.summary import summarise_pyramid
 
 
 @click.command()
@@ -19,7 +21,7 @@ from metacontrol_experiments.io.display import refusing
 def summary(bag: Path, output: Path | None) -> None:
     """Print the summary of a mission's BAG as JSON."""
     with refusing(BagError, MetricsError):
-        told = summarise(read_record(bag))
+        told = summarise_pyramid(read_pyramid(bag)) if is_of_pyramid(bag) else summarise(read_record(bag))
         if output:
             write_summary(told, output)
         else:

@@ -15,6 +15,8 @@ from metacontrol_experiments.campaign.progress import LONGEST_LOG, Attempt, Stat
 from metacontrol_experiments.mission.settings import ROS, SUMMARY_NAME
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from metacontrol_experiments.campaign.matrix import Run
     from metacontrol_experiments.mission.ground import Ground
 
@@ -32,23 +34,35 @@ def drive_on_ros(run: Run, deadline: float, ground: Ground) -> tuple[Attempt, di
         deadline: wall s for it.
         ground: where it is driven.
     """
+    with tempfile.TemporaryDirectory(prefix="campaign-") as folder:
+        output = Path(folder, "mission")
+        attempt, summary = drive_command(_command(run, ground, output), output, deadline)
+        if attempt.status is not Status.DONE:
+            return attempt, {}
+        return attempt, {"summary": summary, "log": _end_of(output / _CONSOLE)}
+
+
+def drive_command(command: Sequence[str], output: Path, deadline: float) -> tuple[Attempt, dict[str, Any]]:
+    """Run `metacontrol run`; return how that went, and the summary.
+
+    Args:
+        command: its words.
+        output: the folder that it is given.
+        deadline: wall s for it.
+    """
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="campaign-") as folder:
-        output, said = Path(folder, "mission"), Path(folder, "said.log")
+        said = Path(folder, "said.log")
         with said.open("wb") as log:
-            process = subprocess.Popen(
-                [*_OWN, *_command(run, ground, output)], stdout=log, stderr=subprocess.STDOUT, start_new_session=True
-            )
-        in_time = _ends(process, deadline)
-        if not in_time:
-            process.send_signal(signal.SIGINT)
-            if not _ends(process, _GRACE_S):
-                process.kill()
-                process.wait()
+            process = subprocess.Popen([*_OWN, *command], stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
+        try:
+            in_time = _ends(process, deadline)
+        finally:  # also where this process is interrupted
+            _end(process)
         wall_s = round(time.monotonic() - began, 3)
         summary, console = output / SUMMARY_NAME, _end_of(output / _CONSOLE)
         if in_time and process.returncode in (0, 1) and summary.exists():
-            return Attempt(Status.DONE, wall_s), {"summary": json.loads(summary.read_bytes()), "log": console}
+            return Attempt(Status.DONE, wall_s), json.loads(summary.read_bytes())
         told = _end_of(said)
         if not in_time:
             return Attempt(Status.HUNG, wall_s, f"no end within {deadline:g} s of wall time", told + console), {}
@@ -76,6 +90,15 @@ def _command(run: Run, ground: Ground, output: Path) -> list[str]:
     words += [] if run.environment else ["--no-environment"]
     words += [] if run.spares else ["--no-spares"]
     return [sys.executable, "-m", "metacontrol_experiments.cli.main", "run", "--engine", ROS, "--quiet", *words]
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Have a process end, with what it started."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        if not _ends(process, _GRACE_S):
+            process.kill()
+            process.wait()
 
 
 def _ends(process: subprocess.Popen[bytes], deadline: float) -> bool:

@@ -57,7 +57,7 @@ class Display:
         self._tenth = 0
         if CONSOLE.is_terminal and not quiet:
             self._bar = Progress(
-                TextColumn("way"),
+                TextColumn("done"),
                 BarColumn(None),
                 TaskProgressColumn(),
                 TextColumn("{task.description}"),
@@ -95,21 +95,26 @@ class Display:
         if not self._quiet:
             CONSOLE.print(line, soft_wrap=True)
 
-    def progress(self, share: float, stamp: float, left_m: float) -> None:
-        """How much of the way is done (0..1), and how many metres are left as the crow flies."""
+    def progress(self, share: float, stamp: float, left: str) -> None:
+        """How much is done (0..1), and in words what is left."""
         if self._bar:
-            text = f"{stamp - self._start:5.1f} s, {left_m:4.1f} m left"
+            text = f"{stamp - self._start:5.1f} s, {left} left"
             self._bar.update(self._task, completed=share, description=text)
         elif int(share * 10) > self._tenth:
             self._tenth = int(share * 10)
-            self.say(f"{stamp - self._start:7.2f} s  ..  {self._tenth * 10} % of the way")
+            self.say(f"{stamp - self._start:7.2f} s  ..  {self._tenth * 10} % done")
+
+    def show(self, *tables: Table) -> None:
+        """Show tables."""
+        if not self._quiet:
+            for table in tables:
+                CONSOLE.print(table)
 
     def summary(self, summary: dict[str, Any]) -> None:
         """Show the closing tables."""
-        if not self._quiet:
-            CONSOLE.print(_figures(summary))
-            if summary["reconfigurations"]:
-                CONSOLE.print(_reconfigurations(summary["reconfigurations"]))
+        self.show(_figures(summary))
+        if summary["reconfigurations"]:
+            self.show(reconfigurations_table(summary["reconfigurations"]))
 
 
 def _figures(summary: dict[str, Any]) -> Table:
@@ -137,8 +142,8 @@ def _figures(summary: dict[str, Any]) -> Table:
     return table
 
 
-def _reconfigurations(entries: list[dict[str, Any]]) -> Table:
-    """Narrow enough for 80 columns."""
+def reconfigurations_table(entries: list[dict[str, Any]]) -> Table:
+    """Return a table of adaptations, narrow enough for 80 columns."""
     table = Table(title="Reconfigurations (s)", box=None, padding=(0, 1))
     for title in ("at", "trigger", "from", "to", "detect", "decide", "execute"):
         table.add_column(title, justify="left" if title in ("trigger", "from", "to") else "right", no_wrap=True)

@@ -21,15 +21,13 @@ class Readiness:
     """The reports of the system so far.
 
     Attributes:
-        located: a pose of the robot.
         stable: the manipulator reports functions, and all of them as STABLE.
         failed: why the manipulator gave up, None where it has not.
-        has_server: a status of navigation's action server.
+        has_server: a status of the action's server.
         has_graph: the monitor's first look at the graph.
         observed: quality attributes of which a level came in.
     """
 
-    located: bool = False
     stable: bool = False
     failed: str | None = None
     has_server: bool = False
@@ -43,15 +41,15 @@ class Readiness:
         self.stable = bool(reports) and all(report.state == FunctionGrounding.STABLE for report in reports)
         self.failed = f"the manipulator could not deploy {broken[0].configuration}" if broken else None
 
-    def conditions(self, qualities: Iterable[str]) -> Iterator[Condition]:
+    def conditions(self, qualities: Iterable[str], server: str) -> Iterator[Condition]:
         """Yield the conditions that must become true, in their order, each with its description.
 
         Args:
             qualities: quality attributes of which a level must come in.
+            server: the action's, in words.
         """
-        yield lambda: self.located, "the robot's pose on amcl_pose"
         yield lambda: self.stable, "a STABLE configuration on rosgraph_manipulator/active_configuration"
-        yield lambda: self.has_server, "the action server of move_base"
+        yield lambda: self.has_server, server
         yield lambda: self.has_graph, "the monitor's first look at the graph, on /diagnostics"
         for quality in qualities:
             yield partial(self._is_observed, quality), f"a level of {quality} on /diagnostics, from its observer"

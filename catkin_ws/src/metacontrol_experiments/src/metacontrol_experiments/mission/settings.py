@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
+from metacontrol_bags.bag import TOPICS
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S
 
 from metacontrol_experiments.contingency.contingency import Contingency, Kind, with_seed
@@ -70,6 +71,8 @@ class Settings:
 
     launch_package: ClassVar[str] = "metacontrol_sim"
     """Has the launch files of the whole system."""
+    topics: ClassVar[tuple[str, ...]] = TOPICS
+    """What is recorded on ROS."""
 
     @property
     def metacontrol(self) -> bool:

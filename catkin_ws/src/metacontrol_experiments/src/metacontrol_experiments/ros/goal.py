@@ -1,27 +1,27 @@
-"""The goal of a mission, as it is sent to move_base."""
+"""The goal of a mission, as it is sent to an action's server."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import rospy
 from actionlib_msgs.msg import GoalID, GoalStatusArray
 from metacontrol_bags.goal_status import GoalStatus
-from move_base_msgs.msg import MoveBaseActionGoal
-from robot_formulas.geometry import quaternion_of
-
-if TYPE_CHECKING:
-    from robot_formulas.geometry import Pose
 
 
 class MissionGoal:
     """Sends one goal under an id of its own, which a restarted server may take over."""
 
-    def __init__(self) -> None:
-        """Announce the topics."""
-        self.publisher = rospy.Publisher("move_base/goal", MoveBaseActionGoal, queue_size=5)
-        self._cancels = rospy.Publisher("move_base/cancel", GoalID, queue_size=5)
-        self._goal = MoveBaseActionGoal()
+    def __init__(self, action: str, kind: Any) -> None:
+        """Announce the topics.
+
+        Args:
+            action: its name.
+            kind: class of its action goals, such as MoveBaseActionGoal.
+        """
+        self.publisher = rospy.Publisher(f"{action}/goal", kind, queue_size=5)
+        self._cancels = rospy.Publisher(f"{action}/cancel", GoalID, queue_size=5)
+        self._goal = kind()
 
     @property
     def id(self) -> str:
@@ -33,15 +33,12 @@ class MissionGoal:
         """Whether an action server listens."""
         return bool(self.publisher.get_num_connections() > 0)
 
-    def make(self, pose: Pose, now: rospy.Time) -> None:
-        """Make the goal that is sent from now on: a pose in the map frame."""
-        self._goal = goal = MoveBaseActionGoal()
+    def make(self, now: rospy.Time) -> Any:
+        """Make the goal that is sent from now on; return its content, to be filled in."""
+        goal = self._goal = type(self._goal)()
         goal.header.stamp = now
         goal.goal_id = GoalID(stamp=now, id=f"{rospy.get_name()}-1-{now.to_sec():.3f}")
-        target = goal.goal.target_pose
-        target.header.frame_id, target.header.stamp = "map", now
-        target.pose.position.x, target.pose.position.y = pose.x, pose.y
-        target.pose.orientation.z, target.pose.orientation.w = quaternion_of(pose.yaw)
+        return goal.goal
 
     def send(self) -> None:
         """Send the goal, or send it again."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import re
 import signal
+from collections.abc import Callable
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from metacontrol_bags.bag import TOPICS
 from roslib.packages import find_node
 from rospkg import ResourceNotFound
 
@@ -23,12 +23,11 @@ from metacontrol_experiments.io.processes import (
 from metacontrol_experiments.mission.settings import BAG_NAME
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
     from pathlib import Path
 
     from metacontrol_experiments.io.display import Display
-    from metacontrol_experiments.mission.mission import State
-    from metacontrol_experiments.mission.settings import Settings
+    from metacontrol_experiments.ros.mission_node import MissionNode
 
 RECORDER = "/mission_recorder"
 
@@ -41,8 +40,32 @@ _POINTER = ("The traceback for the exception", "log file:")
 _COMPLAINT = re.compile(r"error|exception|fatal|has died|unused args|invalid|no such", re.IGNORECASE)
 
 
-def run_mission(settings: Settings, display: Display) -> State:
-    """Run a mission and record it to OUTPUT/mission.bag.
+class Settings(Protocol):
+    """What a mission of any demonstrator tells."""
+
+    @property
+    def output(self) -> Path:
+        """Folder for its bag and logs."""
+
+    @property
+    def port(self) -> int | None:
+        """Of its master; None for a free one."""
+
+    @property
+    def topics(self) -> Collection[str]:
+        """What is recorded."""
+
+    def launch_command(self, port: int) -> list[str]:
+        """Return the roslaunch command of the whole system, with a master on this port."""
+
+
+Node = TypeVar("Node", bound="MissionNode")
+Make = Callable[["ProcessTree", "Display", Callable[[], None]], Node]
+"""Returns the node of a mission, given the processes of its run, where to show it, and what checks that they run."""
+
+
+def run_mission(settings: Settings, display: Display, make: Make[Node]) -> Node:
+    """Run a mission and record it to OUTPUT/mission.bag; return its node, which knows how it ended.
 
     Whatever happens, no process of the run is left behind.
 
@@ -55,10 +78,10 @@ def run_mission(settings: Settings, display: Display) -> State:
     for folder in (settings.output, log):
         folder.mkdir(parents=True, exist_ok=True)
     with alone_in(settings.output):
-        return _run_alone(settings, display, log, bag)
+        return _run_alone(settings, display, make, log, bag)
 
 
-def _run_alone(settings: Settings, display: Display, log: Path, bag: Path) -> State:
+def _run_alone(settings: Settings, display: Display, make: Make[Node], log: Path, bag: Path) -> Node:
     for old in (bag, bag.with_name(bag.name + ".active")):
         old.unlink(missing_ok=True)
     if settings.port is not None and not is_free(settings.port):
@@ -76,13 +99,12 @@ def _run_alone(settings: Settings, display: Display, log: Path, bag: Path) -> St
     os.environ.update(environment)
     tree = ProcessTree(environment)
     with signals_as_interrupts(), _closing(tree):
-        return _run(settings, display, tree, port, bag)
+        return _run(settings, display, make, tree, port, bag)
 
 
-def _run(settings: Settings, display: Display, tree: ProcessTree, port: int, bag: Path) -> State:
+def _run(settings: Settings, display: Display, make: Make[Node], tree: ProcessTree, port: int, bag: Path) -> Node:
     from metacontrol_experiments.mission.mission import MissionError
-    from metacontrol_experiments.ros.mission import MissionNode  # rospy reads the environment when imported
-    from metacontrol_experiments.ros.startup import StartError
+    from metacontrol_experiments.ros.startup import StartError  # rospy reads the environment when imported
 
     console = settings.output / "log" / "console.log"
     display.say(f"starting the system on port {port}, its console is {console}")
@@ -94,11 +116,11 @@ def _run(settings: Settings, display: Display, tree: ProcessTree, port: int, bag
 
     node = None
     try:
-        node = MissionNode(settings, tree, display, check)
-        node.wait_ready()
-        recorder = tree.start(_record_command(bag), settings.output / "log" / "recorder.log")
-        node.wait_recorded(RECORDER)
-        state = node.drive()
+        node = make(tree, display, check)
+        node.start_up()
+        recorder = tree.start(_record_command(bag, settings.topics), settings.output / "log" / "recorder.log")
+        node.wait_recorded(RECORDER, settings.topics)
+        node.drive()
     except (StartError, MissionError) as error:
         raise RunError(f"{error}; see {console}") from error
     finally:
@@ -109,10 +131,10 @@ def _run(settings: Settings, display: Display, tree: ProcessTree, port: int, bag
     tree.stop(launch, _LAUNCH_GRACE_S)
     if not bag.exists():
         raise RunError(f"the recorder left no {bag}; see {settings.output / 'log' / 'recorder.log'}")
-    return state
+    return node
 
 
-def _record_command(bag: Path) -> list[str]:
+def _record_command(bag: Path, topics: Collection[str]) -> list[str]:
     """Return the command of the recorder itself: its Python front end would not pass signals on.
 
     Raises:
@@ -124,7 +146,7 @@ def _record_command(bag: Path) -> list[str]:
         found = []
     if not found:
         raise RunError("rosbag's recorder is not installed; on Debian it is in the package rosbag")
-    return [found[0], "-O", str(bag), "--min-space", "64M", *TOPICS, f"__name:={RECORDER.lstrip('/')}"]
+    return [found[0], "-O", str(bag), "--min-space", "64M", *topics, f"__name:={RECORDER.lstrip('/')}"]
 
 
 def _last_complaint(console: Path) -> str:

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 import rosgraph
 import rospy
-from metacontrol_bags.bag import TOPICS
 from node_kit.io.xml_rpc import CallError, Client
 
 from metacontrol_experiments.io.processes import wait_until
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
 
 DECISION_TOPIC = "mros1_reasoner/decision"
 
@@ -68,14 +67,14 @@ class Startup:
         name = rospy.resolve_name(node)
         self.wait(lambda: self._offers_decisions(name), f"the node {name} with its topic {DECISION_TOPIC}")
 
-    def wait_for_recorder(self, recorder: str, *publishers: rospy.Publisher) -> None:
-        """Wait until the node `recorder` subscribes to all that is recorded, and is connected to these of this node.
+    def wait_for_recorder(self, recorder: str, topics: Collection[str], *publishers: rospy.Publisher) -> None:
+        """Wait until the node `recorder` subscribes to these topics, and is connected to these of this node.
 
         Raises:
             StartError: it did not come up in time.
         """
         names = {publisher.resolved_name for publisher in publishers}
-        self.wait(lambda: self._recorded(recorder, names), f"the recorder {recorder}")
+        self.wait(lambda: self._recorded(recorder, topics, names), f"the recorder {recorder}")
 
     def _simulated_time(self) -> bool:
         return bool(self._master.call("getParam", "/use_sim_time"))
@@ -84,10 +83,10 @@ class Startup:
         publishers, _, _ = self._master.call("getSystemState")
         return any(topic == rospy.resolve_name(DECISION_TOPIC) and node in nodes for topic, nodes in publishers)
 
-    def _recorded(self, recorder: str, own: set[str]) -> bool:
+    def _recorded(self, recorder: str, topics: Collection[str], own: set[str]) -> bool:
         _, subscribers, _ = self._master.call("getSystemState")
         taken = {topic for topic, nodes in subscribers if recorder in nodes}
-        return taken.issuperset(TOPICS) and own <= _topics_to(recorder)
+        return taken.issuperset(topics) and own <= _topics_to(recorder)
 
 
 def _topics_to(node: str) -> set[str]:

@@ -54,6 +54,7 @@ def main() -> None:
         parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
         arm = parameters.choice("arm", "left", ("left", "right"))
         patience = parameters.number("patience", 10.0, low=0.1)
-        place = GivenCell(BaseOdometry(), patience)
+        max_age = parameters.number("max_age", 2.0, low=0.1)
+        place = GivenCell(BaseOdometry(), patience, max_age)
         Builder(RosRobot(place, MovePosition().go), one_arm(arm))
         rospy.spin()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import TYPE_CHECKING, Protocol
 
@@ -117,14 +118,16 @@ class OwnTags:
 class GivenCell:
     """The cell as another node tells it on `cell_pose`."""
 
-    def __init__(self, odometry: BaseOdometry, patience: float) -> None:
+    def __init__(self, odometry: BaseOdometry, patience: float, max_age: float = math.inf) -> None:
         """Begin to listen.
 
         Args:
             odometry: of the base.
             patience: s of ROS time to wait for a pose.
+            max_age: s of ROS time after which a pose is no longer well known, though the wheels have not turned: a
+                base may be pushed, or the cell.
         """
-        self._odometry, self._patience = odometry, patience
+        self._odometry, self._patience, self._max_age = odometry, patience, max_age
         self._news = threading.Condition()
         self._known: Localisation | None = None
         self._stamp = 0.0
@@ -153,7 +156,9 @@ class GivenCell:
         self._wait(lambda: self._known if self._is_good() else None)
 
     def _is_good(self) -> bool:
-        return self._known is not None and self._known.moved(self._odometry.pose()).deviation <= GOOD
+        if self._known is None or self.age > self._max_age:
+            return False
+        return self._known.moved(self._odometry.pose()).deviation <= GOOD
 
     def _wait(self, known: Callable[[], Localisation | None]) -> Localisation:
         end = rospy.get_time() + self._patience

@@ -5,8 +5,9 @@ The decisions are in `launching`. For one thread only: the main thread of the no
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 from node_kit.io.xml_rpc import CallError
 
@@ -187,12 +188,23 @@ class Launcher:
             self._report()
 
     def stand_by(self) -> None:
-        """Keep a warm process for each Python node that runs, where that is wanted; start none right after a change."""
+        """Keep a warm process for each Python node that runs or is expected, where that is wanted.
+
+        None is started right after a change.
+        """
         now = time.monotonic()
         if self._options.standby:
             may_start = now >= self._next_standby and self._nodes.may_stand_by(now)
             if self._processes.stand_by(self._nodes.needed, may_start):
                 self._next_standby = now + STANDBY_PERIOD
+
+    def expect(self, nodes: Iterable[NodeDescription]) -> None:
+        """Note which nodes may be started next beside those that run; one without an executable here is left out."""
+        commands = []
+        for node in nodes:
+            with contextlib.suppress(CommandLineError):  # whoever deploys it will be told
+                commands.append(self._commands.command(node))
+        self._processes.expect(commands)
 
     def _inspect(self, now: float) -> None:
         for name in self._nodes.to_inspect(now):

@@ -43,6 +43,7 @@ class NodeProcesses:
         self._commands: dict[str, Command] = {}  # by which each node was begun last
         self._hanging: set[str] = set()  # nodes that do not answer the request to end
         self._warm: dict[tuple[Any, ...], Process] = {}
+        self._others: tuple[Command, ...] = ()  # of nodes that do not run now
         self._lost_warm: Counter[tuple[Any, ...]] = Counter()
         for pid in processes.kill_marked(options.mark):
             log(f"killed process {pid}, which an earlier launcher had left behind")
@@ -172,8 +173,14 @@ class NodeProcesses:
 
     # -- standby --------------------------------------------------------------------------------------------------
 
+    def expect(self, commands: Iterable[Command]) -> None:
+        """Note by which commands nodes may be begun that do not run now."""
+        self._others = tuple(commands)
+
     def stand_by(self, names: Iterable[str], may_start: bool) -> bool:
         """End the warm processes that serve none of these nodes, and start one for a Python node that lacks it.
+
+        Nodes that do not run, but may be begun, come after these, as many as the options allow.
 
         Returns:
             Whether one was started.
@@ -184,6 +191,10 @@ class NodeProcesses:
                 self._warm.pop(kind).close()
         commands = (self._commands[name] for name in names if name in self._commands)
         wanted = {_kind(command): command for command in commands if command.is_python}
+        most = len(wanted) + self._options.standby_others
+        for command in self._others:
+            if command.is_python and len(wanted) < most:
+                wanted.setdefault(_kind(command), command)
         for kind in set(self._warm) - set(wanted):
             self._warm.pop(kind).close()
         lacking = [k for k in wanted if k not in self._warm and self._lost_warm[k] < MOST_LOST_WARM]

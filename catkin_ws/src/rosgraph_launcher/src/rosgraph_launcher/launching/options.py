@@ -17,6 +17,7 @@ class LauncherOptions:
         shutdown_timeout: how long a node may take to end after a request over XML-RPC; then it gets SIGINT.
         sigint_timeout: how long it may take after SIGINT; then it gets SIGKILL.
         standby: whether a warm process waits for the next variant of each Python node.
+        standby_others: how many warm processes wait at most for nodes that do not run.
         policy: when nodes that die are started again.
     """
 
@@ -25,4 +26,5 @@ class LauncherOptions:
     shutdown_timeout: float = 2.0
     sigint_timeout: float = 2.0
     standby: bool = True
+    standby_others: int = 8
     policy: RestartPolicy = field(default_factory=RestartPolicy)

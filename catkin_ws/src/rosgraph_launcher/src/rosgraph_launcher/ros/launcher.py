@@ -21,6 +21,9 @@ from metacontrol_msgs.srv import (
     ReadUsage,
     ReadUsageRequest,
     ReadUsageResponse,
+    StandBy,
+    StandByRequest,
+    StandByResponse,
 )
 from node_kit.io.inbox import ClosedError, Inbox
 from node_kit.parameters import ParameterError, ParameterTree
@@ -61,6 +64,7 @@ class LauncherNode:
             rospy.Service("~change", ChangeNodes, self._on_change),
             rospy.Service("~check", CheckNodes, self._on_check),
             rospy.Service("~usage", ReadUsage, self._on_usage),
+            rospy.Service("~stand_by", StandBy, self._on_stand_by),
         )
 
     def end(self, reason: str) -> None:
@@ -119,6 +123,14 @@ class LauncherNode:
         read = {pid: read_sample(pid, pid not in request.alone) for pid in request.pids}
         return ReadUsageResponse(usage_messages({pid: sample for pid, sample in read.items() if sample}))
 
+    def _on_stand_by(self, request: StandByRequest) -> StandByResponse:
+        try:
+            nodes = [from_message(node) for node in request.nodes]
+            self._inbox.call(lambda: self._launcher.expect(nodes))
+        except (ClosedError, ValueError) as error:
+            raise rospy.ServiceException(str(error)) from error
+        return StandByResponse()
+
     def _change(self, request: ChangeNodesRequest) -> ChangeNodesResponse:
         try:
             nodes = {node.name: from_message(node) for node in request.nodes}
@@ -149,6 +161,7 @@ def read_options() -> LauncherOptions:
         shutdown_timeout=parameters.number("shutdown_timeout", default.shutdown_timeout, low=0.0),
         sigint_timeout=parameters.number("sigint_timeout", default.sigint_timeout, low=0.0),
         standby=parameters.flag("standby", default.standby),
+        standby_others=parameters.whole("standby_others", default.standby_others, low=0),
         policy=RestartPolicy(
             intensity=int(parameters.number("restart_intensity", policy.intensity, low=0)),
             period=parameters.number("restart_period", policy.period, low=0.1),

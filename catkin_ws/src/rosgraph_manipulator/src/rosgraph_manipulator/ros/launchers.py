@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from functools import partial
@@ -11,7 +12,7 @@ from typing import Any
 
 import rosgraph
 import rospy
-from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, ChangeNodesResponse, CheckNodes
+from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, ChangeNodesResponse, CheckNodes, StandBy
 from node_kit.io.background import in_background
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.hosts import no_launcher
@@ -104,6 +105,22 @@ class Launchers(LauncherReports):
             self._parts[function] = frozenset(part.launcher for part in asked if configuration and not part.releases)
         self.on_reports()
         return Changed(sum(numbers.values()), phases)
+
+    def stand_by(self, nodes: Iterable[NodeDescription]) -> None:
+        """Tell each launcher which nodes may be needed next, without waiting; where that fails, they start cold."""
+        told: dict[str, list[NodeDescription]] = {}
+        for node in nodes:
+            name = self._find(node.machine)
+            if name:
+                told.setdefault(name, []).append(node)
+        for name, own in told.items():
+            in_background(partial(self._tell_expected, name, own), ASKING)
+
+    def _tell_expected(self, name: str, nodes: Sequence[NodeDescription]) -> None:
+        service = rospy.ServiceProxy(f"{name}/stand_by", StandBy)
+        with contextlib.suppress(*_FAILURES):
+            service.wait_for_service(self._timeout)
+            service([to_message(node) for node in nodes])
 
     def clear(self, function: str) -> list[str]:
         """Stop what runs for a function where it should not; return the hosts on which something did."""

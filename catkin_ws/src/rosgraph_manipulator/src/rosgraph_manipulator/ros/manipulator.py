@@ -49,6 +49,7 @@ from rosgraph_manipulator.ros.launchers import Launchers
 from rosgraph_manipulator.ros.repairs import RepairServer
 from rosgraph_manipulator.ros.requests import Order, RequestServer
 from rosgraph_manipulator.ros.running_system import Comparison
+from rosgraph_manipulator.ros.standby import Standby
 
 ASK_DELAY = 2.0  # s, wall, after a change: nodes may offer dynamic_reconfigure later than all else
 
@@ -91,6 +92,7 @@ class Manipulator:
         )
         self._requests = RequestServer(options, Policy(policy), self._inbox, self._carry_out)
         self._executor.check = self._requests.check
+        self._standby = Standby(options, launchers)
         repair_timeout = parameters.number("repair_timeout", 15.0, low=0.1)
         self._repairs = RepairServer(options, self._inbox, self._executor, repair_timeout)
 
@@ -149,6 +151,8 @@ class Manipulator:
         self._repairs.start()
         while not rospy.is_shutdown():
             self._inbox.do_next(wait_s=0.2)
+            if not self._inbox:
+                self._standby.look()
 
     def _refuse(self, refused: Configuration, reason: str) -> None:
         """Tell that the change that was under way is not begun again, and what runs instead."""
@@ -239,6 +243,7 @@ class Manipulator:
             self._executor.stop_robot(wanted.function)
             self._announcer.announce(wanted, FunctionGrounding.FAILED, outcome, phases)
         self._note(wanted="")
+        self._standby.changed()
         self._tell(outcome, wanted.name, phases)
 
     def _release(self, function: str) -> Outcome:

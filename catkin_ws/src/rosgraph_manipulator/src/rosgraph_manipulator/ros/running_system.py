@@ -100,7 +100,7 @@ class RunningSystem:
         Raises:
             DeploymentError: it can't be read, or names an executable that does not exist.
         """
-        launch = _read(configuration)
+        launch = read_configuration(configuration)
         for remark in launch.remarks:
             rospy.logwarn_once("%s: %s", configuration.launch_file, remark)
         try:
@@ -141,7 +141,7 @@ class RunningSystem:
             DeploymentError: it can't be read.
         """
         if self._described is None or self._described[0] != configuration:
-            self._described = configuration, _read(configuration)
+            self._described = configuration, read_configuration(configuration)
         return self._described[1]
 
     def deployed(self, configuration: Configuration, launch: LaunchFile) -> None:
@@ -181,7 +181,7 @@ class RunningSystem:
             return SystemDescription()
         if function not in self._deployed or self._deployed[function][0] != configuration:
             try:  # an earlier manipulator has deployed it
-                self._deployed[function] = configuration, _read(configuration)
+                self._deployed[function] = configuration, read_configuration(configuration)
             except DeploymentError as error:
                 rospy.logwarn("%s", error)
                 return self._progress.running_system(function, None)
@@ -222,7 +222,12 @@ class RunningSystem:
         return {node for node, answers_now in answers.items() if not answers_now}
 
 
-def _read(configuration: Configuration) -> LaunchFile:
+def read_configuration(configuration: Configuration) -> LaunchFile:
+    """Read the launch file of a configuration.
+
+    Raises:
+        DeploymentError: it can't be read.
+    """
     if configuration.problem:
         raise DeploymentError(configuration.problem)
     try:

@@ -1,0 +1,84 @@
+"""The command `metacontrol campaign` for a file of missions of D1."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from metacontrol_experiments.campaign.matrix import CampaignError
+from metacontrol_experiments.campaign.progress import Status
+from metacontrol_experiments.io.campaign_folder import RUNS
+from metacontrol_experiments.io.campaign_on_ros import drive_command
+from metacontrol_experiments.io.display import tell
+from metacontrol_experiments.managers.manager import MROS
+from metacontrol_experiments.mission.settings import BAG_NAME, SUMMARY_NAME
+from metacontrol_experiments.pyramid.campaign import PyramidRun, parse_pyramids, report
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+REPORT = "report.md"
+_DEADLINE_S = 1200.0
+"""Wall s for a mission: a simulated second may take two."""
+_TRIES = 2
+
+
+def drive_pyramids(content: Any, file: Path, folder: Path) -> bool:
+    """Drive the missions that a file asks for and that the folder lacks; return whether all were driven.
+
+    Of each mission, summary, figure and logs are kept; the bag, too, where the meta-controller had no success.
+
+    Args:
+        content: of the file.
+        file: its path.
+        folder: of the campaign.
+
+    Raises:
+        CampaignError: the file makes no sense, or a summary in the folder can't be read.
+    """
+    runs = parse_pyramids(content, str(file))
+    missing = [run for run in runs if not _summary(folder, run).exists()]
+    try:
+        for number, run in enumerate(missing, start=1):
+            tell(f"{number} of {len(missing)}: {run.name}: {_drive(folder, run)}")
+    finally:
+        driven = _read(folder, runs)
+        if driven:
+            (folder / REPORT).write_text(report(driven), encoding="utf-8")
+    tell(f"{len(driven)} of {len(runs)} missions are in {folder / REPORT}")
+    return len(driven) == len(runs)
+
+
+def _summary(folder: Path, run: PyramidRun) -> Path:
+    return folder / RUNS / run.name / SUMMARY_NAME
+
+
+def _drive(folder: Path, run: PyramidRun) -> str:
+    """Drive a mission, once more where it did not come to an end; return in words what became of it."""
+    output = folder / RUNS / run.name
+    program = [sys.executable, "-m", "metacontrol_experiments.cli.main", "run", "--quiet"]
+    for _ in range(_TRIES):
+        began = time.monotonic()
+        attempt, summary = drive_command([*program, *run.arguments, "--output", str(output)], output, _DEADLINE_S)
+        if attempt.status is Status.DONE:
+            if summary["success"] or run.manager != MROS:
+                (output / BAG_NAME).unlink(missing_ok=True)
+            outcome = "success" if summary["success"] else f"no success: {summary['reason']}"
+            return f"{outcome} ({summary['duration_s']:.0f} s, {time.monotonic() - began:.0f} s of wall time)"
+        _summary(folder, run).unlink(missing_ok=True)
+    return attempt.problem
+
+
+def _read(folder: Path, runs: Iterable[PyramidRun]) -> dict[PyramidRun, dict[str, Any]]:
+    found = {}
+    for run in runs:
+        path = _summary(folder, run)
+        if path.exists():
+            try:
+                found[run] = json.loads(path.read_bytes())
+            except ValueError as error:
+                raise CampaignError(f"{path}: is no JSON ({error}): delete it, and drive the mission again") from error
+    return found

@@ -1,0 +1,114 @@
+"""A campaign of D1: which missions a file asks for, and the table of what became of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+from ros_model.project.schema_check import violations
+
+from metacontrol_experiments.campaign.matrix import CampaignError
+from metacontrol_experiments.managers.manager import MROS, NONE
+from metacontrol_experiments.pyramid.scenarios import MANIPULATION, TITLES
+from metacontrol_experiments.report.statistics import rate
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+_SCENARIO = {"type": "integer", "enum": list(TITLES), "title": f"one of {', '.join(map(str, TITLES))}"}
+_MANAGER = {"type": "string", "enum": [MROS, NONE], "title": f"{MROS} or {NONE}"}
+_SCHEMA = {
+    "type": "object",
+    "title": "a mapping with the keys mission, scenarios, seeds and managers",
+    "required": ["mission", "scenarios", "seeds", "managers"],
+    "additionalProperties": False,
+    "properties": {
+        "mission": {"enum": [MANIPULATION], "title": MANIPULATION},
+        "scenarios": {"type": "array", "minItems": 1, "items": _SCENARIO, "title": "a list"},
+        "seeds": {"type": "integer", "minimum": 1, "title": "the number of seeds, from 1 on"},
+        "managers": {"type": "array", "minItems": 1, "items": _MANAGER, "title": "a list"},
+    },
+}
+_CAUSES = {
+    "light": "the light changes",
+    "obstacle": "an arm stops",
+    "component": "a driver dies",
+    "release": "an arm is free",
+}
+
+
+@dataclass(frozen=True)
+class PyramidRun:
+    """One mission of a campaign."""
+
+    scenario: int
+    seed: int
+    manager: str
+
+    @property
+    def name(self) -> str:
+        """Its name, and its folder below that of the campaign's runs."""
+        return f"scenario{self.scenario}_seed{self.seed:03d}_{self.manager}"
+
+    @property
+    def arguments(self) -> list[str]:
+        """What `metacontrol run` is given for it."""
+        baseline = ["--no-metacontrol"] if self.manager == NONE else []
+        return ["--mission", MANIPULATION, "--scenario", str(self.scenario), "--seed", str(self.seed), *baseline]
+
+
+def asks_for_pyramids(content: Any) -> bool:
+    """Return whether the content of a campaign's file is about D1."""
+    return isinstance(content, dict) and content.get("mission") == MANIPULATION
+
+
+def parse_pyramids(content: Any, where: str) -> tuple[PyramidRun, ...]:
+    """Return the missions of a file, seed by seed, so that an early end leaves some of each kind.
+
+    Raises:
+        CampaignError: it makes no sense.
+    """
+    for violation in violations(content, _SCHEMA):
+        raise CampaignError(f"{where}: {violation}")
+    return tuple(
+        PyramidRun(scenario, seed, manager)
+        for seed in range(1, content["seeds"] + 1)
+        for scenario in dict.fromkeys(content["scenarios"])
+        for manager in dict.fromkeys(content["managers"])
+    )
+
+
+def report(summaries: Mapping[PyramidRun, Mapping[str, Any]]) -> str:
+    """Return the tables of a campaign in Markdown: success, duration and accuracy, and how fast it recovers."""
+    groups: dict[tuple[int, str], list[Mapping[str, Any]]] = {}
+    for run, summary in sorted(summaries.items(), key=lambda item: (item[0].scenario, item[0].manager, item[0].seed)):
+        groups.setdefault((run.scenario, run.manager), []).append(summary)
+    lines = [
+        "| scenario | manager | missions | success (95 %) | duration, median | largest error of a block | "
+        "placed blocks lost | simulated / wall time |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for (scenario, manager), missions in groups.items():
+        share = rate([bool(mission["success"]) for mission in missions])
+        met = f"{share.value:.0%} ({share.low:.0%} to {share.high:.0%})"
+        well = [mission for mission in missions if mission["success"]]
+        durations = f"{median(mission['duration_s'] for mission in well):.0f} s" if well else "-"
+        error = f"{max(mission['placed_error_mm'] for mission in well):.1f} mm" if well else "-"
+        lost, factor = sum(m["placed_lost"] for m in missions), median(m["real_time_factor"] for m in missions)
+        title = f"{scenario}: {TITLES[scenario]}"
+        lines.append(
+            f"| {title} | `{manager}` | {len(missions)} | {met} | {durations} | {error} | {lost} | {factor:.2f} |"
+        )
+    lines += ["", "| cause | changes | cause to next motion, median | largest |", "|---|---|---|---|"]
+    adapted = [mission for (_, manager), missions in groups.items() if manager == MROS for mission in missions]
+    for kind, what in _CAUSES.items():
+        times = _recoveries(adapted, kind)
+        if times:
+            lines.append(f"| {what} | {len(times)} | {median(times):.1f} s | {max(times):.1f} s |")
+    return "\n".join(lines) + "\n"
+
+
+def _recoveries(missions: Iterable[Mapping[str, Any]], kind: str) -> list[float]:
+    strikes = (strike for mission in missions for strike in mission["strikes"])
+    return [s["recover_s"] for s in strikes if s["name"].startswith(f"{kind}:") and s["recover_s"] is not None]

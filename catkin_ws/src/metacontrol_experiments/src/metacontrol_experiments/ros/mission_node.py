@@ -1,0 +1,223 @@
+"""The node /mission: what the missions of all demonstrators have in common.
+
+Callbacks only queue what they get; one thread, the caller's, feeds the state machine.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
+from metacontrol_bags import messages
+from metacontrol_bags.record import CostReport, Event, QualityReport
+from metacontrol_bags.timeline import Timeline
+from metacontrol_msgs.msg import ActiveConfiguration, Decision, MissionEvent
+from node_kit.io.inbox import Inbox
+
+from metacontrol_experiments.io.processes import wait_until
+from metacontrol_experiments.mission.readiness import Readiness
+from metacontrol_experiments.ros.startup import DECISION_TOPIC, StartError, Startup
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
+    from metacontrol_bags.timeline import Report
+
+    from metacontrol_experiments.io.display import Display
+    from metacontrol_experiments.ros.goal import MissionGoal
+
+STANDSTILL_S = 20.0
+"""A clock that does not move for so many wall seconds means that the simulator is gone."""
+
+TAIL_S = 0.5
+"""Simulated seconds that are still recorded after the mission's end."""
+
+
+class MissionNode(ABC):
+    """One mission, from a system that is starting to the event MISSION_END."""
+
+    def __init__(self, display: Display, check: Callable[[], None], thresholds: dict[str, float], decider: str) -> None:
+        """Join the graph.
+
+        Args:
+            display: where the timeline is shown.
+            check: raises an error when the launched system has ended.
+            thresholds: QA name -> level that must not be exceeded.
+            decider: name of the node that decides; empty for the baseline.
+
+        Raises:
+            StartError: the master did not come up in time, or does not run on simulated time.
+        """
+        self._display = display
+        self._check = check
+        self._decider = decider
+        self._timeline = Timeline(thresholds)
+        self._inbox = Inbox()
+        self._readiness = Readiness()
+        self._has_begun = False
+        self._began_wall = time.monotonic()
+        self._startup = Startup(self._attend)
+        self._startup.wait_for_master()
+        rospy.init_node("mission", disable_signals=True)
+        self._events = rospy.Publisher("mission/event", MissionEvent, queue_size=10)
+        self._goal = self._make_goal()
+        self._subscribe("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)
+        self._subscribe(DECISION_TOPIC, Decision, self._on_decision)
+        self._subscribe("/diagnostics", DiagnosticArray, self._on_diagnostics)
+
+    # What a mission of one kind adds
+
+    @abstractmethod
+    def start_up(self) -> None:
+        """Wait until the whole system is up.
+
+        Raises:
+            StartError: it is not, in time; or the manipulator gave up.
+        """
+
+    @property
+    @abstractmethod
+    def is_over(self) -> bool:
+        """Whether the mission is over."""
+
+    @abstractmethod
+    def _make_goal(self) -> MissionGoal:
+        """Return the goal, not yet sent."""
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Publish MISSION_START and send the goal."""
+
+    @abstractmethod
+    def _advance(self, now: float) -> None:
+        """Take in the time."""
+
+    @abstractmethod
+    def _give_up(self, now: float, reason: str, *, interrupted: bool) -> None:
+        """End the mission for a reason from outside."""
+
+    @abstractmethod
+    def _ending(self) -> tuple[float | None, str, dict[str, str]]:
+        """Return when the mission was over, its name, and what MISSION_END tells."""
+
+    # The mission
+
+    def wait_ready(self, thresholds: Collection[str], server: str) -> None:
+        """Wait until the whole system is up.
+
+        Args:
+            thresholds: qualities of which a level has to come in.
+            server: the action's server, in words.
+
+        Raises:
+            StartError: it is not, in time; or the manipulator gave up.
+        """
+        self._startup.wait(lambda: rospy.get_time() > 0, "/clock, from the simulator")
+        for condition, what in self._readiness.conditions(thresholds, server):
+            self._startup.wait(condition, what)
+        self._startup.wait(lambda: self._goal.is_heard, server)
+        if self._decider:
+            self._startup.wait_for_decider(self._decider)
+
+    def wait_recorded(self, recorder: str, topics: Collection[str]) -> None:
+        """Wait until the node `recorder` has subscribed to these topics.
+
+        Raises:
+            StartError: it has not, in time.
+        """
+        self._startup.wait_for_recorder(recorder, topics, self._events, self._goal.publisher)
+
+    def drive(self) -> None:
+        """Send the goal and follow the mission to its end.
+
+        Raises:
+            MissionError: the goal is no goal from here.
+            KeyboardInterrupt: after the end of the mission was published.
+        """
+        self._begin()
+        self._has_begun = True
+        try:
+            self._loop()
+        except KeyboardInterrupt:
+            self._give_up(rospy.get_time(), "interrupted", interrupted=True)
+            self._goal.cancel()
+            self._end()
+            raise
+        self._end()
+
+    def close(self) -> None:
+        """Leave the graph."""
+        rospy.signal_shutdown("the mission is over")
+
+    def _attend(self) -> None:
+        """Do what is due while the system starts.
+
+        Raises:
+            StartError: it will not come up.
+        """
+        self._check()
+        self._inbox.drain()
+        if self._readiness.failed:
+            raise StartError(self._readiness.failed)
+
+    def _loop(self) -> None:
+        clock, moved = rospy.get_time(), time.monotonic()
+        while not self.is_over:
+            self._inbox.drain(0.05)
+            now = rospy.get_time()
+            if now != clock:
+                clock, moved = now, time.monotonic()
+            elif time.monotonic() - moved > STANDSTILL_S:
+                self._give_up(now, "the simulated clock stands still", interrupted=False)
+            self._advance(now)
+            try:
+                self._check()
+            except StartError as error:
+                self._give_up(now, str(error), interrupted=False)
+
+    def _end(self) -> None:
+        ended, name, values = self._ending()
+        stamp = rospy.Time.from_sec(ended if ended is not None else rospy.get_time())
+        values |= {"wall_duration_s": f"{time.monotonic() - self._began_wall:.3f}"}
+        self._publish_event(stamp, MissionEvent.MISSION_END, name, values)
+        wait_until(lambda: rospy.get_time() > stamp.to_sec() + TAIL_S, 2.0)
+
+    def _publish_event(self, stamp: rospy.Time, kind: str, name: str, values: dict[str, str]) -> None:
+        message = MissionEvent(kind=kind, name=name, values=[KeyValue(key, value) for key, value in values.items()])
+        message.header.stamp = stamp
+        self._events.publish(message)
+        self._tell(Event(stamp.to_sec(), kind, name, values))
+
+    def _tell(self, report: Report) -> None:
+        """Show what is new in a report; before the mission runs, only take note of it."""
+        entries = self._timeline.tell(report)
+        if self._has_begun or isinstance(report, Event):
+            for entry in entries:
+                self._display.entry(entry)
+
+    # Callbacks: the inbox brings them to the mission's thread
+
+    def _subscribe(self, topic: str, kind: type, handler: Callable[[Any], None]) -> None:
+        rospy.Subscriber(topic, kind, lambda message: self._inbox.put(partial(handler, message)))
+
+    def _on_configuration(self, message: ActiveConfiguration) -> None:
+        reports = messages.configurations(message, rospy.get_time())
+        self._readiness.take_configurations(reports)
+        for report in reports:
+            self._tell(report)
+
+    def _on_decision(self, message: Decision) -> None:
+        self._tell(messages.decision(message, rospy.get_time()))
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        publisher = message._connection_header.get("callerid", "")
+        for report in messages.diagnostics(message, rospy.get_time(), rospy.get_namespace(), publisher):
+            if isinstance(report, QualityReport) and report.level is not None:
+                self._readiness.observed.add(report.name)
+            self._readiness.has_graph |= not isinstance(report, QualityReport)
+            if not isinstance(report, CostReport):
+                self._tell(report)

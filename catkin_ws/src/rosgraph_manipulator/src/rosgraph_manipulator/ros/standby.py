@@ -1,0 +1,50 @@
+"""Tells the launchers which nodes of other configurations may be needed next: processes stand by for them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rosgraph_launcher.description import NodeDescription
+
+from rosgraph_manipulator.change.deployment import DeploymentError
+from rosgraph_manipulator.configuration.configurations import ManipulatorOptions
+from rosgraph_manipulator.ros.launchers import Launchers
+from rosgraph_manipulator.ros.running_system import read_configuration
+
+
+class Standby:
+    """Reads the launch files while there is nothing else to do, one at a time."""
+
+    def __init__(self, options: ManipulatorOptions, launchers: Launchers) -> None:
+        """Begin without knowing any node.
+
+        Args:
+            options: has the configurations, and the drivers of repairs.
+            launchers: those of all hosts.
+        """
+        self._unread = [*options.configurations.values(), *options.drivers.values()]
+        self._launchers = launchers
+        self._nodes: dict[str, NodeDescription] = {}
+        self._is_told = True
+
+    def changed(self) -> None:
+        """Note that a change was made: a launcher that was started anew knows nothing."""
+        self._is_told = False
+
+    def look(self) -> None:
+        """Take the next step: read a launch file, or tell the launchers."""
+        if self._unread:
+            self._read()
+            self._is_told = False
+        elif not self._is_told:
+            self._is_told = True
+            self._launchers.stand_by(self._nodes.values())
+
+    def _read(self) -> None:
+        try:
+            system = read_configuration(self._unread.pop(0)).system
+        except DeploymentError:
+            return  # whoever requests it will be told
+        for node in system.nodes.values():
+            plain = replace(node, parameters={})  # they are on the parameter server; the process is the same
+            self._nodes.setdefault(repr(plain), plain)

@@ -1,0 +1,69 @@
+"""A campaign of D1: its file, and its report."""
+
+import pytest
+from metacontrol_experiments.campaign.matrix import CampaignError
+from metacontrol_experiments.pyramid.campaign import PyramidRun, asks_for_pyramids, parse_pyramids, report
+
+ASKED = {"mission": "manipulation", "scenarios": [1, 2], "seeds": 2, "managers": ["mros", "none"]}
+
+
+def test_missions_come_seed_by_seed():
+    assert asks_for_pyramids(ASKED)
+    names = [run.name for run in parse_pyramids(ASKED, "a.yaml")]
+    assert names[:4] == [
+        "scenario1_seed001_mros",
+        "scenario1_seed001_none",
+        "scenario2_seed001_mros",
+        "scenario2_seed001_none",
+    ]
+    assert len(names) == len(set(names)) == 8
+
+
+def test_baseline_differs_in_one_word():
+    run, baseline = parse_pyramids(ASKED, "a.yaml")[:2]
+    assert baseline.arguments == [*run.arguments, "--no-metacontrol"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"scenarios": [9]}, "scenarios"),
+        ({"seeds": 0}, "seeds"),
+        ({"seeds": 2.5}, "seeds"),
+        ({"managers": ["rules"]}, "managers"),
+        ({"managers": []}, "managers"),
+        ({"engine": "ros"}, "engine"),
+    ],
+)
+def test_file_that_makes_no_sense_is_refused_by_its_place(change, said):
+    with pytest.raises(CampaignError, match=rf"a\.yaml: .*{said}"):
+        parse_pyramids(ASKED | change, "a.yaml")
+
+
+def test_other_files_are_not_about_it():
+    assert not asks_for_pyramids({"parts": {}})
+    assert not asks_for_pyramids(None)
+
+
+def test_report_tells_success_and_how_fast_it_recovers():
+    def summary(success, *times):
+        strikes = [{"name": "light:0.04", "recover_s": time} for time in times]
+        return {
+            "success": success,
+            "duration_s": 70.0,
+            "placed_error_mm": 1.2,
+            "placed_lost": 0,
+            "real_time_factor": 1.0,
+            "strikes": strikes,
+        }
+
+    told = report(
+        {
+            PyramidRun(1, 1, "mros"): summary(True, 0.5, None),
+            PyramidRun(1, 2, "mros"): summary(True, 0.9),
+            PyramidRun(1, 1, "none"): summary(False),
+        }
+    )
+    assert "| `mros` | 2 | 100% (34% to 100%) | 70 s | 1.2 mm | 0 | 1.00 |" in told
+    assert "| `none` | 1 | 0% (0% to 79%) | - | - | 0 | 1.00 |" in told
+    assert "| the light changes | 2 | 0.7 s | 0.9 s |" in told
