@@ -95,8 +95,8 @@ def test_where_no_design_is_left_the_robot_stops_and_says_why(text, speed, succe
     assert summarise_pyramid(asked)["success"] is success
 
 
-def adapted(number, decided, executed):
-    decision = Decision(str(number), DECIDED, "o", "component:left_arm", "", "fd2_1", decided)
+def adapted(number, decided, executed, trigger="component:left_arm"):
+    decision = Decision(str(number), DECIDED, "o", trigger, "", "fd2_1", decided)
     yield decision
     yield replace(decision, state=EXECUTED, stamp=executed, stamp_executed=executed)
 
@@ -116,15 +116,16 @@ def test_recovery_is_from_the_arm_s_stop_to_the_first_motion_after_the_last_chan
     assert strike["recover_s"] == pytest.approx(4.1, abs=0.11)
 
 
-def test_recovery_counts_what_follows_a_cause_up_to_the_next_one():
+def test_recovery_counts_what_its_cause_has_triggered():
     arms = {"left": still(0.4), "right": still()}
     events = [
         Event(20.0, MissionEvent.PERTURBATION, "light:0.04", {}),
         Event(30.0, MissionEvent.PERTURBATION, "component:camera", {}),
     ]
-    asked = record(events=events, decisions=adapted(1, 30.2, 31.0), arms=arms)
+    made = [*adapted(1, 20.3, 20.5, "environment:light"), *adapted(2, 29.95, 31.0, "component:camera")]
+    asked = record(events=events, decisions=made, arms=arms)
     first, second = summarise_pyramid(asked)["strikes"]
-    assert first["recover_s"] is None
+    assert first["recover_s"] == pytest.approx(0.5, abs=0.11)
     assert second["recover_s"] == pytest.approx(1.0, abs=0.11)
 
 

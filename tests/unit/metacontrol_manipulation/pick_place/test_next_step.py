@@ -62,6 +62,17 @@ def test_layers_are_built_from_below():
     assert decide(situation(held=["left"], filled=[*SLOTS[:3], Slot(1, 0)])) == Place("left", Slot(1, 1))
 
 
+def test_a_hand_that_was_left_at_the_blocks_goes_away_before_the_base_moves():
+    now = replace(situation(FAR_LEFT, base_y=0.3, clear=False), away=frozenset(["right"]))
+    assert decide(now) == Look()
+    assert decide(replace(now, away=frozenset())) == MoveBase(0.0)
+    assert decide(situation(FAR_LEFT, base_y=0.3)) == MoveBase(0.0)
+    progress = now.progress
+    for _ in range(TRIES):  # it can't
+        progress = acted(progress, Look(), 0.3, succeeded=False)
+    assert decide(replace(now, progress=progress)) == MoveBase(0.0)
+
+
 def test_an_arm_that_does_not_work_lets_go():
     assert decide(situation(held=["right"], working=["left"])) == Open("right")
     assert decide(situation(held=["right"], working=["left"]), one_arm("left")) == Open("right")

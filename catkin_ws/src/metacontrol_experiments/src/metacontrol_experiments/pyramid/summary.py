@@ -7,7 +7,7 @@ Definitions
   safely and say why: then `success` is that it stands still from 1 s after the goal's end on, the goal was aborted with
   a reason, and no block that was in place is lost.
 - `recover_s` of a strike: from its cause to the robot's next motion. The cause is the arm's safety stop, or the strike
-  itself. The next motion is the first one, of the base or of any arm, after the last change that followed the cause was
+  itself. The next motion is the first one, of the base or of any arm, after the last change that it caused was
   carried out: often the stopped arm goes back out of the way first. None where nothing was changed.
 """
 
@@ -41,7 +41,9 @@ _STOPPING_S = 1.0
 _MOVES_ARM, _MOVES_BASE = 0.05, 0.02
 """rad/s of a joint and m/s of the base from which on it moves: servos that hold a place are slower."""
 _FOLLOWS_S = 20.0
-"""s after a cause within which a decision is one that follows it, if no other cause comes between."""
+"""s after a cause within which a decision with its trigger follows it, if no other such cause comes between."""
+_SAME_MOMENT_S = 0.1
+"""s by which the clocks of two nodes may differ."""
 _SLOT_PLACES = np.array([slot.position for slot in SLOTS])
 
 
@@ -118,20 +120,30 @@ def _strikes(record: PyramidRecord) -> list[dict[str, Any]]:
     start, found = record.mission.start_stamp, causes(record)
     told = []
     for index, (event, cause) in enumerate(found):
-        until = found[index + 1][1] if index + 1 < len(found) else math.inf
+        later = (moment for other, moment in found[index + 1 :] if _triggers(other.name) == _triggers(event.name))
+        until = next(later, math.inf)
         told.append(
             {
                 "name": event.name,
                 "stamp_s": _rounded(event.stamp - start),
                 "cause_s": _rounded(cause - start),
-                "recover_s": _recovery(record, cause, min(until, cause + _FOLLOWS_S)),
+                "recover_s": _recovery(record, cause, min(until, cause + _FOLLOWS_S), _triggers(event.name)),
             }
         )
     return told
 
 
-def _recovery(record: PyramidRecord, cause: float, until: float) -> float | None:
-    followed = {d.id for d in record.mission.decisions if d.state == DECIDED and cause - 0.1 <= d.stamp <= until}
+def _triggers(strike: str) -> tuple[str, ...]:
+    """Return by which triggers decisions follow a strike."""
+    kind, _, what = strike.partition(":")
+    if kind in ("obstacle", "release"):
+        return (f"component:{what}_arm",)
+    return ("environment:light", "qa:tag_share") if kind == "light" else (strike,)
+
+
+def _recovery(record: PyramidRecord, cause: float, until: float, triggers: tuple[str, ...]) -> float | None:
+    decided = [d for d in record.mission.decisions if d.state == DECIDED and d.trigger in triggers]
+    followed = {d.id for d in decided if cause - _SAME_MOMENT_S <= d.stamp < until - _SAME_MOMENT_S}
     carried_out = [
         d.stamp_executed or d.stamp for d in record.mission.decisions if d.state == EXECUTED and d.id in followed
     ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from arm_motion.grasping import Grasp, grasp
-from arm_motion.planning import NoPathError, plan
+from arm_motion.planning import NoPathError, line, plan
 from arm_motion.scene import Box
 from arm_motion.timing import timed
 
@@ -31,6 +31,8 @@ SPEED, CAREFUL = 0.7, 0.25
 """Shares of the fastest motion: on the way, and near blocks."""
 DEADLINE = 2.0
 """s of wall time for a search."""
+_HIGH, _RISE = 0.30, 0.10
+"""m above the table from which on a hand is over all blocks, and by which it rises from among them."""
 HELD = Box((0.0, 0.0, 0.0), (SIDE - 0.002,) * 3)
 """A held block in the TCP's frame."""
 
@@ -121,6 +123,27 @@ def go(scene: Scene, joints: Vector, goal: Sequence[float], seed: int, *, holds:
     except NoPathError as error:
         raise HandlingError(str(error)) from error
     return [Move(timed(path, SPEED))]
+
+
+def rise(scene: Scene, joints: Vector, table: float) -> list[Deed]:
+    """Return how a hand rises straight by some cm; nothing where it is high above the table.
+
+    Args:
+        scene: what is in the way.
+        joints: where the arm is, rad.
+        table: height of the table in the arm's frame, m.
+
+    Raises:
+        HandlingError: something is in the way.
+    """
+    position, quaternion = scene.forward(joints)
+    if position[2] > table + _HIGH:
+        return []
+    above = (position[0], position[1], position[2] + _RISE)
+    try:
+        return [Move(timed(line(scene, joints, above, quaternion), CAREFUL))]
+    except NoPathError as error:
+        raise HandlingError(str(error)) from error
 
 
 def _way(scene: Scene, joints: Vector, chosen: Grasp, seed: int, held: Box | None = None) -> Move:

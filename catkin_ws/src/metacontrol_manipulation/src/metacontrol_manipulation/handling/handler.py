@@ -8,7 +8,7 @@ from arm_motion.grasping import reachable
 from arm_motion.scene import Scene
 from robot_formulas.geometry import Pose
 
-from metacontrol_manipulation.handling.deeds import go, put, take
+from metacontrol_manipulation.handling.deeds import go, put, rise, take
 from metacontrol_manipulation.handling.surroundings import BlockPose, Surroundings
 from metacontrol_manipulation.pick_place.actions import Pick, Place, PutDown
 from metacontrol_manipulation.pick_place.pyramid import SIDE, TABLE_HEIGHT
@@ -82,6 +82,16 @@ class Handler:
         """
         self._look_around(arm, joints, cell, progress, None)
         return go(self._scene, joints[arm], self._mounts[arm].home, self._seed, holds=holds)
+
+    def rise(self, arm: str, joints: Mapping[str, Sequence[float]], cell: Pose, progress: Progress) -> list[Deed]:
+        """Return how a hand rises straight from among the blocks; nothing where it is not there.
+
+        Raises:
+            HandlingError: something is in the way.
+        """
+        self._look_around(arm, joints, cell, progress, None)
+        top = TABLE_HEIGHT - self._mounts[arm].z
+        return rise(self._scene, joints[arm], top) if self.is_away(arm, joints[arm]) else []
 
     def is_away(self, arm: str, joints: Sequence[float]) -> bool:
         """Return whether an arm is not where it is out of the way."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from metacontrol_manipulation.handling.deeds import OPEN, Grip, HandlingError
 from metacontrol_manipulation.perception.blocks import find_blocks
-from metacontrol_manipulation.pick_place.actions import Done, MoveBase, Open, Pick, Place, PutDown, Retreat, Stuck
+from metacontrol_manipulation.pick_place.actions import Done, Look, MoveBase, Open, Pick, Place, PutDown, Retreat, Stuck
 from metacontrol_manipulation.pick_place.next_step import OVER_PYRAMID, Situation, next_step
 from metacontrol_manipulation.pick_place.progress import Progress, acted, perceived
 
@@ -89,6 +89,7 @@ class Building:
         Args:
             is_wanted: is asked before each action.
         """
+        self._rise()
         self.look(clear=False)
         while is_wanted():
             missing = self._missing_arms(is_wanted)
@@ -122,7 +123,7 @@ class Building:
 
     def _act(self, action: Action) -> None:
         """Do what was decided, and look what came of it."""
-        succeeded, base_y = True, self._base_y()
+        succeeded, base_y, cleared = True, self._base_y(), None
         try:
             if isinstance(action, Pick | Place | PutDown):
                 deeds = self._handler.deeds(action, self._robot.joints, self._robot.cell, self.progress)
@@ -134,10 +135,22 @@ class Building:
                 succeeded = self._robot.retreat(action.arm)
             elif isinstance(action, MoveBase):
                 succeeded = self._robot.move_base(action.y)
+            elif isinstance(action, Look):
+                succeeded = cleared = self._clear_the_view()
         except HandlingError:
             succeeded = False
         self.progress = acted(self.progress, action, base_y, succeeded=succeeded)
-        self.look(clear=not isinstance(action, Pick) and self._clear_the_view())
+        if cleared is None:
+            cleared = not isinstance(action, Pick) and self._clear_the_view()
+        self.look(clear=cleared)
+
+    def _rise(self) -> None:
+        """Have the hands rise that another program has left among the blocks, before anything else moves."""
+        for arm in sorted(self._robot.working):
+            try:
+                self._robot.do(arm, self._handler.rise(arm, self._robot.joints, self._robot.cell, self.progress))
+            except HandlingError:
+                continue  # something is over it: it will be planned around
 
     def _clear_the_view(self) -> bool:
         """Have the arms that work go out of the way; return whether they have."""

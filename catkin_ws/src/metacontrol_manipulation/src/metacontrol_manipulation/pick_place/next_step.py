@@ -115,7 +115,7 @@ def next_step(situation: Situation, design: Design, reach: Reach, under_way: Seq
     action = decision.now()
     if action is None and not under_way:
         action = decision.later()
-    return action
+    return Look() if isinstance(action, MoveBase) and decision.is_in_the_way() else action
 
 
 class _Decision:
@@ -142,6 +142,10 @@ class _Decision:
         """The loose blocks; where there are none and no arm is in the way, whatever may be one."""
         progress = self.progress
         return progress.unclear if progress.clear and not progress.blocks else progress.blocks
+
+    def is_in_the_way(self) -> bool:
+        """Return whether a hand is among the blocks that could go out of the way before the base moves."""
+        return bool(self.away & self.working) and not self.progress.clear and not self._is_given_up(Look())
 
     # -- what can begin at once ---------------------------------------------------------------------------------------
 
