@@ -9,6 +9,7 @@ import cv2
 import pytest
 from ros_model.cli.rosmodel import main
 from ros_model.io.drawing import dot
+from ros_model.io.files import resolve
 from ros_model.language.system_reader import parse_system
 
 SYSTEM = """RosSystem { Name robot RosComponents (
@@ -117,6 +118,40 @@ def test_graph_is_drawn_as_png(show, tmp_path):
     picture = cv2.imread(str(tmp_path / "g.png"))
     assert min(picture.shape[:2]) > 100
     assert len({tuple(pixel) for pixel in picture.reshape(-1, 3)}) > 3
+
+
+def edges_of(path):
+    text = path.read_text()
+    return {
+        tuple(part.strip() for part in line.split(" [")[0].split("->")) for line in text.splitlines() if "->" in line
+    }
+
+
+def project_of(package):
+    return str(resolve(f"package://{package}/models"))
+
+
+def test_project_is_drawn_as_its_hierarchy(tmp_path):
+    path = tmp_path / "h.dot"
+    with pytest.raises(SystemExit) as done:
+        main(["show", project_of("metacontrol_manipulation"), "--graph", str(path)])
+    assert done.value.code == 0
+    text, edges = path.read_text(), edges_of(path)
+    design = {name: line.split()[0] for line in text.splitlines() for name in ("fd1_1", "fd2_1") if f'"{name}"' in line}
+    assert ('"function f_move_position"', design["fd1_1"]) in edges
+    assert (design["fd1_1"], '"function f_calibrate_position"') in edges
+    assert (design["fd2_1"], '"environment light"') in edges
+    assert '"fd1_left\\nfd1_right"' in text  # they require the same
+    assert '"hand\\n1 of left_arm, right_arm"' in text
+    assert '"o_calibrate_position\\nwhen required\\ntag_share: 0.1"' in text
+
+
+def test_many_designs_that_require_the_same_are_drawn_as_one(tmp_path):
+    path = tmp_path / "h.dot"
+    with pytest.raises(SystemExit):
+        main(["show", f"{project_of('metacontrol_sim')}/metacontrol.yaml", "--graph", str(path)])
+    assert "more" in path.read_text()
+    assert ('"component camera"', '"environment light"') in edges_of(path)
 
 
 def test_names_do_not_break_out_of_the_graph(show, tmp_path):

@@ -12,6 +12,7 @@ from ros_model.errors import ModelError
 from ros_model.io.models import read_all
 from ros_model.language.notation import type_text, value_text
 from ros_model.language.packages import PackageSet
+from ros_model.project.settings import FILE_NAME
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import Component, ParameterType, Position, RosSystem, Value
@@ -25,18 +26,26 @@ _UNLIMITED = 100_000  # columns of what is no terminal
     "--graph",
     type=click.Path(),
     metavar="FILE.svg|png|pdf|dot",
-    help="Draw nodes, topics, services, actions and connections of a .rossystem file into this file, with graphviz.",
+    help="Draw into this file, with graphviz: of a .rossystem file nodes, topics, services, actions and connections, "
+    "of a project (metacontrol.yaml or its folder) the functions, their designs, and what these require.",
 )
 @click.argument("file", type=click.Path())
 def show(file: str, graph: str | None) -> None:
-    """Show a .rossystem or .ros file as a tree, or draw it."""
+    """Show a .rossystem or .ros file as a tree, or draw it. A project can be drawn."""
+    if graph is not None and (Path(file).is_dir() or Path(file).name == FILE_NAME):
+        from ros_model.io.drawing import draw
+        from ros_model.io.hierarchy import hierarchy
+        from ros_model.io.project import load_project
+
+        draw(hierarchy(load_project(file)), Path(graph))
+        return
     model = read_all(Path(file))
     if graph is not None:
-        from ros_model.io.drawing import draw
+        from ros_model.io.drawing import dot, draw
 
         if isinstance(model, PackageSet):
             raise ModelError(f"{file}: packages have no connections to draw: give a .rossystem file")
-        draw(model, Path(graph))
+        draw(dot(model), Path(graph))
         return
     from rich.console import Console  # slow to import, and only needed here
 

@@ -1,4 +1,4 @@
-"""Draws a system: its components, the topics, services and actions between them, with graphviz."""
+"""Draws graphs with graphviz, and a system as one: its components, the topics, services and actions between them."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class _Channel:
     targets: dict[str, None] = field(default_factory=dict)
 
 
-def draw(system: RosSystem, path: Path) -> None:
-    """Draw a system into a file, in the format that its extension names.
+def draw(text: str, path: Path) -> None:
+    """Draw a graph, as graphviz reads it, into a file, in the format that its extension names.
 
     Raises:
         ModelError: the extension is none of FORMATS, graphviz is missing or fails, or the file can't be written.
@@ -54,7 +54,6 @@ def draw(system: RosSystem, path: Path) -> None:
     form = path.suffix.removeprefix(".").lower()
     if form not in FORMATS:
         raise ModelError(f"{path}: graphs are drawn as {', '.join(f'.{known}' for known in FORMATS)}: give such a name")
-    text = dot(system)
     try:
         path.write_bytes(text.encode() if form == "dot" else _rendered(text, form))
     except OSError as error:
@@ -66,14 +65,14 @@ def dot(system: RosSystem) -> str:
 
     Ports that no connection names meet, as ROS has it, where they have one name.
     """
-    lines = [f"digraph {_quoted(system.name)} {{", f"{_HEAD}    label={_quoted(system.name)};"]
+    lines = [f"digraph {quoted(system.name)} {{", f"{_HEAD}    label={quoted(system.name)};"]
     stacked = {name for stack in system.stacks for name in stack.components}
     lines += [_node(component) for component in system.components if component.name not in stacked]
     for number, stack in enumerate(system.stacks):
         inside = (_node(component) for component in system.components if component.name in stack.components)
-        lines += [f"    subgraph cluster_{number} {{ label={_quoted(stack.name)}; style=dashed;", *inside, "    }"]
+        lines += [f"    subgraph cluster_{number} {{ label={quoted(stack.name)}; style=dashed;", *inside, "    }"]
     for number, channel in enumerate(_channels(system)):
-        lines.append(f"    t{number} [label={_quoted(channel.name)}, {_STYLES[channel.kind]}];")
+        lines.append(f"    t{number} [label={quoted(channel.name)}, {_STYLES[channel.kind]}];")
         style = f" [{_EDGES[channel.kind]}]" if _EDGES[channel.kind] else ""
         lines += [f"    {_component(source)} -> t{number}{style};" for source in channel.sources]
         lines += [f"    t{number} -> {_component(target)}{style};" for target in channel.targets]
@@ -125,14 +124,15 @@ def _free_ports(components: Iterable[Component], connected: set[tuple[str, str]]
 
 
 def _node(component: Component) -> str:
-    tooltip = f", tooltip={_quoted(str(component.executable))}" if component.executable else ""
-    return f"    {_component(component.name)} [label={_quoted(component.graph_name)}, {_COMPONENT}{tooltip}];"
+    tooltip = f", tooltip={quoted(str(component.executable))}" if component.executable else ""
+    return f"    {_component(component.name)} [label={quoted(component.graph_name)}, {_COMPONENT}{tooltip}];"
 
 
 def _component(name: str) -> str:
-    return _quoted(f"component {name}")
+    return quoted(f"component {name}")
 
 
-def _quoted(text: str) -> str:
-    escaped = "".join(mark if mark.isprintable() else " " for mark in text)
-    return '"' + escaped.replace("\\", "\\\\").replace('"', '\\"') + '"'
+def quoted(text: str) -> str:
+    """Return a text as graphviz reads it, its line breaks included."""
+    rows = ("".join(mark if mark.isprintable() else " " for mark in row) for row in text.split("\n"))
+    return '"' + "\\n".join(row.replace("\\", "\\\\").replace('"', '\\"') for row in rows) + '"'
