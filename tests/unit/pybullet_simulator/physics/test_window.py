@@ -7,7 +7,6 @@ import pybullet
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
-from metacontrol_sim.status_text import StatusText
 from pybullet_simulator.physics.window import (
     LOCAL_HIGH,
     LOW,
@@ -20,6 +19,7 @@ from pybullet_simulator.physics.window import (
     scan_points,
 )
 from robot_formulas.geometry import Pose
+from rosgraph_monitor.diagnostics.status_text import StatusText
 
 
 def report(message, key, value):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import actionlib
 import rospy
+from arm_motion.kinematics import forward
 from control_msgs.msg import (
     FollowJointTrajectoryAction,
     FollowJointTrajectoryGoal,
@@ -15,6 +16,8 @@ from control_msgs.msg import (
     GripperCommandGoal,
 )
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Point, PoseStamped
+from nav_msgs.msg import Path
 from node_kit.ros.action_server import wait_for_server
 from node_kit.ros.goals import send_and_wait
 from pybullet_simulator.messages.arms import FINGERS, joint_names
@@ -66,6 +69,8 @@ class RosRobot:
         self._widths: dict[str, float] = {}
         self._stopped: set[str] = set()
         self._arms = {mount.name: _Clients(mount.name) for mount in ARMS}
+        self._mounts = {mount.name: mount for mount in ARMS}
+        self._plan = rospy.Publisher("arm_plan", Path, queue_size=2)
         self._inputs = (
             rospy.Subscriber("joint_states", JointState, self._on_joints, queue_size=10),
             rospy.Subscriber("/diagnostics", DiagnosticArray, self._on_diagnostics, queue_size=50),
@@ -108,6 +113,7 @@ class RosRobot:
     def do(self, arm: str, deeds: Sequence[Deed]) -> bool:
         """Have an arm do something; return whether it has."""
         clients = self._arms[arm]
+        self._show(arm, deeds)
         for deed in deeds:
             done = clients.follow(deed.trajectory) if isinstance(deed, Move) else clients.grip(deed.width, deed.force)
             if not done:
@@ -136,6 +142,22 @@ class RosRobot:
     def move_base(self, y: float) -> bool:
         """Drive along the table."""
         return self._move_base(y)
+
+    def _show(self, arm: str, deeds: Sequence[Deed]) -> None:
+        """Publish the way of the hand, where somebody wants to see it."""
+        if not self._plan.get_num_connections():
+            return
+        mount = self._mounts[arm]
+        path = Path()
+        path.header.stamp, path.header.frame_id = rospy.Time.now(), "base_link"
+        for deed in deeds:
+            for posture in deed.trajectory.positions if isinstance(deed, Move) else ():
+                (x, y, z), _ = forward(posture)
+                pose = PoseStamped(header=path.header)
+                pose.pose.position = Point(mount.x + x, mount.y + y, mount.z + z)
+                pose.pose.orientation.w = 1.0
+                path.poses.append(pose)
+        self._plan.publish(path)
 
     # Callbacks
 

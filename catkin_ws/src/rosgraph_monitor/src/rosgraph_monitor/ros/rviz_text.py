@@ -1,4 +1,4 @@
-"""Node rviz_text: configuration, quality levels and failed components as a text over the robot, for RViz."""
+"""Node rviz_text: configurations, quality levels and failed components as a text over the robot, for RViz."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_bags import ownership
 from metacontrol_msgs.msg import ActiveConfiguration
+from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import Lifetime
 from visualization_msgs.msg import Marker
 
-from metacontrol_sim.status_text import StatusText
+from rosgraph_monitor.diagnostics.status_text import StatusText
 
 _PERIOD_S = 0.5
-_BEHIND_M, _HEIGHT_M = 1.5, 2.0
-"""Place of the text: what lies ahead of the robot stays in view."""
-_SIZE_M = 0.55
 _CALM, _ALARM = (0.0, 0.0, 0.1), (0.8, 0.0, 0.0)
 """Colours that can be read on a map's light floor and on a costmap."""
 
@@ -25,7 +23,16 @@ class RvizTextNode:
     """Publishes rviz/text."""
 
     def __init__(self) -> None:
-        """Connect."""
+        """Read the parameters and connect.
+
+        Raises:
+            ParameterError: one cannot be used.
+        """
+        parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
+        # What lies ahead of the robot stays in view.
+        self._behind = parameters.number("behind", 1.5)
+        self._height = parameters.number("height", 2.0)
+        self._size = parameters.number("size", 0.55, low=0.01)
         self._text = StatusText()
         self._lock = threading.Lock()
         self._marker = rospy.Publisher("rviz/text", Marker, queue_size=1, latch=True)
@@ -52,17 +59,17 @@ class RvizTextNode:
             return
         marker = Marker(ns="status", type=Marker.TEXT_VIEW_FACING, text="\n".join(lines), frame_locked=True)
         marker.header.frame_id = "base_link"
-        marker.pose.position.x, marker.pose.position.z = -_BEHIND_M, _HEIGHT_M
+        marker.pose.position.x, marker.pose.position.z = -self._behind, self._height
         marker.pose.orientation.w = 1.0
-        marker.scale.z = _SIZE_M
+        marker.scale.z = self._size
         marker.color.r, marker.color.g, marker.color.b = _ALARM if alarm else _CALM
         marker.color.a = 1.0
         self._marker.publish(marker)
 
 
 def main() -> None:
-    """Run the node."""
-    with Lifetime("rviz_text") as life:
+    """Run the node; exit status 2 when a parameter cannot be used."""
+    with Lifetime("rviz_text", ParameterError) as life:
         life.start()
         RvizTextNode()
         rospy.spin()

@@ -1,4 +1,4 @@
-"""The text over the robot in RViz and in PyBullet's window: configuration, quality levels, failed components."""
+"""The text over the robot in RViz and in PyBullet's window: configurations, quality levels, failed components."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ class StatusText:
         self._configurations: list[str] = []
         self._levels: dict[str, float | None] = {}
         self._failed: set[str] = set()
+        self._is_changing = False
 
     @property
     def alarm(self) -> bool:
         """Whether a component has failed or a configuration is not stable."""
-        return bool(self._failed) or any(" " in line for line in self._configurations)
+        return bool(self._failed) or self._is_changing
 
     def take_configuration(self, message: Any) -> None:
         """Take a metacontrol_msgs/ActiveConfiguration."""
-        self._configurations = [
-            f.configuration if f.state == FunctionGrounding.STABLE else f"{f.configuration} {f.state.lower()}"
-            for f in message.functions
-        ]
+        grounded = [function for function in message.functions if function.configuration]
+        self._is_changing = any(function.state != FunctionGrounding.STABLE for function in grounded)
+        self._configurations = [self._configuration(function, alone=len(grounded) == 1) for function in grounded]
 
     def take_diagnostics(self, message: Any) -> None:
         """Take a diagnostic_msgs/DiagnosticArray."""
@@ -48,6 +48,13 @@ class StatusText:
             f"{name} {'stale' if level is None else f'{level:.2f}'}" for name, level in sorted(self._levels.items())
         )
         return (*self._configurations, *levels, *(f"{name} failed" for name in sorted(self._failed)))
+
+    @staticmethod
+    def _configuration(grounding: Any, *, alone: bool) -> str:
+        """Return what a function runs; the function is named where there are several."""
+        what = "" if alone else f"{grounding.function}: "
+        state = "" if grounding.state == FunctionGrounding.STABLE else f" {grounding.state.lower()}"
+        return f"{what}{grounding.configuration}{state}"
 
     def _take_level(self, name: str, value: str) -> None:
         try:
