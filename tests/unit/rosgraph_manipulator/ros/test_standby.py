@@ -1,0 +1,64 @@
+"""Which nodes launchers are told to be ready for."""
+
+import pytest
+from rosgraph_launcher.description import NodeDescription, SystemDescription
+from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions, Repair
+from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError
+from rosgraph_manipulator.ros import running_system
+from rosgraph_manipulator.ros.standby import Standby
+
+
+class Launchers:
+    def __init__(self):
+        self.told = []
+
+    def stand_by(self, nodes):
+        self.told.append({node.name: node for node in nodes})
+
+
+@pytest.fixture
+def launchers():
+    return Launchers()
+
+
+@pytest.fixture
+def standby(monkeypatch, launchers):
+    """Two variants of one node, a function whose launch file is broken, and a driver."""
+
+    def read(path, _args):
+        if path == "broken":
+            raise LaunchFileError("broken: no such file")
+        name = {"slow": "/nav", "fast": "/nav"}.get(path, f"/{path}")
+        node = NodeDescription(name, "/", "p", "x", parameters={"speed": path})
+        return LaunchFile(SystemDescription({name: node}))
+
+    monkeypatch.setattr(running_system, "read_launch_file", read)
+    configurations = {name: Configuration(name, f"f_{name}", name) for name in ("slow", "broken", "fast")}
+    repairs = {"eye": Repair("eye", driver=Configuration("repair_of_eye", "repair_of_eye", "eye"))}
+    return Standby(ManipulatorOptions(configurations, repairs=repairs), launchers)
+
+
+def look(standby, times=10):
+    for _ in range(times):
+        standby.look()
+
+
+def test_nodes_of_all_configurations_and_drivers_are_told_once(standby, launchers):
+    look(standby)
+    (told,) = launchers.told
+    assert set(told) == {"/nav", "/eye"}
+    assert told["/nav"].parameters == {}  # variants that differ in parameters alone are the same process
+
+
+def test_one_launch_file_is_read_at_a_time(standby, launchers):
+    look(standby, 4)
+    assert launchers.told == []
+    look(standby, 1)
+    assert len(launchers.told) == 1
+
+
+def test_launchers_are_told_again_after_each_change(standby, launchers):
+    look(standby)
+    standby.changed()
+    look(standby)
+    assert len(launchers.told) == 2
