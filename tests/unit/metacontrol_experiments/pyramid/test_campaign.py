@@ -19,6 +19,13 @@ def test_missions_come_seed_by_seed():
     assert len(names) == len(set(names)) == 8
 
 
+def test_designs_are_driven_side_by_side():
+    asked = ASKED | {"scenarios": [0], "initial_configurations": ["fd2", "fd1_left,fd1_1,fd2_1"], "managers": ["none"]}
+    first, second = parse_pyramids(asked, "a.yaml")[:2]
+    assert (first.name, second.name) == ("scenario0_seed001_none_fd2", "scenario0_seed001_none_fd1_left-fd1_1-fd2_1")
+    assert second.arguments[-3:] == ["--initial-configuration", "fd1_left,fd1_1,fd2_1", "--no-metacontrol"]
+
+
 def test_baseline_differs_in_one_word():
     run, baseline = parse_pyramids(ASKED, "a.yaml")[:2]
     assert baseline.arguments == [*run.arguments, "--no-metacontrol"]

@@ -48,6 +48,13 @@ _FAILED = 1
     "--parameters", type=MAPPING, default="", help="YAML mapping of parameters of the reasoner, e.g. '{cool_down: 3}'."
 )
 @click.option(
+    "--initial-configuration",
+    "configurations",
+    default="",
+    metavar="NAME,...",
+    help="What is deployed at the start, one of each function.  [default: as the scenario has it]",
+)
+@click.option(
     "--real-time-factor",
     type=Number(0),
     default=1.0,

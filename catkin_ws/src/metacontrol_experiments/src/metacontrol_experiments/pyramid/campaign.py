@@ -27,6 +27,12 @@ _SCHEMA = {
         "mission": {"enum": [MANIPULATION], "title": MANIPULATION},
         "scenarios": {"type": "array", "minItems": 1, "items": _SCENARIO, "title": "a list"},
         "seeds": {"type": "integer", "minimum": 1, "title": "the number of seeds, from 1 on"},
+        "initial_configurations": {
+            "type": "array",
+            "minItems": 1,
+            "items": {"type": "string", "minLength": 1, "title": "names with commas between them"},
+            "title": "a list",
+        },
         "managers": {"type": "array", "minItems": 1, "items": _MANAGER, "title": "a list"},
     },
 }
@@ -40,22 +46,41 @@ _CAUSES = {
 
 @dataclass(frozen=True)
 class PyramidRun:
-    """One mission of a campaign."""
+    """One mission of a campaign.
+
+    Attributes:
+        scenario: number.
+        seed: of everything that is drawn.
+        manager: mros or none.
+        configurations: deployed at the start, by commas; empty: as the scenario has it.
+    """
 
     scenario: int
     seed: int
     manager: str
+    configurations: str = ""
 
     @property
     def name(self) -> str:
         """Its name, and its folder below that of the campaign's runs."""
-        return f"scenario{self.scenario}_seed{self.seed:03d}_{self.manager}"
+        given = f"_{self.configurations.replace(',', '-')}" if self.configurations else ""
+        return f"scenario{self.scenario}_seed{self.seed:03d}_{self.manager}{given}"
 
     @property
     def arguments(self) -> list[str]:
         """What `metacontrol run` is given for it."""
         baseline = ["--no-metacontrol"] if self.manager == NONE else []
-        return ["--mission", MANIPULATION, "--scenario", str(self.scenario), "--seed", str(self.seed), *baseline]
+        given = ["--initial-configuration", self.configurations] if self.configurations else []
+        return [
+            "--mission",
+            MANIPULATION,
+            "--scenario",
+            str(self.scenario),
+            "--seed",
+            str(self.seed),
+            *given,
+            *baseline,
+        ]
 
 
 def asks_for_pyramids(content: Any) -> bool:
@@ -72,41 +97,46 @@ def parse_pyramids(content: Any, where: str) -> tuple[PyramidRun, ...]:
     for violation in violations(content, _SCHEMA):
         raise CampaignError(f"{where}: {violation}")
     return tuple(
-        PyramidRun(scenario, seed, manager)
+        PyramidRun(scenario, seed, manager, configurations)
         for seed in range(1, content["seeds"] + 1)
         for scenario in dict.fromkeys(content["scenarios"])
+        for configurations in dict.fromkeys(content.get("initial_configurations", [""]))
         for manager in dict.fromkeys(content["managers"])
     )
 
 
 def report(summaries: Mapping[PyramidRun, Mapping[str, Any]]) -> str:
     """Return the tables of a campaign in Markdown: success, duration and accuracy, and how fast it recovers."""
-    groups: dict[tuple[int, str], list[Mapping[str, Any]]] = {}
-    for run, summary in sorted(summaries.items(), key=lambda item: (item[0].scenario, item[0].manager, item[0].seed)):
-        groups.setdefault((run.scenario, run.manager), []).append(summary)
+    groups: dict[tuple[int, str, str], list[Mapping[str, Any]]] = {}
+    for run, summary in sorted(summaries.items(), key=lambda item: _order(item[0])):
+        groups.setdefault((run.scenario, run.configurations, run.manager), []).append(summary)
     lines = [
         "| scenario | manager | missions | success (95 %) | duration, median | largest error of a block | "
         "placed blocks lost | simulated / wall time |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for (scenario, manager), missions in groups.items():
+    for (scenario, configurations, manager), missions in groups.items():
         share = rate([bool(mission["success"]) for mission in missions])
         met = f"{share.value:.0%} ({share.low:.0%} to {share.high:.0%})"
         well = [mission for mission in missions if mission["success"]]
         durations = f"{median(mission['duration_s'] for mission in well):.0f} s" if well else "-"
         error = f"{max(mission['placed_error_mm'] for mission in well):.1f} mm" if well else "-"
         lost, factor = sum(m["placed_lost"] for m in missions), median(m["real_time_factor"] for m in missions)
-        title = f"{scenario}: {TITLES[scenario]}"
+        title = f"{scenario}: {TITLES[scenario]}" + (f", `{configurations}`" if configurations else "")
         lines.append(
             f"| {title} | `{manager}` | {len(missions)} | {met} | {durations} | {error} | {lost} | {factor:.2f} |"
         )
     lines += ["", "| cause | changes | cause to next motion, median | largest |", "|---|---|---|---|"]
-    adapted = [mission for (_, manager), missions in groups.items() if manager == MROS for mission in missions]
+    adapted = [mission for (_, _, manager), missions in groups.items() if manager == MROS for mission in missions]
     for kind, what in _CAUSES.items():
         times = _recoveries(adapted, kind)
         if times:
             lines.append(f"| {what} | {len(times)} | {median(times):.1f} s | {max(times):.1f} s |")
     return "\n".join(lines) + "\n"
+
+
+def _order(run: PyramidRun) -> tuple[int, str, str, int]:
+    return run.scenario, run.configurations, run.manager, run.seed
 
 
 def _recoveries(missions: Iterable[Mapping[str, Any]], kind: str) -> list[float]:

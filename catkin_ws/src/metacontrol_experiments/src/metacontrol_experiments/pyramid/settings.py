@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 from metacontrol_experiments.pyramid.record import TOPICS
@@ -22,6 +22,7 @@ class PyramidSettings:
         seed: of the scenario's moments and places, of where the blocks lie, and of all noise.
         metacontrol: whether the reasoner runs; without it nothing else is different.
         parameters: of the reasoner, in place of those that the system has; JSON of a mapping, empty for none.
+        configurations: deployed at the start, by commas, in place of those of the scenario; empty: as the scenario has.
         real_time_factor: simulated per wall second, 0 for as fast as it can.
         gui: show the simulator's window.
         port: of the master; None for a free one.
@@ -33,6 +34,7 @@ class PyramidSettings:
     seed: int = 1
     metacontrol: bool = True
     parameters: str = ""
+    configurations: str = ""
     real_time_factor: float = 1.0
     gui: bool = False
     port: int | None = None
@@ -44,7 +46,8 @@ class PyramidSettings:
     @property
     def drawn(self) -> Scenario:
         """The scenario, as the seed has drawn it."""
-        return draw(self.scenario, self.seed)
+        drawn = draw(self.scenario, self.seed)
+        return replace(drawn, configurations=self.configurations) if self.configurations else drawn
 
     @property
     def decider(self) -> str:

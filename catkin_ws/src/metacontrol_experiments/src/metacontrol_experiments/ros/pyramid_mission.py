@@ -120,7 +120,7 @@ class PyramidMission(MissionNode):
             if isinstance(deed, Inject):
                 self._strike(deed.strike)
             elif isinstance(deed, TakeAway):
-                rospy.ServiceProxy("simulator/delete_obstacle", DeleteObstacle)(_WALL)
+                self._take_away(now)
             elif deed is Action.RESEND_GOAL:
                 self._goal.send()
             elif deed is Action.CANCEL_GOAL:
@@ -152,6 +152,15 @@ class PyramidMission(MissionNode):
         if isinstance(strike.what, Obstacle):
             self._state = course.stands(self.state, strike.what)
         self._publish_event(injected.stamp, MissionEvent.PERTURBATION, str(strike.what), injected.values)
+
+    def _take_away(self, now: float) -> None:
+        try:
+            answer = rospy.ServiceProxy("simulator/delete_obstacle", DeleteObstacle)(_WALL)
+        except (rospy.ROSException, rospy.ServiceException) as error:
+            self._give_up(now, f"the obstacle could not be taken away: {error}", interrupted=False)
+            return
+        if not answer.success:
+            self._give_up(now, f"the obstacle could not be taken away: {answer.message}", interrupted=False)
 
     def _happen(self, strike: Strike) -> Injected | None:
         """Let something happen; return when, None where it cannot happen yet.
