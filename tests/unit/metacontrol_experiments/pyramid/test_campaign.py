@@ -2,7 +2,7 @@
 
 import pytest
 from metacontrol_experiments.campaign.matrix import CampaignError
-from metacontrol_experiments.pyramid.campaign import PyramidRun, asks_for_pyramids, parse_pyramids, report
+from metacontrol_experiments.pyramid.campaign import PyramidRun, asks_for_pyramids, parse_pyramids, report, rows
 
 ASKED = {"mission": "manipulation", "scenarios": [1, 2], "seeds": 2, "managers": ["mros", "none"]}
 
@@ -52,18 +52,34 @@ def test_other_files_are_not_about_it():
     assert not asks_for_pyramids(None)
 
 
-def test_report_tells_success_and_how_fast_it_recovers():
-    def summary(success, *times):
-        strikes = [{"name": "light:0.04", "recover_s": time} for time in times]
-        return {
-            "success": success,
-            "duration_s": 70.0,
-            "placed_error_mm": 1.2,
-            "placed_lost": 0,
-            "real_time_factor": 1.0,
-            "strikes": strikes,
-        }
+def summary(success, *times):
+    strikes = [{"name": "light:0.04", "recover_s": time} for time in times]
+    return {
+        "success": success,
+        "placed": 6,
+        "duration_s": 70.0,
+        "placed_error_mm": 1.2,
+        "moved_mm": 0.0,
+        "placed_lost": 0,
+        "stands_still": True,
+        "real_time_factor": 1.0,
+        "outcome": "reached",
+        "reason": "the pyramid stands",
+        "commit": "abc",
+        "strikes": strikes,
+    }
 
+
+def test_table_has_a_row_for_each_mission_in_the_order_of_scenarios():
+    table = rows({PyramidRun(2, 1, "mros"): summary(True, 2.5), PyramidRun(1, 2, "none"): summary(False)})
+    assert [(row["scenario"], row["manager"], row["success"]) for row in table] == [
+        (1, "none", False),
+        (2, "mros", True),
+    ]
+    assert table[1]["recover_s"] == "light:0.04=2.5"
+
+
+def test_report_tells_success_and_how_fast_it_recovers():
     told = report(
         {
             PyramidRun(1, 1, "mros"): summary(True, 0.5, None),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import sys
 import time
@@ -15,12 +16,12 @@ from metacontrol_experiments.io.campaign_on_ros import drive_command
 from metacontrol_experiments.io.display import tell
 from metacontrol_experiments.managers.manager import MROS
 from metacontrol_experiments.mission.settings import BAG_NAME, SUMMARY_NAME
-from metacontrol_experiments.pyramid.campaign import PyramidRun, parse_pyramids, report
+from metacontrol_experiments.pyramid.campaign import PyramidRun, parse_pyramids, report, rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-REPORT = "report.md"
+REPORT, TABLE = "report.md", "missions.csv"
 _DEADLINE_S = 1200.0
 """Wall s for a mission: a simulated second may take two."""
 _TRIES = 2
@@ -48,6 +49,11 @@ def drive_pyramids(content: Any, file: Path, folder: Path) -> bool:
         driven = _read(folder, runs)
         if driven:
             (folder / REPORT).write_text(report(driven), encoding="utf-8")
+            table = rows(driven)
+            with (folder / TABLE).open("w", newline="", encoding="utf-8") as file_of_table:
+                writer = csv.DictWriter(file_of_table, list(table[0]))
+                writer.writeheader()
+                writer.writerows(table)
     tell(f"{len(driven)} of {len(runs)} missions are in {folder / REPORT}")
     return len(driven) == len(runs)
 

@@ -83,6 +83,22 @@ class PyramidRun:
         ]
 
 
+_COLUMNS = (
+    "success",
+    "placed",
+    "duration_s",
+    "placed_error_mm",
+    "moved_mm",
+    "placed_lost",
+    "stands_still",
+    "real_time_factor",
+    "outcome",
+    "reason",
+    "commit",
+)
+"""What a table of missions has of each summary."""
+
+
 def asks_for_pyramids(content: Any) -> bool:
     """Return whether the content of a campaign's file is about D1."""
     return isinstance(content, dict) and content.get("mission") == MANIPULATION
@@ -133,6 +149,21 @@ def report(summaries: Mapping[PyramidRun, Mapping[str, Any]]) -> str:
         if times:
             lines.append(f"| {what} | {len(times)} | {median(times):.1f} s | {max(times):.1f} s |")
     return "\n".join(lines) + "\n"
+
+
+def rows(summaries: Mapping[PyramidRun, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return a table of all missions: one row for each, in the order of scenarios."""
+    return [
+        {
+            "scenario": run.scenario,
+            "seed": run.seed,
+            "manager": run.manager,
+            "initial_configurations": run.configurations,
+            **{name: summary[name] for name in _COLUMNS},
+            "recover_s": " ".join(f"{s['name']}={s['recover_s']}" for s in summary["strikes"]),
+        }
+        for run, summary in sorted(summaries.items(), key=lambda item: _order(item[0]))
+    ]
 
 
 def _order(run: PyramidRun) -> tuple[int, str, str, int]:
