@@ -121,9 +121,18 @@ def test_processes_stand_by_for_nodes_that_do_not_run_after_those_that_do(nodes,
 
 def test_only_so_many_processes_stand_by_for_nodes_that_do_not_run(tmp_path, said, prepared, command):
     owner = NodeProcesses(LauncherOptions(mark=f"test {tmp_path}", standby_others=1), said.append)
+    owner.begin("/a", command("a"), None)
     owner.expect([command("c"), command("d")])
-    assert [owner.stand_by((), may_start=True) for _ in range(2)] == [True, False]
+    assert [owner.stand_by(["/a"], may_start=True) for _ in range(3)] == [True, True, False]
     owner.close()
+
+
+def test_nothing_stands_by_where_nothing_runs(nodes, prepared, begun, command):
+    nodes.expect([command("c")])
+    for _ in range(3):
+        nodes.stand_by(begun, may_start=True)
+    assert not nodes.stand_by((), may_start=False)
+    assert all(process.status is not None for process in prepared)
 
 
 def test_process_that_stands_by_is_replaced_only_so_often(nodes, prepared, begun):

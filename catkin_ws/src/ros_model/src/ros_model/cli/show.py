@@ -32,7 +32,7 @@ _UNLIMITED = 100_000  # columns of what is no terminal
 @click.argument("file", type=click.Path())
 def show(file: str, graph: str | None) -> None:
     """Show a .rossystem or .ros file as a tree, or draw it. A project can be drawn."""
-    if graph is not None and (Path(file).is_dir() or Path(file).name == FILE_NAME):
+    if graph is not None and (Path(file).name == FILE_NAME or Path(file, FILE_NAME).exists()):
         from ros_model.io.drawing import draw
         from ros_model.io.hierarchy import hierarchy
         from ros_model.io.project import load_project

@@ -180,7 +180,8 @@ class NodeProcesses:
     def stand_by(self, names: Iterable[str], may_start: bool) -> bool:
         """End the warm processes that serve none of these nodes, and start one for a Python node that lacks it.
 
-        Nodes that do not run, but may be begun, come after these, as many as the options allow.
+        Nodes that do not run, but may be begun, come after these, as many as the options allow. Where nothing runs,
+        nothing stands by.
 
         Returns:
             Whether one was started.
@@ -189,10 +190,11 @@ class NodeProcesses:
             if process.status is not None:
                 self._lost_warm[kind] += 1
                 self._warm.pop(kind).close()
-        commands = (self._commands[name] for name in names if name in self._commands)
+        running = list(names)
+        commands = (self._commands[name] for name in running if name in self._commands)
         wanted = {_kind(command): command for command in commands if command.is_python}
         most = len(wanted) + self._options.standby_others
-        for command in self._others:
+        for command in self._others if running else ():
             if command.is_python and len(wanted) < most:
                 wanted.setdefault(_kind(command), command)
         for kind in set(self._warm) - set(wanted):

@@ -26,5 +26,5 @@ class LauncherOptions:
     shutdown_timeout: float = 2.0
     sigint_timeout: float = 2.0
     standby: bool = True
-    standby_others: int = 8
+    standby_others: int = 4
     policy: RestartPolicy = field(default_factory=RestartPolicy)
