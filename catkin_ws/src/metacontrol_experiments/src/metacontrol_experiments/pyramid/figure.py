@@ -113,40 +113,43 @@ def _draw_functions(axis: Axes, record: PyramidRecord) -> None:
     start, end = record.mission.start_stamp, record.mission.end_stamp
     names = list(_FUNCTIONS)
     for row, function in enumerate(names):
-        reports = [r for r in record.mission.configurations if r.function == function]
-        for begin, until, name, state in _spans(reports, _absences(record, function), start, end):
-            is_stable = state == FunctionGrounding.STABLE
-            colour = _COLOURS.get(name, _OTHER) if is_stable else _CHANGING
+        for begin, until, report in spans(record, function):
+            is_stable = report.state == FunctionGrounding.STABLE
+            colour = _COLOURS.get(report.configuration, _OTHER) if is_stable else _CHANGING
             axis.barh(row, until - begin, left=begin - start, height=0.7, color=colour)
             if is_stable and until - begin > 0.04 * (end - start):
-                axis.text((begin + until) / 2.0 - start, row, name, ha="center", va="center", color="white")
+                place = (begin + until) / 2.0 - start
+                axis.text(place, row, report.configuration, ha="center", va="center", color="white")
     axis.set_yticks(range(len(names)), [_FUNCTIONS[name] for name in names])
     axis.set_ylim(len(names) - 0.5, -1.3)
     for number, (event, cause) in enumerate(causes(record)):
         axis.text(cause - start, -0.6 - 0.35 * (number % 2), f" {event.name}", color=_CAUSE, fontsize=9)
 
 
-def _absences(record: PyramidRecord, function: str) -> list[float]:
-    """Return the stamps of reports in which a function is not grounded."""
-    stamps = sorted({r.stamp for r in record.mission.configurations})
-    grounded = {r.stamp for r in record.mission.configurations if r.function == function and r.configuration}
-    return [stamp for stamp in stamps if stamp not in grounded]
+def spans(record: PyramidRecord, function: str) -> list[tuple[float, float, ConfigurationReport]]:
+    """Return begin and end (s of ROS time, within the mission) of each grounding of a function."""
+    start, end = record.mission.start_stamp, record.mission.end_stamp
+    stamps = [max((report.stamp for report in reports), default=0.0) for reports in record.groundings]
+    found = []
+    for reports, stamp, until in zip(record.groundings, stamps, [*stamps[1:], end], strict=True):
+        report = next((r for r in reports if r.function == function and r.configuration), None)
+        begin = max(stamp, start)
+        if report is not None and min(until, end) > begin:
+            found.append((begin, min(until, end), report))
+    return _joined(found)
 
 
-def _spans(
-    reports: list[ConfigurationReport], absences: list[float], start: float, end: float
-) -> list[tuple[float, float, str, str]]:
-    """Return begin, end, configuration and state of each grounding."""
-    changes = sorted(
-        [(r.stamp, r.configuration, r.state) for r in reports if r.configuration]
-        + [(stamp, "", "") for stamp in absences]
-    )
-    ends = [stamp for stamp, _, _ in changes[1:]] + [end]
-    return [
-        (max(stamp, start), min(until, end), name, state)
-        for (stamp, name, state), until in zip(changes, ends, strict=True)
-        if name and until > start and stamp < end
-    ]
+def _joined(found: list[tuple[float, float, ConfigurationReport]]) -> list[tuple[float, float, ConfigurationReport]]:
+    """Return spans in which nothing changes for the function as one."""
+    joined: list[tuple[float, float, ConfigurationReport]] = []
+    for begin, until, report in found:
+        last = joined[-1] if joined else None
+        same = last and (last[2].configuration, last[2].state) == (report.configuration, report.state)
+        if last and same and last[1] == begin:
+            joined[-1] = last[0], until, report
+        else:
+            joined.append((begin, until, report))
+    return joined
 
 
 def _draw_blocks(axis: Axes, record: PyramidRecord) -> None:

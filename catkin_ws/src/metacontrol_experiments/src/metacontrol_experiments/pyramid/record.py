@@ -84,6 +84,7 @@ class PyramidRecord:
 
     Attributes:
         mission: events, components, levels, configurations, decisions, and the results of the action.
+        groundings: what runs for each function that anything runs for, at each change, in the order of the changes.
         stops: of the arms.
         base: (n, 5) array of stamp, x, y, yaw, speed: m, m, rad, and m/s with rad/s added.
         arms: of each arm an (n, 3) array of stamp, speed of the fastest joint in rad/s, contact force in N.
@@ -97,6 +98,7 @@ class PyramidRecord:
     """
 
     mission: MissionRecord
+    groundings: tuple[tuple[ConfigurationReport, ...], ...] = ()
     stops: tuple[Stop, ...] = ()
     base: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 5)))
     arms: dict[str, NDArray[np.float64]] = field(default_factory=dict)
@@ -160,7 +162,7 @@ class _Reader:
         }
         self._events: list[Event] = []
         self._decisions: list[Decision] = []
-        self._configurations: list[ConfigurationReport] = []
+        self._groundings: list[tuple[ConfigurationReport, ...]] = []
         self._reports: list[Any] = []
         self._results: list[GoalReport] = []
         self._stops: list[Stop] = []
@@ -185,12 +187,13 @@ class _Reader:
                 events=tuple(self._events),
                 components=tuple(report for report in reports if isinstance(report, ComponentReport)),
                 observed=tuple(report for report in reports if isinstance(report, QualityReport)),
-                configurations=tuple(self._configurations),
+                configurations=tuple(report for reports in self._groundings for report in reports),
                 decisions=tuple(self._decisions),
                 results=tuple(self._results),
                 first_stamp=first,
                 last_stamp=last,
             ),
+            tuple(self._groundings),
             tuple(self._stops),
             _table(self._base, 5),
             {arm: _table(rows, 3) for arm, rows in self._arms.items()},
@@ -248,7 +251,7 @@ class _Reader:
             self._positions.setdefault(name, []).append((stamp, float(position)))
 
     def _active(self, now: float, message: Any, _publisher: str) -> None:
-        self._configurations += messages.configurations(message, now)
+        self._groundings.append(messages.configurations(message, now))
 
     def _arm(self, arm: str) -> Any:
         def take(_now: float, message: Any, _publisher: str) -> None:
