@@ -121,9 +121,9 @@ def _draw_functions(axis: Axes, record: PyramidRecord) -> None:
                 place = (begin + until) / 2.0 - start
                 axis.text(place, row, report.configuration, ha="center", va="center", color="white")
     axis.set_yticks(range(len(names)), [_FUNCTIONS[name] for name in names])
-    axis.set_ylim(len(names) - 0.5, -1.3)
+    axis.set_ylim(len(names) - 0.5, -1.7)
     for number, (event, cause) in enumerate(causes(record)):
-        axis.text(cause - start, -0.6 - 0.35 * (number % 2), f" {event.name}", color=_CAUSE, fontsize=9)
+        axis.text(cause - start, -0.55 - 0.37 * (number % 3), f" {event.name}", color=_CAUSE, fontsize=9)
 
 
 def spans(record: PyramidRecord, function: str) -> list[tuple[float, float, ConfigurationReport]]:
