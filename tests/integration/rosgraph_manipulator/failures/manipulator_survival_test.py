@@ -28,7 +28,7 @@ from metacontrol_msgs.srv import ChangeNodes
 class SurvivalTest(PairTest):
     manipulator_parameters = {"probation": 0.0, "settle_time": 0.2}
     # No death is forgotten.
-    launcher_parameters = {"restart_intensity": 1, "restart_period": 100.0, "standby_others": 0}
+    launcher_parameters = {"restart_intensity": 1, "restart_period": 100.0}
 
     def setUp(self):
         self.wait_until_it_serves()

@@ -17,11 +17,11 @@ class Server(EndsQuietly, Closed):
 
 
 def test_closed_topic_is_no_traceback_at_the_end(monkeypatch):
-    monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
+    monkeypatch.setattr(rospy.core, "is_shutdown_requested", lambda: True)  # is_shutdown() is not true yet
     Server().publish_status()
 
 
 def test_closed_topic_is_told_while_the_node_runs(monkeypatch):
-    monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
+    monkeypatch.setattr(rospy.core, "is_shutdown_requested", lambda: False)
     with pytest.raises(rospy.ROSException, match="closed topic"):
         Server().publish_status()

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from metacontrol_experiments.cli.figure import draw_pyramid_figure
 from metacontrol_experiments.cli.missions import mission_option
-from metacontrol_experiments.cli.options import MAPPING, Number
+from metacontrol_experiments.cli.options import MAPPING, run_options
 from metacontrol_experiments.cli.summary import write_summary
 from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.display import Display, reconfigurations_table, refusing
@@ -54,19 +54,7 @@ _FAILED = 1
     metavar="NAME,...",
     help="What is deployed at the start, one of each function.  [default: as the scenario has it]",
 )
-@click.option(
-    "--real-time-factor",
-    type=Number(0),
-    default=1.0,
-    show_default=True,
-    help="Simulated per wall second; 0: as fast as it can.",
-)
-@click.option(
-    "--output", type=click.Path(file_okay=False, path_type=Path), default=Path("results/mission"), show_default=True
-)
-@click.option("--port", type=click.IntRange(1, 65535), help="Of the run's own ROS master; a free one by default.")
-@click.option("--gui", is_flag=True, help="Show the simulator's window.")
-@click.option("--quiet", is_flag=True, help="Say nothing but errors.")
+@run_options
 def build(quiet: bool, output: Path, no_metacontrol: bool, **options: Any) -> None:
     """Have D1 build its pyramid while a scenario strikes, and leave bag, summary and figure in a folder.
 

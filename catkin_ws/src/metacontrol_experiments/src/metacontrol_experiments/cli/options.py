@@ -50,3 +50,30 @@ def ground_options(command: Callable[..., Any]) -> Callable[..., Any]:
     routes = click.option("--routes", type=path, help="YAML file of routes.  [default: the factory's]")
     world = click.option("--world", type=path, help="World file, or a map's YAML file.  [default: the factory]")
     return world(routes(command))
+
+
+def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add what every kind of mission on ROS takes: pace, folder, port, window, silence."""
+    options = (
+        click.option(
+            "--real-time-factor",
+            type=Number(0),
+            default=1.0,
+            show_default=True,
+            help="Simulated per wall second; 0: as fast as it can.",
+        ),
+        click.option(
+            "--output",
+            type=click.Path(file_okay=False, path_type=Path),
+            default=Path("results/mission"),
+            show_default=True,
+        ),
+        click.option(
+            "--port", type=click.IntRange(1, 65535), help="Of the run's own ROS master; a free one by default."
+        ),
+        click.option("--gui", is_flag=True, help="Show the simulator's window."),
+        click.option("--quiet", is_flag=True, help="Say nothing but errors."),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command

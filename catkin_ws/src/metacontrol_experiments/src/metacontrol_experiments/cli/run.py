@@ -16,7 +16,7 @@ from mros1_reasoner.loop.settings import setting_names
 
 from metacontrol_experiments.cli.figure import draw_figure
 from metacontrol_experiments.cli.missions import ByMission
-from metacontrol_experiments.cli.options import MAPPING, Number, ground_options
+from metacontrol_experiments.cli.options import MAPPING, Number, ground_options, run_options
 from metacontrol_experiments.cli.summary import write_summary
 from metacontrol_experiments.contingency.contingency import Contingency, Kind, Moment
 from metacontrol_experiments.contingency.parsing import (
@@ -127,18 +127,11 @@ _FAILED = 1
     multiple=True,
     metavar="KIND:WHAT[@WHEN]",
     help="What goes wrong, any number of times: kill:, stop:, unplug:, freeze:, thaw:, repeat: or jump:COMPONENT, "
-    "power:FACTOR, clutter:Number, light:0..1; at share:0..1 of the way, time:SECONDS or place:X,Y. Clutter is there "
+    "power:FACTOR, clutter:NUMBER, light:0..1; at share:0..1 of the way, time:SECONDS or place:X,Y. Clutter is there "
     "from the start.",
 )
 @click.option("--timeline", type=click.Path(path_type=Path), help="YAML file of contingencies.")
 @ground_options
-@click.option(
-    "--real-time-factor",
-    type=Number(0),
-    default=1.0,
-    show_default=True,
-    help="Simulated per wall second; 0: as fast as it can.",
-)
 @click.option(
     "--timeout", type=Number(0, min_open=True), default=TIMEOUT_S, show_default=True, help="Simulated seconds."
 )
@@ -148,13 +141,8 @@ _FAILED = 1
 @click.option(
     "--nfr-energy", type=Number(0, 1), default=DEFAULT_THRESHOLDS["energy"], show_default=True, help="Required level."
 )
-@click.option(
-    "--output", type=click.Path(file_okay=False, path_type=Path), default=Path("results/mission"), show_default=True
-)
-@click.option("--port", type=click.IntRange(1, 65535), help="Of the run's own ROS master; a free one by default.")
-@click.option("--gui", is_flag=True, help="Show the simulator's window.")
+@run_options
 @click.option("--rviz", is_flag=True, help="Show RViz.")
-@click.option("--quiet", is_flag=True, help="Say nothing but errors.")
 def run(quiet: bool, output: Path, **options: Any) -> None:
     """Run a mission and leave its bag, summary and figure in a folder.
 

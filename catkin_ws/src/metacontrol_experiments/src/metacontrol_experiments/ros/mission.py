@@ -18,7 +18,7 @@ from robot_formulas.geometry import Pose, quaternion_of
 
 from metacontrol_experiments.contingency.contingency import InjectionError
 from metacontrol_experiments.mission import mission
-from metacontrol_experiments.mission.mission import Action, Inject
+from metacontrol_experiments.mission.mission import Action, Inject, State
 from metacontrol_experiments.ros.fault_injection import FaultInjector, Injected, serve
 from metacontrol_experiments.ros.goal import MissionGoal
 from metacontrol_experiments.ros.mission_node import MissionNode
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from metacontrol_experiments.contingency.contingency import Contingency
     from metacontrol_experiments.io.display import Display
     from metacontrol_experiments.io.processes import ProcessTree
-    from metacontrol_experiments.mission.mission import State
     from metacontrol_experiments.mission.settings import Settings
 
 _REQUEST_S = 30.0
@@ -38,7 +37,7 @@ _REQUEST_S = 30.0
 _SERVER = "the action server of move_base"
 
 
-class NavigationMission(MissionNode):
+class NavigationMission(MissionNode[State]):
     """A mission of D2."""
 
     def __init__(self, settings: Settings, tree: ProcessTree, display: Display, check: Callable[[], None]) -> None:
@@ -55,7 +54,6 @@ class NavigationMission(MissionNode):
         """
         self._settings = settings
         self._plan = settings.plan
-        self._state: State | None = None
         self._position: tuple[float, float] | None = None
         super().__init__(display, check, settings.thresholds, settings.decider)
         self._injector = FaultInjector(settings.components, tree.owns)
@@ -63,13 +61,6 @@ class NavigationMission(MissionNode):
         self._subscribe("amcl_pose", PoseWithCovarianceStamped, self._on_pose)
         self._subscribe("move_base/status", GoalStatusArray, self._on_status)
         self._subscribe("move_base/result", MoveBaseActionResult, self._on_result)
-
-    @property
-    def state(self) -> State:
-        """The mission's; only once it has begun."""
-        if self._state is None:
-            raise RuntimeError("the mission has not started")
-        return self._state
 
     @property
     def is_over(self) -> bool:

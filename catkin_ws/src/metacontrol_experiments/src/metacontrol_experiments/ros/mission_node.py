@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
@@ -37,8 +37,11 @@ TAIL_S = 0.5
 """Simulated seconds that are still recorded after the mission's end."""
 
 
-class MissionNode(ABC):
-    """One mission, from a system that is starting to the event MISSION_END."""
+State = TypeVar("State")
+
+
+class MissionNode(ABC, Generic[State]):
+    """One mission, from a system that is starting to the event MISSION_END; its state machine has a State."""
 
     def __init__(self, display: Display, check: Callable[[], None], thresholds: dict[str, float], decider: str) -> None:
         """Join the graph.
@@ -52,13 +55,13 @@ class MissionNode(ABC):
         Raises:
             StartError: the master did not come up in time, or does not run on simulated time.
         """
+        self._state: State | None = None  # None before the mission has begun
         self._display = display
         self._check = check
         self._decider = decider
         self._timeline = Timeline(thresholds)
         self._inbox = Inbox()
         self._readiness = Readiness()
-        self._has_begun = False
         self._began_wall = time.monotonic()
         self._startup = Startup(self._attend)
         self._startup.wait_for_master()
@@ -78,6 +81,13 @@ class MissionNode(ABC):
         Raises:
             StartError: it is not, in time; or the manipulator gave up.
         """
+
+    @property
+    def state(self) -> State:
+        """The mission's; only once it has begun."""
+        if self._state is None:
+            raise RuntimeError("the mission has not started")
+        return self._state
 
     @property
     @abstractmethod
@@ -139,7 +149,6 @@ class MissionNode(ABC):
             KeyboardInterrupt: after the end of the mission was published.
         """
         self._begin()
-        self._has_begun = True
         try:
             self._loop()
         except KeyboardInterrupt:
@@ -195,7 +204,7 @@ class MissionNode(ABC):
     def _tell(self, report: Report) -> None:
         """Show what is new in a report; before the mission runs, only take note of it."""
         entries = self._timeline.tell(report)
-        if self._has_begun or isinstance(report, Event):
+        if self._state is not None:
             for entry in entries:
                 self._display.entry(entry)
 

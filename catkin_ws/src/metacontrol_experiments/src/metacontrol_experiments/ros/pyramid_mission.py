@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger
 from metacontrol_experiments.contingency.contingency import Contingency, InjectionError, Kind
 from metacontrol_experiments.mission.mission import Action
 from metacontrol_experiments.pyramid import course
-from metacontrol_experiments.pyramid.course import Inject, TakeAway
+from metacontrol_experiments.pyramid.course import Inject, State, TakeAway
 from metacontrol_experiments.pyramid.record import ACTION
 from metacontrol_experiments.pyramid.scenarios import ARMS, Kill, Light, Obstacle, Release
 from metacontrol_experiments.pyramid.summary import IN_PLACE, placed
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
     from metacontrol_experiments.io.display import Display
     from metacontrol_experiments.io.processes import ProcessTree
-    from metacontrol_experiments.pyramid.course import State
     from metacontrol_experiments.pyramid.scenarios import Strike
     from metacontrol_experiments.pyramid.settings import PyramidSettings
 
@@ -52,7 +51,7 @@ _CALL_S = 10.0
 _SERVER = "the action server of build"
 
 
-class PyramidMission(MissionNode):
+class PyramidMission(MissionNode[State]):
     """A mission of D1."""
 
     def __init__(
@@ -70,7 +69,6 @@ class PyramidMission(MissionNode):
             StartError: the master did not come up in time, or does not run on simulated time.
         """
         self._settings, self._scenario = settings, settings.drawn
-        self._state: State | None = None
         self._placing = ""  # the arm that is to place a block
         super().__init__(display, check, {}, settings.decider)
         self._injector = FaultInjector(_COMPONENTS, tree.owns)
@@ -80,13 +78,6 @@ class PyramidMission(MissionNode):
         for arm in ARMS:
             self._subscribe(f"simulator/{arm}_arm/state", ArmState, partial(self._on_arm, arm))
         self._subscribe("ground_truth/blocks", PoseArray, self._on_blocks)
-
-    @property
-    def state(self) -> State:
-        """The mission's; only once it has begun."""
-        if self._state is None:
-            raise RuntimeError("the mission has not started")
-        return self._state
 
     @property
     def is_over(self) -> bool:

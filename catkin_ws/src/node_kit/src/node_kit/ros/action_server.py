@@ -52,7 +52,7 @@ class EndsQuietly:
     """Goes before actionlib's ActionServer in a list of bases: such a server may end at any time.
 
     Its timer publishes the status now and then. Where that happens just when the node closes its topics, actionlib lets
-    a traceback be printed.
+    a traceback be printed. rospy closes them before `is_shutdown` says so, but after the end was asked for.
     """
 
     def publish_status(self) -> None:
@@ -60,5 +60,5 @@ class EndsQuietly:
         try:
             super().publish_status()  # type: ignore[misc]
         except rospy.ROSException:
-            if not rospy.is_shutdown():
+            if not rospy.core.is_shutdown_requested():
                 raise

@@ -93,7 +93,7 @@ class ArmNode:
         try:
             self._take(state)
         except rospy.ROSException:  # the node's topics are closed while it ends
-            if not rospy.is_shutdown():
+            if not rospy.core.is_shutdown_requested():
                 raise
 
     def _take(self, state: ArmState) -> None:

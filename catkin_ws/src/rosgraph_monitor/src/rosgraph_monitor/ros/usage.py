@@ -71,7 +71,7 @@ class UsageWatch:
                 if graph is not None:
                     self._publish(self._meter.tell(self._measure(graph)))
             except Exception as error:  # it costs this look, and not those to come
-                if not rospy.is_shutdown():
+                if not rospy.core.is_shutdown_requested():
                     self._warn("CPU and memory are not reported", error)
             time.sleep(_PERIOD)
 
