@@ -21,6 +21,7 @@ class CellRobot:
         self.blocked = set()
         self.ways = {"left": [], "right": []}
         """Targets of each arm's trajectories; the last one leads to where the arm is."""
+        self.under_way, self.results, self.most_at_once = {}, [], 0
         for _ in range(40):
             self.step()
 
@@ -56,14 +57,45 @@ class CellRobot:
         return self.simulation.look()[1], self.camera
 
     def do(self, arm, deeds):
+        self.begin(arm, deeds)
+        while True:
+            name, succeeded = self.ended()
+            if name == arm:
+                return succeeded
+            self.results.append((name, succeeded))
+
+    def begin(self, arm, deeds):
+        self.under_way[arm] = self._work(arm, deeds)
+
+    def ended(self):
+        if self.results:
+            return self.results.pop(0)
+        while True:
+            self.most_at_once = max(self.most_at_once, len(self.under_way))
+            for arm, work in list(self.under_way.items()):
+                try:
+                    next(work)
+                except StopIteration as end:
+                    del self.under_way[arm]
+                    return arm, end.value
+            self.step()
+
+    def halt(self):
+        self.under_way, self.results = {}, []
+        for arm in self.simulation.arms.values():
+            arm.command(arm.positions)
+        self.wait(0.5)
+
+    def _work(self, arm, deeds):
+        """Do something; each turn of the generator is a step of the simulation. Return whether it was done."""
         for deed in deeds:
             if isinstance(deed, Move):
-                if not self._follow(arm, deed.trajectory):
+                if not (yield from self._follow(arm, deed.trajectory)):
                     return False
             else:
                 self.simulation.arms[arm].command_gripper(deed.width, deed.force)
                 for _ in range(round(0.5 / STEP)):
-                    self.step()
+                    yield
         return True
 
     def retreat(self, arm):
@@ -99,7 +131,7 @@ class CellRobot:
             target = trajectory.at(elapsed)[0]
             self.ways[name][-1].append(target)
             arm.command(target)
-            self.step()
+            yield
             if arm.contact_force > FORCE_LIMIT:
                 arm.command(arm.positions)
                 self.blocked.add(name)

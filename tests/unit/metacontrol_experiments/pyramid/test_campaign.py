@@ -2,7 +2,7 @@
 
 import pytest
 from metacontrol_experiments.campaign.matrix import CampaignError
-from metacontrol_experiments.pyramid.campaign import PyramidRun, asks_for_pyramids, parse_pyramids, report, rows
+from metacontrol_experiments.pyramid.campaign import PyramidRun, asks_for_pyramids, levels, parse_pyramids, report, rows
 
 ASKED = {"mission": "manipulation", "scenarios": [1, 2], "seeds": 2, "managers": ["mros", "none"]}
 
@@ -90,3 +90,23 @@ def test_report_tells_success_and_how_fast_it_recovers():
     assert "| `mros` | 2 | 100% (34% to 100%) | 70 s | 1.2 mm | 0 | 1.00 |" in told
     assert "| `none` | 1 | 0% (0% to 79%) | - | - | 0 | 1.00 |" in told
     assert "| the light changes | 2 | 0.7 s | 0.9 s |" in told
+
+
+def test_levels_of_designs_come_from_missions_in_which_nothing_went_wrong():
+    def built(success, duration):
+        return {**summary(success), "duration_s": duration}
+
+    one, both = "fd1_left,fd1_1,fd2_1", "fd2"
+    fast, slow = levels(
+        {
+            PyramidRun(0, 1, "none", one): built(True, 80.0),
+            PyramidRun(0, 2, "none", one): built(False, 10.0),
+            PyramidRun(0, 1, "none", both): built(True, 40.0),
+            PyramidRun(0, 2, "none", both): built(True, 50.0),
+            PyramidRun(2, 1, "mros"): built(True, 5.0),
+        }
+    )[::-1]
+    assert (fast["name"], fast["performance"], fast["duration"], fast["success"]) == ("fd2", 1.0, 45.0, 1.0)
+    assert (slow["name"], slow["performance"], slow["duration"], slow["success"]) == ("fd1_left", 0.25, 80.0, 0.5)
+    assert slow["placement_error"] == pytest.approx(0.0012)
+    assert levels({PyramidRun(2, 1, "mros"): built(True, 5.0)}) == []

@@ -121,6 +121,23 @@ def test_without_a_table_variants_are_files(load, settings, tmp_path):
     assert [variant.name for variant in load().variants] == ["one"]
 
 
+def test_levels_of_variants_that_are_files_come_from_a_table(load, settings, tmp_path):
+    (tmp_path / "variants").mkdir()
+    for name in ("one", "two"):
+        (tmp_path / "variants" / f"{name}.rossystem").write_text(f"RosSystem {{ Name {name} }}")
+    settings["variants"] = {"qa": "qa.csv"}
+    assert [v.expected_qas for v in load(qa="name,safety\none,0.2\ntwo,\n").variants] == [{"safety": 0.2}, {}]
+    with pytest.raises(ModelError, match=r"qa.csv:1:1: no row for two"):
+        load(qa="name,safety\none,0.2\n")
+    with pytest.raises(ModelError, match=r"qa.csv:4:1: 'three' is none of the 2 variants"):
+        load(qa="name,safety\none,0.2\ntwo,\nthree,1\n")
+    (tmp_path / "variants" / "two.rossystem").write_text(
+        "RosSystem { Name two Parameters { Parameter { name qa_safety type Double value 0.5 } } }"
+    )
+    with pytest.raises(ModelError, match=r"two.rossystem:1:.*two has qa_safety here and in qa.csv: keep one"):
+        load(qa="name,safety\none,0.2\ntwo,0.3\n")
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

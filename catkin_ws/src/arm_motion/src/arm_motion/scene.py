@@ -7,6 +7,7 @@ of the meshes in pybullet_data, the fingers are open.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +31,15 @@ _SELF = (*((link, other) for link in (4, 5, 6, 8, 9, 10) for other in (-1, 0, 1)
 """Pairs of links that may hit each other, by 1000 random postures; other pairs never do, or always touch."""
 _WITH_HELD = (-1, 0, 1, 2, 3, 4, 5, 6)
 _FAR = (0.0, 0.0, 100.0)
+_SWEEPING = (2, 3, 4, 5, 6, 8, 9, 10)
+"""Links whose way is swept; those before hardly leave their places."""
+_HAND = (8, 9, 10)
+_ROOM_OF_HAND = 0.03
+"""m by which the hand's way is wider: it may hold something."""
+_SWEEP_STEP = 0.15
+"""rad, the norm, between postures of a way that is swept."""
+_BOXES_OF_BODY = 16
+"""As many as PyBullet puts into one body."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,14 +83,27 @@ class Scene:
         self._other: int | None = None
         self._offset: tuple[float, ...] | None = None
         self._obstacles: list[int] = []
+        self._ways: list[int] = []
         self._held: tuple[Box, int] | None = None
         self.set(boxes, other_arm)
 
-    def set(self, boxes: Sequence[Box] = (), other_arm: tuple[Sequence[float], Sequence[float]] | None = None) -> None:
-        """Replace boxes and other arm, which is faster than a new scene."""
-        for body in self._obstacles:
+    def set(
+        self,
+        boxes: Sequence[Box] = (),
+        other_arm: tuple[Sequence[float], Sequence[float]] | None = None,
+        ways: Sequence[Box] = (),
+    ) -> None:
+        """Replace boxes and other arm, which is faster than a new scene.
+
+        Args:
+            boxes: as above.
+            other_arm: as above.
+            ways: where another arm may come, see `swept`: boxes along the axes of the frame, of which many cost little.
+        """
+        for body in (*self._obstacles, *self._ways):
             pybullet.removeBody(body, physicsClientId=self._client)
         self._obstacles = [self._body(box) for box in boxes]
+        self._ways = [self._bodies(ways[i : i + _BOXES_OF_BODY]) for i in range(0, len(ways), _BOXES_OF_BODY)]
         offset = None if other_arm is None else tuple(other_arm[0])
         if offset != self._offset:
             if self._other is not None:
@@ -132,6 +155,26 @@ class Scene:
         found = kinematics.inverse(position, quaternion, near)
         return next((joints for joints in found if self.is_free(joints, held)), None)
 
+    def swept(self, path: Sequence[Vector]) -> list[Box]:
+        """Return boxes along the axes of link0 in which all that moves of the arm is, somewhere on a path.
+
+        Args:
+            path: joints, to be followed straight from one to the next. Neighbours should not be far from each other.
+        """
+        boxes: list[Box] = []
+        for first, second in pairwise(_thinned(path)):
+            lows, highs = (np.stack(bounds) for bounds in zip(self._bounds(first), self._bounds(second), strict=True))
+            low, high = lows.min(axis=0), highs.max(axis=0)
+            boxes += [_between(one, other) for one, other in zip(low, high, strict=True)]
+        return boxes
+
+    def _bounds(self, joints: Vector) -> tuple[Array, Array]:
+        """Return the lowest and the highest corners (links, 3) of what moves in a posture."""
+        self._pose(self._arm, joints)
+        corners = np.array([pybullet.getAABB(self._arm, link, self._client) for link in _SWEEPING])
+        room = np.array([_ROOM_OF_HAND if link in _HAND else 0.0 for link in _SWEEPING])[:, None]
+        return corners[:, 0] - room, corners[:, 1] + room
+
     def is_free(self, joints: Vector, held: Box | None = None, clearance: float | None = None) -> bool:
         """Say whether a posture is within the limits, and neither the arm nor what it holds hits anything.
 
@@ -145,7 +188,7 @@ class Scene:
         if (joints < LOWER).any() or (joints > UPPER).any():
             return False
         self._pose(self._arm, joints)
-        others = [*self._obstacles, *([] if self._other is None else [self._other])]
+        others = [*self._obstacles, *self._ways, *([] if self._other is None else [self._other])]
         if any(self._hits(other, clearance) for other in others) or self._hits_itself():
             return False
         return held is None or not self._held_hits(held, others)
@@ -191,6 +234,32 @@ class Scene:
             physicsClientId=self._client,
         )
 
+    def _bodies(self, boxes: Sequence[Box]) -> int:
+        """Make one body of boxes."""
+        shapes = pybullet.createCollisionShapeArray(
+            [pybullet.GEOM_BOX] * len(boxes),
+            halfExtents=[[length / 2.0 for length in box.size] for box in boxes],
+            collisionFramePositions=[list(box.position) for box in boxes],
+            collisionFrameOrientations=[list(box.quaternion) for box in boxes],
+            physicsClientId=self._client,
+        )
+        return int(pybullet.createMultiBody(0.0, shapes, physicsClientId=self._client))
+
     def _pose(self, arm: int, joints: Vector) -> None:
         values = [[float(angle)] for angle in joints]
         pybullet.resetJointStatesMultiDof(arm, range(JOINTS), values, physicsClientId=self._client)
+
+
+def _thinned(path: Sequence[Vector]) -> list[Array]:
+    """Return postures of a path that are about as far from each other as its way is swept; at least two."""
+    points = [np.asarray(joints, float) for joints in path]
+    kept = [points[0]]
+    for point in points[1:-1]:
+        if np.linalg.norm(point - kept[-1]) >= _SWEEP_STEP:
+            kept.append(point)
+    return [*kept, points[-1]]
+
+
+def _between(low: Array, high: Array) -> Box:
+    (x, y, z), (length, width, height) = ((low + high) / 2.0).tolist(), (high - low).tolist()
+    return Box((x, y, z), (length, width, height))

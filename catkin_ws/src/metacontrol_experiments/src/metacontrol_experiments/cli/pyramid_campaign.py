@@ -16,12 +16,12 @@ from metacontrol_experiments.io.campaign_on_ros import drive_command
 from metacontrol_experiments.io.display import tell
 from metacontrol_experiments.managers.manager import MROS
 from metacontrol_experiments.mission.settings import BAG_NAME, SUMMARY_NAME
-from metacontrol_experiments.pyramid.campaign import PyramidRun, parse_pyramids, report, rows
+from metacontrol_experiments.pyramid.campaign import PyramidRun, levels, parse_pyramids, report, rows
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping, Sequence
 
-REPORT, TABLE = "report.md", "missions.csv"
+REPORT, TABLE, LEVELS = "report.md", "missions.csv", "qa.csv"
 _DEADLINE_S = 1200.0
 """Wall s for a mission: a simulated second may take two."""
 _TRIES = 2
@@ -30,7 +30,8 @@ _TRIES = 2
 def drive_pyramids(content: Any, file: Path, folder: Path) -> bool:
     """Drive the missions that a file asks for and that the folder lacks; return whether all were driven.
 
-    Of each mission, summary, figure and logs are kept; the bag, too, where the meta-controller had no success.
+    Of each mission, summary, figure and logs are kept; the bag, too, where the meta-controller had no success, or a
+    block that was in place was lost. Where designs built without disturbance, their measured levels are in qa.csv.
 
     Args:
         content: of the file.
@@ -49,13 +50,19 @@ def drive_pyramids(content: Any, file: Path, folder: Path) -> bool:
         driven = _read(folder, runs)
         if driven:
             (folder / REPORT).write_text(report(driven), encoding="utf-8")
-            table = rows(driven)
-            with (folder / TABLE).open("w", newline="", encoding="utf-8") as file_of_table:
-                writer = csv.DictWriter(file_of_table, list(table[0]))
-                writer.writeheader()
-                writer.writerows(table)
+            _write(folder / TABLE, rows(driven))
+            _write(folder / LEVELS, levels(driven))
     tell(f"{len(driven)} of {len(runs)} missions are in {folder / REPORT}")
     return len(driven) == len(runs)
+
+
+def _write(path: Path, table: Sequence[Mapping[str, Any]]) -> None:
+    """Write a table with rows; write none without."""
+    if table:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, list(table[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(table)
 
 
 def _summary(folder: Path, run: PyramidRun) -> Path:
@@ -70,7 +77,7 @@ def _drive(folder: Path, run: PyramidRun) -> str:
         began = time.monotonic()
         attempt, summary = drive_command([*program, *run.arguments, "--output", str(output)], output, _DEADLINE_S)
         if attempt.status is Status.DONE:
-            if summary["success"] or run.manager != MROS:
+            if (summary["success"] and not summary["placed_lost"]) or run.manager != MROS:
                 (output / BAG_NAME).unlink(missing_ok=True)
             outcome = "success" if summary["success"] else f"no success: {summary['reason']}"
             return f"{outcome} ({summary['duration_s']:.0f} s, {time.monotonic() - began:.0f} s of wall time)"

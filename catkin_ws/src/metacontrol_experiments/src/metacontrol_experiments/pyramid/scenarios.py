@@ -109,14 +109,15 @@ class Scenario:
     can_be_built: bool = True
 
 
+UNDISTURBED = 0
 TITLES = {
-    0: "nothing goes wrong",
+    UNDISTURBED: "nothing goes wrong",
     1: "one arm works, and the light changes and changes back",
     2: "an arm meets an obstacle",
     3: "both, the arm is free again, and the camera's driver dies",
     4: "both arms meet an obstacle: no design is left",
 }
-"""By number."""
+"""The number of the one in which nothing goes wrong; and titles by number."""
 
 
 def draw(number: int, seed: int) -> Scenario:
@@ -126,11 +127,11 @@ def draw(number: int, seed: int) -> Scenario:
         KeyError: there is none of this number.
     """
     rng = np.random.default_rng([seed, _STREAM, number])
-    return {0: _undisturbed, 1: _light, 2: _obstacle, 3: _both, 4: _both_arms}[number](rng)
+    return {UNDISTURBED: _undisturbed, 1: _light, 2: _obstacle, 3: _both, 4: _both_arms}[number](rng)
 
 
 def _undisturbed(_rng: Generator) -> Scenario:
-    return Scenario(0)
+    return Scenario(UNDISTURBED)
 
 
 def _light(rng: Generator) -> Scenario:

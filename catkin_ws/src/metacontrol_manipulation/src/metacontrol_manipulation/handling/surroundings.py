@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from arm_motion.scene import Box
@@ -69,6 +69,13 @@ class Surroundings:
     def other_arm(self, other: ArmMount, joints: Sequence[float]) -> tuple[tuple[float, float, float], Sequence[float]]:
         """Return where the other arm stands, and its joints, as a scene takes them."""
         return (other.x - self._mount.x, other.y - self._mount.y, other.z - self._mount.z), joints
+
+    def of_other(self, other: ArmMount, boxes: Iterable[Box]) -> list[Box]:
+        """Return boxes of the other arm's frame in this arm's: both arms have the same orientation."""
+        dx, dy, dz = self.other_arm(other, ())[0]
+        return [
+            replace(box, position=(box.position[0] + dx, box.position[1] + dy, box.position[2] + dz)) for box in boxes
+        ]
 
     def _box(self, place: BlockPose, size: tuple[float, ...]) -> Box:
         position, yaw = self.in_arm(place)

@@ -1,17 +1,24 @@
 """Builds the pyramid: looks, decides, acts, until it stands or nothing can be done. It knows its robot by a protocol.
 
 Nothing is remembered that could not be seen: whoever begins anew, on the same table, goes on with the work.
+
+Where two arms build, one takes a block while the other one puts its own. An arm keeps out of everywhere that the other
+one comes, or came, in what it is at: so either may stop, or go back, at any moment. What lies loose is known then from
+the last look with both arms out of the way; only of the pyramid it is looked after each block. As soon as anything is
+not as expected, nothing new begins before both arms are out of the way and all is seen again.
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Protocol
 
-from metacontrol_manipulation.handling.deeds import OPEN, Grip, HandlingError
+from metacontrol_manipulation.handling.deeds import OPEN, RELEASED, Grip, HandlingError
 from metacontrol_manipulation.perception.blocks import find_blocks
 from metacontrol_manipulation.pick_place.actions import Done, Look, MoveBase, Open, Pick, Place, PutDown, Retreat, Stuck
 from metacontrol_manipulation.pick_place.next_step import OVER_PYRAMID, Situation, next_step
-from metacontrol_manipulation.pick_place.progress import Progress, acted, perceived
+from metacontrol_manipulation.pick_place.progress import Progress, acted, perceived, pyramid_perceived
+from metacontrol_manipulation.pick_place.pyramid import SLOTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -29,6 +36,8 @@ if TYPE_CHECKING:
 
 PATIENCE = 10.0
 """s for which a program that needs all of its arms waits for one that does not work."""
+_IN_SLOT = 0.006
+"""m between a hand that holds a block and a slot within which the block stands in the slot."""
 _PAUSE = 0.1
 """s between two looks at whether it works again."""
 
@@ -58,6 +67,15 @@ class Robot(Protocol):
     def do(self, arm: str, deeds: Sequence[Deed]) -> bool:
         """Have an arm do something; return whether it has."""
 
+    def begin(self, arm: str, deeds: Sequence[Deed]) -> None:
+        """Have an arm begin something, and do not wait for its end."""
+
+    def ended(self) -> tuple[str, bool]:
+        """Wait until an arm has ended what it has begun; return which one, and whether it has done it."""
+
+    def halt(self) -> None:
+        """Have all arms that move stop where they are, whoever moves them."""
+
     def retreat(self, arm: str) -> bool:
         """Have an arm that does not work go back to where its last motion began; return whether it has."""
 
@@ -81,6 +99,8 @@ class Building:
             tell: is called with each action before it begins.
         """
         self._robot, self._handler, self._design, self._tell = robot, handler, design, tell
+        self._under_way: dict[str, tuple[Pick | Place, Sequence[Deed], float]] = {}
+        self._is_expected = True
         self.progress = Progress()
 
     def run(self, is_wanted: Callable[[], bool] = lambda: True) -> Done | Stuck | None:
@@ -89,17 +109,39 @@ class Building:
         Args:
             is_wanted: is asked before each action.
         """
+        self._robot.halt()
         self._rise()
         self.look(clear=False)
-        while is_wanted():
-            missing = self._missing_arms(is_wanted)
-            if missing:
-                return Stuck(f"the {' and the '.join(missing)} arm is stopped: free it, or take a design without it")
-            if not is_wanted():
-                break
-            action = next_step(self._situation(), self._design, self._reach)
-            if action is None:
-                return Stuck("nothing is under way, and there is nothing to begin")
+        try:
+            while is_wanted():
+                missing = self._missing_arms(is_wanted)
+                if missing:
+                    return Stuck(f"the {' and the '.join(missing)} arm is stopped: free it, or take a design without it")
+                if not is_wanted():
+                    break
+                ending = self._step()
+                if ending is not None:
+                    return ending
+            return None
+        finally:
+            if self._under_way:
+                self._robot.halt()
+
+    def _step(self) -> Done | Stuck | None:
+        """Begin the next action, or wait for the end of one; return how all ended, if it has."""
+        if not self._is_expected and not self._under_way:
+            self._is_expected = True
+            self.look(clear=self._clear_the_view())
+        under_way = [action for action, _, _ in self._under_way.values()]
+        action = next_step(self._situation(), self._design, self._reach, under_way) if self._is_expected else None
+        if isinstance(action, Pick | Place) and len(self._design.arms) > 1:
+            if not self._begin(action):
+                self._take_in_an_end()
+        elif self._under_way:
+            self._take_in_an_end()
+        elif action is None:
+            return Stuck("nothing is under way, and there is nothing to begin")
+        else:
             self._tell(action)
             if isinstance(action, Done | Stuck):
                 return action
@@ -144,13 +186,52 @@ class Building:
             cleared = not isinstance(action, Pick) and self._clear_the_view()
         self.look(clear=cleared)
 
+    def _begin(self, action: Pick | Place) -> bool:
+        """Have an arm begin an action beside what is under way; return False where that has to end first."""
+        other = next((deeds for _, deeds, _ in self._under_way.values()), ())
+        plan = self._handler.place_and_leave if isinstance(action, Place) else self._handler.deeds
+        try:
+            deeds = plan(action, self._robot.joints, self._robot.cell, self.progress, other)
+        except HandlingError:
+            if self._under_way:
+                return False
+            self._tell(action)
+            self.progress = acted(self.progress, action, self._base_y(), succeeded=False)
+            self._is_expected = False
+            return True
+        self._tell(action)
+        self._under_way[action.arm] = action, deeds, self._base_y()
+        self._robot.begin(action.arm, deeds)
+        return True
+
+    def _take_in_an_end(self) -> None:
+        """Wait until an arm has ended what it is at, and look what came of it."""
+        arm, succeeded = self._robot.ended()
+        action, _, base_y = self._under_way.pop(arm)
+        succeeded = succeeded and (arm in self._robot.held) == isinstance(action, Pick)
+        self.progress = acted(self.progress, action, base_y, succeeded=succeeded)
+        if isinstance(action, Place) and succeeded:
+            depth, camera = self._robot.depth()
+            before = self.progress.filled
+            self.progress = pyramid_perceived(self.progress, find_blocks(depth, camera, self._robot.cell))
+            succeeded = self.progress.filled >= before | {action.slot}
+        self._is_expected = self._is_expected and succeeded
+
     def _rise(self) -> None:
-        """Have the hands rise that another program has left among the blocks, before anything else moves."""
+        """Have the hands rise that another program has left among the blocks, before anything else moves.
+
+        One that holds a block in a slot lets go of it first: that program was about to.
+        """
         for arm in sorted(self._robot.working):
             try:
-                self._robot.do(arm, self._handler.rise(arm, self._robot.joints, self._robot.cell, self.progress))
+                way = self._handler.rise(arm, self._robot.joints, self._robot.cell, self.progress)
             except HandlingError:
                 continue  # something is over it: it will be planned around
+            self._robot.do(arm, [Grip(RELEASED), *way] if self._holds_in_slot(arm) else way)
+
+    def _holds_in_slot(self, arm: str) -> bool:
+        hand = self._handler.hand(arm, self._robot.joints[arm], self._robot.cell)
+        return arm in self._robot.held and any(math.dist(hand, slot.position) < _IN_SLOT for slot in SLOTS)
 
     def _clear_the_view(self) -> bool:
         """Have the arms that work go out of the way; return whether they have."""

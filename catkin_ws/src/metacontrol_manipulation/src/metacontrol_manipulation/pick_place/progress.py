@@ -63,21 +63,17 @@ def perceived(progress: Progress, view: BlockView, base_y: float, *, clear: bool
         progress: what was known.
         view: what was seen.
         base_y: m, where the base stood along the table.
-        unclear: where something was seen then that may be a block.
         clear: whether the arms were out of the way, as far as they can go.
     """
-    unknown = view.hidden & progress.hidden
-    filled = carrying(view.filled | (view.hidden & progress.filled))
+    progress = pyramid_perceived(progress, view)
     looked_from = (*progress.looked_from, base_y) if clear else progress.looked_from
-    return replace(
-        progress,
-        filled=filled,
-        hidden=frozenset(unknown) - filled,
-        blocks=view.blocks,
-        unclear=view.unclear,
-        clear=clear,
-        looked_from=looked_from,
-    )
+    return replace(progress, blocks=view.blocks, unclear=view.unclear, clear=clear, looked_from=looked_from)
+
+
+def pyramid_perceived(progress: Progress, view: BlockView) -> Progress:
+    """Return what is known after a look at the pyramid only, as where an arm is at work beside it."""
+    filled = carrying(view.filled | (view.hidden & progress.filled))
+    return replace(progress, filled=filled, hidden=frozenset(view.hidden & progress.hidden) - filled)
 
 
 def acted(progress: Progress, action: Action, base_y: float, *, succeeded: bool) -> Progress:
@@ -95,6 +91,8 @@ def acted(progress: Progress, action: Action, base_y: float, *, succeeded: bool)
         progress = replace(progress, failures=dict(failures))
     elif isinstance(action, Place):  # what is in the way of one block may not be in that of the next
         progress = replace(progress, failures={})
+    elif isinstance(action, Pick):
+        progress = replace(progress, blocks=tuple(block for block in progress.blocks if block != action.block))
     if isinstance(action, Place):  # a look will tell whether it is filled
         progress = replace(progress, hidden=progress.hidden | ({action.slot} - progress.filled))
     if isinstance(action, MoveBase):

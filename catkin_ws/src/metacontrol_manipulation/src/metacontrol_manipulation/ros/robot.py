@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import TYPE_CHECKING, Any
 
 import actionlib
@@ -48,6 +49,10 @@ _HELD = 0.008
 """m by which the fingers may be nearer or farther than a block's edge while they hold it."""
 _PATIENCE = 10.0
 """s of ROS time for an image, and for an arm's driver after the end of its motion."""
+_BRAKING = 2.0
+"""s of ROS time in which an arm stands after its motion was cancelled."""
+_LOOK, _STANDING = 0.1, 0.005
+"""s between two looks at an arm's joints, and rad by which none of them moves in between if it stands."""
 
 
 class RosRobot:
@@ -69,6 +74,8 @@ class RosRobot:
         self._widths: dict[str, float] = {}
         self._stopped: set[str] = set()
         self._arms = {mount.name: _Clients(mount.name) for mount in ARMS}
+        self._workers = ThreadPoolExecutor(len(ARMS), "arm")
+        self._begun: dict[Future[bool], str] = {}
         self._mounts = {mount.name: mount for mount in ARMS}
         self._plan = rospy.Publisher("arm_plan", Path, queue_size=2)
         self._inputs = (
@@ -120,6 +127,30 @@ class RosRobot:
                 return False
         rospy.sleep(0.1)  # ROS time, for the joints' last state to arrive
         return True
+
+    def begin(self, arm: str, deeds: Sequence[Deed]) -> None:
+        """Have an arm do something in a thread of its own."""
+        self._begun[self._workers.submit(self.do, arm, deeds)] = arm
+
+    def ended(self) -> tuple[str, bool]:
+        """Wait until an arm has ended what it has begun; return which one, and whether it has done it."""
+        done, _ = wait(self._begun, return_when=FIRST_COMPLETED)
+        future = min(done, key=lambda one: self._begun[one])
+        return self._begun.pop(future), future.result()
+
+    def halt(self) -> None:
+        """Have arms that move stop where they are, also if another program moves them, and wait until they stand."""
+        for clients in self._arms.values():
+            clients.cancel()
+        wait(self._begun)
+        self._begun.clear()
+        until, before = rospy.get_time() + _BRAKING, self.joints
+        while rospy.get_time() < until and not rospy.is_shutdown():
+            rospy.sleep(_LOOK)
+            now = self.joints
+            if all(abs(a - b) < _STANDING for arm in now for a, b in zip(now[arm], before[arm], strict=True)):
+                return
+            before = now
 
     def retreat(self, arm: str) -> bool:
         """Have an arm that is stopped go back to where its last trajectory began; return whether it has."""
@@ -211,6 +242,11 @@ class _Clients:
 
     def grip(self, width: float, force: float) -> bool:
         return self._send(self._gripper, GripperCommandGoal(GripperCommand(width, force)), 2.0)
+
+    def cancel(self) -> None:
+        """Cancel whatever the arm is at, by whomever."""
+        self._motion.cancel_all_goals()
+        self._gripper.cancel_all_goals()
 
     @staticmethod
     def _send(client: actionlib.ActionClient, goal: Any, duration: float) -> bool:

@@ -29,7 +29,7 @@ from ros_model.project.corrections import wrong_corrections
 from ros_model.project.project import Project
 from ros_model.project.settings import FILE_NAME, parse_settings
 from ros_model.project.tables import FORMATS, parse_table
-from ros_model.project.variants import make_systems, without
+from ros_model.project.variants import make_systems, with_levels, without
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -67,7 +67,8 @@ def load_project(folder: str | Path) -> Project:
                 by_table.update(variant.name for variant in found)
                 levels += expected
             else:
-                found = _from_files(source, keys)
+                found, expected = _from_files(source, keys)
+                levels += expected
             variants += found
     wrong.tell()
     project = Project(
@@ -172,7 +173,8 @@ def _from_table(source: Settings, keys: Keys, base: RosSystem, columns: Columns)
         return [part for _, part in make_systems(base, columns, *tables)], tables[1:]
 
 
-def _from_files(source: Settings, keys: Keys) -> list[RosSystem]:
+def _from_files(source: Settings, keys: Keys) -> tuple[list[RosSystem], list[Table]]:
+    """Return the variants of a family that are written by hand, and the table of their levels, where it has one."""
     family = dict(source.families)[keys]
     if "files" in family:
         paths = [source.inside(*keys, "files", number) for number in range(len(family["files"]))]
@@ -188,4 +190,14 @@ def _from_files(source: Settings, keys: Keys) -> list[RosSystem]:
                 variant.position,
                 rule="settings",
             )
-    return variants
+    if "qa" not in family:
+        return variants, []
+    table = read_table(source.inside(*keys, "qa"))
+    whole: list[RosSystem] = []
+    wrong = Gathered()
+    with _ruled(source):
+        for variant in variants:
+            with wrong.step():
+                whole.append(with_levels(variant, table))
+        wrong.tell()
+    return whole, [table]

@@ -25,12 +25,13 @@ from ros_model.language.metamodel import (
 )
 from ros_model.language.remappings import with_header
 from ros_model.project.columns import TARGET_OF, check_columns, outlet, with_implied, with_ports
+from ros_model.project.tables import Row
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
     from ros_model.project.columns import Columns, Setting, Wire
-    from ros_model.project.tables import Row, Table
+    from ros_model.project.tables import Table
 
 _ABOUT = re.compile(r"source|seeds|missions|.*_spread")
 """Columns of a table of levels that tell where they are from."""
@@ -258,6 +259,22 @@ def _expected(row: Row, columns: Mapping[str, str], levels: Table | None) -> lis
             found.append(SystemParameter(f"qa_{quality}", ParameterType("Double"), float(cell), position=where))
     wrong.tell()
     return found
+
+
+def with_levels(variant: RosSystem, levels: Table) -> RosSystem:
+    """Return a variant that was written by hand, with the expected levels of a table.
+
+    Raises:
+        ModelError: the table has no row for it, a cell is no number, or the variant itself has a level, too.
+    """
+    found = _expected(Row(variant.name, {}, variant.position), {}, levels)
+    names = {parameter.name for parameter in found}
+    double = next((parameter for parameter in variant.parameters if parameter.name in names), None)
+    if double is not None:
+        raise ModelError(
+            f"{variant.name} has {double.name} here and in {levels.path.name}: keep one", double.position, rule="table"
+        )
+    return replace(variant, parameters=(*variant.parameters, *found))
 
 
 def _levels(row: Row, levels: Table | None) -> list[tuple[str, Value | None, str, Position]]:
