@@ -1,5 +1,7 @@
 """The pyramid is built without ROS, by physics and a depth image; whoever takes over goes on with the work."""
 
+import math
+
 import pytest
 from helpers.cell_robot import CellRobot, errors
 from metacontrol_manipulation.handling.handler import Handler
@@ -45,6 +47,56 @@ def test_other_arm_and_the_base_go_on_when_an_arm_is_blocked(robot, handler):
     assert all(action.arm == "right" for action in second if isinstance(action, Pick | Place))
     for _ in range(1000):  # it stands still for 5 s
         robot.step()
+    assert max(errors(robot.simulation, SLOTS).values()) < IN_PLACE
+
+
+def test_both_arms_are_at_work_at_the_same_time_and_do_not_meet(robot, handler):
+    forces = []
+
+    def step():
+        CellRobot.step(robot)
+        forces.append(max(arm.contact_force for arm in robot.simulation.arms.values()))
+
+    robot.step, began = step, robot.simulation.time
+    done = []
+    ending = Building(robot, handler, BOTH_ARMS, done.append).run()
+    assert isinstance(ending, Done), ending
+    assert robot.most_at_once == 2
+    assert sum(isinstance(action, Pick | Place) for action in done) == 2 * len(SLOTS), "something was done twice"
+    assert robot.simulation.time - began < 60.0, "one arm after the other takes 68 to 77 s"
+    assert max(forces) < 15.0
+    assert max(errors(robot.simulation, SLOTS).values()) < IN_PLACE
+
+
+class KilledError(Exception):
+    """The program is killed."""
+
+
+def test_hand_that_holds_a_block_in_its_slot_lets_go_of_it_when_another_program_takes_over(robot, handler):
+    placing = []
+
+    def step():
+        CellRobot.step(robot)
+        for action in placing:
+            hand = handler.hand(action.arm, robot.joints[action.arm], robot.cell)
+            if action.arm in robot.held and math.dist(hand, action.slot.position) < 0.004:
+                raise KilledError
+
+    def note(action):
+        if isinstance(action, Place):
+            placing.append(action)
+
+    robot.step = step
+    with pytest.raises(KilledError):
+        Building(robot, handler, BOTH_ARMS, note).run()
+    robot.step = lambda: CellRobot.step(robot)
+    assert placing[0].arm in robot.held
+    done = []
+    ending = Building(robot, handler, BOTH_ARMS, done.append).run()
+    assert isinstance(ending, Done), ending
+    assert placing[0].slot not in {action.slot for action in done if isinstance(action, Place)}, (
+        "the block was put there again"
+    )
     assert max(errors(robot.simulation, SLOTS).values()) < IN_PLACE
 
 

@@ -1,5 +1,7 @@
 """Postures that hit something, and postures that do not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pybullet
 import pytest
@@ -132,3 +134,34 @@ def test_scenes_are_apart(scene):
         assert scene.is_free(low)
         assert not other.is_free(low)
     assert scene.is_free(low)
+
+
+def test_a_way_is_swept_from_end_to_end(scene):
+    path = np.linspace(at(scene, 0.5, 0.3, 0.2), at(scene, 0.5, -0.3, 0.4), 40)
+    boxes = scene.swept(path)
+    low = np.array([np.subtract(box.position, np.divide(box.size, 2.0)) for box in boxes])
+    high = np.array([np.add(box.position, np.divide(box.size, 2.0)) for box in boxes])
+    for posture in path:
+        hand = scene.forward(posture)[0]
+        assert ((low < hand - 0.02) & (hand + 0.02 < high)).all(axis=1).any(), "what the hand holds is outside"
+    scene.set(ways=boxes)
+    assert not any(scene.is_free(posture) for posture in path)
+    assert not scene.is_free(at(scene, 0.5, 0.0, 0.3), clearance=0.0), "the way between its ends is free"
+    scene.set(ways=[replace(box, position=tuple(np.add(box.position, (0.0, -0.9, 0.0)))) for box in boxes])
+    assert scene.is_free((1.2, *HOME[1:]))
+
+
+def test_ways_hit_as_single_boxes_do(scene):
+    random = np.random.default_rng(1)
+    with Scene() as other:
+        for _ in range(20):
+            boxes = [
+                Box(tuple(random.uniform((-0.8, -0.8, 0.0), 0.8)), tuple(random.uniform(0.05, 0.15, 3)))
+                for _ in range(random.integers(1, 40))
+            ]
+            scene.set(boxes)
+            other.set(ways=boxes)
+            for posture in HOME + random.normal(0.0, 0.5, (10, 7)):
+                assert scene.is_free(posture, CUBE) == other.is_free(posture, CUBE)
+    scene.set()
+    assert scene.is_free(HOME)

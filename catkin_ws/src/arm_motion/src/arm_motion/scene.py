@@ -31,9 +31,8 @@ _SELF = (*((link, other) for link in (4, 5, 6, 8, 9, 10) for other in (-1, 0, 1)
 """Pairs of links that may hit each other, by 1000 random postures; other pairs never do, or always touch."""
 _WITH_HELD = (-1, 0, 1, 2, 3, 4, 5, 6)
 _FAR = (0.0, 0.0, 100.0)
-_SWEEPING = (2, 3, 4, 5, 6, 8, 9, 10)
-"""Links whose way is swept; those before hardly leave their places."""
-_HAND = (8, 9, 10)
+_SWEEPING = ((2,), (3,), (4,), (5,), (6,), (8, 9, 10))
+"""Links whose way is swept, the hand with its fingers as one; those before hardly leave their places."""
 _ROOM_OF_HAND = 0.03
 """m by which the hand's way is wider: it may hold something."""
 _SWEEP_STEP = 0.15
@@ -171,9 +170,14 @@ class Scene:
     def _bounds(self, joints: Vector) -> tuple[Array, Array]:
         """Return the lowest and the highest corners (links, 3) of what moves in a posture."""
         self._pose(self._arm, joints)
-        corners = np.array([pybullet.getAABB(self._arm, link, self._client) for link in _SWEEPING])
-        room = np.array([_ROOM_OF_HAND if link in _HAND else 0.0 for link in _SWEEPING])[:, None]
-        return corners[:, 0] - room, corners[:, 1] + room
+        lows, highs = [], []
+        for links in _SWEEPING:
+            corners = np.array([pybullet.getAABB(self._arm, link, self._client) for link in links])
+            lows.append(corners[:, 0].min(axis=0))
+            highs.append(corners[:, 1].max(axis=0))
+        lows[-1] -= _ROOM_OF_HAND
+        highs[-1] += _ROOM_OF_HAND
+        return np.stack(lows), np.stack(highs)
 
     def is_free(self, joints: Vector, held: Box | None = None, clearance: float | None = None) -> bool:
         """Say whether a posture is within the limits, and neither the arm nor what it holds hits anything.

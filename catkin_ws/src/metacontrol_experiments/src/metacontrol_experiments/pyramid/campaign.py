@@ -1,9 +1,9 @@
 """A campaign of D1: which missions a file asks for, the table of what became of them, and the levels of designs.
 
 The levels of a design are measured where it builds and nothing goes wrong: `duration` in s and `placement_error`, the
-largest distance of a block from its slot in m, are means over the missions in which the pyramid stands; `success` is the
-share of these missions; `performance` is the mean of the shortest time that any design took with the same seed by the
-design's own, 0 without success.
+largest distance of a block from its slot in m, are means over the missions in which the pyramid stands; `success` is
+the share of these missions; `performance` is the mean of the shortest time that any design took with the same seed by
+the design's own, 0 without success.
 """
 
 from __future__ import annotations
@@ -148,12 +148,12 @@ def report(summaries: Mapping[PyramidRun, Mapping[str, Any]]) -> str:
         lines.append(
             f"| {title} | `{manager}` | {len(missions)} | {met} | {durations} | {error} | {lost} | {factor:.2f} |"
         )
-    lines += ["", "| cause | changes | cause to next motion, median | largest |", "|---|---|---|---|"]
     adapted = [mission for (_, _, manager), missions in groups.items() if manager == MROS for mission in missions]
-    for kind, what in _CAUSES.items():
-        times = _recoveries(adapted, kind)
-        if times:
-            lines.append(f"| {what} | {len(times)} | {median(times):.1f} s | {max(times):.1f} s |")
+    recovered = {what: times for kind, what in _CAUSES.items() if (times := _recoveries(adapted, kind))}
+    if recovered:
+        lines += ["", "| cause | changes | cause to next motion, median | largest |", "|---|---|---|---|"]
+    for what, times in recovered.items():
+        lines.append(f"| {what} | {len(times)} | {median(times):.1f} s | {max(times):.1f} s |")
     return "\n".join(lines) + "\n"
 
 
@@ -200,6 +200,7 @@ def levels(summaries: Mapping[PyramidRun, Mapping[str, Any]]) -> list[dict[str, 
                 "performance_spread": round(stdev(shares), 3) if len(shares) > 1 else "",
                 "duration_spread": round(stdev(durations), 1) if len(durations) > 1 else "",
                 "missions": len(missions),
+                "seeds": f"{min(seed for seed, _ in missions)}-{max(seed for seed, _ in missions)}",
             }
         )
     return found

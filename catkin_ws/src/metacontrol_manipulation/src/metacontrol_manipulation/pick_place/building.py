@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Protocol
 
-from metacontrol_manipulation.handling.deeds import OPEN, RELEASED, Grip, HandlingError
+from metacontrol_manipulation.handling.deeds import OPEN, RELEASE, Grip, HandlingError
 from metacontrol_manipulation.perception.blocks import find_blocks
 from metacontrol_manipulation.pick_place.actions import Done, Look, MoveBase, Open, Pick, Place, PutDown, Retreat, Stuck
 from metacontrol_manipulation.pick_place.next_step import OVER_PYRAMID, Situation, next_step
@@ -112,11 +112,13 @@ class Building:
         self._robot.halt()
         self._rise()
         self.look(clear=False)
+        self._is_expected = len(self._design.arms) == 1 or not self._situation().away & self._robot.working
         try:
             while is_wanted():
                 missing = self._missing_arms(is_wanted)
                 if missing:
-                    return Stuck(f"the {' and the '.join(missing)} arm is stopped: free it, or take a design without it")
+                    arms = " and the ".join(missing)
+                    return Stuck(f"the {arms} arm is stopped: free it, or take a design without it")
                 if not is_wanted():
                     break
                 ending = self._step()
@@ -188,10 +190,13 @@ class Building:
 
     def _begin(self, action: Pick | Place) -> bool:
         """Have an arm begin an action beside what is under way; return False where that has to end first."""
+        robot, handler = self._robot, self._handler
         other = next((deeds for _, deeds, _ in self._under_way.values()), ())
-        plan = self._handler.place_and_leave if isinstance(action, Place) else self._handler.deeds
         try:
-            deeds = plan(action, self._robot.joints, self._robot.cell, self.progress, other)
+            if isinstance(action, Place):
+                deeds = handler.place_and_leave(action, robot.joints, robot.cell, self.progress, other)
+            else:
+                deeds = handler.deeds(action, robot.joints, robot.cell, self.progress, other)
         except HandlingError:
             if self._under_way:
                 return False
@@ -227,7 +232,7 @@ class Building:
                 way = self._handler.rise(arm, self._robot.joints, self._robot.cell, self.progress)
             except HandlingError:
                 continue  # something is over it: it will be planned around
-            self._robot.do(arm, [Grip(RELEASED), *way] if self._holds_in_slot(arm) else way)
+            self._robot.do(arm, [*RELEASE, *way] if self._holds_in_slot(arm) else way)
 
     def _holds_in_slot(self, arm: str) -> bool:
         hand = self._handler.hand(arm, self._robot.joints[arm], self._robot.cell)
