@@ -8,6 +8,7 @@ import os
 import select
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -311,6 +312,30 @@ def test_without_a_master_they_say_so_in_one_line_and_end_with_2(world):
                 f"{NAMES.get(name, name)}: no ROS master answers at {world.uri}: start roscore or set ROS_MASTER_URI\n"
             )
             assert [said for said in said.splitlines(True) if not said.startswith("pybullet build")] == [line]
+
+
+def asks_for(service):
+    """Return what a TCPROS client says first that wants to know whether a service is there."""
+    fields = [f"service={service}", "md5sum=*", "callerid=/test", "probe=1"]
+    header = b"".join(struct.pack("<I", len(field)) + field.encode() for field in fields)
+    return struct.pack("<I", len(header)) + header
+
+
+def test_client_that_says_nothing_or_nonsense_keeps_nobody_out(world):
+    world.start_master()
+    world.start_all()
+    for node in NODES:
+        with case(node), contextlib.ExitStack() as stack:
+            service = next(name for name in sorted(world.registrations(node)) if name.endswith("/get_loggers"))
+            address = world.ask("lookupService", service)
+            host, _, port = address.removeprefix("rosrpc://").rpartition(":")
+            connect = lambda: stack.enter_context(socket.create_connection((host, int(port)), DEADLINE_S))  # noqa: B023, E731
+            silent, mistaken = connect(), connect()
+            mistaken.sendall(b"POST /RPC2 HTTP/1.1\r\n\r\n")
+            client = connect()
+            client.sendall(asks_for(service))
+            assert client.recv(4096), "the service does not answer"
+            assert silent.recv(1) == mistaken.recv(1) == b"", "the node waits for ever"
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=lambda number: number.name)

@@ -20,6 +20,7 @@ import rospy
 from node_kit.io.master_watch import MasterWatch
 from node_kit.io.xml_rpc import CallError
 from node_kit.master import View
+from node_kit.ros.handshakes import greet_apart
 from node_kit.ros.quick_start import quick_start
 
 BAD_START = 2
@@ -87,6 +88,7 @@ class Lifetime:
                 self.end("there is no master", BAD_START)
             with quick_start():
                 rospy.init_node(self._name, anonymous=anonymous, disable_signals=True)
+            greet_apart()
         except (CallError, OSError, rospy.ROSInitException) as error:
             raise _StartError(str(error)) from error
         self._name = rospy.get_name()

@@ -1,0 +1,46 @@
+"""Has rospy greet each client in a thread of its own, and not for ever.
+
+rospy reads the header of a new TCPROS connection in the thread that accepts all of them, without a deadline. Somebody
+who connects and says nothing, or takes the port for that of another node, as callers of an ended node may whose port
+was given anew, keeps all others out: topics are not connected any more, and services do not answer.
+"""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from rospy.impl import tcpros_base
+
+PATIENCE = 5.0
+"""Wall s for a client to say what it wants."""
+
+_Handler = Callable[[socket.socket, Any, Any], Any]
+
+
+def greet_apart() -> None:
+    """Change this node's TCPROS server, which `rospy.init_node` has started; it goes on as it was without one."""
+    server = tcpros_base._tcpros_server  # rospy has no other way to it
+    if server is None or server.tcp_ros_server is None:
+        return
+    greet = server.tcp_ros_server.inbound_handler
+
+    def greet_in_thread(client: socket.socket, address: object) -> None:
+        client.settimeout(PATIENCE)
+        threading.Thread(target=greet, args=(client, address), name="greeting", daemon=True).start()
+
+    server.topic_connection_handler = _without_deadline(server.topic_connection_handler)
+    server.service_connection_handler = _without_deadline(server.service_connection_handler)
+    server.tcp_ros_server.inbound_handler = greet_in_thread
+
+
+def _without_deadline(handler: _Handler) -> _Handler:
+    """Return a handler of connections whose header is read; from then on they may be silent."""
+
+    def handle(client: socket.socket, address: object, header: object) -> Any:
+        client.settimeout(None)
+        return handler(client, address, header)
+
+    return handle
