@@ -3,9 +3,11 @@
 import math
 from functools import cached_property
 
+import numpy as np
 from arm_motion.timing import Trajectory
 from metacontrol_manipulation.handling.deeds import Move
 from metacontrol_manipulation.perception.camera import Camera, mounted
+from metacontrol_manipulation.perception.tags import find_cell
 from pybullet_simulator.physics.cell_simulation import STEP, CellSimulation
 from pybullet_simulator.robot.manipulator import MAST_CAMERA
 from robot_formulas.geometry import Pose
@@ -14,9 +16,10 @@ FORCE_LIMIT = 25.0
 
 
 class CellRobot:
-    """Steps the simulation while it acts. It knows by the truth where the cell is."""
+    """Steps the simulation while it acts. It knows by the truth where the cell is, if it need not see a tag."""
 
     def __init__(self, seed=0):
+        self.needs_tags = False
         self.simulation = CellSimulation(seed)
         self.blocked = set()
         self.ways = {"left": [], "right": []}
@@ -53,7 +56,14 @@ class CellRobot:
         pose = mounted(view.x, view.y, view.z, view.pitch)
         return Camera(view.width, view.height, view.focal_length, view.focal_length, *view.principal_point, pose)
 
+    def sees_cell(self):
+        if not self.needs_tags:
+            return True
+        light = self.simulation.look()[0]
+        return find_cell((np.clip(light, 0.0, 1.0) * 255).astype(np.uint8), self.camera) is not None
+
     def depth(self):
+        assert self.sees_cell(), "it is not known where the cell is"
         return self.simulation.look()[1], self.camera
 
     def do(self, arm, deeds):

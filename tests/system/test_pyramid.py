@@ -100,6 +100,20 @@ def test_hand_that_holds_a_block_in_its_slot_lets_go_of_it_when_another_program_
     assert max(errors(robot.simulation, SLOTS).values()) < IN_PLACE
 
 
+def test_arms_that_hide_where_the_cell_is_go_out_of_the_way(robot, handler):
+    building = Building(robot, handler, BOTH_ARMS, lambda action: None)
+    building.look(clear=True)
+    for arm, side in (("left", 1.0), ("right", -1.0)):
+        nearest = min((block for block in building.progress.blocks if side * block.y > 0.0), key=lambda one: abs(one.y))
+        above = handler.deeds(Pick(arm, nearest), robot.joints, robot.cell, building.progress)[:2]
+        assert robot.do(arm, above)
+    robot.blocked, robot.needs_tags = {"right"}, True
+    assert not robot.sees_cell()
+    ending = Building(robot, handler, one_arm("left"), lambda action: None).run()
+    assert isinstance(ending, Done), ending
+    assert max(errors(robot.simulation, SLOTS).values()) < IN_PLACE
+
+
 def test_without_a_working_arm_it_says_why(robot, handler):
     robot.blocked = {"left", "right"}
     ending = Building(robot, handler, BOTH_ARMS, lambda action: None).run()

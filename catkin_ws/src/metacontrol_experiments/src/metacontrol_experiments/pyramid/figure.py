@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -41,6 +42,8 @@ _COLOURS = {
 _OTHER = "#bcbd22"
 _CAUSE, _CHANGING = "#d62728", "#c9c9c9"
 _ARM_COLOURS = {"left": "#ff7f0e", "right": "#2ca02c"}
+_TITLE_WIDTH = 100
+"""Characters of a line of the title."""
 _FORCE_LIMIT = 25.0
 """N, at which an arm stops."""
 _LEAST_FORCE = 0.1
@@ -102,10 +105,11 @@ def _title(summary: dict[str, Any]) -> str:
     manager = "with metacontrol" if summary["metacontrol"] else "baseline without metacontrol"
     result = "success" if summary["success"] else "no success"
     scenario = summary["scenario"]
-    return (
-        f"D1, scenario {scenario} ({TITLES.get(scenario, 'unknown')}), seed {summary['seed']}, {manager}\n"
-        f"{result}: {summary['placed']} of 6 blocks in place after {summary['duration_s']:.0f} s; {summary['reason']}"
+    lines = (
+        f"D1, scenario {scenario} ({TITLES.get(scenario, 'unknown')}), seed {summary['seed']}, {manager}",
+        f"{result}: {summary['placed']} of 6 blocks in place after {summary['duration_s']:.0f} s; {summary['reason']}",
     )
+    return "\n".join(textwrap.fill(line, _TITLE_WIDTH) for line in lines)
 
 
 def _draw_functions(axis: Axes, record: PyramidRecord) -> None:

@@ -38,6 +38,8 @@ PATIENCE = 10.0
 """s for which a program that needs all of its arms waits for one that does not work."""
 _IN_SLOT = 0.006
 """m between a hand that holds a block and a slot within which the block stands in the slot."""
+_STEPS_BACK = 4
+"""How often a stopped arm goes a part of its way back, so that the cell can be seen."""
 _PAUSE = 0.1
 """s between two looks at whether it works again."""
 
@@ -60,6 +62,9 @@ class Robot(Protocol):
     @property
     def cell(self) -> Pose:
         """Pose of the cell frame in base_link."""
+
+    def sees_cell(self) -> bool:
+        """Return whether it is seen where the cell is, or known well enough without."""
 
     def depth(self) -> tuple[NDArray[np.float32], Camera]:
         """Take a depth image, and tell by which camera."""
@@ -111,6 +116,7 @@ class Building:
         """
         self._robot.halt()
         self._rise()
+        self._show_the_cell()
         self.look(clear=False)
         self._is_expected = len(self._design.arms) == 1 or not self._situation().away & self._robot.working
         try:
@@ -233,6 +239,15 @@ class Building:
             except HandlingError:
                 continue  # something is over it: it will be planned around
             self._robot.do(arm, [*RELEASE, *way] if self._holds_in_slot(arm) else way)
+
+    def _show_the_cell(self) -> None:
+        """Have arms go out of the way that hide where the cell is: another program has left them there."""
+        for _ in range(_STEPS_BACK):
+            if self._robot.sees_cell():
+                return
+            self._clear_the_view()
+            for arm in sorted(self._situation().away - self._robot.working):
+                self._robot.retreat(arm)
 
     def _holds_in_slot(self, arm: str) -> bool:
         hand = self._handler.hand(arm, self._robot.joints[arm], self._robot.cell)

@@ -18,7 +18,7 @@ from metacontrol_manipulation.pick_place.next_step import one_arm
 from metacontrol_manipulation.ros.approach import CELL
 from metacontrol_manipulation.ros.builder import Builder
 from metacontrol_manipulation.ros.errors import RobotError
-from metacontrol_manipulation.ros.places import BaseOdometry, GivenCell
+from metacontrol_manipulation.ros.places import BaseOdometry, GivenCell, home_of
 from metacontrol_manipulation.ros.robot import RosRobot
 
 _WAY = 40.0
@@ -55,6 +55,6 @@ def main() -> None:
         arm = parameters.choice("arm", "left", ("left", "right"))
         patience = parameters.number("patience", 10.0, low=0.1)
         max_age = parameters.number("max_age", 2.0, low=0.1)
-        place = GivenCell(BaseOdometry(), patience, max_age)
+        place = GivenCell(BaseOdometry(), patience, max_age, home_of(parameters))
         Builder(RosRobot(place, MovePosition().go), one_arm(arm))
         rospy.spin()

@@ -25,6 +25,8 @@ GOOD = 0.008
 """m: with a larger error, a block that is in its place would look as if it were not."""
 _PATIENCE = 10.0
 """s of ROS time for the first odometry, and for an image."""
+_GLANCE = 1.0
+"""s of ROS time in which a tag is found in some image, if it can be."""
 
 
 class Place(Protocol):
@@ -32,6 +34,9 @@ class Place(Protocol):
 
     def cell(self) -> Pose:
         """Return the pose of the cell frame in base_link, now."""
+
+    def is_seen(self) -> bool:
+        """Return whether it is known well enough where the cell is, after some time for that."""
 
     def renew(self) -> None:
         """Look again while the base stands.
@@ -97,6 +102,10 @@ class OwnTags:
         """Return the pose of the cell frame in base_link, now."""
         return self._known(self._odometry.pose()).seen_from(self._odometry.pose())
 
+    def is_seen(self) -> bool:
+        """Return True: odometry tells it where no tag is seen."""
+        return True
+
     def renew(self) -> None:
         """Take an image, and find the tags in it.
 
@@ -118,7 +127,9 @@ class OwnTags:
 class GivenCell:
     """The cell as another node tells it on `cell_pose`."""
 
-    def __init__(self, odometry: BaseOdometry, patience: float, max_age: float = math.inf) -> None:
+    def __init__(
+        self, odometry: BaseOdometry, patience: float, max_age: float = math.inf, home: Pose | None = None
+    ) -> None:
         """Begin to listen.
 
         Args:
@@ -126,10 +137,13 @@ class GivenCell:
             patience: s of ROS time to wait for a pose.
             max_age: s of ROS time after which a pose is no longer well known, though the wheels have not turned: a
                 base may be pushed, or the cell.
+            home: pose of the base in the cell frame where the frame odom begins. With it, something is known before a
+                tag is seen: not well enough to handle blocks, but to go out of the way.
         """
         self._odometry, self._patience, self._max_age = odometry, patience, max_age
         self._news = threading.Condition()
         self._known: Localisation | None = None
+        self._expected = at_home(home) if home else None
         self._stamp = 0.0
         self._input = rospy.Subscriber("cell_pose", PoseWithCovarianceStamped, self._on_pose, queue_size=1)
 
@@ -139,13 +153,26 @@ class GivenCell:
         return rospy.get_time() - self._stamp
 
     def cell(self) -> Pose:
-        """Return the pose of the cell frame in base_link, now.
+        """Return the pose of the cell frame in base_link, now; before it was told, as odometry has it.
 
         Raises:
-            RobotError: it was never told.
+            RobotError: it was never told, and home is not known.
         """
-        known = self._wait(lambda: self._known)
-        return known.seen_from(self._odometry.pose())
+        if self._known is None and self._expected is None:
+            self._wait(lambda: self._known is not None)
+        known = self._known or self._expected
+        assert known is not None  # noqa: S101 (it has been waited for)
+        return known.moved(self._odometry.pose()).seen_from(self._odometry.pose())
+
+    def is_seen(self) -> bool:
+        """Return whether it is known well enough where the cell is, after some time for that."""
+        end = rospy.get_time() + _GLANCE
+        with self._news:
+            while not self._is_good():
+                if rospy.is_shutdown() or rospy.get_time() > end:
+                    return False
+                self._news.wait(0.05)
+        return True
 
     def renew(self) -> None:
         """Wait until it is well known where the cell is.
@@ -153,23 +180,22 @@ class GivenCell:
         Raises:
             RobotError: it is not, for some time.
         """
-        self._wait(lambda: self._known if self._is_good() else None)
+        self._wait(self._is_good)
 
     def _is_good(self) -> bool:
         if self._known is None or self.age > self._max_age:
             return False
         return self._known.moved(self._odometry.pose()).deviation <= GOOD
 
-    def _wait(self, known: Callable[[], Localisation | None]) -> Localisation:
+    def _wait(self, is_known: Callable[[], bool]) -> None:
         end = rospy.get_time() + self._patience
         with self._news:
-            while (found := known()) is None:
+            while not is_known():
                 if rospy.is_shutdown() or rospy.get_time() > end:
                     raise RobotError(
                         f"no tag of the cell is seen for {self._patience:g} s: see light, camera and localizer"
                     )
                 self._news.wait(0.1)
-        return found
 
     def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
         base = self._odometry.at(message.header.stamp)

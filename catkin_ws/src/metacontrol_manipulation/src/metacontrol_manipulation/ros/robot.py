@@ -104,6 +104,10 @@ class RosRobot:
         """Pose of the cell frame in base_link."""
         return self._place.cell()
 
+    def sees_cell(self) -> bool:
+        """Return whether it is known well enough where the cell is."""
+        return self._place.is_seen()
+
     def depth(self) -> tuple[NDArray[np.float32], Camera]:
         """See anew where the cell is, then take a depth image.
 
