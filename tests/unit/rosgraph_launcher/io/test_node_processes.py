@@ -40,8 +40,9 @@ def prepared(monkeypatch):
 def command(tmp_path):
     def make(name):
         script = tmp_path / name
-        script.write_text("#!/usr/bin/python3\n")
-        script.chmod(0o755)
+        if not script.exists():  # a process that stands by for it may be about to run it
+            script.write_text("#!/usr/bin/python3\n")
+            script.chmod(0o755)
         return Command((str(script),), str(tmp_path), {"PATH": os.environ["PATH"], "MROS_LAUNCHER": f"test {tmp_path}"})
 
     return make
