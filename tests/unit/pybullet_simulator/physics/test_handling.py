@@ -60,6 +60,22 @@ def test_three_blocks_are_stacked_within_2_mm(cell, hand):
     assert max(hand.forces) < NORMAL
 
 
+def test_block_that_was_turned_is_let_go_of_where_it_stands(cell, hand):
+    hand.pick("block_1")
+    place = np.array((-0.20, 0.05, FLOOR_LAYER))
+    hand.move_over(place + (0.0, 0.0, 0.08), ACROSS)
+    hand.move_straight(place)
+    hand.wait(0.2)
+    before = np.array(cell.blocks["block_1"][0])
+    hand.arm.command_gripper(0.064, 20.0)
+    cell.step()
+    normals = np.array([point[7] for point in pybullet.getContactPoints(cell._robot, physicsClientId=cell.client)])
+    assert len(normals)
+    assert np.abs(normals[:, 0]) == pytest.approx(1.0, abs=0.02), "a finger presses aside, and takes the block along"
+    hand.wait(0.5)
+    assert cell.blocks["block_1"][0] == pytest.approx(before, abs=0.001)
+
+
 def test_block_stays_in_the_hand_while_the_base_drives_sideways(cell, hand):
     hand.pick("block_1")
     before = np.array(cell.blocks["block_1"][0]) - (*cell.base_pose[:2], 0.0)

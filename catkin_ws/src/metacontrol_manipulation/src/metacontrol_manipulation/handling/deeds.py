@@ -27,8 +27,6 @@ RELEASED = 0.064
 """m between the fingers after a block was put: 7 mm at each side, so that they do not touch its neighbours."""
 GRIP_FORCE = 20.0
 """N, all that the gripper has; a block of 0.09 kg needs 1 N at rest."""
-LOOSE_FORCE = 1.0
-"""N; fingers that open under their full force throw the block after the one that leaves it last, by up to 7 mm."""
 SPEED, CAREFUL = 0.7, 0.25
 """Shares of the fastest motion: on the way, and near blocks."""
 DEADLINE = 2.0
@@ -60,7 +58,7 @@ class Grip:
 
 Deed = Move | Grip
 
-RELEASE = (Grip(0.0, LOOSE_FORCE), Grip(RELEASED))
+LET_GO = Grip(RELEASED)
 """A block that stands somewhere is let go of, and stays there."""
 
 
@@ -112,7 +110,7 @@ def put(scene: Scene, around: Surroundings, joints: Vector, place: BlockPose, se
     return [
         _way(scene, joints, chosen, seed, HELD),
         Move(timed(chosen.down, CAREFUL)),
-        *RELEASE,
+        LET_GO,
         Move(timed(up, CAREFUL)),
     ]
 

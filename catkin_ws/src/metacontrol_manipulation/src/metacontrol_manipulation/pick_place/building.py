@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Protocol
 
-from metacontrol_manipulation.handling.deeds import OPEN, RELEASE, Grip, HandlingError
+from metacontrol_manipulation.handling.deeds import LET_GO, OPEN, Grip, HandlingError
 from metacontrol_manipulation.perception.blocks import find_blocks
 from metacontrol_manipulation.pick_place.actions import Done, Look, MoveBase, Open, Pick, Place, PutDown, Retreat, Stuck
 from metacontrol_manipulation.pick_place.next_step import OVER_PYRAMID, Situation, next_step
@@ -238,7 +238,7 @@ class Building:
                 way = self._handler.rise(arm, self._robot.joints, self._robot.cell, self.progress)
             except HandlingError:
                 continue  # something is over it: it will be planned around
-            self._robot.do(arm, [*RELEASE, *way] if self._holds_in_slot(arm) else way)
+            self._robot.do(arm, [LET_GO, *way] if self._holds_in_slot(arm) else way)
 
     def _show_the_cell(self) -> None:
         """Have arms go out of the way that hide where the cell is: another program has left them there."""

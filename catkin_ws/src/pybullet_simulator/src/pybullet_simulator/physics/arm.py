@@ -68,6 +68,7 @@ class Arm:
         efforts: Nm, of the servos.
         gripper_width: m between the fingers.
         contact_force: N, see below.
+        groups: of its links, and with which they meet.
     """
 
     def __init__(self, mount: ArmMount, body: int, links: Mapping[str, int], client: int) -> None:
@@ -90,6 +91,8 @@ class Arm:
         self._limits = [self._limit(joint) for joint in (*self._joints, *self.fingers)]
         self._forces: deque[float] = deque([0.0] * _FORCE_STEPS, _FORCE_STEPS)
         self.held: int | None = None
+        self.groups = (1, 1)
+        self._gripper_command: tuple[float, float] | None = None
         self._couple_fingers()
         for joint, position in zip(self._joints, home, strict=True):
             pybullet.resetJointState(body, joint, position, physicsClientId=client)
@@ -128,6 +131,9 @@ class Arm:
         """
         if not math.isfinite(width) or not math.isfinite(force) or force < 0.0:
             raise ArmError(f"gripper command ({width}, {force}) refused: it must be a finite width and force")
+        if (width, force) != self._gripper_command:
+            self._gripper_command = width, force
+            self._forget_contacts()
         for finger, limit in zip(self.fingers, self._limits[JOINTS:], strict=True):
             self._aim(finger, limit, width / 2.0, min(force, limit.effort))
 
@@ -148,6 +154,16 @@ class Arm:
         touched = [{contact.body for contact in own if contact.link == finger} & blocks for finger in self.fingers]
         self.held = min(touched[0] & touched[1], default=None)
         self._forces.append(sum(contact.force for contact in own if contact.body != self.held) + self._on_held())
+
+    def _forget_contacts(self) -> None:
+        """Let PyBullet find the fingers' contacts anew: whoever changes its groups has none.
+
+        They are anchored, or a held block would creep out of them; but an anchored contact keeps its normal in the world's
+        frame as long as it sticks. When the hand has turned, that is a wrong one, and a finger that opens would take its
+        block along.
+        """
+        for finger in self.fingers:
+            pybullet.setCollisionFilterGroupMask(self._body, finger, *self.groups, physicsClientId=self._client)
 
     def _on_held(self) -> float:
         """Return the forces on a held block from anything but this arm, N."""

@@ -224,7 +224,8 @@ class CellSimulation:
         """
         groups = dict.fromkeys((-1, *links.values()), (_BASE, _THINGS | _LEFT | _RIGHT))
         for own, other, arm in ((_LEFT, _RIGHT, self.arms["left"]), (_RIGHT, _LEFT, self.arms["right"])):
-            groups |= dict.fromkeys(arm.links, (own, _THINGS | _BASE | _FOOT | other))
+            arm.groups = (own, _THINGS | _BASE | _FOOT | other)
+            groups |= dict.fromkeys(arm.links, arm.groups)
             groups |= dict.fromkeys(arm.feet, (_FOOT, _THINGS | other))
         for link, (group, mask) in groups.items():
             pybullet.setCollisionFilterGroupMask(self._robot, link, group, mask, physicsClientId=self.client)
