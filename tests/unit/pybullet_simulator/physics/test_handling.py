@@ -63,7 +63,7 @@ def test_three_blocks_are_stacked_within_2_mm(cell, hand):
 def test_block_that_was_turned_is_let_go_of_where_it_stands(cell, hand):
     hand.pick("block_1")
     place = np.array((-0.20, 0.05, FLOOR_LAYER))
-    hand.move_over(place + (0.0, 0.0, 0.08), ACROSS)
+    hand.move_over(place + np.array((0.0, 0.0, 0.08)), ACROSS)
     hand.move_straight(place)
     hand.wait(0.2)
     before = np.array(cell.blocks["block_1"][0])

@@ -158,9 +158,8 @@ class Arm:
     def _forget_contacts(self) -> None:
         """Let PyBullet find the fingers' contacts anew: whoever changes its groups has none.
 
-        They are anchored, or a held block would creep out of them; but an anchored contact keeps its normal in the world's
-        frame as long as it sticks. When the hand has turned, that is a wrong one, and a finger that opens would take its
-        block along.
+        They are anchored, or a held block would creep out of them. But an anchored contact keeps its normal, in the
+        world's frame, as long as it sticks: when the hand has turned, a finger that opens would take its block along.
         """
         for finger in self.fingers:
             pybullet.setCollisionFilterGroupMask(self._body, finger, *self.groups, physicsClientId=self._client)
