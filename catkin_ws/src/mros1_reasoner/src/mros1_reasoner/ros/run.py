@@ -23,7 +23,6 @@ from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.ros.core_log import log_core
 
-_WARM_UP = 2  # analyses before the node is ready: the JVM compiles what it has run
 _REST = "mros1_reasoner.ros.reasoner"
 
 
@@ -53,12 +52,11 @@ def run(early: Popen[bytes] | None) -> None:
 
 
 def _warm_up(knowledge_base: KnowledgeBase, reasoner: Reasoner, objectives: tuple[Objective, ...]) -> None:
-    """Make the JVM compile the code of an analysis, by one with every kind of fact."""
+    """Make the JVM load and compile what an analysis needs, by one with every kind of fact."""
     facts = Facts(
         objectives=objectives,
         groundings={o.name: d.name for o in objectives for d in knowledge_base.solving(o.function)[:1]},
         levels={(o.name, quality): limit for o in objectives for quality, limit in o.limits.items()},
         components=dict.fromkeys(knowledge_base.components, vocabulary.FAILED),
     )
-    for _ in range(_WARM_UP):
-        knowledge_base.analyse(facts, reasoner)
+    knowledge_base.analyse(facts, reasoner)
