@@ -259,7 +259,7 @@ def test_pointers_that_are_members_or_global_are_followed_too(node):
           std::unique_ptr<ros::NodeHandle> inner_;
         };
         """
-    code = 'global.reset(new ros::NodeHandle("~y")); global->advertise<std_msgs::String>("global", 1);'
+    code = 'Worker worker; global.reset(new ros::NodeHandle("~y")); global->advertise<std_msgs::String>("global", 1);'
     assert {name for _, name, _ in found(node(code, before))} == {"~x/member", "~y/global"}
 
 
@@ -339,3 +339,135 @@ def test_bad_sources_neither_hang_nor_crash(tmp_path, content):
 def test_variables_that_name_each_other_end(node):
     result = node("std::string a = b; std::string b = a; nh.advertise<std_msgs::String>(a, 1);")
     assert [port.is_resolved for port in result.ports] == [False]
+
+
+LIBRARY = """
+    #include <stereo_msgs/DisparityImage.h>
+    class Base { public: virtual void setUp() = 0; };
+    class Used : public Base {
+     public:
+      explicit Used(ros::NodeHandle& nh) : nh_(nh) {}
+      Used(int seed, int duration) {}
+      void setUp() override { nh_.advertise<std_msgs::String>("virtual", 1); }
+      void helped() { help(nh_); }
+      void never() { nh_.advertise<std_msgs::String>("never", 1); }
+      static void help(ros::NodeHandle& nh) { nh.advertise<std_msgs::String>("helped", 1); }
+      ros::NodeHandle nh_;
+      static int count;
+    };
+    int Used::count = 0;
+    class Unused {
+     public:
+      Unused() { nh_.subscribe<std_msgs::String>("unused", 1, nullptr); }
+      static int count;
+      tf2_ros::TransformBroadcaster broadcaster_;
+      ros::NodeHandle nh_;
+    };
+    int Unused::count = 0;
+    void unused_function(ros::NodeHandle nh) { nh.advertise<std_msgs::String>("unused_function", 1); }
+    """
+
+
+def test_only_what_main_can_reach_counts(node):
+    assert {name for _, name, _ in found(node("Used used(nh); used.helped();", LIBRARY))} == {"virtual", "helped"}
+
+
+def test_class_that_is_named_in_a_text_may_be_loaded(node):
+    assert {name for _, name, _ in found(node('load("demo/Unused");', LIBRARY))} == {"unused", "/tf"}
+
+
+def test_sources_without_a_main_count_as_a_whole(tmp_path):
+    (tmp_path / "library.cpp").write_text(textwrap.dedent(LIBRARY))
+    ports = read_cpp_node([tmp_path / "library.cpp"], tmp_path).ports
+    names = {port.name.removeprefix("{nh}/").partition("@")[0] for port in ports}
+    assert names == {"virtual", "helped", "never", "unused", "/tf", "unused_function"}
+
+
+def test_constructor_that_no_call_fits_makes_nothing(node):
+    before = """
+        class Mapper {
+         public:
+          Mapper() : private_nh_("~") { init(); }
+          Mapper(ros::NodeHandle& nh, ros::NodeHandle& pnh) : node_(nh), private_nh_(pnh) { init(); }
+          Mapper(unsigned seed, unsigned duration) : seed_(seed) { init(); }
+          void init() { private_nh_.getParam("rate", rate_); node_.advertise<nav_msgs::OccupancyGrid>("map", 1); }
+          ros::NodeHandle node_, private_nh_;
+        };
+        """
+    mapped = node("Mapper mapper;", before)
+    assert found(mapped) == {("publisher", "map", "nav_msgs/OccupancyGrid")}
+    assert {parameter.name for parameter in mapped.parameters} == {"~rate"}
+
+
+def test_name_that_is_only_passed_on_by_code_that_nobody_calls_is_left_out(node):
+    before = """
+        class Planner {
+         public:
+          Planner(std::string name, int* map) { initialize(name, map, "map"); }
+          Planner(std::string name, int* map, std::string frame) { initialize(name, map, frame); }
+          void initialize(std::string name, int* map, std::string frame) {
+            ros::NodeHandle pnh("~/" + name);
+            pnh.advertise<nav_msgs::Path>("plan", 1);
+          }
+          void initialize(std::string name, Costmap* costmap) { initialize(name, costmap->map(), costmap->frame()); }
+        };
+        class Derived : public Planner {
+         public:
+          Derived(std::string name, Costmap* costmap) : Planner(name, costmap->map()) {}
+        };
+        """
+    assert found(node('Derived derived("planner", &costmap);', before)) == {
+        ("publisher", "~planner/plan", "nav_msgs/Path")
+    }
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ('nh.advertise < std_msgs::String > ("x", 1);', ("publisher", "x", "std_msgs/String")),
+        (
+            'ros::Subscriber s = nh.subscribe < std_msgs::String\n > ("x", 1, f);',
+            ("subscriber", "x", "std_msgs/String"),
+        ),
+        ('nh.advertise<DisparityImage>("x", 1);', ("publisher", "x", "stereo_msgs/DisparityImage")),
+        ("Named named(ros::this_node::getName());", ("publisher", "~", "std_msgs/String")),
+        (
+            'image_transport::ImageTransport it(nh); image_transport::SubscriberFilter f; f.subscribe(it, "x", 1);',
+            ("subscriber", "x", "sensor_msgs/Image"),
+        ),
+        ('nh.advertise<std_msgs::String>(ros::names::clean("x"), 1);', ("publisher", "x", "std_msgs/String")),
+    ],
+)
+def test_ways_of_writing_that_public_packages_have(node, code, expected):
+    before = """
+        #include <stereo_msgs/DisparityImage.h>
+        struct Named { Named(std::string name) { nh_.advertise<std_msgs::String>(name, 1); } ros::NodeHandle nh_; };
+        """
+    assert found(node(code, before)) == {expected}
+
+
+def test_reconfigure_server_is_no_callback_and_no_null(node):
+    before = """
+        class Worker {
+         public:
+          Worker() : server_(NULL) {
+            server_ = new dynamic_reconfigure::Server<demo::DemoConfig>(ros::NodeHandle("~/inner"));
+            dynamic_reconfigure::Server<demo::DemoConfig>::CallbackType f = boost::bind(&Worker::on, this, _1, _2);
+            server_->setCallback(f);
+          }
+          dynamic_reconfigure::Server<demo::DemoConfig>* server_;
+        };
+        """
+    assert {name for _, name, _ in found(node("Worker worker;", before))} == {
+        "~inner/set_parameters",
+        "~inner/parameter_descriptions",
+        "~inner/parameter_updates",
+    }
+
+
+def test_line_with_several_unknown_names_is_one_interface(node):
+    before = (
+        'void make(ros::NodeHandle nh, std::string n) { ros::NodeHandle a(n); a.advertise<std_msgs::String>("x", 1); }'
+    )
+    made = node('make(nh, one()); make(nh, two()); make(nh, "three");', before).declared()
+    assert [port.name.partition("@")[0] for port in made.ports] == ["{one()}/x", "three/x"]

@@ -123,7 +123,50 @@ def test_paths_outside_the_package_are_refused(tmp_path):
     ]
 
 
-@pytest.mark.parametrize("text", ["(" * 5000, '"', "set(A ${A}${A})" * 200, "a(b", ")))", "[[", "#[["])
+@pytest.mark.parametrize(
+    "cmake",
+    [
+        "macro(tutorial T)\nadd_executable(${T} src/${T}.cpp)\nendmacro()\n"
+        "foreach(one a b)\ntutorial(${one})\nendforeach()",
+        "set(names a b)\nforeach(one IN LISTS names)\nadd_executable(${one} src/${one}.cpp)\nendforeach(one)",
+        "function(make)\nforeach(one ${ARGN})\nadd_executable(${one} src/${one}.cpp)\nendforeach()\nendfunction()\n"
+        "Make(a b)",
+        "function(names out)\nset(${out} src/a.cpp PARENT_SCOPE)\nendfunction()\n"
+        "names(found)\nadd_executable(a ${found})\nadd_executable(b src/b.cpp)",
+        "function(make)\ncmake_parse_arguments(my QUIET NAME SOURCES ${ARGN})\n"
+        "add_executable(${my_NAME} ${my_SOURCES})\nendfunction()\n"
+        "make(NAME a SOURCES src/a.cpp)\nmake(QUIET NAME b SOURCES src/b.cpp)",
+        "set(i 1)\nforeach(i RANGE 1)\nlist(GET names ${i} one)\nendforeach()\n"
+        "add_executable(a src/a.cpp)\nif(NOT CATKIN_ENABLE_TESTING)\nadd_executable(b src/b.cpp)\nendif()",
+        "if(CATKIN_ENABLE_TESTING)\nif(x)\nelse()\nendif()\nadd_executable(check src/a.cpp)\nelse()\n"
+        "add_executable(a src/a.cpp)\nendif()\nadd_executable(b src/b.cpp)",
+    ],
+)
+def test_loops_functions_and_macros_are_run(tmp_path, cmake):
+    make_package(tmp_path, cmake=cmake)
+    for name in ("a", "b"):
+        make_script(tmp_path / "src" / f"{name}.cpp", "int x;\n", 0o644)
+    assert executables(tmp_path) == {"a": ["src/a.cpp"], "b": ["src/b.cpp"]}
+    assert not read_package(tmp_path).remarks
+
+
+def test_folders_that_are_added_are_read_with_paths_of_their_own(tmp_path):
+    make_package(tmp_path, cmake="set(prefix demo)\nadd_subdirectory(src)\nadd_subdirectory(../elsewhere)\n")
+    make_script(tmp_path / "src" / "a.cpp", "int x;\n", 0o644)
+    lines = "set(prefix other)\nadd_executable(${prefix}_a a.cpp)\nadd_executable(b gone.cpp)\nadd_subdirectory(.)\n"
+    (tmp_path / "src" / "CMakeLists.txt").write_text(lines)
+    assert executables(tmp_path) == {"other_a": ["src/a.cpp"], "b": []}
+    assert [str(remark) for remark in read_package(tmp_path).remarks] == [
+        "src/CMakeLists.txt:3:1: not read: the source gone.cpp of b is not in the package"
+    ]
+
+
+ENDLESS = "macro(a)\na()\nendmacro()\na()", "foreach(i RANGE 999999)\nforeach(j RANGE 999999)\nb()\nendforeach()"
+
+
+@pytest.mark.parametrize(
+    "text", ["(" * 5000, '"', "set(A ${A}${A})" * 200, "a(b", ")))", "[[", "#[[", "foreach(", "if(a", *ENDLESS]
+)
 def test_broken_cmake_neither_hangs_nor_crashes(tmp_path, text):
     assert all(command.name for command in commands(text, tmp_path))
 

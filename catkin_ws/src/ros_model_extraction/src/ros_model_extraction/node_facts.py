@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,6 +11,8 @@ from ros_model.language.metamodel import PortKind, Position
 from ros_model.language.packages import Node, ParameterDeclaration, PortDeclaration
 
 from ros_model_extraction.values import UnwritableValueError, typed
+
+_HOLE = re.compile(r"\{.*?\}(?=[^}]*@|[^}]*$)|\{[^{}]*\}")
 
 
 class SourceError(Exception):
@@ -83,9 +86,12 @@ class NodeSource:
         """Return the node of the metamodel: each interface and parameter once."""
         ports: dict[tuple[PortKind, str], PortDeclaration] = {}
         for port in self.ports:
-            known = ports.get((port.kind, port.name))
+            # What one line makes, with several names that are not known, is one interface.
+            name = port.name if port.is_resolved else f"{_HOLE.sub('{}', port.name)}:{port.position.column}"
+            known = ports.get((port.kind, name))
             if known is None or (port.type and not known.type):
-                ports[port.kind, port.name] = PortDeclaration(port.name, port.kind, port.type, position=port.position)
+                shown = known.name if known else port.name
+                ports[port.kind, name] = PortDeclaration(shown, port.kind, port.type, position=port.position)
         parameters: dict[str, ParameterDeclaration] = {}
         for parameter in self.parameters:
             name = private_name(parameter.name)

@@ -35,9 +35,9 @@ _OPTIONS = {  # the class whose `create` makes what may be given to a method alo
 }
 _GETTERS = {"param": 2, "getParam": 1, "getParamCached": 1, "hasParam": 1}
 _FREE_GETTERS = {"ros::param::get": 1, "ros::param::getCached": 1, "ros::param::param": 2, "ros::param::has": 1}
-_TYPE = re.compile(
-    r"(?P<package>[a-z]\w*)::(?P<name>[A-Z]\w*?)_?(?:::(?:Const)?Ptr|::Request|::Response|(?:Const)?Ptr)?"
-)
+_TYPE_NAME = r"(?P<name>[A-Z]\w*?)_?(?:::(?:Const)?Ptr|::Request|::Response|(?:Const)?Ptr)?"
+_TYPE = re.compile(rf"(?P<package>[a-z]\w*)::{_TYPE_NAME}")
+_PLAIN_TYPE = re.compile(_TYPE_NAME)
 _POINTER = re.compile(r"(?:boost|std)::shared_ptr<(.*)>|ros::MessageEvent<(.*)>")
 _IMAGE = "sensor_msgs/Image"
 _CAMERA_INFO = "sensor_msgs/CameraInfo"
@@ -46,7 +46,7 @@ _CAMERA_INFO = "sensor_msgs/CameraInfo"
 def node_of(
     files: Sequence[File], remarks: Iterable[Remark] = (), parameters: Callable[[str], Any] | None = None
 ) -> NodeSource:
-    """Return what C++ sources make of a node.
+    """Return what C++ sources make of a node, as far as `main` can reach them.
 
     Args:
         files: the sources, then the headers that they include.
@@ -89,7 +89,7 @@ class _Reader:
         elif node.type == "field_initializer" and node.named_child_count > 1:
             name, given = node.named_children[0], node.named_children[-1]
             kinds = {declared.type for declared in self._program.declared(text(name), place)}
-            for kind in kinds - {""}:
+            for kind in kinds - {""} if not _is_null(given.named_children) else ():
                 self._object(kind, list(given.named_children), node, place)
 
     # --- parameters
@@ -99,12 +99,12 @@ class _Reader:
         function, arguments = node.child_by_field_name("function"), arguments_of(node)
         if function is None or not arguments:
             return
-        name = text(function).partition("<")[0]
+        name = text(function).partition("<")[0].strip()
         if name in _FREE_GETTERS:
             handles: list[Name] = [Const("")]
             default_at, is_filling = _FREE_GETTERS[name], name != "ros::param::has"
         elif function.type == "field_expression":
-            method = text(function.child_by_field_name("field")).partition("<")[0]
+            method = text(function.child_by_field_name("field")).partition("<")[0].strip()
             if method not in _GETTERS or arguments[0].type == "lambda_expression":
                 return
             owner = function.child_by_field_name("argument")
@@ -148,7 +148,7 @@ class _Reader:
         if function is None:
             return
         name = text(function)
-        plain = name.partition("<")[0]
+        plain = name.partition("<")[0].strip()
         if plain == "ros::init" and len(arguments) > 2:
             self._node(arguments[2], node, place)
         elif plain == "ros::topic::waitForMessage" and arguments:
@@ -167,7 +167,7 @@ class _Reader:
                 self._method(owner, method, arguments, node, place)
 
     def _method(self, owner: Node, method: str, arguments: list[Node], node: Node, place: Place) -> None:
-        name = method.partition("<")[0]
+        name = method.partition("<")[0].strip()
         if name not in _METHODS:
             return
         kinds = {self._program.alias(declared.type) for declared in self._program.declared(text(owner), place)}
@@ -179,6 +179,9 @@ class _Reader:
                 types = [template_arguments(kind)[0] for kind in kinds if template_arguments(kind)]
                 handles = self._handles.of(arguments[0], place)
                 self._port(PortKind.SUBSCRIBER, handles, arguments[1], self._type(types[0]), node, place)
+            return
+        if any("SubscriberFilter" in kind for kind in kinds) and name == "subscribe" and len(arguments) > 1:
+            self._image(name, arguments[0], arguments[1:], node, place)
             return
         handles = self._handles.of(owner, place)
         if (
@@ -257,7 +260,7 @@ class _Reader:
         elif base == "message_filters::Subscriber" and len(arguments) > 1 and not is_member:
             handles = self._handles.of(arguments[0], place)
             self._port(PortKind.SUBSCRIBER, handles, arguments[1], self._template(kind), node, place)
-        elif base == "dynamic_reconfigure::Server" and not (is_member and arguments):
+        elif base == "dynamic_reconfigure::Server" and kind.endswith(">") and not (is_member and arguments):
             handles = [Const("~")]
             if arguments and self._handles.of(arguments[-1], place):
                 handles = self._handles.of(arguments[-1], place)
@@ -318,8 +321,11 @@ class _Reader:
         name = self._program.alias(re.sub(r"\bconst\b|[\s&*]", "", name))
         if match := _POINTER.fullmatch(name):
             return self._type(match[1] or match[2])
-        match = _TYPE.fullmatch(name)
-        return f"{match['package']}/{match['name']}" if match else ""
+        if match := _TYPE.fullmatch(name):
+            return f"{match['package']}/{match['name']}"
+        match = _PLAIN_TYPE.fullmatch(name)
+        package = self._program.message_package(match["name"]) if match else ""
+        return f"{package}/{match['name']}" if match and package else ""
 
     def _of_variable(self, arguments: Sequence[Node], place: Place) -> str:
         """Return the type that the first of some arguments, a variable, is declared with."""
@@ -345,6 +351,10 @@ class _Reader:
         for name in names if argument.type == "call_expression" else names[:1]:
             if found := self._program.function(name, place.owner):
                 yield found[0]
+
+
+def _is_null(arguments: Sequence[Node]) -> bool:
+    return len(arguments) == 1 and text(arguments[0]) in ("NULL", "nullptr", "0")
 
 
 def _constant(node: Node | None) -> Any:

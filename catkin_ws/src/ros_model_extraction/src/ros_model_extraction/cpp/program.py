@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from tree_sitter import Node
 
 from ros_model_extraction.cpp.declarations import Declared, File, Place, declarations, reset_pointer
+from ros_model_extraction.cpp.reachable_code import ReachableCode
 from ros_model_extraction.cpp.syntax import (
     arguments_of,
     child_of,
@@ -27,7 +28,8 @@ MAX_DEPTH = 16
 MAX_VALUES = 16
 
 _KNOWN_TEXTS = {"ros::this_node::getName": "~", "ros::this_node::getNamespace": ""}
-_SAME_TEXT = ("std::string", "string", "ros::names::resolve", "ros::names::remap")
+_SAME_TEXT = ("std::string", "string", "ros::names::resolve", "ros::names::remap", "ros::names::clean")
+_INCLUDED_TYPE = re.compile(r'[<"]([a-z]\w*)/([A-Z]\w*)\.h[>"]')
 
 
 @dataclass
@@ -39,6 +41,8 @@ class _Index:
     given: list[tuple[str, tuple[Node, ...], Place]] = field(default_factory=list)
     macros: dict[str, str] = field(default_factory=dict)
     aliases: dict[str, str] = field(default_factory=dict)
+    constructors: dict[str, list[Node]] = field(default_factory=lambda: defaultdict(list))
+    message_packages: dict[str, str] = field(default_factory=dict)
 
 
 class Program:
@@ -47,18 +51,21 @@ class Program:
     def __init__(self, files: Sequence[File]) -> None:
         """Index the files: sources, then the headers that they include."""
         self._files = files
+        self._code = ReachableCode(files)
+        self._run: dict[int, bool] = {}
         self._index = _Index()
         self._locals: dict[int, dict[str, list[Declared]]] = {}
         self._fills: dict[tuple[str, str], list[tuple[Node | str | None, Place, str]]] = defaultdict(list)
         for file in reversed(files):  # headers, which declare, before the sources that include them
             self._index_file(file)
         for name, values, place in self._index.given:  # only now all declarations are known, wherever they stand
-            self._give(name, values, place)
+            if self.is_run(place):
+                self._give(name, values, place)
 
     def expressions(self) -> Iterator[tuple[Node, Place]]:
-        """Yield every node with its place."""
+        """Yield every node that can be run, with its place."""
         for file in self._files:
-            yield from self._walk(file.root, Place(file))
+            yield from ((node, place) for node, place in self._walk(file.root, Place(file)) if self.is_run(place))
 
     def alias(self, type_name: str) -> str:
         """Return a type with the names that `typedef` and `using` gave replaced by what they stand for."""
@@ -68,6 +75,29 @@ class Program:
                 return type_name
             type_name = self._index.aliases[base] + bracket + rest
         return type_name
+
+    def message_package(self, name: str) -> str:
+        """Return the package of a message that is named without it, by the header that is included; "" for none."""
+        return self._index.message_packages.get(name, "")
+
+    def is_run(self, place: Place) -> bool:
+        """Return whether the code at a place can be run: `main` reaches it, by calls that fit."""
+        function = place.function
+        if function is None:
+            return self._code.has_class(place.owner)
+        if function.id not in self._run:
+            self._run[function.id] = self._code.has_function(function) and self._is_called(function)
+        return self._run[function.id]
+
+    def _is_called(self, function: Node) -> bool:
+        """Return whether a function can be called: no constructor that fits no call, where another one does."""
+        name = function_name(function).rpartition("::")[2]
+        others = self._index.constructors.get(name, ())
+        if function not in others or len(others) == 1:
+            return True
+        calls = self._index.calls.get(name, ())
+        fitting = [one for one in others if any(self._takes(one, arguments, at) for arguments, at in calls)]
+        return function in fitting or not fitting
 
     def function(self, name: str, owner: str = "") -> tuple[Node, Place] | None:
         """Return the definition of a function; the one in a class, where several have the name."""
@@ -99,19 +129,48 @@ class Program:
         found = self._texts(node, place, depth)
         return found[:MAX_VALUES] if found else unknown
 
-    def passed(self, name: str, place: Place) -> list[tuple[Node, Place]]:
-        """Return what the calls of a function pass for one of its parameters."""
+    def passed(self, name: str, place: Place, depth: int = 0) -> list[tuple[Node, Place]]:
+        """Return what the calls of a function pass for one of its parameters.
+
+        A call that only passes on what nobody passes to it is left out, where there are others.
+        """
         if place.function is None or name not in (known := parameters(place.function)):
             return []
         index, _, default = known[name]
         called = function_name(place.function).rpartition("::")[2]
         found = []
         for arguments, at in self._index.calls.get(called, ()):
+            if not self._takes(place.function, arguments, at) or not self.is_run(at):
+                continue
             if index < len(arguments):
                 found.append((arguments[index], at))
             elif default is not None:
                 found.append((default, place))
-        return found
+        given = [(argument, at) for argument, at in found if not self._is_never_passed(argument, at, depth + 1)]
+        return given or found
+
+    def _is_never_passed(self, argument: Node, at: Place, depth: int) -> bool:
+        if depth > MAX_DEPTH or argument.type not in ("identifier", "type_identifier") or at.function is None:
+            return False
+        return text(argument) in parameters(at.function) and not self.passed(text(argument), at, depth)
+
+    def _takes(self, function: Node, arguments: Sequence[Node], at: Place) -> bool:
+        """Return whether a function may be what a call means, by the number of arguments, and by node handles."""
+        known = sorted(parameters(function).values(), key=lambda parameter: parameter[0])
+        needed = sum(default is None for _, _, default in known)
+        if not needed <= len(arguments) <= len(known):
+            return False
+        pairs = zip(arguments, known, strict=False)
+        return all("NodeHandle" not in kind or self._may_be_handle(argument, at) for argument, (_, kind, _) in pairs)
+
+    def _may_be_handle(self, argument: Node, at: Place) -> bool:
+        name = text(argument).lstrip("*&")
+        if "NodeHandle" in name or argument.type in ("number_literal", "string_literal"):
+            return "NodeHandle" in name
+        kinds = [self.alias(declared.type) for declared in self.declared(name, at)]
+        if at.function is not None and name in (given := parameters(at.function)):
+            kinds.append(given[name][1])
+        return not kinds or any("NodeHandle" in kind or kind == "auto" for kind in kinds)
 
     # --- texts
 
@@ -136,7 +195,9 @@ class Program:
                 ]
             case "call_expression":
                 found = self._called_text(node, place, depth)
-            case "identifier" | "field_expression" | "qualified_identifier" | "field_identifier":
+            case "qualified_identifier" if text(node) in _KNOWN_TEXTS:  # `Type name(call());` looks like a function
+                found = [(Const(_KNOWN_TEXTS[text(node)]), "")]
+            case "identifier" | "field_expression" | "qualified_identifier" | "field_identifier" | "type_identifier":
                 found = self._variable_texts(node, place, depth)
         return found
 
@@ -202,8 +263,14 @@ class Program:
         for node, place in self._walk(file.root, Place(file)):
             match node.type:
                 case "function_definition":
-                    self._index.functions[function_name(node).rpartition("::")[2]].append((node, place))
+                    name = function_name(node).rpartition("::")[2]
+                    self._index.functions[name].append((node, place))
+                    if name == place.owner:
+                        self._index.constructors[name].append(node)
                     self._initialised(node, place)
+                case "preproc_include":
+                    if match := _INCLUDED_TYPE.fullmatch(text(child_of(node, "path"))):
+                        self._index.message_packages[match[2]] = match[1]
                 case "preproc_def":
                     value = text(node.child_by_field_name("value")).strip()
                     if value.startswith('"') and value.endswith('"') and len(value) > 1:
@@ -243,7 +310,9 @@ class Program:
                     continue
                 name = f"this->{text(initialiser.named_children[0])}"
                 values = tuple(initialiser.named_children[-1].named_children)
-                self._index.given.append((name, values, Place(place.file, function, place.owner)))
+                at = Place(place.file, function, place.owner)
+                self._index.given.append((name, values, at))
+                self._index.calls[last_name(name.removeprefix("this->"))].append((values, at))  # a base's constructor
 
     def _give(self, name: str, values: tuple[Node, ...], place: Place) -> None:
         """Note what a member or a global variable is given outside its declaration."""

@@ -129,7 +129,7 @@ class _Executables:
         self.remarks: list[Remark] = []
         self._folder = folder
         self._libraries: dict[str, list[Path]] = {}
-        self._compiled: dict[str, tuple[list[Path], int]] = {}
+        self._compiled: dict[str, tuple[list[Path], Position]] = {}
         self._links: dict[str, list[str]] = {}
         self._outputs: dict[str, str] = {}
 
@@ -137,18 +137,13 @@ class _Executables:
         """Collect them."""
         path = self._folder / _CMAKE
         if path.is_file():
-            try:
-                text = read_source(path, _CMAKE).decode("utf-8", "replace")
-            except SourceError as error:
-                self.remarks.append(error.remark)
-                text = ""
-            for command in commands(text, self._folder):
+            for command in commands(self._text(path), self._folder, self._text):
                 self._command(command)
-        for name, (sources, line) in self._compiled.items():
+        for name, (sources, position) in self._compiled.items():
             linked = [source for library in self._reachable(name) for source in self._libraries.get(library, ())]
             output = self._outputs.get(name, name)
             every = tuple(dict.fromkeys([*sources, *linked]))
-            self.executables[output] = Executable(output, every, False, Position(_CMAKE, line, 1))
+            self.executables[output] = Executable(output, every, False, position)
         used = {library for name in self._compiled for library in self._reachable(name)}
         for library in sorted(self._libraries.keys() - used):
             if self._libraries[library]:
@@ -158,6 +153,16 @@ class _Executables:
             relative = str(script.relative_to(self._folder))
             self.executables.setdefault(script.name, Executable(script.name, (script,), True, Position(relative, 1, 1)))
 
+    def _text(self, path: Path) -> str:
+        """Return a CMakeLists.txt of the package; nothing, and a remark, where it can't be read."""
+        if not path.is_relative_to(self._folder) or not os.path.isfile(path):
+            return ""
+        try:
+            return read_source(path, str(path.relative_to(self._folder))).decode("utf-8", "replace")
+        except SourceError as error:
+            self.remarks.append(error.remark)
+            return ""
+
     def _command(self, command: Command) -> None:
         arguments = command.arguments
         match command.name:
@@ -165,7 +170,7 @@ class _Executables:
                 for program in sections(arguments, _INSTALL_WORDS).get("PROGRAMS", ()):
                     self._program(program, command)
             case "add_executable" | "cs_add_executable" | "catkin_add_executable" if arguments:
-                self._compiled[arguments[0]] = (self._sources(arguments[1:], command), command.line)
+                self._compiled[arguments[0]] = (self._sources(arguments[1:], command), self._position(command))
             case "add_library" | "cs_add_library" | "catkin_add_library" if arguments:
                 self._libraries[arguments[0]] = self._sources(arguments[1:], command)
             case "target_link_libraries" if arguments:
@@ -179,8 +184,8 @@ class _Executables:
                         self._outputs[target] = properties[properties.index("OUTPUT_NAME") + 1]
 
     def _program(self, program: str, command: Command) -> None:
-        position = Position(_CMAKE, command.line, 1)
-        path = self._inside(program)
+        position = self._position(command)
+        path = self._inside(program, command)
         if path is None or not os.path.isfile(path):  # which says no where the folder can't be entered
             self.remarks.append(Remark(position, f"not read: the program {program} is not in the package"))
         elif _is_python(path):
@@ -193,20 +198,22 @@ class _Executables:
         for name in names:
             if name in _LIBRARY_WORDS or (Path(name).suffix and Path(name).suffix not in _SOURCES):
                 continue
-            path = self._inside(name)
+            path = self._inside(name, command)
             if path is None or not os.path.isfile(path):
-                position = Position(_CMAKE, command.line, 1)
                 text = f"not read: the source {name} of {command.arguments[0]} is not in the package"
-                self.remarks.append(Remark(position, text))
+                self.remarks.append(Remark(self._position(command), text))
             else:
                 found.append(path)
         return found
 
-    def _inside(self, name: str) -> Path | None:
+    def _position(self, command: Command) -> Position:
+        return Position(str((command.folder / _CMAKE).relative_to(self._folder)), command.line, 1)
+
+    def _inside(self, name: str, command: Command) -> Path | None:
         """Return the path of a file of the package, None for one that is outside or not known."""
         if "${" in name or "$<" in name:
             return None
-        path = Path(os.path.normpath(self._folder / name))
+        path = Path(os.path.normpath(command.folder / name))
         return path if path.is_relative_to(self._folder) else None
 
     def _reachable(self, target: str) -> list[str]:

@@ -1,9 +1,10 @@
-"""Reads CMakeLists.txt as far as executables need it: commands with arguments, and variables that are set plainly."""
+"""Reads CMakeLists.txt as far as executables need it: runs its commands, loops, functions, and plain variables."""
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,38 +19,41 @@ _MAX_WORDS = 10_000
 _MAX_LENGTH = 100_000
 _MAX_DEPTH = 3
 """Variables within variables' names, `${${PROJECT_NAME}_SOURCES}`; values are expanded when they are set."""
+_MAX_COMMANDS = 100_000
+_MAX_CALLS = 32
+_BLOCKS = ("foreach", "function", "macro", "if", "while")
+_TESTING = ("CATKIN_ENABLE_TESTING", "BUILD_TESTING")
+_OUTER = ";outer"
+"""Names of variables that a function sets for its caller; no variable of a file has a semicolon in its name."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """A command with its arguments, variables replaced; what could not be replaced still holds `${...}`."""
+    """A command with its arguments, variables replaced; what could not be replaced still holds `${...}`.
+
+    Attributes:
+        folder: of the CMakeLists.txt that has the command; its relative paths start there.
+        line: of that file; of the call, where a function of the file has the command.
+    """
 
     name: str
     arguments: tuple[str, ...]
     line: int
+    folder: Path
 
 
-def commands(text: str, folder: Path) -> Iterator[Command]:
-    """Yield the commands of a CMakeLists.txt in order. Branches and loops are taken as if they were not there.
+def commands(text: str, folder: Path, read: Callable[[Path], str] | None = None) -> Iterator[Command]:
+    """Yield the commands of a CMakeLists.txt in the order in which CMake runs them.
+
+    Loops and the file's own functions and macros are run. Branches are taken as if they were not there, but for what is
+    built only for tests.
 
     Args:
         text: its content.
         folder: where it lies, for `file(GLOB ...)`.
+        read: gives the content of a CMakeLists.txt by its path, for `add_subdirectory`; without it, those are left out.
     """
-    variables = {name: str(folder) for name in ("CMAKE_CURRENT_SOURCE_DIR", "CMAKE_SOURCE_DIR", "PROJECT_SOURCE_DIR")}
-    for name, words, line in _raw(text):
-        arguments = tuple(_expanded(words, variables))
-        if name == "set" and arguments:
-            values = [a for a in arguments[1:] if a not in ("CACHE", "PARENT_SCOPE")]
-            variables[arguments[0]] = ";".join(values)
-        elif name == "list" and arguments[:1] == ("APPEND",) and len(arguments) > 1:
-            before = [variables[arguments[1]]] if variables.get(arguments[1]) else []
-            variables[arguments[1]] = ";".join([*before, *arguments[2:]])
-        elif name == "project" and arguments:
-            variables["PROJECT_NAME"] = arguments[0]
-        elif name == "file" and arguments[:1] in (("GLOB",), ("GLOB_RECURSE",)) and len(arguments) > 1:
-            variables[arguments[1]] = ";".join(_glob(arguments[2:], folder, recurse=arguments[0] == "GLOB_RECURSE"))
-        yield Command(name, arguments, line)
+    yield from _Run(folder, read).run(list(_raw(text)), folder)
 
 
 def sections(arguments: Sequence[str], keywords: Sequence[str]) -> dict[str, list[str]]:
@@ -63,6 +67,166 @@ def sections(arguments: Sequence[str], keywords: Sequence[str]) -> dict[str, lis
         else:
             found[current].append(argument)
     return found
+
+
+_Words = list[tuple[str, bool]]
+_Line = tuple[str, _Words, int]
+
+
+class _Run:
+    """Runs a CMakeLists.txt, and those of the folders below that it adds."""
+
+    def __init__(self, folder: Path, read: Callable[[Path], str] | None) -> None:
+        self._read = read
+        self._variables = {f"{name}_SOURCE_DIR": str(folder) for name in ("CMAKE", "PROJECT")}
+        self._functions: dict[str, tuple[bool, list[str], list[_Line]]] = {}
+        self._left = _MAX_COMMANDS
+        self._added: set[Path] = set()
+
+    def run(self, lines: Sequence[_Line], folder: Path, call: int = 0, depth: int = 0) -> Iterator[Command]:
+        """Run commands.
+
+        Args:
+            lines: the commands.
+            folder: of the file that has them.
+            call: line of the call, 0 outside of functions.
+            depth: of calls and loops.
+        """
+        at = 0
+        while at < len(lines) and self._left > 0 and depth <= _MAX_CALLS:
+            name, words, line = lines[at]
+            self._left -= 1
+            self._variables["CMAKE_CURRENT_SOURCE_DIR"] = str(folder)
+            end = _end(lines, at) if name in _BLOCKS else at
+            inner = lines[at + 1 : end]
+            arguments = tuple(_expanded(words, self._variables))
+            at = end + 1
+            if name == "foreach" and arguments:
+                yield from self._loop(arguments, inner, folder, call, depth)
+            elif name in ("function", "macro") and arguments:
+                self._functions[arguments[0].lower()] = (name == "macro", list(arguments[1:]), list(inner))
+            elif name in _BLOCKS:
+                if name == "if" and _is_for_tests(words):
+                    inner = inner[_otherwise(inner) :]
+                yield from self.run(inner, folder, call, depth + 1)
+            elif name in self._functions:
+                yield from self._call(name, arguments, folder, call or line, depth)
+            elif name == "add_subdirectory" and arguments:
+                yield from self._add(arguments[0], folder, depth)
+            else:
+                self._assign(name, arguments, folder)
+                yield Command(name, arguments, call or line, folder)
+
+    def _loop(
+        self, arguments: Sequence[str], inner: Sequence[_Line], folder: Path, call: int, depth: int
+    ) -> Iterator[Command]:
+        variable, before = arguments[0], self._variables.get(arguments[0])
+        for item in self._items(arguments[1:]):
+            self._variables[variable] = item
+            yield from self.run(inner, folder, call, depth + 1)
+        self._restore({variable: before})
+
+    def _items(self, words: Sequence[str]) -> list[str]:
+        """Return what a loop goes through."""
+        if words[:1] == ("RANGE",):
+            if len(words) not in (2, 3, 4) or not all(word.isdecimal() for word in words[1:]):
+                return []
+            first, *rest = (int(word[:6]) for word in words[1:])
+            start, stop, step = (0, first, 1) if not rest else (first, rest[0], max(1, (*rest, 1)[1]))
+            return [str(number) for number in range(start, stop + 1, step)[:_MAX_WORDS]]
+        if words[:1] != ("IN",):
+            return list(words)
+        parts = sections(words[1:], ("LISTS", "ITEMS"))
+        listed = [item for name in parts.get("LISTS", ()) for item in self._variables.get(name, "").split(";") if item]
+        return [*listed, *parts.get("ITEMS", ())]
+
+    def _call(self, name: str, arguments: tuple[str, ...], folder: Path, call: int, depth: int) -> Iterator[Command]:
+        is_macro, parameters, body = self._functions[name]
+        given = dict(zip(parameters, arguments, strict=False))
+        given |= {f"ARGV{number}": argument for number, argument in enumerate(arguments)}
+        given |= {
+            "ARGV": ";".join(arguments),
+            "ARGC": str(len(arguments)),
+            "ARGN": ";".join(arguments[len(parameters) :]),
+        }
+        if is_macro:
+            before: dict[str, str | None] = {key: self._variables.get(key) for key in given}
+            self._variables |= given
+            yield from self.run(body, folder, call, depth + 1)
+            self._restore(before)
+            return
+        outer, self._variables = self._variables, self._variables | given | {_OUTER: ""}
+        yield from self.run(body, folder, call, depth + 1)
+        inner, self._variables = self._variables, outer
+        for key in filter(None, inner[_OUTER].split(";")):
+            self._variables[key] = inner[f"{_OUTER}{key}"]
+
+    def _add(self, name: str, folder: Path, depth: int) -> Iterator[Command]:
+        below = Path(os.path.normpath(folder / name))
+        if self._read is None or "${" in name or below in self._added:
+            return
+        self._added.add(below)
+        outer, self._variables = self._variables, dict(self._variables)
+        yield from self.run(list(_raw(self._read(below / "CMakeLists.txt"))), below, 0, depth + 1)
+        self._variables = outer
+
+    def _restore(self, before: dict[str, str | None]) -> None:
+        for key, value in before.items():
+            if value is None:
+                self._variables.pop(key, None)
+            else:
+                self._variables[key] = value
+
+    def _assign(self, name: str, arguments: Sequence[str], folder: Path) -> None:
+        """Set the variables that a command sets."""
+        variables = self._variables
+        match name, arguments:
+            case "set", (variable, *values):
+                kept = values[: values.index("CACHE")] if "CACHE" in values else values
+                if kept[-1:] == ["PARENT_SCOPE"] and _OUTER in variables:
+                    variables[_OUTER] += f";{variable}"
+                    variables[f"{_OUTER}{variable}"] = ";".join(kept[:-1])
+                else:
+                    variables[variable] = ";".join(value for value in kept if value != "PARENT_SCOPE")
+            case "unset", (variable, *_):
+                variables.pop(variable, None)
+            case "list", ("APPEND", variable, *values):
+                before = [variables[variable]] if variables.get(variable) else []
+                variables[variable] = ";".join([*before, *values])
+            case "project", (project, *_):
+                variables["PROJECT_NAME"] = project
+            case "file", ("GLOB" | "GLOB_RECURSE" as kind, variable, *patterns):
+                variables[variable] = ";".join(_glob(patterns, folder, recurse=kind == "GLOB_RECURSE"))
+            case "cmake_parse_arguments", (prefix, options, single, several, *rest) if rest[:1] != ["PARSE_ARGV"]:
+                keywords = [*options.split(";"), *single.split(";"), *several.split(";")]
+                for keyword, values in sections(rest, [word for word in keywords if word]).items():
+                    is_option = keyword in options.split(";")
+                    variables[f"{prefix}_{keyword or 'UNPARSED_ARGUMENTS'}"] = "TRUE" if is_option else ";".join(values)
+
+
+def _end(lines: Sequence[_Line], start: int) -> int:
+    """Return where the block ends that starts at a line; the number of lines if it does not end."""
+    block, depth = lines[start][0], 0
+    for at in range(start, len(lines)):
+        depth += (lines[at][0] == block) - (lines[at][0] == f"end{block}")
+        if depth == 0:
+            return at
+    return len(lines)
+
+
+def _otherwise(inner: Sequence[_Line]) -> int:
+    """Return where a condition's other branch starts; the number of lines if it has none."""
+    depth = 0
+    for at, (name, _, _) in enumerate(inner):
+        depth += (name == "if") - (name == "endif")
+        if depth == 0 and name in ("else", "elseif"):
+            return at
+    return len(inner)
+
+
+def _is_for_tests(words: _Words) -> bool:
+    condition = [word for word, _ in words]
+    return condition[:1] != ["NOT"] and any(word.strip("${}") in _TESTING for word in condition)
 
 
 def _raw(text: str) -> Iterator[tuple[str, list[tuple[str, bool]], int]]:

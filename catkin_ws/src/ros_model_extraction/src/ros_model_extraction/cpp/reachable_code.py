@@ -1,0 +1,167 @@
+"""Which code of a program's C++ sources its `main` can reach: a library may have more than its program uses.
+
+Names decide, not types. So too much may count as reached, but nothing that `main` can call by a name in the sources.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from tree_sitter import Node
+
+from ros_model_extraction.cpp.declarations import File
+from ros_model_extraction.cpp.syntax import function_name, text, walk
+
+_WORDS = ("identifier", "field_identifier", "type_identifier", "namespace_identifier")
+_CLASSES = ("class_specifier", "struct_specifier")
+_NAMED_IN_TEXT = re.compile(r"[A-Za-z_]\w*(?:(?:::|/)[A-Za-z_]\w*)+")
+_EXPORT = "PLUGINLIB_"
+
+
+@dataclass
+class _Class:
+    """A class: its bases, words of its members' types, and the methods that are called through a base."""
+
+    bases: set[str] = field(default_factory=set)
+    words: set[str] = field(default_factory=set)
+    virtual: set[str] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class _Function:
+    id: int
+    name: str
+    owner: str
+    words: frozenset[str]
+
+
+class ReachableCode:
+    """The functions and classes of a program that its `main` can reach; all of them where no source has a `main`."""
+
+    def __init__(self, files: Sequence[File]) -> None:
+        """Follow the names from `main` and from the objects outside of functions."""
+        self._classes: dict[str, _Class] = defaultdict(_Class)
+        self._functions: list[_Function] = []
+        self._globals: set[str] = set()
+        for file in files:
+            self._collect(file.root)
+        self._has_main = any(function.name == "main" and not function.owner for function in self._functions)
+        self._words: set[str] = set()
+        self._reached: set[int] = set()
+        if self._has_main:
+            self._follow()
+
+    def has_function(self, function: Node) -> bool:
+        """Return whether a function, by its definition, can be reached."""
+        return not self._has_main or function.id in self._reached
+
+    def has_class(self, name: str) -> bool:
+        """Return whether objects of a class can be reached."""
+        return not self._has_main or name not in self._classes or name in self._words
+
+    def _follow(self) -> None:
+        self._words = {"main", *self._globals}
+        seen: set[str] = set()
+        while True:
+            for name in (self._words & self._classes.keys()) - seen:
+                seen.add(name)
+                self._words |= self._classes[name].words | self._classes[name].bases
+            for function in self._functions:
+                if function.id not in self._reached and self._is_called(function):
+                    self._reached.add(function.id)
+                    self._words |= function.words
+            if not (self._words & self._classes.keys()) - seen and not any(
+                self._is_called(function) for function in self._functions if function.id not in self._reached
+            ):
+                return
+
+    def _is_called(self, function: _Function) -> bool:
+        if function.owner not in self._classes:
+            return function.name in self._words
+        if function.owner not in self._words:
+            return False
+        plain = function.name.lstrip("~")
+        return plain in self._words or plain == function.owner or self._is_virtual(function.owner, function.name, set())
+
+    def _is_virtual(self, owner: str, name: str, seen: set[str]) -> bool:
+        """Return whether a method may be called through a base; whoever has a base of another package calls all."""
+        seen.add(owner)
+        known = self._classes[owner]
+        if name in known.virtual or name.startswith("operator"):
+            return True
+        return any(
+            base not in self._classes or (base not in seen and self._is_virtual(base, name, seen))
+            for base in known.bases
+        )
+
+    # --- what the sources have
+
+    def _collect(self, root: Node) -> None:
+        todo = [(root, "")]
+        while todo:
+            node, owner = todo.pop()
+            if node.type == "function_definition":
+                self._function(node, owner)
+                continue
+            if node.type in _CLASSES and node.child_by_field_name("body"):
+                owner = text(node.child_by_field_name("name")).partition("<")[0].rpartition("::")[2] or owner
+                self._class(node, owner)
+            elif node.type == "field_declaration" and owner:
+                self._member(node, owner)
+            elif node.type == "declaration" and not owner and not function_name(node):
+                self._globals |= set() if text(node).startswith(_EXPORT) else _made_by(node)
+            todo += [(child, owner) for child in node.named_children]
+
+    def _function(self, node: Node, owner: str) -> None:
+        qualified = function_name(node)
+        before, _, name = qualified.rpartition("::")
+        owner = before.rpartition("::")[2].partition("<")[0] or owner
+        if owner and _is_declared_virtual(node):
+            self._classes[owner].virtual.add(name)
+        self._functions.append(_Function(node.id, name, owner, frozenset(_words(node))))
+
+    def _class(self, node: Node, name: str) -> None:
+        if not name:
+            return
+        known = self._classes[name]
+        for child in node.named_children:
+            if child.type == "base_class_clause":
+                known.bases |= {text(n).partition("<")[0].rpartition("::")[2] for n in _bases(child)}
+
+    def _member(self, node: Node, owner: str) -> None:
+        known = self._classes[owner]
+        if name := function_name(node):
+            if _is_declared_virtual(node):
+                known.virtual.add(name)
+        else:
+            known.words |= _words(node)
+
+
+def _bases(clause: Node) -> Iterable[Node]:
+    return (n for n in clause.named_children if n.type in ("type_identifier", "qualified_identifier", "template_type"))
+
+
+def _is_declared_virtual(node: Node) -> bool:
+    head = text(node).partition("{")[0]
+    return re.search(r"\b(virtual|override|final)\b", head) is not None
+
+
+def _made_by(declaration: Node) -> set[str]:
+    """Return the names in the type of a global variable and in its value; not in its own name, `Class::member`."""
+    declarators = declaration.children_by_field_name("declarator")
+    parts = [declaration.child_by_field_name("type"), *(one.child_by_field_name("value") for one in declarators)]
+    return {word for part in parts if part is not None for word in _words(part)}
+
+
+def _words(node: Node) -> set[str]:
+    """Return the names in a piece of code, and those in its texts that may name a class to be loaded."""
+    found: set[str] = set()
+    for inner in walk(node):
+        if inner.type in _WORDS:
+            found.add(text(inner))
+        elif inner.type == "string_content":
+            found |= {part for match in _NAMED_IN_TEXT.findall(text(inner)) for part in re.split("::|/", match)}
+    return found
