@@ -319,9 +319,16 @@ def test_given_parameter_decides_a_name(node):
 
 
 def test_part_that_does_not_parse_is_told_and_the_rest_read(node):
-    result = node('nh.advertise<std_msgs::String>("x", 1);', before="int broken(;\n")
+    before = 'int broken(;\nvoid f() { @ pnh.advertise<std_msgs::String>("y", 1) @@ x; }\n'
+    result = node('nh.advertise<std_msgs::String>("x", 1);', before=before)
     assert ("publisher", "x", "std_msgs/String") in found(result)
-    assert "main.cpp:2:" in remarks(result) and "no C++ that can be parsed" in remarks(result)
+    assert "main.cpp:3:" in remarks(result) and "can't be parsed" in remarks(result)
+    assert "main.cpp:2:" not in remarks(result), "what can't be about ROS is nothing to act upon"
+
+
+def test_classes_that_are_loaded_by_name_are_told_of(node):
+    result = node('pluginlib::ClassLoader<Base> loader("demo", "demo::Base");')
+    assert "the classes that pluginlib::ClassLoader loads by name are not followed" in remarks(result)
 
 
 @pytest.mark.parametrize(

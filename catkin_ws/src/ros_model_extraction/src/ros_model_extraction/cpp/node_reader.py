@@ -26,6 +26,7 @@ _ACTIONS = {
     "actionlib::SimpleActionClient": PortKind.ACTION_CLIENT,
     "actionlib::ActionClient": PortKind.ACTION_CLIENT,
 }
+_LOADERS = ("pluginlib::ClassLoader", "nodelet::Loader")
 _METHODS = ("advertise", "subscribe", "advertiseService", "serviceClient", "advertiseCamera", "subscribeCamera")
 _OPTIONS = {  # the class whose `create` makes what may be given to a method alone
     "advertise": (PortKind.PUBLISHER, "AdvertiseOptions"),
@@ -251,7 +252,10 @@ class _Reader:
         kind = self._program.alias(type_name)
         base = kind.partition("<")[0]
         position = place.file.position(node)
-        if base in CPP_FIXED:
+        if base in _LOADERS and node.type != "field_initializer":
+            said = f"the classes that {base} loads by name are not followed: their interfaces are not in this model"
+            self.remarks.append(Remark(position, said))
+        elif base in CPP_FIXED:
             self._add([FoundPort(made.kind, made.name, made.type, position) for made in CPP_FIXED[base]])
         elif base in _ACTIONS and arguments and not is_member:
             handles, rest = self._leading_handle(arguments, place)

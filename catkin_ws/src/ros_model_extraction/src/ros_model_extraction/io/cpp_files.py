@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import tree_sitter_cpp
 from ros_model.language.metamodel import Position
-from tree_sitter import Language, Parser
+from tree_sitter import Language, Node, Parser
 
 from ros_model_extraction.cpp.declarations import File
 from ros_model_extraction.cpp.node_reader import node_of
@@ -22,6 +23,8 @@ from ros_model_extraction.io.source_files import read_source
 from ros_model_extraction.node_facts import NodeSource, Remark, SourceError
 
 _LANGUAGE = Language(tree_sitter_cpp.language())
+_ROS_CALL = re.compile(r"\b(advertise|subscribe|serviceClient|getParam|param)\w*\s*(<|\()|\bSimpleAction")
+_MAX_LINES = 20
 _HEADERS = (".h", ".hpp", ".hh", ".hxx")
 
 
@@ -71,11 +74,25 @@ def _read_files(sources: Iterable[Path], package_folder: Path) -> tuple[list[Fil
 def _read(path: Path, folder: Path, parser: Parser, remarks: list[Remark]) -> File:
     shown = str(path.relative_to(folder)) if path.is_relative_to(folder) else str(path)
     root = parser.parse(read_source(path, shown)).root_node
-    if root.has_error:
-        bad = next((node for node in walk(root) if node.is_error or node.is_missing), root)
+    for bad in _not_understood(root):
         position = Position(shown, bad.start_point[0] + 1, bad.start_point[1] + 1)
-        remarks.append(Remark(position, "not read: this is no C++ that can be parsed; the rest of the file is"))
+        lines = bad.end_point[0] - bad.start_point[0] + 1
+        text = f"not read: {lines} line(s) that can't be parsed; look whether they make interfaces or read parameters"
+        remarks.append(Remark(position, text))
     return File(shown, root)
+
+
+def _not_understood(root: Node) -> Iterator[Node]:
+    """Yield what can't be parsed, and may be about ROS; macros that the parser does not know are everywhere."""
+    todo = [root] if root.has_error else []
+    while todo:
+        node = todo.pop()
+        lines = node.end_point[0] - node.start_point[0]
+        if node.is_error and lines < _MAX_LINES:
+            if _ROS_CALL.search(text(node)):
+                yield node
+        else:  # an error of that size is around what was understood
+            todo += [child for child in reversed(node.children) if child.has_error or child.is_error]
 
 
 def _included(file: File, path: Path, folder: Path) -> Iterator[Path]:

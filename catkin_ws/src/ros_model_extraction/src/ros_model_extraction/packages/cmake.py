@@ -190,6 +190,8 @@ class _Run:
                     variables[variable] = ";".join(value for value in kept if value != "PARENT_SCOPE")
             case "unset", (variable, *_):
                 variables.pop(variable, None)
+            case "qt4_wrap_cpp" | "qt5_wrap_cpp" | "qt4_add_resources" | "qt5_add_resources", (variable, *_):
+                variables[variable] = ""  # files that it makes
             case "list", ("APPEND", variable, *values):
                 before = [variables[variable]] if variables.get(variable) else []
                 variables[variable] = ";".join([*before, *values])
