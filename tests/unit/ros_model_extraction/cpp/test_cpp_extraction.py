@@ -478,3 +478,39 @@ def test_line_with_several_unknown_names_is_one_interface(node):
     )
     made = node('make(nh, one()); make(nh, two()); make(nh, "three");', before).declared()
     assert [port.name.partition("@")[0] for port in made.ports] == ["{one()}/x", "three/x"]
+
+
+@pytest.mark.parametrize(
+    ("code", "kind", "default"),
+    [
+        ('double x; pnh.param("x", x, 5.0);', "Double", 5.0),
+        ('double x; pnh.param<double>("x", x, 5);', "Double", 5.0),
+        ('int x; pnh.param("x", x, 5);', "Integer", 5),
+        ('unsigned int x; pnh.getParam("x", x);', "Integer", None),
+        ('float x; pnh.getParam("x", x);', "Double", None),
+        ('std::string x; pnh.getParam("x", x);', "String", None),
+        ('bool x; if (!pnh.getParam("x", x)) x = true;', "Boolean", True),
+        ('double x; if (!pnh.getParam("x", x)) { ROS_INFO("none"); x = 1; }', "Double", 1.0),
+        ('double x, y; if (!pnh.getParam("x", x)) y = 1;', "Double", None),
+        ('double x; if (pnh.getParam("x", x)) x = 1;', "Double", None),
+        ('double x; pnh.param("x", x, 2 * (1 + 0.5));', "Double", 3.0),
+        ('int x; pnh.param("x", x, 7 / 2);', "Integer", 3),
+        ('int x; pnh.param("x", x, 7 / 0);', "Integer", None),
+        ('double x; pnh.param("x", x, some());', "Double", None),
+        ('XmlRpc::XmlRpcValue x; pnh.getParam("x", x);', None, None),
+    ],
+)
+def test_parameter_has_the_type_and_the_default_that_the_code_gives_it(node, code, kind, default):
+    (parameter,) = node(code).declared().parameters
+    assert (parameter.name, parameter.type.kind if parameter.type else None, parameter.value) == ("x", kind, default)
+
+
+def test_names_of_types_are_followed_to_what_can_be_reached(node):
+    before = """
+        class Diagnostics { diagnostic_updater::Updater updater_; };
+        typedef Diagnostics diagnostics_type;
+        using diagnostics_pointer = std::shared_ptr<diagnostics_type>;
+        """
+    assert found(node("diagnostics_pointer made;", before)) == {
+        ("publisher", "/diagnostics", "diagnostic_msgs/DiagnosticArray")
+    }

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ros_model.language.metamodel import PortKind, Position
+from ros_model.language.metamodel import ParameterType, PortKind, Position
 from ros_model.language.packages import Node, ParameterDeclaration, PortDeclaration
 
 from ros_model_extraction.values import UnwritableValueError, typed
@@ -60,11 +60,17 @@ class FoundPort:
 
 @dataclass(frozen=True)
 class FoundParameter:
-    """A parameter that a piece of code reads; the name as FoundPort's; `default` is None where there is none."""
+    """A parameter that a piece of code reads; the name as FoundPort's.
+
+    Attributes:
+        default: None where there is none.
+        kind: Boolean, Integer, Double or String, as the code declares it; "" where only the default tells.
+    """
 
     name: str
     default: Any
     position: Position
+    kind: str = ""
 
 
 @dataclass(frozen=True)
@@ -96,7 +102,8 @@ class NodeSource:
         for parameter in self.parameters:
             name = private_name(parameter.name)
             declared = _declared(replace(parameter, name=name))
-            if name not in parameters or parameters[name].value is None:
+            before = parameters.get(name)
+            if before is None or (before.value is None and (declared.value is not None or before.type is None)):
                 parameters[name] = declared
         order = list(PortKind)
         by_kind = sorted(ports.values(), key=lambda port: order.index(port.kind))
@@ -123,10 +130,14 @@ def unique(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
 
 
 def _declared(parameter: FoundParameter) -> ParameterDeclaration:
-    if parameter.default is None:
-        return ParameterDeclaration(parameter.name, position=parameter.position)
+    name, position, default = parameter.name, parameter.position, parameter.default
+    declared = ParameterType(parameter.kind) if parameter.kind else None
+    if default is None:
+        return ParameterDeclaration(name, declared, position=position)
+    if parameter.kind == "Double" and type(default) is int:
+        default = float(default)
     try:
-        kind, value = typed(parameter.default)
+        kind, value = typed(default)
     except UnwritableValueError:
-        return ParameterDeclaration(parameter.name, position=parameter.position)
-    return ParameterDeclaration(parameter.name, kind, value, position=parameter.position)
+        return ParameterDeclaration(name, declared, position=position)
+    return ParameterDeclaration(name, kind, value, position=position)

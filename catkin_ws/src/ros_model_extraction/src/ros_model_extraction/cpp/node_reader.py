@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
@@ -13,7 +14,15 @@ from tree_sitter import Node
 from ros_model_extraction.cpp.declarations import File, Place
 from ros_model_extraction.cpp.handles import Handles, in_namespace
 from ros_model_extraction.cpp.program import Program
-from ros_model_extraction.cpp.syntax import arguments_of, parameter_types, template_arguments, text, type_text
+from ros_model_extraction.cpp.syntax import (
+    arguments_of,
+    child_of,
+    parameter_types,
+    template_arguments,
+    text,
+    type_text,
+    walk,
+)
 from ros_model_extraction.node_facts import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
 from ros_model_extraction.python.values import Const, Text
 from ros_model_extraction.ros_api import CPP_FIXED, RECONFIGURE_SERVER
@@ -25,6 +34,12 @@ _ACTIONS = {
     "actionlib::ActionServer": PortKind.ACTION_SERVER,
     "actionlib::SimpleActionClient": PortKind.ACTION_CLIENT,
     "actionlib::ActionClient": PortKind.ACTION_CLIENT,
+}
+_KINDS = {
+    **dict.fromkeys(("double", "float"), "Double"),
+    **dict.fromkeys(("int", "unsigned", "unsignedint", "long", "size_t", "int32_t", "uint32_t", "int64_t"), "Integer"),
+    "bool": "Boolean",
+    "string": "String",
 }
 _LOADERS = ("pluginlib::ClassLoader", "nodelet::Loader")
 _METHODS = ("advertise", "subscribe", "advertiseService", "serviceClient", "advertiseCamera", "subscribeCamera")
@@ -121,13 +136,23 @@ class _Reader:
             default = arguments[2] if default_at == 2 and len(arguments) > 2 else None
             variable = arguments[1] if is_filling and len(arguments) > 1 else None
         position = place.file.position(node)
+        kind = self._kind(text(function), variable, place)
+        value = _constant(default if default is not None else _otherwise(node, variable))
         for namespace in handles:
             for key, _ in self._program.texts(arguments[0], place):
                 shown = self._name("parameter", in_namespace(namespace, key), position)
-                self.parameters.append(FoundParameter(shown, _constant(default), position))
+                self.parameters.append(FoundParameter(shown, value, position, kind))
         if variable is not None:
             note = f"the default of the parameter {text(arguments[0])}"
             self._program.note_fill(variable, self._given(handles, arguments[0], place) or default, place, note)
+
+    def _kind(self, called: str, variable: Node | None, place: Place) -> str:
+        """Return the kind of a parameter, by the template argument of the call or by the variable that it fills."""
+        kinds = template_arguments(called.replace(" ", ""))
+        if variable is not None:
+            kinds += [self._program.alias(declared.type) for declared in self._program.declared(text(variable), place)]
+        known = (_KINDS.get(kind.removeprefix("std::"), "") for kind in kinds)
+        return next((kind for kind in known if kind), "")
 
     def _given(self, handles: Sequence[Name], name: Node, place: Place) -> str | None:
         """Return the value of a parameter, where values are given and it is a text."""
@@ -357,6 +382,20 @@ class _Reader:
                 yield found[0]
 
 
+def _otherwise(call: Node, variable: Node | None) -> Node | None:
+    """Return what a variable is set to where `getParam` fails: `if (!nh.getParam("x", x)) x = 1;`."""
+    negated = call.parent
+    if variable is None or negated is None or negated.type != "unary_expression" or not text(negated).startswith("!"):
+        return None
+    branch = negated.parent
+    while branch is not None and branch.type in ("condition_clause", "parenthesized_expression"):
+        branch = branch.parent
+    if branch is None or branch.type != "if_statement":
+        return None
+    given = (node for node in walk(branch.child_by_field_name("consequence")) if node.type == "assignment_expression")
+    return next((child_of(node, "right") for node in given if text(child_of(node, "left")) == text(variable)), None)
+
+
 def _is_null(arguments: Sequence[Node]) -> bool:
     return len(arguments) == 1 and text(arguments[0]) in ("NULL", "nullptr", "0")
 
@@ -377,4 +416,27 @@ def _constant(node: Node | None) -> Any:
             found = float(shown.rstrip("fF")) if re.search(r"[.eE]", shown) else int(shown, 0)
     elif node.type == "call_expression" and shown.startswith(("std::string(", "string(")) and len(given) == 1:
         found = _constant(given[0])
+    elif node.type == "parenthesized_expression" and node.named_child_count == 1:
+        found = _constant(node.named_children[0])
+    elif shown == "M_PI":
+        found = math.pi
+    elif node.type == "binary_expression":
+        found = _calculated(node)
     return found
+
+
+def _calculated(node: Node) -> int | float | None:
+    """Return what a sum or product of numbers is, as C++ has it: integers divide without a rest."""
+    one, other = (_constant(child_of(node, side)) for side in ("left", "right"))
+    if not (isinstance(one, int | float) and isinstance(other, int | float)):
+        return None
+    match text(node.child_by_field_name("operator")):
+        case "+":
+            return one + other
+        case "-":
+            return one - other
+        case "*":
+            return one * other
+        case "/" if other:
+            return int(one / other) if isinstance(one, int) and isinstance(other, int) else one / other
+    return None

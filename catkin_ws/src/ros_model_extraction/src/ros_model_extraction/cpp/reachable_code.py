@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from tree_sitter import Node
 
 from ros_model_extraction.cpp.declarations import File
-from ros_model_extraction.cpp.syntax import function_name, text, walk
+from ros_model_extraction.cpp.syntax import child_of, function_name, text, walk
 
 _WORDS = ("identifier", "field_identifier", "type_identifier", "namespace_identifier")
 _CLASSES = ("class_specifier", "struct_specifier")
@@ -46,6 +46,7 @@ class ReachableCode:
         self._classes: dict[str, _Class] = defaultdict(_Class)
         self._functions: list[_Function] = []
         self._globals: set[str] = set()
+        self._aliases: dict[str, set[str]] = defaultdict(set)
         for file in files:
             self._collect(file.root)
         self._has_main = any(function.name == "main" and not function.owner for function in self._functions)
@@ -66,6 +67,9 @@ class ReachableCode:
         self._words = {"main", *self._globals}
         seen: set[str] = set()
         while True:
+            for name in (self._words & self._aliases.keys()) - seen:
+                seen.add(name)
+                self._words |= self._aliases[name]
             for name in (self._words & self._classes.keys()) - seen:
                 seen.add(name)
                 self._words |= self._classes[name].words | self._classes[name].bases
@@ -73,7 +77,7 @@ class ReachableCode:
                 if function.id not in self._reached and self._is_called(function):
                     self._reached.add(function.id)
                     self._words |= function.words
-            if not (self._words & self._classes.keys()) - seen and not any(
+            if not (self._words & (self._classes.keys() | self._aliases.keys())) - seen and not any(
                 self._is_called(function) for function in self._functions if function.id not in self._reached
             ):
                 return
@@ -109,6 +113,9 @@ class ReachableCode:
             if node.type in _CLASSES and node.child_by_field_name("body"):
                 owner = text(node.child_by_field_name("name")).partition("<")[0].rpartition("::")[2] or owner
                 self._class(node, owner)
+            elif node.type in ("type_definition", "alias_declaration"):
+                name = text(node.child_by_field_name("declarator") or node.child_by_field_name("name"))
+                self._aliases[name] |= _words(child_of(node, "type"))
             elif node.type == "field_declaration" and owner:
                 self._member(node, owner)
             elif node.type == "declaration" and not owner and not function_name(node):
