@@ -328,7 +328,7 @@ def test_part_that_does_not_parse_is_told_and_the_rest_read(node):
 
 def test_classes_that_are_loaded_by_name_are_told_of(node):
     result = node('pluginlib::ClassLoader<Base> loader("demo", "demo::Base");')
-    assert "the classes that pluginlib::ClassLoader loads by name are not followed" in remarks(result)
+    assert "of the classes that pluginlib::ClassLoader loads, only those of this package count" in remarks(result)
 
 
 @pytest.mark.parametrize(
@@ -514,3 +514,44 @@ def test_names_of_types_are_followed_to_what_can_be_reached(node):
     assert found(node("diagnostics_pointer made;", before)) == {
         ("publisher", "/diagnostics", "diagnostic_msgs/DiagnosticArray")
     }
+
+
+def test_class_with_a_template_is_followed_through_the_name_that_it_has_been_given(node):
+    before = """
+        template<typename T> class Filter {
+         public:
+          Filter(ros::NodeHandle nh, ros::NodeHandle pnh, int size = 15);
+          void on(const nav_msgs::Odometry::ConstPtr& message);
+          ros::NodeHandle nh_, pnh_;
+        };
+        template<typename T>
+        Filter<T>::Filter(ros::NodeHandle nh, ros::NodeHandle pnh, int size) : nh_(nh), pnh_(pnh) {
+          nh_.advertise<nav_msgs::Odometry>("filtered", 1);
+          pnh_.subscribe("raw", 1, &Filter<T>::on, this);
+        }
+        typedef Filter<Kalman> KalmanFilter;
+        """
+    assert found(node("KalmanFilter filter(nh, pnh);", before)) == {
+        ("publisher", "filtered", "nav_msgs/Odometry"),
+        ("subscriber", "~raw", "nav_msgs/Odometry"),
+    }
+
+
+def test_handles_reach_members_of_members_and_image_transport(node):
+    before = """
+        struct Detector { Detector(ros::NodeHandle pnh) { pnh.getParam("family", family); } std::string family; };
+        class Camera {
+         public:
+          Camera(ros::NodeHandle nh, ros::NodeHandle& pnh);
+          Detector detector_;
+          image_transport::ImageTransport inner_;
+          image_transport::ImageTransport* transport_;
+        };
+        Camera::Camera(ros::NodeHandle nh, ros::NodeHandle& pnh) : detector_(pnh), inner_(nh) {
+          transport_ = &inner_;
+          transport_->advertiseCamera("front/image", 1);
+        }
+        """
+    made = node("Camera camera(nh, pnh);", before)
+    assert {name for _, name, _ in found(made)} == {"front/image", "front/camera_info"}
+    assert [parameter.name for parameter in made.declared().parameters] == ["family"]

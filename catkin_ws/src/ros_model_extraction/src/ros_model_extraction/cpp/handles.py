@@ -12,6 +12,7 @@ from ros_model_extraction.cpp.syntax import arguments_of, parameters, text
 from ros_model_extraction.python.values import Const, Hole, Text, joined
 
 _FUNCTION_HOMES = ("getNodeHandle", "getMTNodeHandle", "getPrivateNodeHandle", "getMTPrivateNodeHandle")
+_HANDLES = ("NodeHandle", "ImageTransport")  # the latter has one
 _NULL = ("nullptr", "NULL", "0")
 _POINTERS = ("_ptr", "Ptr")
 
@@ -45,9 +46,9 @@ class Handles:
         found: list[Const | Text] = []
         for declared in self._program.declared(name, place):
             kind = self._program.alias(declared.type)
-            if "NodeHandle" not in kind and not any("NodeHandle" in text(value) for value in declared.values):
+            if not _names_handle(kind) and not any("NodeHandle" in text(value) for value in declared.values):
                 continue
-            is_handle = kind.endswith("NodeHandle") and not declared.is_indirect  # else it is made elsewhere
+            is_handle = kind.endswith(_HANDLES) and not declared.is_indirect  # else it is made elsewhere
             if not is_handle and (not declared.values or text(declared.values[0]) in _NULL):
                 continue
             is_made = [v for v in declared.values if v.type in ("call_expression", "new_expression")]
@@ -90,6 +91,10 @@ def in_namespace(namespace: Const | Text, name: Const | Text) -> Const | Text:
         return name
     between = "" if namespace == Const("~") or not shown else "/"
     return joined([as_text(namespace), Text((between,)), as_text(name)])
+
+
+def _names_handle(kind: str) -> bool:
+    return any(handle in kind for handle in _HANDLES)
 
 
 def _is_textual(node: Node) -> bool:

@@ -53,6 +53,7 @@ _GETTERS = {"param": 2, "getParam": 1, "getParamCached": 1, "hasParam": 1}
 _FREE_GETTERS = {"ros::param::get": 1, "ros::param::getCached": 1, "ros::param::param": 2, "ros::param::has": 1}
 _TYPE_NAME = r"(?P<name>[A-Z]\w*?)_?(?:::(?:Const)?Ptr|::Request|::Response|(?:Const)?Ptr)?"
 _TYPE = re.compile(rf"(?P<package>[a-z]\w*)::{_TYPE_NAME}")
+_NO_PACKAGES = ("ros", "std", "boost")
 _PLAIN_TYPE = re.compile(_TYPE_NAME)
 _POINTER = re.compile(r"(?:boost|std)::shared_ptr<(.*)>|ros::MessageEvent<(.*)>")
 _IMAGE = "sensor_msgs/Image"
@@ -278,7 +279,7 @@ class _Reader:
         base = kind.partition("<")[0]
         position = place.file.position(node)
         if base in _LOADERS and node.type != "field_initializer":
-            said = f"the classes that {base} loads by name are not followed: their interfaces are not in this model"
+            said = f"of the classes that {base} loads, only those of this package count that a text in its source names"
             self.remarks.append(Remark(position, said))
         elif base in CPP_FIXED:
             self._add([FoundPort(made.kind, made.name, made.type, position) for made in CPP_FIXED[base]])
@@ -350,7 +351,8 @@ class _Reader:
         name = self._program.alias(re.sub(r"\bconst\b|[\s&*]", "", name))
         if match := _POINTER.fullmatch(name):
             return self._type(match[1] or match[2])
-        if match := _TYPE.fullmatch(name):
+        match = _TYPE.fullmatch(name)
+        if match and match["package"] not in _NO_PACKAGES:
             return f"{match['package']}/{match['name']}"
         match = _PLAIN_TYPE.fullmatch(name)
         package = self._program.message_package(match["name"]) if match else ""
@@ -375,7 +377,7 @@ class _Reader:
         if inner.type == "lambda_expression":
             yield inner
             return
-        shown = text(argument)
+        shown = re.sub(r"<[^<>]*>", "", text(argument))
         names = re.findall(r"&?\s*((?:\w+::)*\w+)", shown)
         for name in names if argument.type == "call_expression" else names[:1]:
             if found := self._program.function(name, place.owner):

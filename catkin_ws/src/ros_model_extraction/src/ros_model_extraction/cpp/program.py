@@ -14,6 +14,7 @@ from ros_model_extraction.cpp.reachable_code import ReachableCode
 from ros_model_extraction.cpp.syntax import (
     arguments_of,
     child_of,
+    class_name,
     function_name,
     last_name,
     literal_text,
@@ -39,10 +40,13 @@ class _Index:
     globals: dict[str, list[Declared]] = field(default_factory=lambda: defaultdict(list))
     members: dict[tuple[str, str], list[Declared]] = field(default_factory=lambda: defaultdict(list))
     given: list[tuple[str, tuple[Node, ...], Place]] = field(default_factory=list)
+    initialised: list[tuple[str, tuple[Node, ...], Place]] = field(default_factory=list)
     macros: dict[str, str] = field(default_factory=dict)
     aliases: dict[str, str] = field(default_factory=dict)
     constructors: dict[str, list[Node]] = field(default_factory=lambda: defaultdict(list))
     message_packages: dict[str, str] = field(default_factory=dict)
+    defaults: dict[tuple[str, str, int], int] = field(default_factory=dict)
+    """How many parameters have a default by a class's declaration, by class, name, and number of all."""
 
 
 class Program:
@@ -58,6 +62,14 @@ class Program:
         self._fills: dict[tuple[str, str], list[tuple[Node | str | None, Place, str]]] = defaultdict(list)
         for file in reversed(files):  # headers, which declare, before the sources that include them
             self._index_file(file)
+        for name, values, place in self._index.initialised:  # a base class, or a member of some class
+            kinds = {declared.type for declared in self._index.members.get((place.owner, name), ())} or {name}
+            for kind in kinds:
+                self._index.calls[last_name(kind)].append((values, place))
+        for alias in list(self._index.aliases):
+            name = last_name(self.alias(alias))
+            if alias in self._index.calls and name != alias:
+                self._index.calls[name] += self._index.calls[alias]
         for name, values, place in self._index.given:  # only now all declarations are known, wherever they stand
             if self.is_run(place):
                 self._give(name, values, place)
@@ -157,7 +169,9 @@ class Program:
     def _takes(self, function: Node, arguments: Sequence[Node], at: Place) -> bool:
         """Return whether a function may be what a call means, by the number of arguments, and by node handles."""
         known = sorted(parameters(function).values(), key=lambda parameter: parameter[0])
-        needed = sum(default is None for _, _, default in known)
+        owner, _, name = function_name(function).rpartition("::")
+        defaults = self._index.defaults.get((class_name(owner), name, len(known)), 0)
+        needed = len(known) - max(defaults, sum(default is not None for _, _, default in known))
         if not needed <= len(arguments) <= len(known):
             return False
         pairs = zip(arguments, known, strict=False)
@@ -293,6 +307,9 @@ class Program:
     def _index_declaration(self, node: Node, place: Place) -> None:
         if name := function_name(node):
             self._index.functions[name.rpartition("::")[2]].append((node, place))
+            known = parameters(node).values()
+            count = sum(default is not None for _, _, default in known)
+            self._index.defaults[place.owner, name.rpartition("::")[2], len(known)] = count
         for name, declared in declarations(node, place):
             if place.function is None and place.owner:
                 self._index.members[place.owner, name].append(declared)
@@ -312,7 +329,7 @@ class Program:
                 values = tuple(initialiser.named_children[-1].named_children)
                 at = Place(place.file, function, place.owner)
                 self._index.given.append((name, values, at))
-                self._index.calls[last_name(name.removeprefix("this->"))].append((values, at))  # a base's constructor
+                self._index.initialised.append((name.removeprefix("this->"), values, at))
 
     def _give(self, name: str, values: tuple[Node, ...], place: Place) -> None:
         """Note what a member or a global variable is given outside its declaration."""
@@ -335,11 +352,11 @@ class Program:
             inner = place
             if node.type == "function_definition":
                 name = function_name(node)
-                owner = name.rpartition("::")[0].rpartition("::")[2] or place.owner
+                owner = class_name(name.rpartition("::")[0]) or place.owner
                 inner = Place(place.file, node, owner)
                 place = Place(place.file, place.function, owner)
             elif node.type in ("class_specifier", "struct_specifier") and node.child_by_field_name("body"):
-                inner = Place(place.file, None, text(node.child_by_field_name("name")))
+                inner = Place(place.file, None, class_name(text(node.child_by_field_name("name"))))
             yield node, inner if node.type == "function_definition" else place
             todo += [(child, inner) for child in reversed(node.named_children)]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from tree_sitter import Node
 
 from ros_model_extraction.cpp.declarations import File
-from ros_model_extraction.cpp.syntax import child_of, function_name, text, walk
+from ros_model_extraction.cpp.syntax import child_of, class_name, function_name, text, walk
 
 _WORDS = ("identifier", "field_identifier", "type_identifier", "namespace_identifier")
 _CLASSES = ("class_specifier", "struct_specifier")
@@ -111,7 +111,7 @@ class ReachableCode:
                 self._function(node, owner)
                 continue
             if node.type in _CLASSES and node.child_by_field_name("body"):
-                owner = text(node.child_by_field_name("name")).partition("<")[0].rpartition("::")[2] or owner
+                owner = class_name(text(node.child_by_field_name("name"))) or owner
                 self._class(node, owner)
             elif node.type in ("type_definition", "alias_declaration"):
                 name = text(node.child_by_field_name("declarator") or node.child_by_field_name("name"))
@@ -125,7 +125,7 @@ class ReachableCode:
     def _function(self, node: Node, owner: str) -> None:
         qualified = function_name(node)
         before, _, name = qualified.rpartition("::")
-        owner = before.rpartition("::")[2].partition("<")[0] or owner
+        owner = class_name(before) or owner
         if owner and _is_declared_virtual(node):
             self._classes[owner].virtual.add(name)
         self._functions.append(_Function(node.id, name, owner, frozenset(_words(node))))
@@ -136,7 +136,7 @@ class ReachableCode:
         known = self._classes[name]
         for child in node.named_children:
             if child.type == "base_class_clause":
-                known.bases |= {text(n).partition("<")[0].rpartition("::")[2] for n in _bases(child)}
+                known.bases |= {class_name(text(n)) for n in _bases(child)}
 
     def _member(self, node: Node, owner: str) -> None:
         known = self._classes[owner]

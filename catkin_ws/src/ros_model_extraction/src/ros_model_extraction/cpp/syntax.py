@@ -91,6 +91,11 @@ def function_name(function: Node) -> str:
     return text(declarator.child_by_field_name("declarator")) if declarator is not None else ""
 
 
+def class_name(name: str) -> str:
+    """Return a class's name without its namespaces and template arguments."""
+    return name.partition("<")[0].rpartition("::")[2].strip()
+
+
 def child_of(node: Node, name: str) -> Node:
     """Return a node's child by the name of its field; the node itself where it has none."""
     return node.child_by_field_name(name) or node
