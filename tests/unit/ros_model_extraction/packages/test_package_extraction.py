@@ -472,3 +472,28 @@ def test_what_a_launch_file_says_and_a_model_can_not_is_listed(tmp_path, monkeyp
         "cell/tool": (("in", "out"),),
     }
     assert 'Left out: args="--fast", launch-prefix="nice", env="A=b", respawn="true" of /cell/eye' in header
+
+
+@pytest.mark.parametrize(
+    ("imported", "name"),
+    [
+        ("import demo.msg", "demo.msg.Level"),
+        ("from demo.msg import *", "Level"),
+        ("from demo.msg import Level", "Level"),
+        ("import demo", "demo.msg.Level"),
+    ],
+)
+@pytest.mark.parametrize("has_module", [True, False])
+def test_messages_of_the_package_itself_are_known(tmp_path, imported, name, has_module):
+    folder = make_package(tmp_path / "other_folder", "demo")
+    (folder / "msg").mkdir()
+    (folder / "msg" / "Level.msg").write_text("int32 level\n")
+    if has_module:
+        (folder / "src" / "demo").mkdir(parents=True)
+        (folder / "src" / "demo" / "__init__.py").touch()
+    make_script(
+        folder / "nodes" / "a",
+        f"#!/usr/bin/env python3\nimport rospy\n{imported}\nrospy.init_node('a')\nrospy.Publisher('level', {name})\n",
+    )
+    (artifact,) = extract_package(folder).package.artifacts
+    assert [(port.name, port.type) for port in artifact.nodes[0].ports] == [("level", "demo/Level")]

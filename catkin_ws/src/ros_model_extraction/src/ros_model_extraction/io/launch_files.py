@@ -149,7 +149,9 @@ class _Sources:
         if executable is None:
             self._problems[node.name] = f"the source of {node.type} is not in {package.folder}"
             return None
-        library = self._libraries.setdefault(package.name, Library([package.folder / "src"], package.folder))
+        library = self._libraries.setdefault(
+            package.name, Library([package.folder / "src"], package.folder, package.name)
+        )
         try:
             return read_executable(package, executable, library, lambda name: _lookup(tree, resolve(name, node.name)))
         except SourceError as error:

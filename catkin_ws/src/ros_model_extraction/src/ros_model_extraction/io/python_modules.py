@@ -23,13 +23,15 @@ if TYPE_CHECKING:
 class Library:
     """Finds modules in the source of packages, and reads each once."""
 
-    def __init__(self, folders: Sequence[Path], package_folder: Path) -> None:
+    def __init__(self, folders: Sequence[Path], package_folder: Path, package: str = "") -> None:
         """Search these folders, then the sources of installed packages.
 
         Args:
             folders: where top-level modules lie.
             package_folder: positions name files relative to it.
+            package: its name; it may have messages, and need not be installed.
         """
+        self._package = package
         self.remarks: list[Remark] = []
         self._folders = list(folders)
         self._beside: Path | None = None  # the folder of the script, which Python searches first
@@ -61,12 +63,12 @@ class Library:
         return self._modules[name]
 
     def has_message(self, source: str, name: str) -> bool:
-        """Return whether an installed package defines a message or service: `std_msgs.msg`, `String`."""
+        """Return whether this or an installed package defines a message or service: `std_msgs.msg`, `String`."""
         package, _, kind = source.partition(".")
         if kind not in ("msg", "srv"):
             return False
         try:
-            folder = Path(self._packages.get_path(package))
+            folder = self._package_folder if package == self._package else Path(self._packages.get_path(package))
         except rospkg.ResourceNotFound:
             return False
         action = re.sub(r"(Action)?(Goal|Result|Feedback)?$", "", name).removesuffix("Action")

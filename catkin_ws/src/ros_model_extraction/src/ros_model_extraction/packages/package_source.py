@@ -58,7 +58,7 @@ def extract_package(folder: Path) -> ExtractedPackage:
     package = read_package(folder)
     nodes = {}
     remarks = list(package.remarks)
-    library = Library([folder / "src", folder], folder)
+    library = Library([folder / "src", folder], folder, package.name)
     for executable in package.executables:
         try:
             nodes[executable.name] = read_executable(package, executable, library)

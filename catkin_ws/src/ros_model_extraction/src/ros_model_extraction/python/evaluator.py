@@ -223,6 +223,8 @@ class Evaluator(ExpressionEvaluator):
         if inner := self._library.module(f"{module.name}.{name}"):
             return [(ModuleValue(inner), world)]
         found = self._starred(name, module.scope)
+        if found is None and name in ("msg", "srv") and module.is_package:  # these are generated into the module
+            found = External(f"{module.name}.{name}")
         return [(found, world)] if found else []
 
     def annotated(self, results: Results, annotation: ast.expr | None, frame: Frame) -> Results:
