@@ -555,3 +555,46 @@ def test_handles_reach_members_of_members_and_image_transport(node):
     made = node("Camera camera(nh, pnh);", before)
     assert {name for _, name, _ in found(made)} == {"front/image", "front/camera_info"}
     assert [parameter.name for parameter in made.declared().parameters] == ["family"]
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        (
+            'interactive_markers::InteractiveMarkerServer server("marks", "", false);',
+            {
+                ("publisher", "marks/update", "visualization_msgs/InteractiveMarkerUpdate"),
+                ("publisher", "marks/update_full", "visualization_msgs/InteractiveMarkerInit"),
+                ("subscriber", "marks/feedback", "visualization_msgs/InteractiveMarkerFeedback"),
+            },
+        ),
+        (
+            'auto info = boost::make_shared<camera_info_manager::CameraInfoManager>(ros::NodeHandle("cam"), "front");',
+            {("service server", "cam/set_camera_info", "sensor_msgs/SetCameraInfo")},
+        ),
+        (
+            'realtime_tools::RealtimePublisher<nav_msgs::Odometry> odom(pnh, "odom", 100);',
+            {("publisher", "~odom", "nav_msgs/Odometry")},
+        ),
+    ],
+)
+def test_helpers_that_many_packages_use_make_their_interfaces(node, code, expected):
+    assert found(node(code)) == expected
+
+
+def test_controller_manager_makes_its_services_below_the_handle_that_it_is_given(node):
+    names = {name for _, name, _ in found(node("controller_manager::ControllerManager manager(&robot, nh);"))}
+    assert "controller_manager/list_controllers" in names and len(names) == 6
+
+
+def test_handle_may_be_the_default_of_a_parameter(node):
+    before = """
+        struct Chain {
+          Chain(const ros::NodeHandle& nh = {}, const ros::NodeHandle& pnh = {"~"}) : nh_(nh), pnh_(pnh) {
+            nh_.advertise<std_msgs::String>("out", 1);
+            pnh_.advertise<std_msgs::String>("own", 1);
+          }
+          ros::NodeHandle nh_, pnh_;
+        };
+        """
+    assert {name for _, name, _ in found(node("Chain chain;", before))} == {"out", "~own"}

@@ -318,6 +318,14 @@ def test_dynamic_reconfigure_makes_its_three_interfaces(node):
     assert ("subscriber", "other/parameter_updates", "dynamic_reconfigure/Config") in found(result)
 
 
+def test_interactive_markers_are_below_their_namespace(node):
+    code = """
+        from interactive_markers.interactive_marker_server import InteractiveMarkerServer
+        InteractiveMarkerServer("marks")
+        """
+    assert {name for _, name, _ in found(node(code))} == {"marks/update", "marks/update_full", "marks/feedback"}
+
+
 def test_star_import_of_messages_resolves_by_the_installed_package(node):
     assert found(node("from sensor_msgs.msg import *\nrospy.Publisher('x', LaserScan)")) == {
         ("publisher", "x", "sensor_msgs/LaserScan")

@@ -59,6 +59,55 @@ RECONFIGURE_SERVER = (
 )
 """Below the server's namespace; a client has the counterparts."""
 
+
+@dataclass(frozen=True)
+class Below:
+    """Interfaces below a namespace that an object is given: by a node handle, and by a name in it.
+
+    Attributes:
+        made: the interfaces.
+        handle: place of the node handle among the arguments, None where there is none.
+        name: place of the name, None where there is none.
+        inner: a name that all interfaces have before their own.
+    """
+
+    made: tuple[Made, ...]
+    handle: int | None = None
+    name: int | None = None
+    inner: str = ""
+
+
+_MARKERS = (
+    Made(_PUBLISHER, "update", "visualization_msgs/InteractiveMarkerUpdate"),
+    Made(_PUBLISHER, "update_full", "visualization_msgs/InteractiveMarkerInit"),
+    Made(_SUBSCRIBER, "feedback", "visualization_msgs/InteractiveMarkerFeedback"),
+)
+_CONTROLLERS = (
+    ("list_controller_types", "ListControllerTypes"),
+    ("list_controllers", "ListControllers"),
+    ("load_controller", "LoadController"),
+    ("reload_controller_libraries", "ReloadControllerLibraries"),
+    ("switch_controller", "SwitchController"),
+    ("unload_controller", "UnloadController"),
+)
+
+PYTHON_BELOW = {
+    "interactive_markers.interactive_marker_server.InteractiveMarkerServer": (Below(_MARKERS), (0, "topic_ns")),
+}
+"""And which argument has the namespace."""
+
+CPP_BELOW = {
+    "interactive_markers::InteractiveMarkerServer": Below(_MARKERS, name=0),
+    "camera_info_manager::CameraInfoManager": Below(
+        (Made(PortKind.SERVICE_SERVER, "set_camera_info", "sensor_msgs/SetCameraInfo"),), handle=0
+    ),
+    "controller_manager::ControllerManager": Below(
+        tuple(Made(PortKind.SERVICE_SERVER, name, f"controller_manager_msgs/{kind}") for name, kind in _CONTROLLERS),
+        handle=1,
+        inner="controller_manager",
+    ),
+}
+
 COUNTERPART = {end: other for ends in ENDS.values() for end, other in zip(ends, reversed(ends), strict=True)}
 
 CPP_FIXED = {

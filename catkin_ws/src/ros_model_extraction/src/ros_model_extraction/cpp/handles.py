@@ -31,18 +31,26 @@ class Handles:
         return found[:MAX_VALUES] or [Text((Hole(text(node)),))]
 
     def _handles(self, node: Node, place: Place, depth: int) -> list[Const | Text]:
-        name = text(node).lstrip("*&").removeprefix("this->")
-        if node.type in ("call_expression", "new_expression"):
-            called = name.partition("(")[0].partition("<")[0].removeprefix("new ").strip()
-            if called in _FUNCTION_HOMES:
-                return [Const("~" if "Private" in called else "")]
-            if called.endswith(("NodeHandle", "make_shared", "make_unique", "ImageTransport")):
-                return self._constructed(arguments_of(node), place, depth)
-            if called.endswith((*_POINTERS, "std::move")) and arguments_of(node):
-                return self.of(arguments_of(node)[0], place, depth + 1)
-            return []
-        if node.type in ("pointer_expression", "parenthesized_expression") and node.named_child_count:
-            return self.of(node.named_children[-1], place, depth + 1)
+        match node.type:
+            case "call_expression" | "new_expression":
+                return self._called(node, place, depth)
+            case "compound_literal_expression" | "initializer_list":  # the default `= {"~"}` of a parameter
+                return self._constructed((node.child_by_field_name("value") or node).named_children, place, depth)
+            case "pointer_expression" | "parenthesized_expression" if node.named_child_count:
+                return self.of(node.named_children[-1], place, depth + 1)
+        return self._named(text(node).lstrip("*&").removeprefix("this->"), place, depth)
+
+    def _called(self, node: Node, place: Place, depth: int) -> list[Const | Text]:
+        called = text(node).lstrip("*&").partition("(")[0].partition("<")[0].removeprefix("new ").strip()
+        if called.removeprefix("this->") in _FUNCTION_HOMES:
+            return [Const("~" if "Private" in called else "")]
+        if called.endswith(("NodeHandle", "make_shared", "make_unique", "ImageTransport")):
+            return self._constructed(arguments_of(node), place, depth)
+        if called.endswith((*_POINTERS, "std::move")) and arguments_of(node):
+            return self.of(arguments_of(node)[0], place, depth + 1)
+        return []
+
+    def _named(self, name: str, place: Place, depth: int) -> list[Const | Text]:
         found: list[Const | Text] = []
         for declared in self._program.declared(name, place):
             kind = self._program.alias(declared.type)

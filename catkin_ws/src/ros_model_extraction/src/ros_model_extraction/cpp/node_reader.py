@@ -25,7 +25,7 @@ from ros_model_extraction.cpp.syntax import (
 )
 from ros_model_extraction.node_facts import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
 from ros_model_extraction.python.values import Const, Text
-from ros_model_extraction.ros_api import CPP_FIXED, RECONFIGURE_SERVER
+from ros_model_extraction.ros_api import CPP_BELOW, CPP_FIXED, RECONFIGURE_SERVER, Below
 
 Name = Const | Text
 
@@ -42,6 +42,10 @@ _KINDS = {
     "string": "String",
 }
 _LOADERS = ("pluginlib::ClassLoader", "nodelet::Loader")
+_HANDLE_AND_NAME = {
+    "message_filters::Subscriber": PortKind.SUBSCRIBER,
+    "realtime_tools::RealtimePublisher": PortKind.PUBLISHER,
+}
 _METHODS = ("advertise", "subscribe", "advertiseService", "serviceClient", "advertiseCamera", "subscribeCamera")
 _OPTIONS = {  # the class whose `create` makes what may be given to a method alone
     "advertise": (PortKind.PUBLISHER, "AdvertiseOptions"),
@@ -287,9 +291,11 @@ class _Reader:
             handles, rest = self._leading_handle(arguments, place)
             if rest:
                 self._port(_ACTIONS[base], handles, rest[0], self._template(kind), node, place)
-        elif base == "message_filters::Subscriber" and len(arguments) > 1 and not is_member:
+        elif base in _HANDLE_AND_NAME and len(arguments) > 1 and not is_member:
             handles = self._handles.of(arguments[0], place)
-            self._port(PortKind.SUBSCRIBER, handles, arguments[1], self._template(kind), node, place)
+            self._port(_HANDLE_AND_NAME[base], handles, arguments[1], self._template(kind), node, place)
+        elif base in CPP_BELOW and not (is_member and arguments):
+            self._below(CPP_BELOW[base], arguments, node, place)
         elif base == "dynamic_reconfigure::Server" and kind.endswith(">") and not (is_member and arguments):
             handles = [Const("~")]
             if arguments and self._handles.of(arguments[-1], place):
@@ -297,6 +303,20 @@ class _Reader:
             for namespace in handles:
                 for made in RECONFIGURE_SERVER:
                     shown = self._name(made.kind.value, in_namespace(namespace, Const(made.name)), position)
+                    self._add([FoundPort(made.kind, shown, made.type, position)])
+
+    def _below(self, below: Below, arguments: list[Node], node: Node, place: Place) -> None:
+        """Look at an object that makes interfaces below a namespace."""
+        position = place.file.position(node)
+        handle = arguments[below.handle] if below.handle is not None and below.handle < len(arguments) else None
+        given = arguments[below.name] if below.name is not None and below.name < len(arguments) else None
+        names = [value for value, _ in self._program.texts(given, place)] if given is not None else [Const("")]
+        for namespace in self._handles.of(handle, place):
+            for name in names:
+                for made in below.made:
+                    inner = "/".join(part for part in (below.inner, made.name) if part)
+                    full = in_namespace(namespace, in_namespace(name, Const(inner)))
+                    shown = self._name(made.kind.value, full, position)
                     self._add([FoundPort(made.kind, shown, made.type, position)])
 
     def _leading_handle(self, arguments: list[Node], place: Place) -> tuple[list[Name], list[Node]]:

@@ -32,7 +32,14 @@ from ros_model_extraction.python.values import (
     source_of,
     text_of,
 )
-from ros_model_extraction.ros_api import COUNTERPART, PYTHON_FIXED, PYTHON_MAKERS, RECONFIGURE_SERVER, Maker
+from ros_model_extraction.ros_api import (
+    COUNTERPART,
+    PYTHON_BELOW,
+    PYTHON_FIXED,
+    PYTHON_MAKERS,
+    RECONFIGURE_SERVER,
+    Maker,
+)
 
 if TYPE_CHECKING:
     from ros_model_extraction.io.python_modules import Library
@@ -44,9 +51,17 @@ _INIT_NODE = "rospy.init_node"
 _GET_PARAMETER = {"rospy.get_param", "rospy.get_param_cached"}
 _HAS_PARAMETER = "rospy.has_param"
 _RECONFIGURE = {"dynamic_reconfigure.Server": False, "dynamic_reconfigure.Client": True}
-_INTERESTING = {*PYTHON_MAKERS, *PYTHON_FIXED, *_RECONFIGURE, *_GET_PARAMETER, _INIT_NODE, _HAS_PARAMETER}
+_INTERESTING = {
+    *PYTHON_MAKERS,
+    *PYTHON_FIXED,
+    *PYTHON_BELOW,
+    *_RECONFIGURE,
+    *_GET_PARAMETER,
+    _INIT_NODE,
+    _HAS_PARAMETER,
+}
 
-_NAMES = {name.rpartition(".")[2] for name in (*PYTHON_MAKERS, *PYTHON_FIXED)}
+_NAMES = {name.rpartition(".")[2] for name in (*PYTHON_MAKERS, *PYTHON_FIXED, *PYTHON_BELOW)}
 
 
 def read_python_node(
@@ -149,6 +164,12 @@ class _Reader:
             self._port(PYTHON_MAKERS[name], given, call, frame, world)
         elif name in PYTHON_FIXED:
             self.ports += [FoundPort(made.kind, made.name, made.type, position) for made in PYTHON_FIXED[name]]
+        elif name in PYTHON_BELOW:
+            below, place = PYTHON_BELOW[name]
+            for value, w in self._argument(given, place, frame, world, call):
+                prefix = text_of(value) or Text((Hole("namespace"),))
+                for made in below.made:
+                    self._found(made.kind, joined([prefix, Text((f"/{made.name}",))]), made.type, w, position)
         elif name in _RECONFIGURE:
             self._reconfigure(_RECONFIGURE[name], given, call, frame, world)
         elif name == _INIT_NODE:
