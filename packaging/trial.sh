@@ -84,10 +84,7 @@ export ROS_PACKAGE_PATH=${PWD%/*}
 rosmodel snapshot -o models/
 rosmodel init models/snapshot.rossystem
 rosmodel generate all models/ -o .
-roslaunch rosgraph_monitor monitor.launch config:="$PWD/config/rosgraph_monitor.yaml" >~/monitor.log 2>&1 &
-roslaunch rosgraph_manipulator manipulator.launch config:="$PWD/config/rosgraph_manipulator.yaml" \
-  initial_configuration:=snapshot_default >~/manipulator.log 2>&1 &
-roslaunch mros1_reasoner run.launch config:="$PWD/config/reasoner.yaml" >~/reasoner.log 2>&1 &
+roslaunch mros1_reasoner metacontrol.launch project:="$PWD" initial_configuration:=snapshot_default >~/metacontrol.log 2>&1 &
 wait_for STABLE timeout 10 rostopic echo -n 1 /rosgraph_manipulator/active_configuration
 wait_for /reasoner rosnode list
 OWN

@@ -92,3 +92,17 @@ def test_monitor_without_a_file_has_the_parameters_that_are_set_elsewhere(server
     server.set("/rosgraph_monitor/observers", ["x"])
     server.start(MONITOR)
     assert server.get("/rosgraph_monitor/observers") == ["x"]
+
+
+def test_one_launch_file_starts_the_meta_controller_of_a_project(server, tmp_path):
+    (tmp_path / "config").mkdir()
+    nodes = {"rosgraph_monitor": "desired_model", "rosgraph_manipulator": "configurations", "reasoner": "model_file"}
+    for node, parameter in nodes.items():
+        (tmp_path / "config" / f"{node}.yaml").write_text(yaml.safe_dump({parameter: f"of {node}"}))
+    file = "mros1_reasoner/launch/metacontrol.launch"
+    server.start(file, f"project:={tmp_path}", "initial_configuration:=careful", "parameters:={cool_down: 3}")
+    assert {node: server.get(f"/{node}/{parameter}") for node, parameter in nodes.items()} == {
+        node: f"of {node}" for node in nodes
+    }
+    assert server.get("/rosgraph_manipulator/initial_configuration") == "careful"
+    assert server.get("/reasoner/cool_down") == 3
