@@ -5,7 +5,7 @@ import re
 import pytest
 import yaml
 from ros_model.errors import ModelError
-from ros_model.generators.deployment import manipulator
+from ros_model.generators.deployment import manipulator, reasoner
 from ros_model.io.project import load_project, problems_of
 from ros_model.language.metamodel import PortPath, compose
 
@@ -121,6 +121,11 @@ def test_without_a_table_variants_are_files(load, settings, tmp_path):
     assert [variant.name for variant in load().variants] == ["one"]
 
 
+def test_utility_function_goes_to_the_reasoner_with_its_parameters(load, settings):
+    settings["utility"] = {"weights": {"safety": -1.0}}
+    assert reasoner(load())["utility"] == {"weights": {"safety": -1.0}}
+
+
 def test_levels_of_variants_that_are_files_come_from_a_table(load, settings, tmp_path):
     (tmp_path / "variants").mkdir()
     for name in ("one", "two"):
@@ -151,6 +156,9 @@ def test_levels_of_variants_that_are_files_come_from_a_table(load, settings, tmp
         ({"colour": 1}, "colour: unknown key, allowed here: package, base"),
         ({"functions": []}, "functions: is '[]', must be a mapping"),
         ({"utility": "speed"}, "utility: 'speed' is none of quality_attributes: safety"),
+        ({"utility": {}}, "utility: is '{}', must be a mapping of one utility to its parameters"),
+        ({"utility": {"a": 1, "b": 2}}, "must be a mapping of one utility to its parameters"),
+        ({"utility": [1]}, "utility: is '[1]', must be a name, or a mapping of one utility to its parameters"),
         (
             {"quality_attributes": {"safety": {"direction": "down"}}},
             "quality_attributes.safety.direction: is 'down', must be lower_is_better or higher_is_better",
@@ -383,7 +391,7 @@ def test_every_problem_of_the_settings_is_told_at_its_place(tmp_path):
         "objectives: {o: {function: f_move, nfrs: {safety: .nan}}}\n"
     )
     assert [str(problem).removeprefix(f"{path}:") for problem in problems_of(path)] == [
-        "1:1: utility: is missing, must be a name",
+        "1:1: utility: is missing, must be a name, or a mapping of one utility to its parameters",
         "1:1: package: is 'robot models', must be a name of letters, digits, '_' and '-'",
         "3:1: colour: unknown key, allowed here: package, base, variants, functions, quality_attributes, utility, "
         "objectives, components, topics, environment, roles, spares, observers, reasoner, manipulator, arguments, "

@@ -164,7 +164,8 @@ def _unclear_repairs(settings: Settings) -> Iterator[ModelError]:
 
 def _unknown_qas(settings: Settings) -> Iterator[ModelError]:
     content = settings.content
-    used: list[tuple[str, Keys]] = [(content["utility"], ("utility",))]
+    utility = content["utility"]
+    used: list[tuple[str, Keys]] = [(utility, ("utility",))] if isinstance(utility, str) else []
     qualities = content["quality_attributes"]
     used += [(e["typical"], ("quality_attributes", q, "typical")) for q, e in qualities.items() if "typical" in e]
     for name, objective in content["objectives"].items():

@@ -1,0 +1,1 @@
+"""What this robot adds to the meta-controller: an observer, and a utility function."""
