@@ -6,7 +6,7 @@ import pytest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist
 from metacontrol_bags.bag import BagError, read_record
-from metacontrol_bags.metrics import MetricsError, configuration_at, summarise
+from metacontrol_bags.metrics import MetricsError, configuration_at, summarise, verdict
 from metacontrol_bags.record import Event, MissionRecord
 from metacontrol_bags.series import mean, periods_missed, share_above
 
@@ -98,6 +98,8 @@ def test_success_needs_all_four_conditions(summary, mission_bag, tmp_path):
     risky = summarise(read_record(mission_bag.write(tmp_path / "risky.bag")))
     assert risky["time_above_threshold"]["safety"] == pytest.approx(0.06)
     assert risky["goal_reached"] and not risky["success"]
+    assert verdict(summary, "; ") == "yes"
+    assert verdict(risky, "; ") == "no: time above the safety threshold 6.0%, not below 5%"
 
 
 def test_cause_stamped_by_a_clock_ahead_of_the_reasoners_is_found(bag, tmp_path):
@@ -134,6 +136,7 @@ def test_baseline_that_is_stuck_has_failed(bag, tmp_path):
     bag.event(40.0, "MISSION_END", "r1", outcome="aborted")
     summary = summarise(read_record(bag.write(tmp_path / "baseline.bag")))
     assert summary["goal_reached"] is False and summary["success"] is False and summary["metacontrol"] is False
+    assert verdict(summary, "; ").startswith("no: goal not reached; mean safety not known, not below 0.4; time above")
     assert summary["goals"] == {"sent": 1, "failed": 1}
     assert summary["reconfigurations"] == [] and summary["collisions"] is None
     assert summary["mean_qa"] == {"safety": None, "energy": None}

@@ -35,6 +35,8 @@ from metacontrol_bags.violations import CELL_M, describe
 from metacontrol_bags.words import DiagnosticWords, FunctionGrounding, MissionEvent
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from metacontrol_bags.decision import Decision
 
 SCHEMA_VERSION = 1
@@ -96,7 +98,7 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
         "metacontrol": told.get("metacontrol", "true" if record.decisions else "false") == "true",
         "seed": int(_number(told, "seed", 0)),
         "goal_reached": reached,
-        "success": reached and duration <= TIMEOUT_S and _good_quality(means, above),
+        "success": not _unmet(reached, duration, means, above),
         "duration_s": _rounded(duration),
         "path_length_m": _rounded(path_length(record, start, end)),
         "collisions": _collisions(record.contacts, start, end),
@@ -220,11 +222,34 @@ def _quality_cause(record: MissionRecord, name: str, decided: Decision) -> tuple
     return start_of_run(truth), reported
 
 
-def _good_quality(means: dict[str, float | None], above: dict[str, float | None]) -> bool:
+def verdict(summary: Mapping[str, Any], between: str) -> str:
+    """Return "yes" for a successful mission, else "no" and the conditions that it did not meet.
+
+    Args:
+        summary: see `summarise`.
+        between: what stands between two of them.
+    """
+    if summary["success"]:
+        return "yes"
+    reached, duration = summary["goal_reached"], summary["duration_s"]
+    return f"no: {between.join(_unmet(reached, duration, summary['mean_qa'], summary['time_above_threshold']))}"
+
+
+def _unmet(
+    reached: bool, duration: float | None, means: Mapping[str, float | None], above: Mapping[str, float | None]
+) -> list[str]:
+    found = [] if reached else ["goal not reached"]
+    if duration is None or duration > TIMEOUT_S:
+        found.append(f"longer than {TIMEOUT_S:g} s")
     safety = means["safety"]
     if safety is None or safety >= MAX_MEAN_SAFETY:
-        return False
-    return all((share := above[name]) is not None and share < limit for name, limit in MAX_SHARE.items())
+        found.append(f"mean safety {'not known' if safety is None else f'{safety:.2f}'}, not below {MAX_MEAN_SAFETY}")
+    for name, limit in MAX_SHARE.items():
+        share = above[name]
+        if share is None or share >= limit:
+            shown = "not known" if share is None else f"{share:.1%}"
+            found.append(f"time above the {name} threshold {shown}, not below {limit:.0%}")
+    return found
 
 
 def _collisions(contacts: Samples, start: float, end: float) -> int | None:

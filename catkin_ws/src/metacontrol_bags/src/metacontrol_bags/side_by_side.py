@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from metacontrol_bags.metrics import verdict
+
 UNKNOWN = "-"
 
 
@@ -51,7 +53,7 @@ def _column(summary: Mapping[str, Any]) -> dict[str, str]:
         "meta-controller": _yes(summary["metacontrol"]),
         "contingency": _contingency(summary["contingency"]),
         "goal reached": _yes(summary["goal_reached"]) if goals["sent"] else UNKNOWN,
-        "success (paper's four conditions)": _yes(summary["success"]),
+        "success (paper's four conditions)": verdict(summary, "; "),
         "outcome": summary["reason"],
         "duration": _number(summary["duration_s"], "s"),
         "way driven": _number(summary["path_length_m"], "m"),

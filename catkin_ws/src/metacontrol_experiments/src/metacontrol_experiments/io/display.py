@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
+from metacontrol_bags.metrics import verdict
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
@@ -127,7 +128,7 @@ def _figures(summary: dict[str, Any]) -> Table:
     configurations = dict.fromkeys((summary["initial_configuration"], summary["final_configuration"]))
     rows: list[tuple[str, str]] = [
         ("goal reached", "yes" if goal else f"no ({summary['outcome']})"),
-        ("success (paper's four conditions)", "yes" if summary["success"] else "no"),
+        ("success (paper's four conditions)", verdict(summary, "\n")),
         ("duration", _with_unit(summary["duration_s"], "s")),
         ("way driven", _with_unit(summary["path_length_m"], "m")),
         ("collisions", "-" if summary["collisions"] is None else str(summary["collisions"])),
