@@ -2,6 +2,7 @@
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
 from rich.console import Console
 from ros_model.graph.snapshot import build_snapshot
 from rosgraph_monitor.cli.snapshot import lines
@@ -34,6 +35,18 @@ def test_board_shows_nodes_qualities_with_thresholds_and_findings():
     text = shown(overview, 11.0, parameters={"reasoner": {"nfr_safety": 0.6}})
     for expected in ("laser", "TRUE", "12.50", "safety", "0.25", "0.6", "Missing node", "dead: gone"):
         assert expected in text
+
+
+def test_board_shows_what_each_function_runs():
+    overview = Overview()
+    assert "Functions" not in shown(overview, 0.0), "there may be no manipulator"
+    groundings = [FunctionGrounding("f_move", "careful", "STABLE"), FunctionGrounding("f_arm", "", "RECONFIGURING")]
+    overview.take_configuration(ActiveConfiguration(functions=groundings))
+    text = shown(overview, 0.0)
+    for expected in ("f_move", "careful", "STABLE", "f_arm", "RECONFIGURING"):
+        assert expected in text
+    overview.take_configuration(ActiveConfiguration())
+    assert "f_move" not in shown(overview, 0.0)
 
 
 def test_finding_that_is_not_repeated_is_over():

@@ -1,4 +1,4 @@
-"""Tables for a terminal: the present state of nodes, qualities and findings, from diagnostics. Pure."""
+"""Tables for a terminal: the present state of functions, nodes, qualities and findings. Pure."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from metacontrol_msgs.msg import DiagnosticWords as Words
+from metacontrol_msgs.msg import FunctionGrounding
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -37,6 +38,12 @@ class Overview:
     qualities: dict[str, _Row] = field(default_factory=dict)
     findings: dict[tuple[str, str, str], _Row] = field(default_factory=dict)
     usage: dict[tuple[str, str], str] = field(default_factory=dict)
+    functions: dict[str, tuple[str, str]] = field(default_factory=dict)
+    """The configuration of each, and its state."""
+
+    def take_configuration(self, message: Any) -> None:
+        """Take in what the manipulator runs (metacontrol_msgs/ActiveConfiguration)."""
+        self.functions = {f.function: (f.configuration, f.state) for f in message.functions}
 
     def take(self, statuses: Iterable[Any], now: float) -> None:
         """Take in statuses (diagnostic_msgs/DiagnosticStatus) that arrived at wall time `now` in s."""
@@ -63,7 +70,15 @@ class Overview:
             now: wall time in s.
         """
         self.findings = {key: row for key, row in self.findings.items() if now - row.at <= _FORGET}
-        return Group(self._nodes(nodes), self._qualities(thresholds(parameters), now), self._findings())
+        tables = (self._nodes(nodes), self._qualities(thresholds(parameters), now), self._findings())
+        return Group(*([self._functions()] if self.functions else []), *tables)
+
+    def _functions(self) -> Table:
+        table = Table("function", "configuration", "state", title="Functions", title_justify="left")
+        for name, (configuration, state) in sorted(self.functions.items()):
+            style = _STYLE[s.Level.OK if state == FunctionGrounding.STABLE else s.Level.WARN]
+            table.add_row(Text(name), Text(configuration), Text(state, style))
+        return table
 
     def _nodes(self, nodes: Iterable[str]) -> Table:
         table = Table("node or component", "status", "CPU %", "MB", title="Nodes", title_justify="left")

@@ -1,4 +1,4 @@
-"""ROS shell of `rosrun rosgraph_monitor watch`: a live table of nodes, qualities, thresholds and findings."""
+"""ROS shell of `rosrun rosgraph_monitor watch`: live tables of functions, nodes, qualities and findings."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_bags import ownership
+from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.io.xml_rpc import CallError
 from node_kit.ros.lifetime import BAD_START, LONGEST_END, Lifetime
 from rich.console import Console, Group, RenderableType
@@ -35,7 +36,7 @@ def main() -> None:
 @click.command()
 @click.option("--once", type=float, metavar="S", help="Listen for so many seconds, print once and end.")
 def command(once: float | None) -> None:
-    """Show a live table of what the monitor says, until Ctrl-C; into a pipe, print the table whenever it differs.
+    """Show what runs and what the monitor says, live, until Ctrl-C; into a pipe, print it whenever it differs.
 
     For a robot in a namespace, set ROS_NAMESPACE.
 
@@ -58,7 +59,12 @@ def command(once: float | None) -> None:
         with lock:
             overview.take(own, time.monotonic())
 
+    def take_configuration(message: ActiveConfiguration) -> None:
+        with lock:
+            overview.take_configuration(message)
+
     rospy.Subscriber(ownership.TOPIC, DiagnosticArray, take, queue_size=100)
+    rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, take_configuration)
 
     def tables(graph: GraphSnapshot) -> Group:
         with lock:
