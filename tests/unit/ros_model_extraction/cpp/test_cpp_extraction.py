@@ -379,6 +379,11 @@ def test_only_what_main_can_reach_counts(node):
     assert {name for _, name, _ in found(node("Used used(nh); used.helped();", LIBRARY))} == {"virtual", "helped"}
 
 
+def test_class_within_a_function_is_part_of_it(node):
+    code = 'struct Own { void go(ros::NodeHandle n) { n.advertise<std_msgs::String>("x", 1); } }; Own().go(nh);'
+    assert found(node(code)) == {("publisher", "x", "std_msgs/String")}
+
+
 def test_class_that_is_named_in_a_text_may_be_loaded(node):
     assert {name for _, name, _ in found(node('load("demo/Unused");', LIBRARY))} == {"unused", "/tf"}
 

@@ -54,10 +54,12 @@ class ReachableCode:
         self._reached: set[int] = set()
         if self._has_main:
             self._follow()
+        everything = {function.id for function in self._functions}
+        self._unreached = everything - self._reached if self._has_main else set()
 
     def has_function(self, function: Node) -> bool:
-        """Return whether a function, by its definition, can be reached."""
-        return not self._has_main or function.id in self._reached
+        """Return whether a function, by its definition, can be reached; one within another counts as reached."""
+        return function.id not in self._unreached
 
     def has_class(self, name: str) -> bool:
         """Return whether objects of a class can be reached."""
@@ -65,22 +67,17 @@ class ReachableCode:
 
     def _follow(self) -> None:
         self._words = {"main", *self._globals}
-        seen: set[str] = set()
-        while True:
-            for name in (self._words & self._aliases.keys()) - seen:
-                seen.add(name)
+        known = -1
+        while known != len(self._words) + len(self._reached):
+            known = len(self._words) + len(self._reached)
+            for name in self._words & self._aliases.keys():
                 self._words |= self._aliases[name]
-            for name in (self._words & self._classes.keys()) - seen:
-                seen.add(name)
+            for name in self._words & self._classes.keys():
                 self._words |= self._classes[name].words | self._classes[name].bases
             for function in self._functions:
                 if function.id not in self._reached and self._is_called(function):
                     self._reached.add(function.id)
                     self._words |= function.words
-            if not (self._words & (self._classes.keys() | self._aliases.keys())) - seen and not any(
-                self._is_called(function) for function in self._functions if function.id not in self._reached
-            ):
-                return
 
     def _is_called(self, function: _Function) -> bool:
         if function.owner not in self._classes:
