@@ -458,6 +458,11 @@ def test_ways_of_writing_that_public_packages_have(node, code, expected):
     assert found(node(code, before)) == {expected}
 
 
+def test_type_without_its_package_that_two_packages_have_is_not_known(node):
+    before = "#include <std_msgs/Level.h>\n#include <demo_msgs/Level.h>"
+    assert found(node('nh.advertise<Level>("x", 1);', before)) == {("publisher", "x", "")}
+
+
 def test_reconfigure_server_is_no_callback_and_no_null(node):
     before = """
         class Worker {
@@ -503,6 +508,8 @@ def test_line_with_several_unknown_names_is_one_interface(node):
         ('int x; pnh.param("x", x, 7 / 0);', "Integer", None),
         ('double x; pnh.param("x", x, some());', "Double", None),
         ('XmlRpc::XmlRpcValue x; pnh.getParam("x", x);', None, None),
+        (f'double x; pnh.param("x", x, {"(" * 3000}1.0{")" * 3000});', "Double", None),
+        (f'double x; pnh.param("x", x, 1.0 + 1{"0" * 400});', "Double", None),
     ],
 )
 def test_parameter_has_the_type_and_the_default_that_the_code_gives_it(node, code, kind, default):

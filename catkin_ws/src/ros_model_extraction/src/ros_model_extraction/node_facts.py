@@ -12,7 +12,8 @@ from ros_model.language.packages import Node, ParameterDeclaration, PortDeclarat
 
 from ros_model_extraction.values import UnwritableValueError, typed
 
-_HOLE = re.compile(r"\{.*?\}(?=[^}]*@|[^}]*$)|\{[^{}]*\}")
+_HOLES = re.compile(r"\{.*\}")
+"""From the first expression in braces to the last one."""
 
 
 class SourceError(Exception):
@@ -93,7 +94,7 @@ class NodeSource:
         ports: dict[tuple[PortKind, str], PortDeclaration] = {}
         for port in self.ports:
             # What one line makes, with several names that are not known, is one interface.
-            name = port.name if port.is_resolved else f"{_HOLE.sub('{}', port.name)}:{port.position.column}"
+            name = port.name if port.is_resolved else f"{_HOLES.sub('{}', port.name)}:{port.position.column}"
             known = ports.get((port.kind, name))
             if known is None or (port.type and not known.type):
                 shown = known.name if known else port.name

@@ -92,9 +92,9 @@ _CONTROLLERS = (
 )
 
 PYTHON_BELOW = {
-    "interactive_markers.interactive_marker_server.InteractiveMarkerServer": (Below(_MARKERS), (0, "topic_ns")),
+    "interactive_markers.interactive_marker_server.InteractiveMarkerServer": (_MARKERS, (0, "topic_ns")),
 }
-"""And which argument has the namespace."""
+"""The interfaces, and which argument has the namespace that they are below (place, keyword)."""
 
 CPP_BELOW = {
     "interactive_markers::InteractiveMarkerServer": Below(_MARKERS, name=0),

@@ -13,7 +13,7 @@ from tree_sitter import Node
 
 from ros_model_extraction.cpp.declarations import File, Place
 from ros_model_extraction.cpp.handles import Handles, in_namespace
-from ros_model_extraction.cpp.program import Program
+from ros_model_extraction.cpp.program import MAX_DEPTH, Program
 from ros_model_extraction.cpp.syntax import (
     arguments_of,
     child_of,
@@ -422,9 +422,9 @@ def _is_null(arguments: Sequence[Node]) -> bool:
     return len(arguments) == 1 and text(arguments[0]) in ("NULL", "nullptr", "0")
 
 
-def _constant(node: Node | None) -> Any:
-    """Return a literal's value, None for what is none."""
-    if node is None:
+def _constant(node: Node | None, depth: int = 0) -> Any:
+    """Return the value of a literal, or of numbers that are calculated; None for what is none."""
+    if node is None or depth > MAX_DEPTH:
         return None
     shown = text(node)
     given = arguments_of(node)
@@ -437,19 +437,20 @@ def _constant(node: Node | None) -> Any:
         with contextlib.suppress(ValueError):
             found = float(shown.rstrip("fF")) if re.search(r"[.eE]", shown) else int(shown, 0)
     elif node.type == "call_expression" and shown.startswith(("std::string(", "string(")) and len(given) == 1:
-        found = _constant(given[0])
+        found = _constant(given[0], depth + 1)
     elif node.type == "parenthesized_expression" and node.named_child_count == 1:
-        found = _constant(node.named_children[0])
+        found = _constant(node.named_children[0], depth + 1)
     elif shown == "M_PI":
         found = math.pi
     elif node.type == "binary_expression":
-        found = _calculated(node)
+        with contextlib.suppress(OverflowError):
+            found = _calculated(node, depth)
     return found
 
 
-def _calculated(node: Node) -> int | float | None:
+def _calculated(node: Node, depth: int) -> int | float | None:
     """Return what a sum or product of numbers is, as C++ has it: integers divide without a rest."""
-    one, other = (_constant(child_of(node, side)) for side in ("left", "right"))
+    one, other = (_constant(child_of(node, side), depth + 1) for side in ("left", "right"))
     if not (isinstance(one, int | float) and isinstance(other, int | float)):
         return None
     match text(node.child_by_field_name("operator")):

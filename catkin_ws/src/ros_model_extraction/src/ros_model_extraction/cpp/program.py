@@ -89,7 +89,7 @@ class Program:
         return type_name
 
     def message_package(self, name: str) -> str:
-        """Return the package of a message that is named without it, by the header that is included; "" for none."""
+        """Return the package of a message that is named without it, by its header; "" for none, and for two."""
         return self._index.message_packages.get(name, "")
 
     def is_run(self, place: Place) -> bool:
@@ -284,7 +284,8 @@ class Program:
                     self._initialised(node, place)
                 case "preproc_include":
                     if match := _INCLUDED_TYPE.fullmatch(text(child_of(node, "path"))):
-                        self._index.message_packages[match[2]] = match[1]
+                        known = self._index.message_packages.setdefault(match[2], match[1])
+                        self._index.message_packages[match[2]] = match[1] if known == match[1] else ""
                 case "preproc_def":
                     value = text(node.child_by_field_name("value")).strip()
                     if value.startswith('"') and value.endswith('"') and len(value) > 1:

@@ -165,10 +165,10 @@ class _Reader:
         elif name in PYTHON_FIXED:
             self.ports += [FoundPort(made.kind, made.name, made.type, position) for made in PYTHON_FIXED[name]]
         elif name in PYTHON_BELOW:
-            below, place = PYTHON_BELOW[name]
+            interfaces, place = PYTHON_BELOW[name]
             for value, w in self._argument(given, place, frame, world, call):
                 prefix = text_of(value) or Text((Hole("namespace"),))
-                for made in below.made:
+                for made in interfaces:
                     self._found(made.kind, joined([prefix, Text((f"/{made.name}",))]), made.type, w, position)
         elif name in _RECONFIGURE:
             self._reconfigure(_RECONFIGURE[name], given, call, frame, world)
