@@ -17,6 +17,7 @@ from metacontrol_bags.record import CostReport, Event, QualityReport
 from metacontrol_bags.timeline import Timeline
 from metacontrol_msgs.msg import ActiveConfiguration, Decision, MissionEvent
 from node_kit.io.inbox import Inbox
+from node_kit.ros.connections import connect_to_all
 
 from metacontrol_experiments.io.processes import wait_until
 from metacontrol_experiments.mission.readiness import Readiness
@@ -65,6 +66,7 @@ class MissionNode(ABC, Generic[State]):
         self._began_wall = time.monotonic()
         self._startup = Startup(self._attend)
         self._startup.wait_for_master()
+        connect_to_all()
         rospy.init_node("mission", disable_signals=True)
         self._events = rospy.Publisher("mission/event", MissionEvent, queue_size=10)
         self._goal = self._make_goal()

@@ -3,6 +3,9 @@
 rospy reads the header of a new TCPROS connection in the thread that accepts all of them, without a deadline. Somebody
 who connects and says nothing, or takes the port for that of another node, as callers of an ended node may whose port
 was given anew, keeps all others out: topics are not connected any more, and services do not answer.
+
+A subscriber that connects twice has closed its first connection before it makes the second (`connections.py`). rospy
+would let the first replace the second where it is handled last; so connections that are closed already are left out.
 """
 
 from __future__ import annotations
@@ -37,10 +40,24 @@ def greet_apart() -> None:
 
 
 def _without_deadline(handler: _Handler) -> _Handler:
-    """Return a handler of connections whose header is read; from then on they may be silent."""
+    """Return a handler of connections whose header is read; from then on they may be silent. Closed ones are none."""
 
     def handle(client: socket.socket, address: object, header: object) -> Any:
-        client.settimeout(None)
+        if _is_closed(client):
+            client.close()
+            return None
+        client.setblocking(True)
         return handler(client, address, header)
 
     return handle
+
+
+def _is_closed(client: socket.socket) -> bool:
+    """Tell whether the other side has closed a connection on which all it has sent was read; it does not block then."""
+    client.setblocking(False)
+    try:
+        return not client.recv(1, socket.MSG_PEEK)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True

@@ -20,6 +20,7 @@ import rospy
 from node_kit.io.master_watch import MasterWatch
 from node_kit.io.xml_rpc import CallError
 from node_kit.master import View
+from node_kit.ros.connections import connect_to_all
 from node_kit.ros.handshakes import greet_apart
 from node_kit.ros.quick_start import quick_start
 
@@ -86,6 +87,7 @@ class Lifetime:
             self.watch.start(rosgraph.get_master_uri())
             if not self.watch.confirm():
                 self.end("there is no master", BAD_START)
+            connect_to_all()
             with quick_start():
                 rospy.init_node(self._name, anonymous=anonymous, disable_signals=True)
             greet_apart()

@@ -1,0 +1,67 @@
+"""Has rospy connect each topic to all of its publishers, once to each.
+
+With rospy alone, a node that listens to a topic of several publishers may never hear one of them, without a word:
+
+- Two lists of publishers that arrive within milliseconds, as they do while several nodes start, are handled by two
+  threads, and both connect to the same publisher. Here the newer connection replaces the older one. At the publisher
+  the older one may be handled last, and replaces the newer one. Both are closed, and nobody connects again.
+- The answer to the registration of a subscriber is a list of publishers, too. It may be handled after a newer list,
+  which is then dropped.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import defaultdict
+from typing import Any
+
+from rospy.impl.masterslave import ROSHandler
+from rospy.impl.registration import RegManager
+
+_connect_topic, _publisher_update = ROSHandler._connect_topic, RegManager.publisher_update
+
+
+def connect_to_all() -> None:
+    """Change rospy in this process, before `rospy.init_node` or after it; without effect a second time."""
+    ROSHandler._connect_topic, RegManager.publisher_update = _connect_once, _update_with_earlier
+
+
+class _Locks:
+    """A lock for each topic and publisher; it goes with the last thread that wants it."""
+
+    def __init__(self) -> None:
+        self._guard = threading.Lock()
+        self._locks: defaultdict[tuple[str, str], threading.Lock] = defaultdict(threading.Lock)
+        self._wanted: defaultdict[tuple[str, str], int] = defaultdict(int)
+
+    def acquire(self, key: tuple[str, str]) -> None:
+        with self._guard:
+            lock = self._locks[key]
+            self._wanted[key] += 1
+        lock.acquire()
+
+    def release(self, key: tuple[str, str]) -> None:
+        with self._guard:
+            self._locks[key].release()
+            self._wanted[key] -= 1
+            if not self._wanted[key]:
+                del self._wanted[key], self._locks[key]
+
+
+_locks = _Locks()
+
+
+def _connect_once(handler: ROSHandler, topic: str, publisher: str) -> Any:
+    """Connect to a publisher, unless that was done meanwhile; return what rospy returns: status, text, 0."""
+    _locks.acquire((topic, publisher))
+    try:
+        return _connect_topic(handler, topic, publisher)
+    finally:
+        _locks.release((topic, publisher))
+
+
+def _update_with_earlier(manager: RegManager, topic: str, publishers: list[str]) -> None:
+    """Take in a list of publishers, with those of lists not yet handled. One that is gone refuses the connection."""
+    with manager.cond:  # reentrant
+        waiting = [uri for name, uris in manager.updates if name == topic for uri in uris]
+        _publisher_update(manager, topic, list(dict.fromkeys([*publishers, *waiting])))

@@ -1,0 +1,82 @@
+"""A topic is connected to each of its publishers, once, however the lists of publishers come in."""
+
+import contextlib
+import socket
+import threading
+import time
+from socketserver import ThreadingMixIn
+from xmlrpc.server import SimpleXMLRPCServer
+
+import pytest
+import rospy.topics
+from helpers.waiting import wait_for
+from node_kit.ros.connections import connect_to_all
+from rospy.impl import registration, tcpros_base
+from rospy.impl.masterslave import ROSHandler
+from rospy.impl.registration import Registration, RegManager
+from std_msgs.msg import String
+
+UPDATES = 8
+
+
+class Api(ThreadingMixIn, SimpleXMLRPCServer):
+    daemon_threads = True
+
+
+class Publisher:
+    """Answers to whoever asks for a topic after a while, and keeps the connections that are then made."""
+
+    def __init__(self, stack):
+        self.server = stack.enter_context(socket.create_server(("localhost", 0)))
+        self.asked, self.connections = 0, []
+        api = stack.enter_context(Api(("localhost", 0), logRequests=False))
+        stack.callback(api.shutdown)
+        api.register_function(self.request_topic, "requestTopic")
+        self.uri = f"http://localhost:{api.server_address[1]}/"
+        threading.Thread(target=api.serve_forever, args=(0.01,), daemon=True).start()
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def request_topic(self, *_):
+        self.asked += 1
+        time.sleep(0.2)  # so that whoever else asks is there, too
+        return 1, "", ["TCPROS", "localhost", self.server.getsockname()[1]]
+
+    def accept(self):
+        with contextlib.suppress(OSError):
+            while True:
+                self.connections.append(self.server.accept()[0])
+
+
+@pytest.fixture
+def publisher():
+    with contextlib.ExitStack() as stack:
+        yield Publisher(stack)
+
+
+@pytest.fixture
+def topics(monkeypatch):
+    manager = rospy.topics._TopicManager()
+    monkeypatch.setattr(registration, "_topic_manager", manager)
+    monkeypatch.setattr(tcpros_base, "_use_tcp_keepalive", False)  # else it asks the master
+    connect_to_all()
+    yield manager
+    manager.close_all()
+
+
+def test_lists_that_come_at_once_make_one_connection(publisher, topics):
+    subscriber = topics.acquire_impl(Registration.SUB, "/news", String)
+    handler = ROSHandler("/listener", "http://localhost:1")
+    threads = [threading.Thread(target=handler._connect_topic, args=("/news", publisher.uri)) for _ in range(UPDATES)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    wait_for(lambda: publisher.connections, "a connection")
+    assert (publisher.asked, len(publisher.connections), len(subscriber.connections)) == (1, 1, 1)
+
+
+def test_publisher_that_a_newer_list_has_is_not_lost_when_an_older_list_comes_last(topics):
+    manager = RegManager(ROSHandler("/listener", "http://localhost:1"))
+    for topic, publishers in [("/news", ["http://b"]), ("/other", ["http://c"]), ("/news", ["http://a"])]:
+        manager.publisher_update(topic, publishers)
+    assert manager.updates[-1] == ("/news", ["http://a", "http://b"])
