@@ -17,10 +17,11 @@ def test_text_tells_configuration_levels_and_failures():
     text.take_diagnostics(report("QA status", "safety", 0.2))
     text.take_diagnostics(report("QA status", "energy", 0.61))
     assert text.lines() == ("f2_v2_r2", "energy 0.61", "safety 0.20") and not text.alarm
+    text.take_limits({"energy": 0.62, "noise": 1.0})
     text.take_diagnostics(report("Component status", "front_laser", "FALSE"))
     text.take_diagnostics(report("QA stale", "safety", "front/scan is silent"))
     text.take_configuration(ActiveConfiguration(functions=[FunctionGrounding("f_navigate", "f1", "RECONFIGURING")]))
-    assert text.lines() == ("f1 reconfiguring", "energy 0.61", "safety stale", "front_laser failed") and text.alarm
+    assert text.lines() == ("f1 reconfiguring", "energy 0.61 (limit 0.62)", "safety stale", "front_laser failed") and text.alarm
     text.take_diagnostics(report("Component status", "front_laser", "RECOVERED"))
     assert "front_laser failed" not in text.lines()
 

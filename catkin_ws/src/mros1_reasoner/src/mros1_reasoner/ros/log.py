@@ -15,14 +15,16 @@ from mros1_reasoner.ros.core_log import PREFIX
 from mros1_reasoner.ros.log_throttle import LogThrottle
 
 _LONGEST = 1000  # remarks that are told once
+_LEVEL_PERIOD = 30.0
+"""Wall s in which the level of a quality attribute is told once."""
 
 
 class Log:
     """Tells on rosout what the node does."""
 
-    def __init__(self, period: float) -> None:
-        """Tell levels at most once in a period, s."""
-        self._warnings, self._levels = LogThrottle(), LogThrottle(period, burst=1)
+    def __init__(self) -> None:
+        """Nothing is told yet."""
+        self._warnings, self._levels = LogThrottle(), LogThrottle(_LEVEL_PERIOD, burst=1)
         self._told: set[str] = set()
 
     def tell(self, text: str) -> None:

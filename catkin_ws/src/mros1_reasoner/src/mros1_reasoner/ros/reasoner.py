@@ -80,7 +80,7 @@ class ReasonerNode:
             {*knowledge_base.qualities, *knowledge_base.environment}, knowledge_base.components, parameters.nodes
         )
         self._node_of = {component: node for node, component in parameters.nodes.items()}
-        self._log = Log(self._period)
+        self._log = Log()
         self._taken_over: set[str] = set()
         self._goals: dict[str, tuple[str, bool]] = {}  # newest goal of an objective's task, and whether it failed
         self._journal = JournalTopic(name, parameters, knowledge_base.files)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from metacontrol_msgs.msg import DiagnosticWords, FunctionGrounding
@@ -15,6 +16,7 @@ class StatusText:
         """Start with nothing known."""
         self._configurations: list[str] = []
         self._levels: dict[str, float | None] = {}
+        self._limits: Mapping[str, float] = {}
         self._failed: set[str] = set()
         self._is_changing = False
 
@@ -28,6 +30,10 @@ class StatusText:
         grounded = [function for function in message.functions if function.configuration]
         self._is_changing = any(function.state != FunctionGrounding.STABLE for function in grounded)
         self._configurations = [self._configuration(function, alone=len(grounded) == 1) for function in grounded]
+
+    def take_limits(self, limits: Mapping[str, float]) -> None:
+        """Take the required levels of quality attributes, by their names."""
+        self._limits = limits
 
     def take_diagnostics(self, message: Any) -> None:
         """Take a diagnostic_msgs/DiagnosticArray."""
@@ -44,10 +50,12 @@ class StatusText:
 
     def lines(self) -> tuple[str, ...]:
         """Return the lines, from top to bottom."""
-        levels = (
-            f"{name} {'stale' if level is None else f'{level:.2f}'}" for name, level in sorted(self._levels.items())
-        )
+        levels = (self._level(name, level) for name, level in sorted(self._levels.items()))
         return (*self._configurations, *levels, *(f"{name} failed" for name in sorted(self._failed)))
+
+    def _level(self, name: str, level: float | None) -> str:
+        limit = f" (limit {self._limits[name]:g})" if name in self._limits else ""
+        return f"{name} {'stale' if level is None else f'{level:.2f}'}{limit}"
 
     @staticmethod
     def _configuration(grounding: Any, *, alone: bool) -> str:

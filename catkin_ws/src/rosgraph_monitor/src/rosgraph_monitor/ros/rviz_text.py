@@ -12,6 +12,7 @@ from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import Lifetime
 from visualization_msgs.msg import Marker
 
+from rosgraph_monitor.diagnostics.overview import thresholds
 from rosgraph_monitor.diagnostics.status_text import StatusText
 
 _PERIOD_S = 0.5
@@ -49,7 +50,9 @@ class RvizTextNode:
             self._text.take_diagnostics(message)
 
     def _on_configuration(self, message: ActiveConfiguration) -> None:
+        limits = thresholds(rospy.get_param(rospy.get_namespace(), {}))  # they may have changed meanwhile
         with self._lock:
+            self._text.take_limits(limits)
             self._text.take_configuration(message)
 
     def _publish(self) -> None:
