@@ -3,7 +3,7 @@
 
 The packages install to /usr, as Debian's own ROS packages do: share/PKG, lib/PKG, lib/python3/dist-packages/PKG. What
 they need beyond Debian is in `mros-python`: a virtual environment in /usr/lib/mros with the exact versions of
-requirements/python.txt. Only our executables use it, by their first line, so the system's own Python stays as it is.
+requirements/python-robot.txt and python.txt. Only our executables use it, by their first line, so the system's own Python stays as it is.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "catkin_ws" / "src"
-REQUIREMENTS = ROOT / "requirements" / "python.txt"
+REQUIREMENTS = [ROOT / "requirements" / "python-robot.txt", ROOT / "requirements" / "python.txt"]
 
 ENVIRONMENT = Path("usr/lib/mros")
 """Where the virtual environment is installed, from the root."""
@@ -326,7 +326,14 @@ def install_python(stage: Path, manifest: Manifest) -> Control:
     environment = stage / ENVIRONMENT
     run("/usr/bin/python3", "-m", "venv", "--system-site-packages", "--without-pip", "--symlinks", str(environment))
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", str(environment / "bin" / "python3"))
-    run(*pip, "install", "--ignore-installed", "--no-deps", "--no-compile", "-r", str(REQUIREMENTS))
+    run(
+        *pip,
+        "install",
+        "--ignore-installed",
+        "--no-deps",
+        "--no-compile",
+        *[f"--requirement={path}" for path in REQUIREMENTS],
+    )
     for path in (environment / "bin").iterdir():
         if not path.name.startswith("python"):
             path.unlink()  # commands of the packages, and scripts that name this folder

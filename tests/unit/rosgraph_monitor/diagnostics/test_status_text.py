@@ -21,7 +21,10 @@ def test_text_tells_configuration_levels_and_failures():
     text.take_diagnostics(report("Component status", "front_laser", "FALSE"))
     text.take_diagnostics(report("QA stale", "safety", "front/scan is silent"))
     text.take_configuration(ActiveConfiguration(functions=[FunctionGrounding("f_navigate", "f1", "RECONFIGURING")]))
-    assert text.lines() == ("f1 reconfiguring", "energy 0.61 (limit 0.62)", "safety stale", "front_laser failed") and text.alarm
+    assert (
+        text.lines() == ("f1 reconfiguring", "energy 0.61 (limit 0.62)", "safety stale", "front_laser failed")
+        and text.alarm
+    )
     text.take_diagnostics(report("Component status", "front_laser", "RECOVERED"))
     assert "front_laser failed" not in text.lines()
 
