@@ -3,7 +3,8 @@
 
 The packages install to /usr, as Debian's own ROS packages do: share/PKG, lib/PKG, lib/python3/dist-packages/PKG. What
 they need beyond Debian is in `mros-python`: a virtual environment in /usr/lib/mros with the exact versions of
-requirements/python-robot.txt and python.txt. Only our executables use it, by their first line, so the system's own Python stays as it is.
+requirements/python-robot.txt and python.txt. Only our executables use it, by their first line, so the system's own
+Python stays as it is.
 """
 
 from __future__ import annotations
