@@ -12,7 +12,7 @@ from ros_model.errors import ModelError
 from ros_model.generators import write_files
 from ros_model.generators.family import origin
 from ros_model.io.models import read_system
-from ros_model.io.project import locate, read_settings, read_table
+from ros_model.io.project import library_beside, locate, read_settings, read_table
 from ros_model.language.remappings import with_header
 from ros_model.language.system_writer import write_system
 from ros_model.project.columns import Columns, parse_columns
@@ -107,8 +107,9 @@ def variants(
 Pairs = list[tuple["RosSystem", "RosSystem"]]
 
 
-def _make(base: RosSystem, columns: Columns, table: Path, qa: Path | None) -> Pairs:
-    return list(make_systems(base, columns, read_table(table), read_table(qa) if qa else None))
+def _make(base: RosSystem, columns: Columns, table: Path, qa: Path | None, models: Path | None = None) -> Pairs:
+    library = library_beside(models) if models and columns.nodes else None
+    return list(make_systems(base, columns, read_table(table), read_table(qa) if qa else None, library))
 
 
 def _from_project(path: Path, table: str | None, qa: str | None) -> tuple[Pairs, Path, str]:
@@ -125,7 +126,7 @@ def _from_project(path: Path, table: str | None, qa: str | None) -> tuple[Pairs,
     for keys, family in families:
         chosen = Path(table) if table else settings.inside(*keys, "table")
         levels = Path(qa) if qa else settings.inside(*keys, "qa") if "qa" in family else None
-        found += _make(base, parse_columns(family, settings.within(keys)), chosen, levels)
+        found += _make(base, parse_columns(family, settings.within(keys)), chosen, levels, settings.path.parent)
         tables.append(table or family["table"])
     return found, settings.path.parent / "variants", origin(settings.content["base"], tables)
 

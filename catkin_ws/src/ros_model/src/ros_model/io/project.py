@@ -79,7 +79,7 @@ def load_project(folder: str | Path) -> Project:
         source=source,
         whole_base=whole_base,
         by_table=frozenset(by_table),
-        read_library=partial(_read_library, source.path.parent),
+        read_library=partial(library_beside, source.path.parent),
     )
     wrong.add(wrong_names(project))
     wrong.add(wrong_levels(project))
@@ -143,7 +143,12 @@ def read_table(path: Path) -> Table:
     return parse_table(read_text(path), path)
 
 
-def _read_library(folder: Path) -> Library:
+def library_beside(folder: Path) -> Library:
+    """Return what the `.ros` models of a folder, and of those below, declare.
+
+    Raises:
+        ModelError: one can't be read.
+    """
     return read_library(files_in(folder, PACKAGES))
 
 
@@ -170,7 +175,9 @@ def _from_table(source: Settings, keys: Keys, base: RosSystem, columns: Columns)
                 tables.append(read_table(source.inside(*keys, key)))
     wrong.tell()
     with _ruled(source):
-        return [part for _, part in make_systems(base, columns, *tables)], tables[1:]
+        library = library_beside(source.path.parent) if columns.nodes else None
+        qa = tables[1] if len(tables) > 1 else None
+        return [part for _, part in make_systems(base, columns, tables[0], qa, library)], tables[1:]
 
 
 def _from_files(source: Settings, keys: Keys) -> tuple[list[RosSystem], list[Table]]:

@@ -1,4 +1,4 @@
-"""What the columns of a table of variants set: parameters, connections, the presence of components, expected levels."""
+"""What the columns of a table of variants set: parameters, connections, executables, components, expected levels."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ros_model.errors import Gathered, ModelError
 from ros_model.language.library import hint
-from ros_model.language.metamodel import ENDS, PortPath, Position
+from ros_model.language.metamodel import ENDS, PortPath, Position, Reference
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import PortKind, RosSystem
@@ -64,6 +64,7 @@ class Columns:
         component: the component that varies, where a column doesn't say another.
         parameters: column -> parameters.
         wires: column -> its value -> connections.
+        nodes: column -> its value -> the node that the component is then.
         presence: column -> components that are there where it is true.
         expected: column -> quality attribute whose expected level it holds.
         ignored: columns that set nothing.
@@ -73,6 +74,7 @@ class Columns:
     component: str | None = None
     parameters: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
     wires: Mapping[str, Mapping[str, tuple[Wire, ...]]] = field(default_factory=dict)
+    nodes: Mapping[str, Mapping[str, Reference]] = field(default_factory=dict)
     presence: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     expected: Mapping[str, str] = field(default_factory=dict)
     ignored: frozenset[str] = frozenset()
@@ -81,7 +83,7 @@ class Columns:
     @property
     def names(self) -> frozenset[str]:
         """All columns that are mapped."""
-        return self.ignored.union(self.parameters, self.wires, self.presence, self.expected)
+        return self.ignored.union(self.parameters, self.wires, self.nodes, self.presence, self.expected)
 
     @property
     def optional(self) -> frozenset[str]:
@@ -127,6 +129,13 @@ def parse_columns(section: Mapping[str, Any], where: Where = _nowhere) -> Column
         target = PortPath.parse(entry["to"])
         return Wire(PortPath.parse(entry["from"]), target.component, target.port, where(*keys))
 
+    def node(column: str, value: str, text: str) -> Reference:
+        default("nodes", column, value)
+        try:
+            return Reference.parse(text)
+        except ValueError as error:
+            raise ModelError(f"{error}: write PACKAGE.EXECUTABLE.NODE", where("nodes", column, value)) from None
+
     return Columns(
         component,
         {
@@ -139,6 +148,10 @@ def parse_columns(section: Mapping[str, Any], where: Where = _nowhere) -> Column
                 for value, entries in choices.items()
             }
             for column, choices in section.get("connections", {}).items()
+        },
+        {
+            column: {value: node(column, value, text) for value, text in choices.items()}
+            for column, choices in section.get("nodes", {}).items()
         },
         {column: tuple(names) for column, names in section.get("components", {}).items()},
         section.get("expected", {}),

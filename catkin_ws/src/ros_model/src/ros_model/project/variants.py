@@ -8,6 +8,7 @@ from decimal import Decimal
 from typing import TYPE_CHECKING
 
 from ros_model.errors import Gathered, ModelError
+from ros_model.language.library import Library
 from ros_model.language.metamodel import (
     Component,
     Connection,
@@ -25,6 +26,7 @@ from ros_model.language.metamodel import (
 )
 from ros_model.language.remappings import with_header
 from ros_model.project.columns import TARGET_OF, check_columns, outlet, with_implied, with_ports
+from ros_model.project.executables import with_executable
 from ros_model.project.tables import Row
 
 if TYPE_CHECKING:
@@ -40,7 +42,7 @@ _PORT_ORDER = list(PortKind)
 
 
 def make_systems(
-    base: RosSystem, columns: Columns, table: Table, levels: Table | None = None
+    base: RosSystem, columns: Columns, table: Table, levels: Table | None = None, library: Library | None = None
 ) -> tuple[tuple[RosSystem, RosSystem], ...]:
     """Return, for each row of the table, the whole system and the part of it that the variant brings.
 
@@ -53,6 +55,7 @@ def make_systems(
         table: one row a variant.
         levels: a column for each quality attribute, and perhaps what tells where they are from:
             `source`, `seeds`, `missions`, `*_spread`.
+        library: declares the nodes that columns choose.
 
     Raises:
         ModelError: the base, the columns and the tables do not fit together; says where, of every row.
@@ -70,18 +73,19 @@ def make_systems(
         with wrong.step():
             expected += _expected(row, columns.expected, levels)
         with wrong.step():
-            whole = _whole(base, columns, row, expected)
+            whole = _whole(base, columns, row, expected, library or Library())
             found.append((whole, replace(_part(whole, columns.varied), parameters=tuple(expected))))
     wrong.tell()
     return tuple(found)
 
 
-def _whole(base: RosSystem, columns: Columns, row: Row, expected: list[SystemParameter]) -> RosSystem:
+def _whole(base: RosSystem, columns: Columns, row: Row, expected: list[SystemParameter], library: Library) -> RosSystem:
     """Return the whole system that a row makes of the base."""
     wrong = Gathered()
     wrong.add(_wrong_cells(columns, row))
     wrong.tell()
-    rewired = _rewired(without(base, _absent(row, columns)), columns, row)
+    present = _with_nodes(without(base, _absent(row, columns)), columns, row, library)
+    rewired = _rewired(present, columns, row)
     components = tuple(_with_parameters(component, columns, row) for component in rewired.components)
     own = {parameter.name for parameter in expected}
     inherited = tuple(parameter for parameter in base.parameters if parameter.name not in own)
@@ -94,7 +98,7 @@ def _wrong_cells(columns: Columns, row: Row) -> Iterator[ModelError]:
     for column in columns.presence:
         if not isinstance(row.cells[column], bool):
             yield ModelError(f"column {column!r} is {row.cells[column]!r}, must be true or false", row.position)
-    for column, choices in columns.wires.items():
+    for column, choices in (*columns.wires.items(), *columns.nodes.items()):
         if (value := _key(row.cells[column])) not in choices:
             yield ModelError(f"column {column!r} is {value!r}, must be {' or '.join(choices)}", row.position)
     for column, settings in columns.parameters.items():
@@ -134,6 +138,16 @@ def _part(whole: RosSystem, names: Collection[str]) -> RosSystem:
 
 def _absent(row: Row, columns: Columns) -> frozenset[str]:
     return frozenset(name for column, names in columns.presence.items() if not row.cells[column] for name in names)
+
+
+def _with_nodes(system: RosSystem, columns: Columns, row: Row, library: Library) -> RosSystem:
+    """Return the system with the nodes that the row chooses; a component that the variant lacks stays away."""
+    for column, choices in columns.nodes.items():
+        value = _key(row.cells[column])
+        if columns.component and system.component(columns.component):
+            where = columns.where("nodes", column, value)
+            system = with_executable(system, columns.component, choices[value], library, where)
+    return system
 
 
 def _rewired(system: RosSystem, columns: Columns, row: Row) -> RosSystem:
