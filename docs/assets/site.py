@@ -14,6 +14,7 @@ CONTENT = (
     "docs/**/*.png",
     "docs/**/*.svg",
     "docs/**/*.css",
+    "docs/**/*.js",
     "docker/*.md",
     "packaging/*.md",
     "examples/**/*.md",
