@@ -148,6 +148,15 @@ def test_node_of_a_variant_that_the_users_launch_file_starts(project, launched, 
     assert "in barn.launch" in line
 
 
+def test_arguments_of_a_node_that_variants_would_bring_without_them(project):
+    system = SystemFacts(snapshot(), launched={"/feeder": Launched("barn.launch", arguments="--hay 3")})
+    line = told(project(), system)[0]
+    assert line.startswith("/feeder: runs with the arguments '--hay 3', and variants bring it without any: ")
+    assert "arguments: {feeder: '--hay 3'}" in line
+    (note,) = told(project("arguments: {feeder: --hay 3}\n"), system)
+    assert note.startswith("note: ")
+
+
 def test_action_whose_goal_is_kept_is_offered_by_nobody(project):
     more = "manipulator: {save_action: feed, goal_msg_type: barn_msgs.msg.FeedAction}\n"
     (line,) = told(project(more), SystemFacts(snapshot()))

@@ -237,6 +237,9 @@ def _managed(project: Project, system: SystemFacts) -> Iterator[Complaint]:
         launched = system.launched.get(node or "")
         if node is None or launched is None:
             continue
+        if launched.arguments and name not in project.arguments:
+            what = f"runs with the arguments {launched.arguments!r}, and variants bring it without any"
+            yield Complaint(node, what, f"add to metacontrol.yaml: arguments: {{{name}: {launched.arguments!r}}}")
         where = f"in {launched.file}" if launched.file else "in the launch file that starts it"
         if launched.respawn:
             what = "variants bring this node, and roslaunch starts its own again (respawn)"

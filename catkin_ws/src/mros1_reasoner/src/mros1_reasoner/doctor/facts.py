@@ -33,11 +33,13 @@ class Launched:
         file: the launch file; empty if it is not known.
         respawn: whether roslaunch starts it again when it ends.
         required: whether roslaunch ends all of its nodes when this one ends.
+        arguments: what the launch file gives the program (`args`).
     """
 
     file: str = ""
     respawn: bool = False
     required: bool = False
+    arguments: str = ""
 
 
 @dataclass(frozen=True)

@@ -249,7 +249,9 @@ def _launch_file(arguments: Sequence[str], folder: Path) -> Path:
 def _entry(path: str, node: str, entries: Sequence[Any]) -> Launched:
     """Return what a launch file says of a node."""
     entry = next((entry for entry in entries if f"{entry.namespace}{entry.name}" == node), None)
-    return Launched(path, bool(entry.respawn), bool(entry.required)) if entry else Launched(path)
+    if entry is None:
+        return Launched(path)
+    return Launched(path, bool(entry.respawn), bool(entry.required), " ".join(str(entry.args or "").split()))
 
 
 def _address_problem(master: str) -> str:
