@@ -275,7 +275,7 @@ def test_executable_without_the_interfaces_is_no_alternative(run, base):
     (path.parent / "w.ros").write_text(SOURCES)
     status, _, err = run("init", path, "--component", "finder", "--alternative", "w/sound")
     assert status == 2
-    assert "--alternative 'w/sound' has not the interfaces of cell_2/finder; there are w/laser_finder.py" in err
+    assert "--alternative 'w/sound' does not have the interfaces of cell_2/finder; there are w/laser_finder.py" in err
 
 
 def test_new_package_is_whole_and_lints_clean(run, base, tmp_path):

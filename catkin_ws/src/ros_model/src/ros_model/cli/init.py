@@ -197,7 +197,7 @@ def _alternatives(component: Component, folder: Path, names: tuple[str, ...]) ->
     """Return the executables that become variants: those named, or said yes to; others are told.
 
     Raises:
-        ModelError: one that is named has not the interfaces of the component.
+        ModelError: one that is named does not have the interfaces of the component.
     """
     library, unread = read_sources(folder)
     for error in unread:
@@ -206,7 +206,7 @@ def _alternatives(component: Component, folder: Path, names: tuple[str, ...]) ->
     for name in names:
         if name not in found:
             known = f"there are {', '.join(found)}" if found else "no model beside the base tells of one"
-            raise ModelError(f"--alternative {name!r} has not the interfaces of {component.graph_name}; {known}")
+            raise ModelError(f"--alternative {name!r} does not have the interfaces of {component.graph_name}; {known}")
     chosen = [found[name] for name in names]
     for name, other in found.items():
         if name in names:
