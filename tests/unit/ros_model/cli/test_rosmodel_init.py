@@ -1,6 +1,8 @@
 """`rosmodel init`: a first metacontrol.yaml that checks clean as it is, and never takes the place of one."""
 
 import errno
+import io
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -52,8 +54,9 @@ def test_what_varies_is_what_acts_or_what_is_said(run, base):
     assert project.settings["variants"]["component"] == "move_base"
     other = base(D2.read_text()).parent.parent / "other.rossystem"
     other.write_text(D2.read_text())
-    assert run("init", other, "--component", "camera", "--package", "mine", "--qa", "safety", "--qa", "energy")[0] == 0
-    settings = yaml.safe_load((other.parent / "metacontrol.yaml").read_text())
+    named = ("--package", "mine", "-o", other.parent)
+    assert run("init", other, "--component", "camera", *named, "--qa", "safety", "--qa", "energy")[0] == 0
+    settings = yaml.safe_load((other.parent / "mine" / "models" / "metacontrol.yaml").read_text())
     assert (settings["variants"]["component"], settings["package"]) == ("camera", "mine")
     assert list(settings["quality_attributes"]) == ["safety", "energy", "performance"]
 
@@ -175,3 +178,139 @@ def test_copies_told_apart_by_their_namespaces_are_both_components(run, base):
     assert run("init", path)[0] == 0
     settings = yaml.safe_load((path.parent / "metacontrol.yaml").read_text())
     assert set(settings["components"]) == {"left/camera", "right/camera", "right/picker"}
+
+
+WELDER = """RosSystem { Name line RosComponents (
+    ComponentInterface { name welder NameSpace cell_2 FromRosNode 'w.welder.welder'
+        RosSubscribers { RosSubscriber seam { RefSubscriber 'w.welder.welder.seam' } }
+        RosParameters { PARAMETERS } },
+    ComponentInterface { name finder NameSpace cell_2 FromRosNode 'w.finder.finder'
+        RosPublishers { RosPublisher seam { RefPublisher 'w.finder.finder.seam' } }
+        RosParameters { RosParameter gain { RefParameter 'w.finder.finder.gain' value 2.0 } } } )
+    TopicConnections { TopicConnection 'cell_2/seam' { From ( 'finder.seam' ) To ( 'welder.seam' ) } } }""".replace(
+    "PARAMETERS",
+    ",".join(
+        f"RosParameter '{name}' {{ RefParameter 'w.welder.welder.{name}' value {number}.5 }}"
+        for number, name in enumerate(["arc/current", "arc/voltage", *(f"limit_{number}" for number in range(8))])
+    ),
+)
+SOURCES = """PackageSet { CatkinPackage w {
+    Artifact finder { Node finder { Publishers { Publisher seam { message 'sensor_msgs.Image' } }
+        Parameters { Parameter { name gain type Double } } } },
+    Artifact 'laser_finder.py' { Node laser { Publishers { Publisher line { message 'sensor_msgs.Image' } } } },
+    Artifact two { Node two { Publishers {
+        Publisher left { message 'sensor_msgs.Image' }, Publisher right { message 'sensor_msgs.Image' } } } },
+    Artifact sound { Node sound { Publishers { Publisher seam { message 'std_msgs.String' } } } },
+    Artifact welder { Node welder { Subscribers { Subscriber seam { message 'sensor_msgs.Image' } }
+        Parameters { NAMES } } } } }""".replace(
+    "NAMES",
+    ",".join(
+        f"Parameter {{ name '{name}' type Double }}"
+        for name in ("arc/current", "arc/voltage", *(f"limit_{number}" for number in range(8)))
+    ),
+)
+
+
+def columns_of(folder):
+    return (folder / "variants.csv").read_text().splitlines()[0].split(",")[1:]
+
+
+def test_many_parameters_are_no_columns_unless_asked_for(run, base):
+    path = base(WELDER)
+    status, out, _ = run("init", path, "--component", "welder")
+    assert (status, columns_of(path.parent)) == (0, [])
+    assert "10 parameters of cell_2/welder are no column: arc/current, arc/voltage," in out
+    assert "--vary 'cell_2/welder/arc/current'" in out
+    assert run("check", path.parent)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("patterns", "columns"),
+    [
+        (["cell_2/welder/arc/*"], ["current", "voltage"]),
+        (["limit_[01]", "arc/current"], ["limit_0", "limit_1", "current"]),
+        (["finder/gain", "welder/arc/voltage"], ["gain", "voltage"]),
+    ],
+)
+def test_parameters_that_vary_are_columns_also_those_of_other_components(run, base, patterns, columns):
+    path = base(WELDER)
+    options = [word for pattern in patterns for word in ("--vary", pattern)]
+    assert run("init", path, "--component", "cell_2/welder", *options)[0] == 0
+    assert columns_of(path.parent) == columns
+    assert run("check", path.parent)[0] == 0
+    assert run("generate", "all", path.parent, "-o", path.parent.parent)[0] == 0
+
+
+def test_pattern_that_fits_nothing_is_refused(run, base):
+    path = base(WELDER)
+    status, _, err = run("init", path, "--component", "welder", "--vary", "wleder/*")
+    assert status == 2
+    assert "--vary 'wleder/*' fits no parameter that a table can hold; there are cell_2/welder/arc/current," in err
+
+
+def test_executables_with_the_same_interfaces_are_offered_and_become_variants(run, base):
+    path = base(WELDER)
+    (path.parent / "w.ros").write_text(SOURCES)
+    offer = "w/laser_finder.py has the interfaces of cell_2/finder"
+    arguments = ("init", path, "--component", "finder", "-o", path.parent.parent.parent, "--package", "line")
+    status, out, err = run(*arguments, "--alternative", "w/laser_finder.py")
+    assert status == 0, err
+    assert "w/two" not in out
+    assert "w/sound" not in out
+    models = path.parent.parent.parent / "line" / "models"
+    project = load_project(models)
+    (variant,) = (variant for variant in project.variants if variant.name == "line_laser_finder")
+    (finder,) = variant.components
+    assert (finder.graph_name, str(finder.executable)) == ("cell_2/finder", "w.laser_finder.py.laser")
+    assert [(port.name, port.reference.name) for port in finder.ports] == [("seam", "line")]
+    launch = (models.parent / "launch" / "variants" / "line_laser_finder.launch").read_text()
+    assert 'type="laser_finder.py"' in launch
+    assert 'ns="cell_2"' in launch
+    assert '<remap from="line" to="/cell_2/seam" />' in launch
+    assert offer in run("init", path, "--component", "finder")[1]
+
+
+def test_executable_without_the_interfaces_is_no_alternative(run, base):
+    path = base(WELDER)
+    (path.parent / "w.ros").write_text(SOURCES)
+    status, _, err = run("init", path, "--component", "finder", "--alternative", "w/sound")
+    assert status == 2
+    assert "--alternative 'w/sound' does not have the interfaces of cell_2/finder; there are w/laser_finder.py" in err
+
+
+def test_new_package_is_whole_and_lints_clean(run, base, tmp_path):
+    path = base(WELDER)
+    status, out, _ = run("init", path, "--package", "welding", "-o", tmp_path / "src")
+    folder = tmp_path / "src" / "welding"
+    assert status == 0
+    assert "w: not on ROS_PACKAGE_PATH" in out
+    for name in ("package.xml", "CMakeLists.txt", "setup.py", "launch/welding.launch", "config/reasoner.yaml"):
+        assert (folder / name).is_file()
+    assert load_project(folder / "models").package == "welding"
+    assert run("check", folder / "models")[0] == 0
+    lint = subprocess.run(["catkin_lint", "--strict", "-W2", str(folder)], check=False, capture_output=True, text=True)
+    assert lint.returncode == 0, lint.stderr
+
+
+def test_new_package_takes_no_folder_that_is_there(run, base, tmp_path):
+    path = base(WELDER)
+    (tmp_path / "welding").mkdir()
+    status, _, err = run("init", path, "--package", "welding", "-o", tmp_path)
+    assert (status, "is there already" in err) == (2, True)
+
+
+def test_new_package_has_a_name_of_small_letters(run, base, tmp_path):
+    status, _, err = run("init", base(WELDER), "--package", "Welding", "-o", tmp_path)
+    assert (status, "is no name of a new package" in err) == (2, True)
+
+
+def test_answers_on_a_terminal_choose_parameters_and_alternatives(run, base, monkeypatch):
+    path = base(WELDER)
+    (path.parent / "w.ros").write_text(SOURCES)
+    monkeypatch.setattr("ros_model.cli.init._is_asked", lambda: True)
+    monkeypatch.setattr("sys.stdin", io.StringIO("1\ny\n"))
+    status, out, _ = run("init", path, "--component", "finder")
+    assert status == 0
+    assert "1  gain = 2.0" in out
+    assert columns_of(path.parent) == ["gain"]
+    assert {variant.name for variant in load_project(path.parent).variants} == {"line_default", "line_laser_finder"}

@@ -77,6 +77,15 @@ def generate(what: str, models: str | None, output: str | None, as_packages: boo
     if what == "launch" and models.endswith(_SYSTEM):
         _generate_launch_file(Path(models), Path(output))
         return
+    run_generators(what, models, output, as_packages=as_packages)
+
+
+def run_generators(what: str, models: str, output: str, *, as_packages: bool = False) -> None:
+    """Check a project, run one generator or all, and tell what was written.
+
+    Raises:
+        ModelError: there is no such generator, the project has an error, or a file can't be written.
+    """
     generators = find_generators()
     if what != ALL and what not in generators:
         raise ModelError(f"no generator {what!r}: there are {', '.join(sorted(generators))} and {ALL}")

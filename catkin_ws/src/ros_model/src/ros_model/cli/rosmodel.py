@@ -28,7 +28,7 @@ _COMMANDS = {
     "variants": "ros_model.cli.variants:variants",
 }
 """Command -> where it is. A command's module is imported when it is run, so that the others' imports cost nothing."""
-_OFFERED = {"extract": "ros_model_extraction", "snapshot": "ros_model_extraction"}
+_OFFERED = {"doctor": "mros1_reasoner", "extract": "ros_model_extraction", "snapshot": "ros_model_extraction"}
 """Command -> the package of this project that adds it, to be named where it is not there."""
 _PLUGINS = "ros_model"
 """Tag of what packages export: `<export><ros_model command="NAME" function="MODULE:FUNCTION"/></export>`."""

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 from ros_model.findings import ERROR, WARNING
+from ros_model.language.metamodel import Reference
 from ros_model.language.packages import Node, Package, Spec, SpecKind
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
-    from ros_model.language.metamodel import Reference
     from ros_model.language.packages import MessageField, PortDeclaration
 
 BUILTIN_TYPES = frozenset(
@@ -148,6 +148,17 @@ class Library:
         """Return what is declared of an executable, under any name of its node; None if no model declares it."""
         nodes = self._nodes.get(reference.package, {}).get(reference.artifact)
         return None if nodes is None else tuple(port for node in nodes.values() for port in node.ports)
+
+    def executables(self) -> Iterator[tuple[Reference, Node]]:
+        """Yield each executable that models declare, with what is declared of it, under the first name of its node."""
+        for package, artifacts in self._nodes.items():
+            for artifact, nodes in artifacts.items():
+                for name in nodes:
+                    reference = Reference(package, artifact, name)
+                    found = self.node(reference)
+                    if isinstance(found, Node):
+                        yield reference, found
+                    break
 
     def missing_type(self, kind: SpecKind, name: str) -> Unknown | None:
         """Return what is wrong with the name of a message, service or action type; None if it is known."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import csv
+import fnmatch
 import io
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import PortKind
+from ros_model.language.system_writer import write_system
+from ros_model.project.alternatives import variant_of
 from ros_model.project.schema_check import load_schema
 from ros_model.project.settings import FILE_NAME
 from ros_model.project.tables import NAME, typed_cell
@@ -19,10 +22,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from ros_model.language.metamodel import Component, RosParameter, RosSystem
+    from ros_model.project.alternatives import Alternative
 
 TABLE = "variants.csv"
 LEVELS = "qa.csv"
+ALTERNATIVE_LEVELS = "alternatives_qa.csv"
 UTILITY = "performance"
+_FEW = 8
+"""Parameters that are all columns if nobody says which: a table that still fits a screen."""
+_SHOWN = 5  # names in a remark
 _GRAPH_NAME = re.compile(load_schema("metacontrol")["$defs"]["graph_name"]["pattern"])
 
 _TEMPLATE = """\
@@ -36,7 +44,7 @@ base: {base}
 
 variants:
   # CHANGE: the component that the variants bring, in place of the base's.
-  component: {component}
+- component: {component}
   # One row for each variant; its name is that of its launch file and of its function design.
   table: {table}
   # Its expected level of each quality attribute, measured or estimated.
@@ -52,7 +60,7 @@ variants:
   #     none: []
   # Column of true and false -> components that are there or not.
   # components:
-  #   has_filter: [scan_filter]
+  #   has_filter: [scan_filter]{alternatives}
 
 # What the robot can do, and which variants (all, or a list of names) do it. CHANGE the name.
 # requires: [FUNCTION] names functions that must be provided too.
@@ -92,11 +100,24 @@ manipulator:
 
 @dataclass(frozen=True)
 class Choices:
-    """What a first project needs to know beside the base; None: it is guessed."""
+    """What a first project needs to know beside the base; None: it is guessed.
+
+    Attributes:
+        package: the package of the models.
+        component: what varies.
+        qualities: quality attributes, beside performance.
+        vary: shell patterns of the parameters that become columns, `NODE/PARAMETER` or `PARAMETER` of the component
+            that varies; None: all of that component if they are few, else none.
+        alternatives: executables that become variants, too.
+        ranges: of parameters, in words, by package and parameter.
+    """
 
     package: str
     component: str | None = None
     qualities: tuple[str, ...] = ()
+    vary: tuple[str, ...] | None = None
+    alternatives: tuple[Alternative, ...] = ()
+    ranges: Mapping[tuple[str, str], str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -104,12 +125,14 @@ class FirstProject:
     """A first project.
 
     Attributes:
-        texts: of metacontrol.yaml and its two tables, by the names of the files.
+        texts: of metacontrol.yaml, its tables and files of variants, by the names of the files.
         remarks: what the project leaves to the user, one line each.
+        variant: the name of the variant that is as the base.
     """
 
     texts: dict[str, str]
     remarks: tuple[str, ...] = ()
+    variant: str = ""
 
 
 def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> FirstProject:
@@ -125,10 +148,11 @@ def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> 
         ModelError: the base has no component that could vary, or not the one chosen.
     """
     component = _varying(base, choices.component)
-    columns = _columns(component)
+    columns = _columns(base, component, choices.vary)
     variant = re.sub(r"[^A-Za-z0-9_]+", "_", base.name).strip("_").lower() or "base"
     what = re.sub(r"\W+", "_", component.name, flags=re.ASCII).strip("_")
     qualities = dict.fromkeys((*choices.qualities, UTILITY))
+    others_run = [variant_of(alternative, base) for alternative in choices.alternatives]
     others = {key: name for key, name in _nodes(base).items() if name != component.graph_name}
     nodes = {key: {"node": name} for key, name in others.items() if _GRAPH_NAME.search(key) and "\n" not in key}
     action = next((p.name for p in component.ports if p.kind is PortKind.ACTION_SERVER), None)
@@ -140,7 +164,8 @@ def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> 
         component=flow(component.name),
         table=TABLE,
         levels=LEVELS,
-        parameters=_lines({column: [parameter.key] for column, parameter in columns.items()}),
+        parameters=_lines({column: [chosen.entry(component)] for column, chosen in columns.items()}),
+        alternatives=_family_of_files([variant.name for variant in others_run]),
         example_port=_example_port(base, component),
         function=f"f_{what}",
         objective=f"o_{what}",
@@ -150,14 +175,79 @@ def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> 
         action=f"  # save_action: {action or 'ACTION'}\n  # goal_msg_type: PACKAGE.msg.TYPEAction",
         kill=flow(component.graph_name),
     )
-    values = [_cell(parameter) for parameter in columns.values()]
+    if not others_run:
+        text = text.replace("\n- component:", "\n  component:", 1)
+    values = [_cell(chosen.parameter) for chosen in columns.values()]
     texts = {
         FILE_NAME: text,
         TABLE: _csv([NAME, *columns], [f"{variant}_default", *values]),
         LEVELS: _csv([NAME, *qualities, "source"], [f"{variant}_default", *["0.5"] * len(qualities), "estimated"]),
     }
+    if others_run:
+        rows = [[system.name, *["0.5"] * len(qualities), "estimated"] for system in others_run]
+        texts[ALTERNATIVE_LEVELS] = _csv([NAME, *qualities, "source"], *rows)
+        texts |= {f"variants/{system.name}.rossystem": write_system(system) for system in others_run}
     unnamed = [name for key, name in others.items() if key not in nodes]
-    return FirstProject(texts, (*_copies(base, component), *_unnamed(unnamed)))
+    remarks = (*_left_out(component, columns, choices), *_copies(base, component), *_unnamed(unnamed))
+    return FirstProject(texts, remarks, f"{variant}_default")
+
+
+def varying(base: RosSystem, name: str | None = None) -> Component:
+    """Return the component that is to vary: the one chosen, by its name or that of its node, else the likeliest.
+
+    Raises:
+        ModelError: the base has no component that could vary, or not the one chosen.
+    """
+    return _varying(base, name)
+
+
+def parameters_of(component: Component) -> list[RosParameter]:
+    """Return the parameters of a component whose values a cell of a table can hold."""
+    return [parameter for parameter in component.parameters if _fits_cell(parameter)]
+
+
+def default_columns(component: Component) -> list[RosParameter]:
+    """Return the parameters that become columns if nobody says which: all, if they are few, else none."""
+    found = parameters_of(component)
+    return found if len(found) <= _FEW else []
+
+
+@dataclass(frozen=True)
+class _Column:
+    component: Component
+    parameter: RosParameter
+
+    def entry(self, varied: Component) -> str | dict[str, str]:
+        """Return what stands under `parameters` in metacontrol.yaml."""
+        if self.component is varied:
+            return self.parameter.key
+        return {"name": self.parameter.key, "component": self.component.name}
+
+
+def _family_of_files(names: Sequence[str]) -> str:
+    if not names:
+        return ""
+    files = "".join(f"\n  - variants/{name}.rossystem" for name in names)
+    told = "\n  # Variants that run another executable, each a file that is yours."
+    return f"{told}\n- files:{files}\n  qa: {ALTERNATIVE_LEVELS}"
+
+
+def _left_out(component: Component, columns: Mapping[str, _Column], choices: Choices) -> Iterator[str]:
+    """Yield which parameters are columns, which are not, and how to add one."""
+    package = component.executable.package if component.executable else ""
+    for name, column in columns.items():
+        if told := choices.ranges.get((package, column.parameter.key.rpartition("/")[2])):
+            yield f"column {name}: {told}"
+    chosen = {id(column.parameter) for column in columns.values()}
+    rest = [parameter.key for parameter in parameters_of(component) if id(parameter) not in chosen]
+    if rest:
+        shown = ", ".join(rest[:_SHOWN]) + (", ..." if len(rest) > _SHOWN else "")
+        count = f"{len(rest)} parameters" if len(rest) != 1 else "1 parameter"
+        yield (
+            f"{count} of {component.graph_name} {'is' if len(rest) == 1 else 'are'} no column: {shown}. "
+            f"To vary one, add a column to {TABLE} and its name to `parameters`, or start again "
+            f"with --vary '{component.graph_name}/{rest[0]}'"
+        )
 
 
 def _nodes(base: RosSystem) -> dict[str, str]:
@@ -192,7 +282,8 @@ def _varying(base: RosSystem, name: str | None) -> Component:
     """Return the component that was chosen, else the one that most looks like it: by actions, parameters, inputs."""
     candidates = [component for component in base.components if component.executable and component.executable.node]
     if name is not None:
-        chosen = next((component for component in candidates if component.name == name), None)
+        named = [component for component in candidates if name in {component.name, component.graph_name}]
+        chosen = named[0] if named else None
         if chosen is None:
             known = ", ".join(component.name for component in candidates)
             raise ModelError(f"{name!r} is no component with a FromRosNode; there are {known}", base.position)
@@ -208,19 +299,54 @@ def _varying(base: RosSystem, name: str | None) -> Component:
     return max(candidates, key=likeness)
 
 
-def _columns(component: Component) -> dict[str, RosParameter]:
-    """Return a column for each parameter whose value a cell can hold, named by the last part of its name."""
-    found: dict[str, RosParameter] = {}
-    for parameter in component.parameters:
-        text = _cell(parameter)
-        again = typed_cell(text)
-        if parameter.value is None or again != parameter.value or type(again) is not type(parameter.value):
-            continue
-        column = parameter.key.rpartition("/")[2]
+def _columns(base: RosSystem, component: Component, patterns: Sequence[str] | None) -> dict[str, _Column]:
+    """Return a column for each parameter that varies, named by the last part of its name.
+
+    Raises:
+        ModelError: a pattern fits no parameter.
+    """
+    if patterns is None:
+        chosen = [_Column(component, parameter) for parameter in default_columns(component)]
+    else:
+        chosen = _chosen(base, component, patterns)
+    found: dict[str, _Column] = {}
+    for entry in chosen:
+        column = entry.parameter.key.rpartition("/")[2]
         if column in found or column in {NAME, ""}:
-            column = parameter.key
-        found.setdefault(column, parameter)
+            column = entry.parameter.key
+        if column in found:
+            column = f"{entry.component.name}/{entry.parameter.key}"
+        found.setdefault(column, entry)
     return found
+
+
+def _chosen(base: RosSystem, component: Component, patterns: Sequence[str]) -> list[_Column]:
+    others = [other for other in base.components if other is not component and other.executable]
+    candidates = [
+        (_Column(owner, parameter), names)
+        for owner in (component, *others)
+        for parameter in parameters_of(owner)
+        if (names := _names(owner, parameter, is_varied=owner is component))
+    ]
+    found: dict[int, _Column] = {}
+    for pattern in patterns:
+        fitting = [c for c, names in candidates if any(fnmatch.fnmatchcase(name, pattern.strip("/")) for name in names)]
+        if not fitting:
+            known = [f"{owner.component.graph_name}/{owner.parameter.key}" for owner, _ in candidates[:_SHOWN]]
+            there = ", ".join(known) + (", ..." if len(candidates) > _SHOWN else "") or "none"
+            raise ModelError(f"--vary {pattern!r} fits no parameter that a table can hold; there are {there}")
+        found |= {id(column.parameter): column for column in fitting}
+    return list(found.values())
+
+
+def _names(component: Component, parameter: RosParameter, *, is_varied: bool) -> tuple[str, ...]:
+    names = (f"{component.graph_name}/{parameter.key}", f"{component.name}/{parameter.key}")
+    return (*names, parameter.key) if is_varied else names
+
+
+def _fits_cell(parameter: RosParameter) -> bool:
+    again = typed_cell(_cell(parameter))
+    return parameter.value is not None and again == parameter.value and type(again) is type(parameter.value)
 
 
 def _cell(parameter: RosParameter) -> str:
