@@ -197,7 +197,8 @@ WELDER = """RosSystem { Name line RosComponents (
 SOURCES = """PackageSet { CatkinPackage w {
     Artifact finder { Node finder { Publishers { Publisher seam { message 'sensor_msgs.Image' } }
         Parameters { Parameter { name gain type Double } } } },
-    Artifact 'laser_finder.py' { Node laser { Publishers { Publisher line { message 'sensor_msgs.Image' } } } },
+    Artifact 'laser_finder.py' { Node laser { Publishers { Publisher line { message 'sensor_msgs.Image' } }
+        Parameters { Parameter { name 'power' type Double } } } },
     Artifact two { Node two { Publishers {
         Publisher left { message 'sensor_msgs.Image' }, Publisher right { message 'sensor_msgs.Image' } } } },
     Artifact sound { Node sound { Publishers { Publisher seam { message 'std_msgs.String' } } } },
@@ -248,10 +249,10 @@ def test_pattern_that_fits_nothing_is_refused(run, base):
     assert "--vary 'wleder/*' fits no parameter that a table can hold; there are cell_2/welder/arc/current," in err
 
 
-def test_executables_with_the_same_interfaces_are_offered_and_become_variants(run, base):
+def test_executables_with_the_same_outputs_are_offered_and_become_variants(run, base):
     path = base(WELDER)
     (path.parent / "w.ros").write_text(SOURCES)
-    offer = "w/laser_finder.py has the interfaces of cell_2/finder"
+    offer = "w/laser_finder.py publishes and serves what cell_2/finder does"
     arguments = ("init", path, "--component", "finder", "-o", path.parent.parent.parent, "--package", "line")
     status, out, err = run(*arguments, "--alternative", "w/laser_finder.py")
     assert status == 0, err
@@ -270,12 +271,15 @@ def test_executables_with_the_same_interfaces_are_offered_and_become_variants(ru
     assert offer in run("init", path, "--component", "finder")[1]
 
 
-def test_executable_without_the_interfaces_is_no_alternative(run, base):
+def test_executable_without_the_outputs_is_no_alternative(run, base):
     path = base(WELDER)
     (path.parent / "w.ros").write_text(SOURCES)
     status, _, err = run("init", path, "--component", "finder", "--alternative", "w/sound")
     assert status == 2
-    assert "--alternative 'w/sound' does not have the interfaces of cell_2/finder; there are w/laser_finder.py" in err
+    assert (
+        "--alternative 'w/sound' does not publish and serve all that cell_2/finder does; there are w/laser_finder.py"
+        in err
+    )
 
 
 def test_new_package_is_whole_and_lints_clean(run, base, tmp_path):
@@ -312,5 +316,5 @@ def test_answers_on_a_terminal_choose_parameters_and_alternatives(run, base, mon
     status, out, _ = run("init", path, "--component", "finder")
     assert status == 0
     assert "1  gain = 2.0" in out
-    assert columns_of(path.parent) == ["gain"]
+    assert columns_of(path.parent) == ["finder", "gain"]
     assert {variant.name for variant in load_project(path.parent).variants} == {"line_default", "line_laser_finder"}

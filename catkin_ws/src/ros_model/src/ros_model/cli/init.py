@@ -21,7 +21,8 @@ from ros_model.io.installed import InstalledPackages
 from ros_model.io.models import files_in, read_sources, read_system
 from ros_model.io.project import load_project
 from ros_model.language.any_language import PACKAGES
-from ros_model.project.alternatives import alternatives
+from ros_model.language.library import Unknown
+from ros_model.project.executables import alternatives
 from ros_model.project.first_package import package_texts
 from ros_model.project.first_project import (
     LEVELS,
@@ -35,8 +36,7 @@ from ros_model.project.first_project import (
 from ros_model.project.requirements import requirement_lines
 
 if TYPE_CHECKING:
-    from ros_model.language.metamodel import Component, RosSystem
-    from ros_model.project.alternatives import Alternative
+    from ros_model.language.metamodel import Component, Reference, RosSystem
     from ros_model.project.first_project import FirstProject
 
 _QUALITY = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -95,7 +95,7 @@ def init(
         component,
         qualities,
         vary or _asked_parameters(varied, ranges),
-        _alternatives(varied, path.parent, others),
+        _alternatives(system, varied, path.parent, others),
         ranges,
     )
     if package is None or package == around:
@@ -128,7 +128,7 @@ def _new_package(path: Path, system: RosSystem, choices: Choices, output: Path) 
     models = {f"models/{file}": text for file, text in first.texts.items()}
     models |= {f"models/{file.name}": read_text(file) for file in (path, *_beside(path.parent))}
     packages = {c.executable.package for c in system.components if c.executable}
-    packages |= {alternative.reference.package for alternative in choices.alternatives}
+    packages |= {alternative.package for alternative in choices.alternatives}
     installed = InstalledPackages()
     unknown = sorted(package for package in packages if not installed.has_package(package))
     _write(folder, {**package_texts(name, packages, first.variant, (TABLE, LEVELS)), **models})
@@ -193,31 +193,41 @@ def _asked_parameters(component: Component, ranges: dict[tuple[str, str], str]) 
     return cast("tuple[str, ...] | None", answer)
 
 
-def _alternatives(component: Component, folder: Path, names: tuple[str, ...]) -> tuple[Alternative, ...]:
-    """Return the executables that become variants: those named, or said yes to; others are told.
+def _alternatives(
+    system: RosSystem, component: Component, folder: Path, names: tuple[str, ...]
+) -> dict[Reference, frozenset[str]]:
+    """Return the nodes of executables that become variants, those named or said yes to, and their parameters.
+
+    Others are told.
 
     Raises:
-        ModelError: one that is named does not have the interfaces of the component.
+        ModelError: one that is named does not do what the component does.
     """
     library, unread = read_sources(folder)
     for error in unread:
         click.echo(f"rosmodel: {error}: no alternatives are looked for there", err=True)
-    found = {other.name: other for other in alternatives(component, library)}
+    found = {f"{node.package}/{node.artifact}": node for node in alternatives(system, component, library)}
     for name in names:
         if name not in found:
-            known = f"there are {', '.join(found)}" if found else "no model beside the base tells of one"
-            raise ModelError(f"--alternative {name!r} does not have the interfaces of {component.graph_name}; {known}")
+            known = f"there are {', '.join(found)}" if found else "no model beside the base tells of one that does"
+            does = f"publish and serve all that {component.graph_name} does"
+            raise ModelError(f"--alternative {name!r} does not {does}; {known}")
     chosen = [found[name] for name in names]
-    for name, other in found.items():
+    for name, node in found.items():
         if name in names:
             continue
-        told = f"{name} has the interfaces of {component.graph_name}"
+        told = f"{name} publishes and serves what {component.graph_name} does"
         if _is_asked():
             if click.confirm(f"{told}. Make it a variant?", default=True):
-                chosen.append(other)
+                chosen.append(node)
         else:
             click.echo(f"{told}: --alternative {name} makes it a variant")
-    return tuple(chosen)
+    declared = {node: library.node(node) for node in chosen}
+    return {
+        node: frozenset(parameter.name for parameter in found.parameters)
+        for node, found in declared.items()
+        if not isinstance(found, Unknown)
+    }
 
 
 def _package_around(folder: Path) -> str:

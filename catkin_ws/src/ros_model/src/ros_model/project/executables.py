@@ -1,7 +1,12 @@
-"""Another executable for a component: it has the ports of the new node, wired by their names as ROS does it."""
+"""Another executable for a component: it has the ports of the new node, wired by their names as ROS does it.
+
+A port of the new node stands for one of the former node where both have one name. It also does where each has only one
+of its kind and type, and nothing else in the system has its name: then it is remapped to the former one's topic.
+"""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -21,10 +26,35 @@ from ros_model.language.metamodel import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from ros_model.language.library import Library
     from ros_model.language.packages import PortDeclaration
 
 _PORT_ORDER = list(PortKind)
+_OUTPUTS = frozenset(out for out, _ in ENDS.values())
+_GENERAL = ("tf", "tf_static", "rosout", "diagnostics", "clock")
+"""Topics that tell nothing of what a node is for."""
+
+
+def alternatives(system: RosSystem, component: Component, library: Library) -> list[Reference]:
+    """Return the executables of the models that publish and serve all that a component does.
+
+    What is below the component's own name tells of this node alone, and does not count.
+    """
+    outputs = {port for port in component.ports if port.kind in _OUTPUTS and _is_telling(component, port.name)}
+    executable, found = component.executable, []
+    if executable is None or not outputs:
+        return []
+    types = _types(component, library)
+    for reference, node in library.executables():
+        if (reference.package, reference.artifact) == (executable.package, executable.artifact):
+            continue
+        known = [port for port in node.ports if "{" not in port.name]
+        same = _counterparts(system, component, known, library)
+        if outputs <= {port for i, port in same.items() if types.get(_key(component, port), i.type) == i.type}:
+            found.append(reference)
+    return found
 
 
 def with_executable(
@@ -53,7 +83,12 @@ def with_executable(
     if isinstance(declared, Unknown):
         raise ModelError(f"{declared.message}: `rosmodel extract` makes models from source", where)
     interfaces = library.interfaces(node) or ()
-    ports = {_port(component, port, node) for port in interfaces if "{" not in port.name}
+    known = [port for port in interfaces if "{" not in port.name]
+    same = _counterparts(system, component, known, library)
+    ports = {
+        replace(same[port], reference=replace(node, name=port.name)) if port in same else _port(component, port, node)
+        for port in known
+    }
     unsure, sure = {port.kind for port in interfaces if "{" in port.name}, {(port.kind, port.name) for port in ports}
     for port in component.ports:
         if port.kind in unsure and (port.kind, port.name) not in sure:
@@ -75,15 +110,62 @@ def with_executable(
     return _wired(replace(system, components=components, connections=kept), component, changed)
 
 
-def _port(component: Component, declared: PortDeclaration, node: Reference) -> Port:
-    """Return the port for an interface of the new node; with the name that the former node's port had."""
-    full = component.resolved(declared.name)
+def _counterparts(
+    system: RosSystem, component: Component, interfaces: Sequence[PortDeclaration], library: Library
+) -> Mapping[PortDeclaration, Port]:
+    """Return the ports of a component that interfaces of another node stand for."""
+    found: dict[PortDeclaration, Port] = {}
     for port in component.ports:
-        in_code = port.reference.name if port.reference and port.reference.name else port.name
-        if port.kind is declared.kind and full in {component.resolved(in_code), component.resolved(port.name)}:
-            return replace(port, reference=replace(node, name=declared.name))
+        names = {component.resolved(port.name), component.resolved(_in_code(port))}
+        alike = (
+            i for i in interfaces if i.kind is port.kind and i not in found and component.resolved(i.name) in names
+        )
+        if interface := next(alike, None):
+            found[interface] = port
+    types = _types(component, library)
+    taken = set(found.values())
+    left_ports: dict[tuple[PortKind, str], list[Port]] = defaultdict(list)
+    for port in component.ports:
+        kind = types.get(_key(component, port))
+        if port not in taken and kind and not _is_general(component, port.name):
+            left_ports[port.kind, kind].append(port)
+    left: dict[tuple[PortKind, str], list[PortDeclaration]] = defaultdict(list)
+    for interface in interfaces:
+        if interface not in found and not _is_general(component, interface.name):
+            left[interface.kind, interface.type].append(interface)
+    for key, ports in left_ports.items():
+        if len(ports) == len(left[key]) == 1 and not _named_alike(system, component, left[key][0].name, key[0]):
+            found[left[key][0]] = ports[0]
+    return found
+
+
+def _types(component: Component, library: Library) -> dict[tuple[PortKind, str], str]:
+    """Return the types of what a component's node has, as far as models tell them."""
+    own = library.interfaces(component.executable) or () if component.executable else ()
+    return {(i.kind, component.resolved(i.name)): i.type for i in own if i.type}
+
+
+def _key(component: Component, port: Port) -> tuple[PortKind, str]:
+    return port.kind, component.resolved(_in_code(port))
+
+
+def _in_code(port: Port) -> str:
+    return port.reference.name if port.reference and port.reference.name else port.name
+
+
+def _is_general(component: Component, name: str) -> bool:
+    return component.resolved(name).strip("/") in _GENERAL
+
+
+def _is_telling(component: Component, name: str) -> bool:
+    return not _is_general(component, name) and not component.resolved(name).startswith(f"/{component.graph_name}/")
+
+
+def _port(component: Component, declared: PortDeclaration, node: Reference) -> Port:
+    """Return the port for an interface that the former node did not have."""
     namespace = f"/{component.graph_name}".rpartition("/")[0]
-    return Port(full.removeprefix(f"{namespace}/"), declared.kind, replace(node, name=declared.name))
+    name = component.resolved(declared.name).removeprefix(f"{namespace}/")
+    return Port(name, declared.kind, replace(node, name=declared.name))
 
 
 def _without_lost_ends(system: RosSystem, changed: Component) -> list[Connection]:
@@ -112,7 +194,7 @@ def _wired(system: RosSystem, former: Component, changed: Component) -> RosSyste
             continue
         kind = CONNECTION_OF[port.kind]
         out, into = ENDS[kind]
-        others = _named_alike(system, changed, port, out if port.kind is into else into)
+        others = _named_alike(system, changed, port.name, port.kind)
         if not others:
             continue
         here = PortPath(changed.name, port.name)
@@ -129,11 +211,15 @@ def _wired(system: RosSystem, former: Component, changed: Component) -> RosSyste
     return replace(system, connections=tuple(connections))
 
 
-def _named_alike(system: RosSystem, changed: Component, port: Port, kind: PortKind) -> tuple[PortPath, ...]:
-    full = changed.resolved(port.name)
+def _named_alike(system: RosSystem, component: Component, name: str, kind: PortKind) -> tuple[PortPath, ...]:
+    """Return the ports of others at the other end of what a component calls so."""
+    out, into = ENDS[CONNECTION_OF[kind]]
+    other_end = out if kind is into else into
+    full = component.resolved(name)
     return tuple(
         PortPath(other.name, end.name)
         for other in system.components
+        if other.name != component.name
         for end in other.ports
-        if end.kind is kind and other.resolved(end.name) == full
+        if end.kind is other_end and other.resolved(end.name) == full
     )

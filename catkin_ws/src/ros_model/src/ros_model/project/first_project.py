@@ -7,12 +7,11 @@ import fnmatch
 import io
 import re
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import PortKind
-from ros_model.language.system_writer import write_system
-from ros_model.project.alternatives import variant_of
 from ros_model.project.schema_check import load_schema
 from ros_model.project.settings import FILE_NAME
 from ros_model.project.tables import NAME, typed_cell
@@ -21,12 +20,10 @@ from ros_model.project.yaml_file import flow
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from ros_model.language.metamodel import Component, RosParameter, RosSystem
-    from ros_model.project.alternatives import Alternative
+    from ros_model.language.metamodel import Component, Reference, RosParameter, RosSystem
 
 TABLE = "variants.csv"
 LEVELS = "qa.csv"
-ALTERNATIVE_LEVELS = "alternatives_qa.csv"
 UTILITY = "performance"
 _FEW = 8
 """Parameters that are all columns if nobody says which: a table that still fits a screen."""
@@ -44,7 +41,7 @@ base: {base}
 
 variants:
   # CHANGE: the component that the variants bring, in place of the base's.
-- component: {component}
+  component: {component}
   # One row for each variant; its name is that of its launch file and of its function design.
   table: {table}
   # Its expected level of each quality attribute, measured or estimated.
@@ -60,7 +57,9 @@ variants:
   #     none: []
   # Column of true and false -> components that are there or not.
   # components:
-  #   has_filter: [scan_filter]{alternatives}
+  #   has_filter: [scan_filter]
+  # Column -> its value -> the node that the component is then, PACKAGE.EXECUTABLE.NODE.
+{nodes}
 
 # What the robot can do, and which variants (all, or a list of names) do it. CHANGE the name.
 # requires: [FUNCTION] names functions that must be provided too.
@@ -108,7 +107,7 @@ class Choices:
         qualities: quality attributes, beside performance.
         vary: shell patterns of the parameters that become columns, `NODE/PARAMETER` or `PARAMETER` of the component
             that varies; None: all of that component if they are few, else none.
-        alternatives: executables that become variants, too.
+        alternatives: nodes of other executables that become variants, too, and the parameters that each declares.
         ranges: of parameters, in words, by package and parameter.
     """
 
@@ -116,7 +115,7 @@ class Choices:
     component: str | None = None
     qualities: tuple[str, ...] = ()
     vary: tuple[str, ...] | None = None
-    alternatives: tuple[Alternative, ...] = ()
+    alternatives: Mapping[Reference, frozenset[str]] = field(default_factory=dict)
     ranges: Mapping[tuple[str, str], str] = field(default_factory=dict)
 
 
@@ -125,7 +124,7 @@ class FirstProject:
     """A first project.
 
     Attributes:
-        texts: of metacontrol.yaml, its tables and files of variants, by the names of the files.
+        texts: of metacontrol.yaml and its two tables, by the names of the files.
         remarks: what the project leaves to the user, one line each.
         variant: the name of the variant that is as the base.
     """
@@ -152,7 +151,8 @@ def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> 
     variant = re.sub(r"[^A-Za-z0-9_]+", "_", base.name).strip("_").lower() or "base"
     what = re.sub(r"\W+", "_", component.name, flags=re.ASCII).strip("_")
     qualities = dict.fromkeys((*choices.qualities, UTILITY))
-    others_run = [variant_of(alternative, base) for alternative in choices.alternatives]
+    nodes_of = _values([component.executable, *choices.alternatives] if choices.alternatives else [])
+    chooser = what if what not in columns else f"{what}_node"
     others = {key: name for key, name in _nodes(base).items() if name != component.graph_name}
     nodes = {key: {"node": name} for key, name in others.items() if _GRAPH_NAME.search(key) and "\n" not in key}
     action = next((p.name for p in component.ports if p.kind is PortKind.ACTION_SERVER), None)
@@ -165,7 +165,7 @@ def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> 
         table=TABLE,
         levels=LEVELS,
         parameters=_lines({column: [chosen.entry(component)] for column, chosen in columns.items()}),
-        alternatives=_family_of_files([variant.name for variant in others_run]),
+        nodes=_node_lines(chooser, nodes_of),
         example_port=_example_port(base, component),
         function=f"f_{what}",
         objective=f"o_{what}",
@@ -175,18 +175,21 @@ def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> 
         action=f"  # save_action: {action or 'ACTION'}\n  # goal_msg_type: PACKAGE.msg.TYPEAction",
         kill=flow(component.graph_name),
     )
-    if not others_run:
-        text = text.replace("\n- component:", "\n  component:", 1)
     values = [_cell(chosen.parameter) for chosen in columns.values()]
+    names = [f"{variant}_default", *(f"{variant}_{value}" for value in [*nodes_of][1:])]
+    rows = []
+    for name, value in zip_longest(names, nodes_of, fillvalue=""):
+        declared = choices.alternatives.get(nodes_of[value]) if value else None
+        cells = [
+            cell if declared is None or chosen.component is not component or chosen.parameter.key in declared else ""
+            for cell, chosen in zip(values, columns.values(), strict=True)
+        ]
+        rows.append([name, *([value] if value else []), *cells])
     texts = {
         FILE_NAME: text,
-        TABLE: _csv([NAME, *columns], [f"{variant}_default", *values]),
-        LEVELS: _csv([NAME, *qualities, "source"], [f"{variant}_default", *["0.5"] * len(qualities), "estimated"]),
+        TABLE: _csv([NAME, *([chooser] if nodes_of else []), *columns], *rows),
+        LEVELS: _csv([NAME, *qualities, "source"], *([name, *["0.5"] * len(qualities), "estimated"] for name in names)),
     }
-    if others_run:
-        rows = [[system.name, *["0.5"] * len(qualities), "estimated"] for system in others_run]
-        texts[ALTERNATIVE_LEVELS] = _csv([NAME, *qualities, "source"], *rows)
-        texts |= {f"variants/{system.name}.rossystem": write_system(system) for system in others_run}
     unnamed = [name for key, name in others.items() if key not in nodes]
     remarks = (*_left_out(component, columns, choices), *_copies(base, component), *_unnamed(unnamed))
     return FirstProject(texts, remarks, f"{variant}_default")
@@ -224,12 +227,21 @@ class _Column:
         return {"name": self.parameter.key, "component": self.component.name}
 
 
-def _family_of_files(names: Sequence[str]) -> str:
-    if not names:
-        return ""
-    files = "".join(f"\n  - variants/{name}.rossystem" for name in names)
-    told = "\n  # Variants that run another executable, each a file that is yours."
-    return f"{told}\n- files:{files}\n  qa: {ALTERNATIVE_LEVELS}"
+def _values(nodes: Sequence[Reference | None]) -> dict[str, Reference]:
+    """Return nodes by short names, which are those of their executables where that is clear."""
+    found: dict[str, Reference] = {}
+    for node in nodes:
+        if node is not None:
+            short = re.sub(r"[^A-Za-z0-9_]+", "_", node.artifact.partition(".")[0]).strip("_").lower()
+            found[short if short and short not in found else f"{node.package}_{short}_{len(found)}"] = node
+    return found
+
+
+def _node_lines(column: str, nodes: Mapping[str, Reference]) -> str:
+    if not nodes:
+        return "  # nodes:\n  #   detector: {fine: my_robot.fine_detector.detector, coarse: my_robot.coarse.detector}"
+    choices = "\n".join(f"      {flow(short)}: {flow(str(node))}" for short, node in nodes.items())
+    return f"  nodes:\n    {flow(column)}:\n{choices}"
 
 
 def _left_out(component: Component, columns: Mapping[str, _Column], choices: Choices) -> Iterator[str]:
