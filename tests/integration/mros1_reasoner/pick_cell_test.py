@@ -114,7 +114,9 @@ class PickCellTest(unittest.TestCase):
         return self.active.get("f_detect") == "coarse"
 
     def test_coarse_detector_takes_over_in_the_dark(self):
-        rospy.Publisher("/lamp", Float32, queue_size=1, latch=True).publish(0.3)
+        lamp = rospy.Publisher("/lamp", Float32, queue_size=1, latch=True)
+        self.addCleanup(lamp.unregister)
+        lamp.publish(0.3)
         self.assertEqual(self.wait_for_decision("found").to_configuration, "coarse")
         self.wait_for_active("coarse", "swift")
         self.wait_for_picks()
