@@ -84,7 +84,10 @@ class PickCellTest(unittest.TestCase):
 
     def wait_for_decision(self, trigger):
         """Wait until a decision by a trigger is carried out; return it."""
-        executed = lambda: next((d for d in self.decisions if d.state == "EXECUTED" and trigger in d.trigger), None)
+
+        def executed():
+            return next((d for d in self.decisions if d.state == "EXECUTED" and trigger in d.trigger), None)
+
         return wait_for(executed, lambda: f"executed by {trigger}: {[(d.trigger, d.state) for d in self.decisions]}")
 
     def kill(self, node):

@@ -24,7 +24,7 @@ def find_sharply(image: np.ndarray, brightness: float) -> list[tuple[float, floa
 
 
 def find_coarsely(image: np.ndarray, contrast: float) -> list[tuple[float, float]]:
-    """Return the centres (x, y) of the squares that are brighter than most by a factor, and brighter than those beside."""
+    """Return the centres (x, y) of the squares that are brighter than most by a factor, and than those beside."""
     height, width = image.shape
     squares = image.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK).mean(axis=(1, 3))
     padded = np.pad(squares, 1)

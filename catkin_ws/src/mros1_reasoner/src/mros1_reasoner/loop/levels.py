@@ -306,7 +306,9 @@ class Levels:
         if blame and strain:
             if against.typical is None:
                 # Better by a share than nothing is anything: what fades has to come back to what is plausible first.
-                before, after = (against.scale.bounded(s, self._judging.most) if fades else s for s in (blame.strain, strain))
+                before, after = blame.strain, strain
+                if fades:
+                    before, after = (against.scale.bounded(found, self._judging.most) for found in (before, after))
                 is_gone = against.scale.is_relieved(before, after, self._judging.relief)
             else:
                 is_gone = self._permits_better(self._usual[key], against)
