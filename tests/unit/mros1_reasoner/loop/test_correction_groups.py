@@ -3,8 +3,8 @@
 import pytest
 from metacontrol_bags.decision import DECIDED
 from mros1_reasoner.io.ontology_files import read_knowledge_base
-from mros1_reasoner.knowledge.model import Objective
-from mros1_reasoner.knowledge.scale import Correction
+from mros1_reasoner.knowledge.model import Direction, Objective
+from mros1_reasoner.knowledge.scale import Correction, Scale
 from mros1_reasoner.loop.levels import Expectation, Judging, Levels
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
@@ -148,6 +148,21 @@ def test_levels_of_one_group_say_nothing_of_another():
     assert levels.strain(60.0, ("o", "q"), "dark").factor == pytest.approx(0.5)
     levels.drop("o")
     assert levels.groups(("o", "q")) == []
+
+
+def test_design_that_found_nothing_is_left_until_most_of_that_is_forgotten():
+    levels, scale, key = Levels(Judging(memory=30.0)), Scale(Direction.HIGHER_IS_BETTER), ("o", "hits")
+    for second in range(10):
+        levels.observe(second, key, 0.0, Expectation(scale, expected=0.9, group="fast"))
+    levels.blame(10.0, key)
+    levels.forget("o")
+
+    def is_gone(now):
+        levels.observe(now, key, 0.6, Expectation(scale, expected=0.6, group="large"))
+        return levels.gone_since(now, "o") is not None
+
+    # 0 times counts as 0.4 times, which fades to 0.48 times in 0.65 time constants.
+    assert next(now for now in range(11, 300) if is_gone(now)) == 29
 
 
 def test_objective_without_limits_is_not_corrected(knowledge_base, pellet):

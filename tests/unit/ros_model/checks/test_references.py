@@ -245,6 +245,15 @@ def test_fault_of_a_package_is_found(text, finding):
         node("Publishers { Publisher { name x message 'p.T' } }").replace(
             "Artifact", "Specs { TopicSpec T { } } Artifact"
         ),
+        *(
+            node(interface).replace("Artifact", "Specs { ActionSpec T { } } Artifact")
+            for interface in (
+                "ActionServers { ActionServer { name x action 'p.T' } }",
+                "ActionServers { ActionServer { name x action 'p.TAction' } }",
+                "Publishers { Publisher { name x message 'p.TActionGoal' } }",
+                "Publishers { Publisher { name x message 'p.TResult' } }",
+            )
+        ),
         node("ActionServers { ActionServer { name x action 'move_base_msgs.MoveBase' } }"),
         node("ActionServers { ActionServer { name x action 'move_base_msgs.MoveBaseAction' } }"),
         node("Publishers { Publisher { name x message 'metacontrol_msgs.MvpReconfigurationGoal' } }"),

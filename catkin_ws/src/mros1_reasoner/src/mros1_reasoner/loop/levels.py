@@ -32,6 +32,7 @@ class Judging:
         timeout: how long a level is valid, s.
         memory: time constant by which corrections fade that nothing confirms, s.
         relief: share by which a level must have become better before the cause of a violation is gone.
+        most: the greatest correction that is plausible, a factor.
     """
 
     history: int = 5
@@ -41,6 +42,7 @@ class Judging:
     timeout: float = 5.0
     memory: float = 30.0
     relief: float = 0.2
+    most: float = 2.5
 
 
 @dataclass(frozen=True)
@@ -299,10 +301,15 @@ class Levels:
     def _relieve(self, now: float, key: Key, against: Expectation) -> None:
         """Note whether the cause for which a design was left is gone; what nobody observes fades."""
         blame = self._blames.get(key)
-        strain = self.strain(now, key, blame.group, fades=blame.group != against.group) if blame else None
+        fades = blame is not None and blame.group != against.group
+        strain = self.strain(now, key, blame.group, fades=fades) if blame else None
         if blame and strain:
             if against.typical is None:
-                is_gone = against.scale.is_relieved(blame.strain, strain, self._judging.relief)
+                # Better by a share than nothing is anything: what fades has to come back to what is plausible first.
+                before, after = blame.strain, strain
+                if fades:
+                    before, after = (against.scale.bounded(found, self._judging.most) for found in (before, after))
+                is_gone = against.scale.is_relieved(before, after, self._judging.relief)
             else:
                 is_gone = self._permits_better(self._usual[key], against)
             since = blame.gone_since if blame.gone_since is not None else now

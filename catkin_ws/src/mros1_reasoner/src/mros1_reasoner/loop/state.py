@@ -60,6 +60,7 @@ class State(View):
                 timeout=settings.level_timeout,
                 memory=settings.correction_memory,
                 relief=settings.relief,
+                most=max(1.0, settings.correction_limit),
             )
         )
         needs = (need for design in knowledge_base.designs.values() for need in design.needs)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import rospkg
 
 from ros_model.findings import WARNING
-from ros_model.language.library import Unknown
+from ros_model.language.library import Unknown, action_of
 from ros_model.language.metamodel import EXTENSIONS_OF_SCRIPTS
 from ros_model.language.packages import EXTENSIONS, PARTS, MessageField, Spec, SpecKind
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
-_OF_AN_ACTION = re.compile(r"(\w+?)(?:Action(?:Goal|Result|Feedback)?|Goal|Result|Feedback)", re.ASCII)
 
 
 class InstalledPackages:
@@ -38,11 +37,10 @@ class InstalledPackages:
             return False
         if (folder / EXTENSIONS[kind] / f"{name}.{EXTENSIONS[kind]}").is_file():
             return True
-        if kind is SpecKind.ACTION:
-            is_made = (folder / "msg" / f"{name}Action.msg").is_file()
-            return is_made or _is_action_of(folder, name.removesuffix("Action"))
-        match = _OF_AN_ACTION.fullmatch(name)
-        return kind is SpecKind.TOPIC and match is not None and _is_action_of(folder, match[1])
+        if kind is SpecKind.ACTION and (folder / "msg" / f"{name}Action.msg").is_file():
+            return True
+        action = action_of(kind, name)
+        return action is not None and _is_action_of(folder, action)
 
     def parts(self, package: str, spec: Spec) -> dict[str, tuple[MessageField, ...]]:
         """Return the fields of an installed message or service by its parts; nothing where there is none."""

@@ -26,6 +26,7 @@ BUILTIN_TYPES = frozenset(
 
 _WORDS = {SpecKind.TOPIC: "message", SpecKind.SERVICE: "service", SpecKind.ACTION: "action"}
 _TYPE = re.compile(r"([A-Za-z]\w*)/([A-Za-z]\w*)", re.ASCII)
+_OF_AN_ACTION = re.compile(r"(\w+?)(?:Action(?:Goal|Result|Feedback)?|Goal|Result|Feedback)", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -167,7 +168,8 @@ class Library:
             return Unknown(f"'{name}' names no {_WORDS[kind]} type: write package.Type")
         package, plain = match.groups()
         declared = self._specs.get(package, {})
-        if (kind, plain) in declared or self.installed.has_type(package, kind, plain):
+        is_declared = (kind, plain) in declared or (SpecKind.ACTION, action_of(kind, plain)) in declared
+        if is_declared or self.installed.has_type(package, kind, plain):
             return None
         if not declared and not self.installed.has_package(package):
             text = f"no .ros model or installed package declares the messages of '{package}', so not '{name}' either"
@@ -189,6 +191,14 @@ def hint(word: str, known: Iterable[str]) -> str:
     """Return `: did you mean ...?` where a known word is almost the one found."""
     found = difflib.get_close_matches(word[:80], [*known], n=1)
     return f": did you mean '{found[0]}'?" if found else ""
+
+
+def action_of(kind: SpecKind, name: str) -> str | None:
+    """Return the action that makes a type: `Dock` for the action type `DockAction` and for the message `DockGoal`."""
+    if kind is SpecKind.ACTION:
+        return name.removesuffix("Action")
+    match = _OF_AN_ACTION.fullmatch(name) if kind is SpecKind.TOPIC else None
+    return match[1] if match else None
 
 
 def full_type(declared: str, package: str) -> str:
