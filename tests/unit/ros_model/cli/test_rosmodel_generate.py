@@ -273,8 +273,8 @@ def test_generator_from_outside_runs_with_all_others(run, models, outside, tmp_p
     assert [line.partition(":")[0] for line in out.splitlines()] == [
         "variants",
         "launch",
-        "deployment",
         "observer",
+        "deployment",
         "poems",
         "tomasys",
     ]
@@ -308,7 +308,7 @@ def test_broken_generator_from_outside_is_told_in_one_line(run, models, outside,
 def test_help_names_the_generators(run):
     status, out, _ = run("generate", "--help")
     assert status == 0
-    assert "variants, launch, deployment" in " ".join(out.split())
+    assert "variants, launch, observer, deployment" in " ".join(out.split())
 
 
 def test_names_of_generators_complete(run):

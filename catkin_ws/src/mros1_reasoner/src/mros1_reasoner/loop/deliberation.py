@@ -14,7 +14,7 @@ from mros1_reasoner.knowledge.scale import Correction
 from mros1_reasoner.loop import lasting
 from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance, is_drift, is_relief
 from mros1_reasoner.loop.readable_state import Running
-from mros1_reasoner.loop.state import VIOLATED, State
+from mros1_reasoner.loop.state import UNLESS_GONE, VIOLATED, State
 from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan, without_makeshift
 from mros1_reasoner.planning.repairing import Stakes, loss_of_change, loss_of_repair, worth_of_nothing
 
@@ -410,7 +410,7 @@ class Deliberation:
             unfulfilled=unfulfilled,
             strained=strained,
             tried={
-                design: f"{reason}, not again for {expiry - now:.0f} s"
+                design: f"{reason}, not again for {expiry - now:.0f} s{UNLESS_GONE if reason == VIOLATED else ''}"
                 for (design, tried_for), (expiry, reason) in self._state.error_log.items()
                 if tried_for == name
             },

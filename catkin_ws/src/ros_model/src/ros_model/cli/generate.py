@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from ros_model.project.project import Project
 
 ALL = "all"
-_FIRST = ("variants", "launch", "deployment")  # the order of `generate all`; others follow by name
+_FIRST = ("variants", "launch", "observer", "deployment")  # in `generate all`; others follow by name. The monitor reads
+# the models of observers, so its configuration names them.
 _SYSTEM = ".rossystem"
 _HEAD = 200  # bytes, in which generated files say that they are
 

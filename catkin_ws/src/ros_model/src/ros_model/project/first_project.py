@@ -91,6 +91,10 @@ manipulator:
   # Nodes that a change may have to stop although it did not start them.
   kill_nodes: [{kill}]
 
+# Parameters of the reasoner. calm: how long, in s, the cause of a violation must be gone before a better variant comes
+# back. Make it longer where a change costs much, as one of a node that builds a map.
+reasoner: {{calm: 10.0}}
+
 # Parameter -> value -> the component that a variant with this value needs, beside those that feed it.
 # requires:
 #   observation_sources: {{scan: front_laser}}
