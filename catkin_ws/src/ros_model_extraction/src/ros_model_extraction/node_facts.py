@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -72,6 +72,10 @@ class FoundParameter:
     default: Any
     position: Position
     kind: str = ""
+
+
+Configurations = Mapping[str, tuple[FoundParameter, ...]]
+"""Parameters of dynamic_reconfigure by the name of the class that it generates, such as `PlannerConfig`."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import contextlib
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ros_model.language.metamodel import PortKind, Position
@@ -23,7 +24,15 @@ from ros_model_extraction.cpp.syntax import (
     type_text,
     walk,
 )
-from ros_model_extraction.node_facts import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
+from ros_model_extraction.node_facts import (
+    Configurations,
+    FoundParameter,
+    FoundPort,
+    NodeSource,
+    Remark,
+    unique,
+    unresolved,
+)
 from ros_model_extraction.python.values import Const, Text
 from ros_model_extraction.ros_api import CPP_BELOW, CPP_FIXED, RECONFIGURE_SERVER, Below
 
@@ -64,18 +73,38 @@ _IMAGE = "sensor_msgs/Image"
 _CAMERA_INFO = "sensor_msgs/CameraInfo"
 
 
+@dataclass(frozen=True)
+class Entry:
+    """Where a node's code starts, and what its package adds.
+
+    Attributes:
+        nodelet: the class that is loaded, with its namespaces; "" for a program, which starts at `main`.
+        configurations: the parameters of dynamic_reconfigure by the name of the class that is generated.
+    """
+
+    nodelet: str = ""
+    configurations: Configurations = field(default_factory=dict)
+
+
+PROGRAM = Entry()
+
+
 def node_of(
-    files: Sequence[File], remarks: Iterable[Remark] = (), parameters: Callable[[str], Any] | None = None
+    files: Sequence[File],
+    remarks: Iterable[Remark] = (),
+    parameters: Callable[[str], Any] | None = None,
+    entry: Entry = PROGRAM,
 ) -> NodeSource:
-    """Return what C++ sources make of a node, as far as `main` can reach them.
+    """Return what C++ sources make of a node, as far as `main` or the class of a nodelet can reach them.
 
     Args:
         files: the sources, then the headers that they include.
         remarks: what is to be said of the files.
         parameters: the value of a parameter by its name as the code has it, or KeyError; without it, defaults count.
+        entry: where its code starts.
     """
-    program = Program(files)
-    reader = _Reader(program, parameters)
+    program = Program(files, entry.nodelet)
+    reader = _Reader(program, parameters, entry.configurations)
     nodes = list(program.expressions())
     for node, place in nodes:  # first what parameters fill variables with, which names may depend on
         if node.type == "call_expression":
@@ -89,7 +118,9 @@ def node_of(
 class _Reader:
     """Keeps what the calls and declarations of ROS make."""
 
-    def __init__(self, program: Program, parameters: Callable[[str], Any] | None) -> None:
+    def __init__(
+        self, program: Program, parameters: Callable[[str], Any] | None, configurations: Configurations
+    ) -> None:
         self.ports: list[FoundPort] = []
         self.parameters: list[FoundParameter] = []
         self.remarks: list[Remark] = []
@@ -98,6 +129,7 @@ class _Reader:
         self._program = program
         self._handles = Handles(program)
         self._values = parameters
+        self._configurations = configurations
 
     def read(self, node: Node, place: Place) -> None:
         """Look at a node: a call, or the declaration of an object."""
@@ -304,6 +336,16 @@ class _Reader:
                 for made in RECONFIGURE_SERVER:
                     shown = self._name(made.kind.value, in_namespace(namespace, Const(made.name)), position)
                     self._add([FoundPort(made.kind, shown, made.type, position)])
+                self._reconfigurable(kind, namespace, position)
+
+    def _reconfigurable(self, server: str, namespace: Name, position: Position) -> None:
+        """Add the parameters of a server of dynamic_reconfigure, which the package's `.cfg` file lists."""
+        name = self._program.alias(template_arguments(server)[0]).rpartition("::")[2]
+        if name not in self._configurations:
+            self.remarks.append(Remark(position, f"the parameters of {name} are not known: its .cfg is elsewhere"))
+        for found in self._configurations.get(name, ()):
+            shown = self._name("parameter", in_namespace(namespace, Const(found.name)), position)
+            self.parameters.append(replace(found, name=shown))
 
     def _below(self, below: Below, arguments: list[Node], node: Node, place: Place) -> None:
         """Look at an object that makes interfaces below a namespace."""

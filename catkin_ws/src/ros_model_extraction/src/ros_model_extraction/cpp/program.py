@@ -52,10 +52,10 @@ class _Index:
 class Program:
     """The sources of an executable, with the headers of its package that they include."""
 
-    def __init__(self, files: Sequence[File]) -> None:
-        """Index the files: sources, then the headers that they include."""
+    def __init__(self, files: Sequence[File], nodelet: str = "") -> None:
+        """Index the files: sources, then the headers that they include; `nodelet` is the class that is loaded."""
         self._files = files
-        self._code = ReachableCode(files)
+        self._code = ReachableCode(files, nodelet)
         self._run: dict[int, bool] = {}
         self._index = _Index()
         self._locals: dict[int, dict[str, list[Declared]]] = {}

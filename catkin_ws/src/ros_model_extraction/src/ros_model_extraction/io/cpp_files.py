@@ -13,7 +13,7 @@ from ros_model.language.metamodel import Position
 from tree_sitter import Language, Node, Parser
 
 from ros_model_extraction.cpp.declarations import File
-from ros_model_extraction.cpp.node_reader import node_of
+from ros_model_extraction.cpp.node_reader import PROGRAM, Entry, node_of
 from ros_model_extraction.cpp.syntax import (
     child_of,
     text,
@@ -29,7 +29,10 @@ _HEADERS = (".h", ".hpp", ".hh", ".hxx")
 
 
 def read_cpp_node(
-    sources: Iterable[Path], package_folder: Path, parameters: Callable[[str], Any] | None = None
+    sources: Iterable[Path],
+    package_folder: Path,
+    parameters: Callable[[str], Any] | None = None,
+    entry: Entry = PROGRAM,
 ) -> NodeSource:
     """Return what C++ sources make of a node.
 
@@ -37,12 +40,13 @@ def read_cpp_node(
         sources: of the executable and of the package's libraries that it links.
         package_folder: its package; positions name files relative to it.
         parameters: the value of a parameter by its name as the code has it, or KeyError; without it, defaults count.
+        entry: where its code starts.
 
     Raises:
         SourceError: none of the sources can be read.
     """
     files, remarks = _read_files(sources, package_folder)
-    return node_of(files, remarks, parameters)
+    return node_of(files, remarks, parameters, entry)
 
 
 def _read_files(sources: Iterable[Path], package_folder: Path) -> tuple[list[File], list[Remark]]:

@@ -67,6 +67,12 @@ def extract_package(folder: Path) -> ExtractedPackage:
     remarks += library.remarks
     for node in nodes.values():
         remarks += node.remarks
+    for executable in package.executables:
+        if executable.nodelet:
+            started = f"nodelet load {executable.loaded_as} MANAGER"
+            remarks.append(
+                Remark(executable.position, f"{executable.name} is a nodelet, which is started by {started}")
+            )
     specs, said = read_specs(folder)
     artifacts = tuple(
         Artifact(name, (named(node, name).declared(),), position=node.position)
@@ -95,10 +101,14 @@ def read_executable(
     if executable.is_python:
         from ros_model_extraction.python.node_reader import read_python_node
 
-        return read_python_node(executable.sources[0], library, package.plugins, parameters)
+        plugins, configurations = package.plugins, package.configurations
+        return read_python_node(executable.sources[0], library, plugins, parameters, configurations)
+    from ros_model_extraction.cpp.node_reader import Entry
     from ros_model_extraction.io.cpp_files import read_cpp_node
 
-    return read_cpp_node(executable.sources, package.folder, parameters)
+    entry = Entry(executable.nodelet, package.configurations)
+    node = read_cpp_node(executable.sources, package.folder, parameters, entry)
+    return replace(node, name=executable.name, position=executable.position) if executable.nodelet else node
 
 
 def named(node: NodeSource, executable: str) -> NodeSource:
