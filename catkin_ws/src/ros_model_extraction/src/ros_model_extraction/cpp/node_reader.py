@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -12,12 +10,14 @@ from typing import Any
 from ros_model.language.metamodel import PortKind, Position
 from tree_sitter import Node
 
+from ros_model_extraction.cpp.constants import Constants
 from ros_model_extraction.cpp.declarations import File, Place
 from ros_model_extraction.cpp.handles import Handles, in_namespace
-from ros_model_extraction.cpp.program import MAX_DEPTH, Program
+from ros_model_extraction.cpp.program import Program
 from ros_model_extraction.cpp.syntax import (
     arguments_of,
     child_of,
+    literal_text,
     parameter_types,
     template_arguments,
     text,
@@ -28,6 +28,7 @@ from ros_model_extraction.node_facts import (
     Configurations,
     FoundParameter,
     FoundPort,
+    LoadedNodelet,
     NodeSource,
     Remark,
     unique,
@@ -50,7 +51,8 @@ _KINDS = {
     "bool": "Boolean",
     "string": "String",
 }
-_LOADERS = ("pluginlib::ClassLoader", "nodelet::Loader")
+_LOADER = "nodelet::Loader"
+_LOADERS = ("pluginlib::ClassLoader", _LOADER)
 _HANDLE_AND_NAME = {
     "message_filters::Subscriber": PortKind.SUBSCRIBER,
     "realtime_tools::RealtimePublisher": PortKind.PUBLISHER,
@@ -112,7 +114,8 @@ def node_of(
     for node, place in nodes:
         reader.read(node, place)
     said = unique([*remarks, *reader.remarks])
-    return NodeSource(reader.node_name, tuple(reader.ports), tuple(reader.parameters), said, reader.position)
+    ports, found, nodelets = map(tuple, (reader.ports, reader.parameters, reader.nodelets))
+    return NodeSource(reader.node_name, ports, found, said, reader.position, nodelets)
 
 
 class _Reader:
@@ -124,10 +127,12 @@ class _Reader:
         self.ports: list[FoundPort] = []
         self.parameters: list[FoundParameter] = []
         self.remarks: list[Remark] = []
+        self.nodelets: list[LoadedNodelet] = []
         self.node_name = ""
         self.position = Position()
         self._program = program
         self._handles = Handles(program)
+        self._constants = Constants(program)
         self._values = parameters
         self._configurations = configurations
 
@@ -174,7 +179,7 @@ class _Reader:
             variable = arguments[1] if is_filling and len(arguments) > 1 else None
         position = place.file.position(node)
         kind = self._kind(text(function), variable, place)
-        value = _constant(default if default is not None else _otherwise(node, variable))
+        value = self._constants.of(default if default is not None else _otherwise(node, variable), place)
         for namespace in handles:
             for key, _ in self._program.texts(arguments[0], place):
                 shown = self._name("parameter", in_namespace(namespace, key), position)
@@ -187,7 +192,10 @@ class _Reader:
         """Return the kind of a parameter, by the template argument of the call or by the variable that it fills."""
         kinds = template_arguments(called.replace(" ", ""))
         if variable is not None:
-            kinds += [self._program.alias(declared.type) for declared in self._program.declared(text(variable), place)]
+            kinds += [
+                self._program.alias(declared.type, declared.place)
+                for declared in self._program.declared(text(variable), place)
+            ]
         known = (_KINDS.get(kind.removeprefix("std::"), "") for kind in kinds)
         return next((kind for kind in known if kind), "")
 
@@ -231,10 +239,17 @@ class _Reader:
 
     def _method(self, owner: Node, method: str, arguments: list[Node], node: Node, place: Place) -> None:
         name = method.partition("<")[0].strip()
+        if name == "load" and len(arguments) > 1:
+            self._loaded(owner, arguments, node, place)
         if name not in _METHODS:
             return
-        kinds = {self._program.alias(declared.type) for declared in self._program.declared(text(owner), place)}
-        if any("ImageTransport" in kind for kind in kinds):
+        kinds = {
+            self._program.alias(declared.type, declared.place)
+            for declared in self._program.declared(text(owner), place)
+        }
+        if any("ImageTransport" in kind for kind in kinds) or text(owner).startswith(
+            "image_transport::ImageTransport("
+        ):
             self._image(name, owner, arguments, node, place)
             return
         if any("message_filters::Subscriber" in kind for kind in kinds) and name == "subscribe":
@@ -265,6 +280,41 @@ class _Reader:
             kind = self._template(method) or self._of_callback(arguments[1:], place)
             self._port(PortKind.SERVICE_SERVER, handles, arguments[0], kind, node, place)
 
+    def _loaded(self, owner: Node, arguments: list[Node], node: Node, place: Place) -> None:
+        """Look at `loader.load(name, "package/Class", remappings, arguments)`."""
+        if not any(self._program.alias(d.type) == _LOADER for d in self._program.declared(text(owner), place)):
+            return
+        position = place.file.position(node)
+        remappings = self._remappings(arguments[2], node, place) if len(arguments) > len("ab") else {}
+        for name, _ in self._program.texts(arguments[0], place):
+            shown = str(name.value) if isinstance(name, Const) else str(name)
+            if shown.startswith("~") and len(shown) > 1:  # the node's own name, and more
+                shown = f"{{ros::this_node::getName()}}{shown[1:]}"
+            for loaded, _ in self._program.texts(arguments[1], place):
+                if isinstance(loaded, Const):
+                    self.nodelets.append(LoadedNodelet(shown, str(loaded.value), remappings, position))
+
+    def _remappings(self, given: Node, call: Node, place: Place) -> dict[str, str]:
+        """Return what a map of remappings holds at a call, as its function fills it before."""
+        found: dict[str, str] = {}
+        for node in walk(place.function):
+            if node.start_byte >= call.start_byte:
+                break
+            if node.type == "call_expression" and text(node.child_by_field_name("function")) == f"{text(given)}.clear":
+                found = {}
+            left = node.child_by_field_name("left") if node.type == "assignment_expression" else None
+            if left is None or left.type != "subscript_expression" or text(child_of(left, "argument")) != text(given):
+                continue
+            inside = [n for n in walk(left) if n.type == "string_literal"]
+            values = self._program.texts(child_of(node, "right"), place)
+            if len(inside) == 1 and values:
+                value = values[0][0]
+                shown = (
+                    str(value.value) if isinstance(value, Const) else unresolved(str(value), place.file.position(node))
+                )
+                found[literal_text(text(inside[0]))] = shown
+        return found
+
     def _options(self, method: str, handles: list[Name], given: Node, place: Place) -> bool:
         """Look at a method that is given options alone; return whether what they are made with is known."""
         kind, options = _OPTIONS[method]
@@ -287,13 +337,16 @@ class _Reader:
         handles: list[Name] = []
         for declared in self._program.declared(text(owner), place):
             handles += self._handles.of(declared.values[0] if declared.values else owner, declared.place)
+        handles = handles or self._handles.of(owner, place)
         self._port(kind, handles, arguments[0], _IMAGE, node, place)
         if name.endswith("Camera"):
             for namespace in handles:
                 for topic, _ in self._program.texts(arguments[0], place):
                     base = in_namespace(namespace, topic)
                     if isinstance(base, Const):
-                        info = f"{str(base.value).rpartition('/')[0]}/camera_info".lstrip("/")
+                        before, between, _ = str(base.value).rpartition("/")
+                        start = "~" if not before and str(base.value).startswith("~") else f"{before}{between}"
+                        info = f"{start}camera_info"
                         self.ports.append(FoundPort(kind, info, _CAMERA_INFO, place.file.position(node)))
 
     def _declaration(self, node: Node, place: Place) -> None:
@@ -311,7 +364,7 @@ class _Reader:
         self, type_name: str, arguments: list[Node], node: Node, place: Place, *, is_member: bool = False
     ) -> None:
         """Look at an object that is made: some of them are interfaces."""
-        kind = self._program.alias(type_name)
+        kind = self._program.alias(type_name, place)
         base = kind.partition("<")[0]
         position = place.file.position(node)
         if base in _LOADERS and node.type != "field_initializer":
@@ -323,7 +376,7 @@ class _Reader:
             handles, rest = self._leading_handle(arguments, place)
             if rest:
                 self._port(_ACTIONS[base], handles, rest[0], self._template(kind), node, place)
-        elif base in _HANDLE_AND_NAME and len(arguments) > 1 and not is_member:
+        elif base in _HANDLE_AND_NAME and len(arguments) > 1 and not is_member and text(arguments[1]) != '""':
             handles = self._handles.of(arguments[0], place)
             self._port(_HANDLE_AND_NAME[base], handles, arguments[1], self._template(kind), node, place)
         elif base in CPP_BELOW and not (is_member and arguments):
@@ -336,11 +389,11 @@ class _Reader:
                 for made in RECONFIGURE_SERVER:
                     shown = self._name(made.kind.value, in_namespace(namespace, Const(made.name)), position)
                     self._add([FoundPort(made.kind, shown, made.type, position)])
-                self._reconfigurable(kind, namespace, position)
+                self._reconfigurable(kind, namespace, position, place)
 
-    def _reconfigurable(self, server: str, namespace: Name, position: Position) -> None:
+    def _reconfigurable(self, server: str, namespace: Name, position: Position, place: Place) -> None:
         """Add the parameters of a server of dynamic_reconfigure, which the package's `.cfg` file lists."""
-        name = self._program.alias(template_arguments(server)[0]).rpartition("::")[2]
+        name = self._program.alias(template_arguments(server)[0], place).rpartition("::")[2]
         if name not in self._configurations:
             self.remarks.append(Remark(position, f"the parameters of {name} are not known: its .cfg is elsewhere"))
         for found in self._configurations.get(name, ()):
@@ -462,46 +515,3 @@ def _otherwise(call: Node, variable: Node | None) -> Node | None:
 
 def _is_null(arguments: Sequence[Node]) -> bool:
     return len(arguments) == 1 and text(arguments[0]) in ("NULL", "nullptr", "0")
-
-
-def _constant(node: Node | None, depth: int = 0) -> Any:
-    """Return the value of a literal, or of numbers that are calculated; None for what is none."""
-    if node is None or depth > MAX_DEPTH:
-        return None
-    shown = text(node)
-    given = arguments_of(node)
-    found: Any = None
-    if node.type == "string_literal":
-        found = shown[1:-1]
-    elif node.type in ("true", "false"):
-        found = node.type == "true"
-    elif node.type in ("number_literal", "unary_expression"):
-        with contextlib.suppress(ValueError):
-            found = float(shown.rstrip("fF")) if re.search(r"[.eE]", shown) else int(shown, 0)
-    elif node.type == "call_expression" and shown.startswith(("std::string(", "string(")) and len(given) == 1:
-        found = _constant(given[0], depth + 1)
-    elif node.type == "parenthesized_expression" and node.named_child_count == 1:
-        found = _constant(node.named_children[0], depth + 1)
-    elif shown == "M_PI":
-        found = math.pi
-    elif node.type == "binary_expression":
-        with contextlib.suppress(OverflowError):
-            found = _calculated(node, depth)
-    return found
-
-
-def _calculated(node: Node, depth: int) -> int | float | None:
-    """Return what a sum or product of numbers is, as C++ has it: integers divide without a rest."""
-    one, other = (_constant(child_of(node, side), depth + 1) for side in ("left", "right"))
-    if not (isinstance(one, int | float) and isinstance(other, int | float)):
-        return None
-    match text(node.child_by_field_name("operator")):
-        case "+":
-            return one + other
-        case "-":
-            return one - other
-        case "*":
-            return one * other
-        case "/" if other:
-            return int(one / other) if isinstance(one, int) and isinstance(other, int) else one / other
-    return None

@@ -9,7 +9,15 @@ from dataclasses import dataclass, field
 
 from tree_sitter import Node
 
-from ros_model_extraction.cpp.declarations import Declared, File, Place, declarations, reset_pointer
+from ros_model_extraction.cpp.declarations import (
+    Declared,
+    File,
+    Place,
+    appended_text,
+    declarations,
+    is_in_branch,
+    reset_pointer,
+)
 from ros_model_extraction.cpp.reachable_code import ReachableCode
 from ros_model_extraction.cpp.syntax import (
     arguments_of,
@@ -42,7 +50,9 @@ class _Index:
     given: list[tuple[str, tuple[Node, ...], Place]] = field(default_factory=list)
     initialised: list[tuple[str, tuple[Node, ...], Place]] = field(default_factory=list)
     macros: dict[str, str] = field(default_factory=dict)
-    aliases: dict[str, str] = field(default_factory=dict)
+    numbers: dict[str, str] = field(default_factory=dict)
+    aliases: dict[tuple[str, str], str] = field(default_factory=dict)
+    """By the class or file that declares it, and by name; under "" that of any."""
     constructors: dict[str, list[Node]] = field(default_factory=lambda: defaultdict(list))
     message_packages: dict[str, str] = field(default_factory=dict)
     defaults: dict[tuple[str, str, int], int] = field(default_factory=dict)
@@ -66,9 +76,9 @@ class Program:
             kinds = {declared.type for declared in self._index.members.get((place.owner, name), ())} or {name}
             for kind in kinds:
                 self._index.calls[last_name(kind)].append((values, place))
-        for alias in list(self._index.aliases):
+        for home, alias in list(self._index.aliases):
             name = last_name(self.alias(alias))
-            if alias in self._index.calls and name != alias:
+            if not home and alias in self._index.calls and name != alias:
                 self._index.calls[name] += self._index.calls[alias]
         for name, values, place in self._index.given:  # only now all declarations are known, wherever they stand
             if self.is_run(place):
@@ -79,14 +89,27 @@ class Program:
         for file in self._files:
             yield from ((node, place) for node, place in self._walk(file.root, Place(file)) if self.is_run(place))
 
-    def alias(self, type_name: str) -> str:
-        """Return a type with the names that `typedef` and `using` gave replaced by what they stand for."""
+    def alias(self, type_name: str, place: Place | None = None) -> str:
+        """Return a type with the names that `typedef` and `using` gave replaced by what they stand for.
+
+        Args:
+            type_name: the type.
+            place: where it is named; several classes may give one name to different types.
+        """
+        homes = [place.owner, place.file.shown, ""] if place else [""]
         for _ in range(MAX_DEPTH):
             base, bracket, rest = type_name.partition("<")
-            if base not in self._index.aliases:
+            outer, _, name = base.rpartition("::")
+            keys = [(class_name(outer), name)] if outer else [(home, base) for home in homes]
+            known = next((self._index.aliases[key] for key in keys if key in self._index.aliases), None)
+            if known is None:
                 return type_name
-            type_name = self._index.aliases[base] + bracket + rest
+            type_name = known + bracket + rest
         return type_name
+
+    def macro(self, name: str) -> str | None:
+        """Return what a macro stands for that has no parameters and is no text; None for none."""
+        return self._index.numbers.get(name)
 
     def message_package(self, name: str) -> str:
         """Return the package of a message that is named without it, by its header; "" for none, and for two."""
@@ -265,6 +288,23 @@ class Program:
         if not found:
             for argument, at in self.passed(name, place):
                 found += self.texts(argument, at, depth + 1)
+        return self._appended(node, found, place, depth) if self._is_local(name, place) else found
+
+    def _appended(
+        self, use: Node, found: list[tuple[Const | Text, str]], place: Place, depth: int
+    ) -> list[tuple[Const | Text, str]]:
+        """Return the texts that a local variable may be after what the function appends to it before its use."""
+        for node in walk(place.function):
+            if node.start_byte >= use.start_byte:
+                break
+            given = appended_text(node)
+            if given is None or given[0] != text(use):
+                continue
+            more = self.texts(given[1], place, depth + 1)
+            longer = [
+                (joined([as_text(one), as_text(two)]), note or other) for one, note in found for two, other in more
+            ]
+            found = [*found, *longer] if is_in_branch(node, use) else longer
         return found
 
     def _filled(self, name: str, place: Place) -> list[tuple[Node | str | None, Place, str]]:
@@ -287,12 +327,11 @@ class Program:
                         known = self._index.message_packages.setdefault(match[2], match[1])
                         self._index.message_packages[match[2]] = match[1] if known == match[1] else ""
                 case "preproc_def":
-                    value = text(node.child_by_field_name("value")).strip()
-                    if value.startswith('"') and value.endswith('"') and len(value) > 1:
-                        self._index.macros[text(child_of(node, "name"))] = literal_text(value)
+                    self._index_macro(text(child_of(node, "name")), text(node.child_by_field_name("value")).strip())
                 case "type_definition" | "alias_declaration":
                     declarator = node.child_by_field_name("declarator") or node.child_by_field_name("name")
-                    self._index.aliases[text(declarator)] = type_text(child_of(node, "type"))
+                    for home in (place.owner or file.shown, ""):
+                        self._index.aliases[home, text(declarator)] = type_text(child_of(node, "type"))
                 case "declaration" | "field_declaration":
                     self._index_declaration(node, place)
                 case "call_expression" | "new_expression":
@@ -302,8 +341,14 @@ class Program:
                     made = re.match(r"(?:\w+::)*make_(?:shared|unique)<(.*)>$", name)
                     arguments = tuple(arguments_of(node))
                     self._index.calls[last_name(made[1] if made else name)].append((arguments, place))
-                case "assignment_expression":
+                case "assignment_expression" if text(node.child_by_field_name("operator")) == "=":
                     self._index.given.append((text(child_of(node, "left")), (child_of(node, "right"),), place))
+
+    def _index_macro(self, name: str, value: str) -> None:
+        if value.startswith('"') and value.endswith('"') and len(value) > 1:
+            self._index.macros[name] = literal_text(value)
+        elif value:
+            self._index.numbers[name] = value
 
     def _index_declaration(self, node: Node, place: Place) -> None:
         if name := function_name(node):
@@ -373,7 +418,7 @@ class Program:
                         found[name].append(declared)
                     continue
                 given = reset_pointer(node)
-                if node.type == "assignment_expression":
+                if node.type == "assignment_expression" and text(node.child_by_field_name("operator")) == "=":
                     given = text(child_of(node, "left")), (child_of(node, "right"),)
                 if given and given[0] in found:
                     kept = [declared for declared in found[given[0]] if declared.values]

@@ -12,7 +12,7 @@ from ros_model.language.packages import Artifact, Package, PackageSet
 
 from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.names import node_name
-from ros_model_extraction.node_facts import NodeSource, Remark, SourceError, unique
+from ros_model_extraction.node_facts import NodeSource, Remark, SourceError, unique, with_nodelet
 from ros_model_extraction.packages.catkin_package import CatkinPackage, Executable, read_package
 from ros_model_extraction.packages.message_files import read_specs
 
@@ -108,7 +108,16 @@ def read_executable(
 
     entry = Entry(executable.nodelet, package.configurations)
     node = read_cpp_node(executable.sources, package.folder, parameters, entry)
-    return replace(node, name=executable.name, position=executable.position) if executable.nodelet else node
+    if executable.nodelet:
+        return replace(node, name=executable.name, position=executable.position)
+    for loaded in node.nodelets:
+        found = next((other for other in package.executables if other.loaded_as == loaded.loaded_as), None)
+        if found is None:
+            said = f"it loads the nodelet {loaded.loaded_as} of another package, whose interfaces are not here"
+            node = replace(node, remarks=(*node.remarks, Remark(loaded.position, said)))
+        else:
+            node = with_nodelet(node, loaded, read_executable(package, found, library, parameters))
+    return node
 
 
 def named(node: NodeSource, executable: str) -> NodeSource:
