@@ -112,6 +112,12 @@ CPP_BELOW = {
     ),
 }
 
+NODELET_MANAGER = (
+    Made(PortKind.SERVICE_SERVER, "~load_nodelet", "nodelet/NodeletLoad"),
+    Made(PortKind.SERVICE_SERVER, "~unload_nodelet", "nodelet/NodeletUnload"),
+    Made(PortKind.SERVICE_SERVER, "~list", "nodelet/NodeletList"),
+)
+
 PYTHON_CALLS = frozenset(
     {
         *("rospy.init_node", "rospy.get_param", "rospy.get_param_cached", "rospy.has_param"),

@@ -6,6 +6,7 @@ import contextlib
 import math
 import operator
 import re
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -15,12 +16,19 @@ from ros_model_extraction.cpp.declarations import Place
 from ros_model_extraction.cpp.program import MAX_DEPTH, Program
 from ros_model_extraction.cpp.syntax import arguments_of, child_of, literal_text, text
 
+_LIMITS = {
+    "std::numeric_limits<double>::max": "DBL_MAX",
+    "std::numeric_limits<float>::max": "FLT_MAX",
+    "std::numeric_limits<int>::max": "INT_MAX",
+}
 _NUMBER = re.compile(r"-?(?:0[xX][0-9a-fA-F]+|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 _MATHEMATICS = {
     "M_PI": math.pi,
     "M_PI_2": math.pi / 2,
     "M_PI_4": math.pi / 4,
-    "std::numeric_limits<double>::max": 1.7976931348623157e308,
+    "DBL_MAX": sys.float_info.max,
+    "FLT_MAX": 3.4028234663852886e38,
+    "INT_MAX": 2**31 - 1,
 }
 _VARIABLES = ("identifier", "field_identifier", "field_expression", "qualified_identifier", "subscript_expression")
 _OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
@@ -80,7 +88,10 @@ class Constants:
         """Return the value of `std::string("x")`, `static_cast<double>(1)`, `(double) 1`, `std::pow(2, 3)`."""
         if node.type == "cast_expression":
             return self.of(node.child_by_field_name("value"), place, depth + 1)
-        called = text(node.child_by_field_name("function")).partition("<")[0]
+        called = text(node.child_by_field_name("function"))
+        if called in _LIMITS:
+            return _MATHEMATICS[_LIMITS[called]]
+        called = called.partition("<")[0]
         given = arguments_of(node)
         if called in _TEXTS and not given:
             return ""
@@ -106,6 +117,9 @@ class Constants:
                 values.append(self.of(declared.values[0], declared.place, depth + 1))
             elif declared.values:
                 values.append(None)
+        for filled, at in self._program.filled(name, place):
+            if isinstance(filled, Node) and filled.start_byte != node.start_byte:
+                values.append(self.of(filled, at, depth + 1))
         known = [value for value in values if value is not None]
         return known[0] if known and all(value == known[0] for value in known) else None
 

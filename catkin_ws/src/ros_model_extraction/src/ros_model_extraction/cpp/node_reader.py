@@ -19,6 +19,7 @@ from ros_model_extraction.cpp.syntax import (
     child_of,
     literal_text,
     parameter_types,
+    parameters,
     template_arguments,
     text,
     type_text,
@@ -35,7 +36,7 @@ from ros_model_extraction.node_facts import (
     unresolved,
 )
 from ros_model_extraction.python.values import Const, Text
-from ros_model_extraction.ros_api import CPP_BELOW, CPP_FIXED, RECONFIGURE_SERVER, Below
+from ros_model_extraction.ros_api import CPP_BELOW, CPP_FIXED, NODELET_MANAGER, RECONFIGURE_SERVER, Below
 
 Name = Const | Text
 
@@ -53,10 +54,12 @@ _KINDS = {
 }
 _LOADER = "nodelet::Loader"
 _LOADERS = ("pluginlib::ClassLoader", _LOADER)
+_FILTER_CHAINS = ("filters::FilterChain", "filters::MultiChannelFilterChain")
 _HANDLE_AND_NAME = {
     "message_filters::Subscriber": PortKind.SUBSCRIBER,
     "realtime_tools::RealtimePublisher": PortKind.PUBLISHER,
 }
+_KNOWN = {*_LOADERS, *CPP_FIXED, *CPP_BELOW, *_ACTIONS, *_HANDLE_AND_NAME, "dynamic_reconfigure::Server"}
 _METHODS = ("advertise", "subscribe", "advertiseService", "serviceClient", "advertiseCamera", "subscribeCamera")
 _OPTIONS = {  # the class whose `create` makes what may be given to a method alone
     "advertise": (PortKind.PUBLISHER, "AdvertiseOptions"),
@@ -182,6 +185,8 @@ class _Reader:
         value = self._constants.of(default if default is not None else _otherwise(node, variable), place)
         for namespace in handles:
             for key, _ in self._program.texts(arguments[0], place):
+                if key == Const(""):  # all of a namespace, or a name that is found at run time
+                    continue
                 shown = self._name("parameter", in_namespace(namespace, key), position)
                 self.parameters.append(FoundParameter(shown, value, position, kind))
         if variable is not None:
@@ -241,6 +246,8 @@ class _Reader:
         name = method.partition("<")[0].strip()
         if name == "load" and len(arguments) > 1:
             self._loaded(owner, arguments, node, place)
+        if name == "configure" and arguments:
+            self._filter_chain(owner, arguments, node, place)
         if name not in _METHODS:
             return
         kinds = {
@@ -282,11 +289,14 @@ class _Reader:
 
     def _loaded(self, owner: Node, arguments: list[Node], node: Node, place: Place) -> None:
         """Look at `loader.load(name, "package/Class", remappings, arguments)`."""
-        if not any(self._program.alias(d.type) == _LOADER for d in self._program.declared(text(owner), place)):
+        kinds = {self._program.alias(d.type) for d in self._program.declared(text(owner), place)}
+        if place.function is not None and text(owner) in (given := parameters(place.function)):
+            kinds.add(given[text(owner)][1])
+        if _LOADER not in kinds:
             return
         position = place.file.position(node)
-        remappings = self._remappings(arguments[2], node, place) if len(arguments) > len("ab") else {}
-        for name, _ in self._program.texts(arguments[0], place):
+        for number, (name, _) in enumerate(self._program.texts(arguments[0], place)):
+            remappings = self._remappings(arguments[2], node, place, number) if len(arguments) > len("ab") else {}
             shown = str(name.value) if isinstance(name, Const) else str(name)
             if shown.startswith("~") and len(shown) > 1:  # the node's own name, and more
                 shown = f"{{ros::this_node::getName()}}{shown[1:]}"
@@ -294,8 +304,27 @@ class _Reader:
                 if isinstance(loaded, Const):
                     self.nodelets.append(LoadedNodelet(shown, str(loaded.value), remappings, position))
 
-    def _remappings(self, given: Node, call: Node, place: Place) -> dict[str, str]:
-        """Return what a map of remappings holds at a call, as its function fills it before."""
+    def _filter_chain(self, owner: Node, arguments: list[Node], node: Node, place: Place) -> None:
+        """Look at `chain.configure(name, node_handle)`: it reads the filters from a parameter."""
+        kinds = (self._program.alias(d.type, d.place) for d in self._program.declared(text(owner), place))
+        if not any(kind.partition("<")[0] in _FILTER_CHAINS for kind in kinds):
+            return
+        position = place.file.position(node)
+        for namespace in self._handles.of(arguments[1] if len(arguments) > 1 else None, place):
+            for name, _ in self._program.texts(arguments[0], place):
+                shown = self._name("parameter", in_namespace(namespace, name), position)
+                ends = ["", "/filter_chain"] if isinstance(name, Const) and name.value else ["/filter_chain"]
+                self.parameters += [FoundParameter(f"{shown}{end}", None, position) for end in ends]
+
+    def _remappings(self, given: Node, call: Node, place: Place, number: int) -> dict[str, str]:
+        """Return what a map of remappings holds at a call, as its function fills it before.
+
+        Args:
+            given: the map.
+            call: where it is given.
+            place: of the call.
+            number: of the call of the function, where it is called several times with other texts.
+        """
         found: dict[str, str] = {}
         for node in walk(place.function):
             if node.start_byte >= call.start_byte:
@@ -308,7 +337,7 @@ class _Reader:
             inside = [n for n in walk(left) if n.type == "string_literal"]
             values = self._program.texts(child_of(node, "right"), place)
             if len(inside) == 1 and values:
-                value = values[0][0]
+                value = values[number if number < len(values) else 0][0]
                 shown = (
                     str(value.value) if isinstance(value, Const) else unresolved(str(value), place.file.position(node))
                 )
@@ -365,11 +394,14 @@ class _Reader:
     ) -> None:
         """Look at an object that is made: some of them are interfaces."""
         kind = self._program.alias(type_name, place)
-        base = kind.partition("<")[0]
+        bases = self._program.full_names(kind.partition("<")[0])
+        base = next((name for name in bases if name in _KNOWN), bases[0])
         position = place.file.position(node)
         if base in _LOADERS and node.type != "field_initializer":
             said = f"of the classes that {base} loads, only those of this package count that a text in its source names"
             self.remarks.append(Remark(position, said))
+            if base == _LOADER and not (arguments and text(arguments[0]) == "false"):
+                self._add([FoundPort(made.kind, made.name, made.type, position) for made in NODELET_MANAGER])
         elif base in CPP_FIXED:
             self._add([FoundPort(made.kind, made.name, made.type, position) for made in CPP_FIXED[base]])
         elif base in _ACTIONS and arguments and not is_member:

@@ -51,6 +51,8 @@ class _Index:
     initialised: list[tuple[str, tuple[Node, ...], Place]] = field(default_factory=list)
     macros: dict[str, str] = field(default_factory=dict)
     numbers: dict[str, str] = field(default_factory=dict)
+    namespace_aliases: dict[str, str] = field(default_factory=dict)
+    namespaces: set[str] = field(default_factory=set)
     aliases: dict[tuple[str, str], str] = field(default_factory=dict)
     """By the class or file that declares it, and by name; under "" that of any."""
     constructors: dict[str, list[Node]] = field(default_factory=lambda: defaultdict(list))
@@ -103,9 +105,18 @@ class Program:
             keys = [(class_name(outer), name)] if outer else [(home, base) for home in homes]
             known = next((self._index.aliases[key] for key in keys if key in self._index.aliases), None)
             if known is None:
-                return type_name
+                first, colons, rest = type_name.partition("::")
+                return f"{self._index.namespace_aliases.get(first, first)}{colons}{rest}"
             type_name = known + bracket + rest
         return type_name
+
+    def full_names(self, type_name: str) -> list[str]:
+        """Return a type's names: as it is, and in each namespace that the sources use."""
+        return [type_name, *(f"{namespace}::{type_name}" for namespace in sorted(self._index.namespaces))]
+
+    def filled(self, name: str, place: Place) -> list[tuple[Node | str | None, Place]]:
+        """Return the values that calls like `param(name, variable, value)` fill a variable with."""
+        return [(value, at) for value, at, _ in self._filled(name.removeprefix("this->"), place)]
 
     def macro(self, name: str) -> str | None:
         """Return what a macro stands for that has no parameters and is no text; None for none."""
@@ -328,21 +339,35 @@ class Program:
                         self._index.message_packages[match[2]] = match[1] if known == match[1] else ""
                 case "preproc_def":
                     self._index_macro(text(child_of(node, "name")), text(node.child_by_field_name("value")).strip())
-                case "type_definition" | "alias_declaration":
-                    declarator = node.child_by_field_name("declarator") or node.child_by_field_name("name")
-                    for home in (place.owner or file.shown, ""):
-                        self._index.aliases[home, text(declarator)] = type_text(child_of(node, "type"))
+                case "namespace_alias_definition" | "using_declaration" | "type_definition" | "alias_declaration":
+                    self._index_name(node, place)
                 case "declaration" | "field_declaration":
                     self._index_declaration(node, place)
                 case "call_expression" | "new_expression":
-                    if reset := reset_pointer(node):
-                        self._index.given.append((*reset, place))
-                    name = text(node.child_by_field_name("function") or node.child_by_field_name("type"))
-                    made = re.match(r"(?:\w+::)*make_(?:shared|unique)<(.*)>$", name)
-                    arguments = tuple(arguments_of(node))
-                    self._index.calls[last_name(made[1] if made else name)].append((arguments, place))
+                    self._index_call(node, place)
                 case "assignment_expression" if text(node.child_by_field_name("operator")) == "=":
                     self._index.given.append((text(child_of(node, "left")), (child_of(node, "right"),), place))
+
+    def _index_name(self, node: Node, place: Place) -> None:
+        """Note a name that the code gives to a namespace or type, or a namespace whose names it uses."""
+        if node.type == "namespace_alias_definition":
+            first, *_, last = node.named_children
+            self._index.namespace_aliases[text(first)] = text(last)
+        elif node.type == "using_declaration":
+            if text(node).startswith("using namespace"):
+                self._index.namespaces.add(text(node.named_children[-1]))
+        else:
+            declarator = node.child_by_field_name("declarator") or node.child_by_field_name("name")
+            for home in (place.owner or place.file.shown, ""):
+                self._index.aliases[home, text(declarator)] = type_text(child_of(node, "type"))
+
+    def _index_call(self, node: Node, place: Place) -> None:
+        if reset := reset_pointer(node):
+            self._index.given.append((*reset, place))
+        name = text(node.child_by_field_name("function") or node.child_by_field_name("type"))
+        made = re.match(r"(?:\w+::)*make_(?:shared|unique)<(.*)>$", name)
+        arguments = tuple(arguments_of(node))
+        self._index.calls[last_name(made[1] if made else name)].append((arguments, place))
 
     def _index_macro(self, name: str, value: str) -> None:
         if value.startswith('"') and value.endswith('"') and len(value) > 1:

@@ -8,12 +8,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import rospkg
 from catkin_pkg.package import InvalidPackage, parse_package_string
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
 
 from ros_model_extraction.io.source_files import read_source, read_xml
+from ros_model_extraction.io.workspace import package_folder
 from ros_model_extraction.node_facts import Configurations, Remark, SourceError
 from ros_model_extraction.packages.cmake import Command, commands, sections
 from ros_model_extraction.packages.nodelet_files import nodelets_of
@@ -115,7 +115,9 @@ def read_package(folder: Path) -> CatkinPackage:
     found.read(described)
     configurations, said = read_configurations(folder)
     dependencies = sorted({d.name for d in (*package.exec_depends, *package.build_depends, *package.run_depends)})
-    installed = set(rospkg.RosPack().list())
+    installed = {name: path for name in dependencies if (path := package_folder(name))}
+    for below in installed.values():
+        configurations = {**read_configurations(below)[0], **configurations}
     plugins = tuple(
         value
         for export in package.exports

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
 from ros_model.language.packages import Artifact, Package, PackageSet
 
 from ros_model_extraction.io.python_modules import Library
+from ros_model_extraction.io.workspace import package_folder
 from ros_model_extraction.names import node_name
-from ros_model_extraction.node_facts import NodeSource, Remark, SourceError, unique, with_nodelet
+from ros_model_extraction.node_facts import LoadedNodelet, NodeSource, Remark, SourceError, unique, with_nodelet
 from ros_model_extraction.packages.catkin_package import CatkinPackage, Executable, read_package
 from ros_model_extraction.packages.message_files import read_specs
 
@@ -111,13 +113,29 @@ def read_executable(
     if executable.nodelet:
         return replace(node, name=executable.name, position=executable.position)
     for loaded in node.nodelets:
-        found = next((other for other in package.executables if other.loaded_as == loaded.loaded_as), None)
+        found = _nodelet(package, loaded, library, parameters)
         if found is None:
-            said = f"it loads the nodelet {loaded.loaded_as} of another package, whose interfaces are not here"
+            said = f"it loads the nodelet {loaded.loaded_as}, whose source is not here: its interfaces are missing"
             node = replace(node, remarks=(*node.remarks, Remark(loaded.position, said)))
         else:
-            node = with_nodelet(node, loaded, read_executable(package, found, library, parameters))
+            node = with_nodelet(node, loaded, found)
     return node
+
+
+def _nodelet(
+    package: CatkinPackage, loaded: LoadedNodelet, library: Library, parameters: Parameters | None
+) -> NodeSource | None:
+    """Return the nodelet that a program loads, of its own or of another package; None where it has no source."""
+    owner = package
+    name = loaded.loaded_as.partition("/")[0]
+    if name != package.name:
+        folder = package_folder(name)
+        try:
+            owner = read_package(folder) if folder else package
+        except ModelError:
+            return None
+    found = next((executable for executable in owner.executables if executable.loaded_as == loaded.loaded_as), None)
+    return read_executable(owner, found, library, parameters) if found else None
 
 
 def named(node: NodeSource, executable: str) -> NodeSource:
