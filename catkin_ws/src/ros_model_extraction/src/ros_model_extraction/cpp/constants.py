@@ -46,11 +46,19 @@ class Constants:
 
     def __init__(self, program: Program) -> None:
         self._program = program
+        self._known: dict[tuple[str, int, int], Any] = {}
 
     def of(self, node: Node | None, place: Place, depth: int = 0) -> Any:
         """Return the value of an expression; None where it is not known."""
         if node is None or depth > MAX_DEPTH:
             return None
+        key = place.file.shown, node.start_byte, node.end_byte
+        if key not in self._known:
+            self._known[key] = None  # for a value that leads to itself
+            self._known[key] = self._value(node, place, depth)
+        return self._known[key]
+
+    def _value(self, node: Node, place: Place, depth: int) -> Any:
         found: Any = None
         inner = node.named_children
         match node.type:

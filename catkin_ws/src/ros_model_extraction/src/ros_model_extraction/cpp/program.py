@@ -69,6 +69,8 @@ class Program:
         self._files = files
         self._code = ReachableCode(files, nodelet)
         self._run: dict[int, bool] = {}
+        self._passed: dict[tuple[int, str], list[tuple[Node, Place]]] = {}
+        self._parameters: dict[int, dict[str, tuple[int, str, Node | None]]] = {}
         self._index = _Index()
         self._locals: dict[int, dict[str, list[Declared]]] = {}
         self._fills: dict[tuple[str, str], list[tuple[Node | str | None, Place, str]]] = defaultdict(list)
@@ -180,9 +182,24 @@ class Program:
 
         A call that only passes on what nobody passes to it is left out, where there are others.
         """
-        if place.function is None or name not in (known := parameters(place.function)):
+        if place.function is None or name not in self.parameters(place.function):
             return []
-        index, _, default = known[name]
+        key = place.function.id, name
+        if key not in self._passed:
+            self._passed[key] = []  # what is asked for while it is being found: a call of itself
+            self._passed[key] = self._find_passed(name, place, depth)
+        return self._passed[key]
+
+    def parameters(self, function: Node) -> dict[str, tuple[int, str, Node | None]]:
+        """Return place, type and default of a function's parameters by name."""
+        if function.id not in self._parameters:
+            self._parameters[function.id] = parameters(function)
+        return self._parameters[function.id]
+
+    def _find_passed(self, name: str, place: Place, depth: int) -> list[tuple[Node, Place]]:
+        if place.function is None:
+            return []
+        index, _, default = self.parameters(place.function)[name]
         called = function_name(place.function).rpartition("::")[2]
         found = []
         for arguments, at in self._index.calls.get(called, ()):
@@ -198,11 +215,11 @@ class Program:
     def _is_never_passed(self, argument: Node, at: Place, depth: int) -> bool:
         if depth > MAX_DEPTH or argument.type not in ("identifier", "type_identifier") or at.function is None:
             return False
-        return text(argument) in parameters(at.function) and not self.passed(text(argument), at, depth)
+        return text(argument) in self.parameters(at.function) and not self.passed(text(argument), at, depth)
 
     def _takes(self, function: Node, arguments: Sequence[Node], at: Place) -> bool:
         """Return whether a function may be what a call means, by the number of arguments, and by node handles."""
-        known = sorted(parameters(function).values(), key=lambda parameter: parameter[0])
+        known = sorted(self.parameters(function).values(), key=lambda parameter: parameter[0])
         owner, _, name = function_name(function).rpartition("::")
         defaults = self._index.defaults.get((class_name(owner), name, len(known)), 0)
         needed = len(known) - max(defaults, sum(default is not None for _, _, default in known))
@@ -216,7 +233,7 @@ class Program:
         if "NodeHandle" in name or argument.type in ("number_literal", "string_literal"):
             return "NodeHandle" in name
         kinds = [self.alias(declared.type) for declared in self.declared(name, at)]
-        if at.function is not None and name in (given := parameters(at.function)):
+        if at.function is not None and name in (given := self.parameters(at.function)):
             kinds.append(given[name][1])
         return not kinds or any("NodeHandle" in kind or kind == "auto" for kind in kinds)
 
@@ -452,7 +469,7 @@ class Program:
         return self._locals[function.id]
 
     def _is_local(self, name: str, place: Place) -> bool:
-        return place.function is not None and (name in self._local(place) or name in parameters(place.function))
+        return place.function is not None and (name in self._local(place) or name in self.parameters(place.function))
 
 
 def _key(place: Place) -> str:
