@@ -12,7 +12,7 @@ from typing import Any
 
 from tree_sitter import Node
 
-from ros_model_extraction.cpp.declarations import Place
+from ros_model_extraction.cpp.declarations import Declared, Place
 from ros_model_extraction.cpp.program import MAX_DEPTH, Program
 from ros_model_extraction.cpp.syntax import arguments_of, child_of, literal_text, text
 
@@ -119,17 +119,16 @@ class Constants:
             return _MATHEMATICS[name]
         if (macro := self._program.macro(name)) is not None:
             return _number(macro)
-        values = []
-        for declared in self._program.declared(name, place):
-            if len(declared.values) == 1 and declared.values[0].start_byte != node.start_byte:
-                values.append(self.of(declared.values[0], declared.place, depth + 1))
-            elif declared.values:
-                values.append(None)
+        given = [d for d in self._program.declared(name, place) if d.values and d.values[0] != node]
+        before = [d for d in given if _is_before(d, node, place)]
+        if before:
+            last = max(before, key=lambda d: d.values[0].start_byte)
+            return self.of(last.values[0], last.place, depth + 1) if len(last.values) == 1 else None
+        values = [self.of(d.values[0], d.place, depth + 1) if len(d.values) == 1 else None for d in given]
         for filled, at in self._program.filled(name, place):
-            if isinstance(filled, Node) and filled.start_byte != node.start_byte:
+            if isinstance(filled, Node) and filled != node:
                 values.append(self.of(filled, at, depth + 1))
-        known = [value for value in values if value is not None]
-        return known[0] if known and all(value == known[0] for value in known) else None
+        return values[0] if values and all(value == values[0] for value in values) else None
 
     def _calculated(self, node: Node, place: Place, depth: int) -> Any:
         """Return what a sum or product is, as C++ has it: integers divide without a rest."""
@@ -142,6 +141,13 @@ class Constants:
         if sign == "/" and isinstance(one, int) and isinstance(other, int):
             return int(one / other) if other else None
         return _OPERATIONS[sign](one, other) if sign in _OPERATIONS and (other or sign != "/") else None
+
+
+def _is_before(declared: Declared, use: Node, place: Place) -> bool:
+    """Return whether the function of a use has given the variable its value before."""
+    function = declared.place.function
+    is_same = function is not None and place.function is not None and function.id == place.function.id
+    return is_same and declared.values[0].end_byte <= use.start_byte
 
 
 def _number(shown: str) -> int | float | None:

@@ -77,7 +77,7 @@ class Program:
         for file in reversed(files):  # headers, which declare, before the sources that include them
             self._index_file(file)
         for name, values, place in self._index.initialised:  # a base class, or a member of some class
-            kinds = {declared.type for declared in self._index.members.get((place.owner, name), ())} or {name}
+            kinds = {declared.type for declared in self._index.members.get((place.owner, name), ())} - {""} or {name}
             for kind in kinds:
                 self._index.calls[last_name(kind)].append((values, place))
         for home, alias in list(self._index.aliases):
@@ -167,6 +167,10 @@ class Program:
             return found
         if place.owner and (found := self._index.members.get((place.owner, plain), [])):
             return found
+        outer, _, inner = plain.replace("->", ".").rpartition(".")
+        if outer and inner.isidentifier():  # a member of an object
+            kinds = {class_name(self.alias(one.type, one.place)) for one in self.declared(outer, place)}
+            return [one for kind in sorted(kinds) for one in self._index.members.get((kind, inner), [])]
         return self._index.globals.get(plain.rpartition("::")[2], [])
 
     def texts(self, node: Node, place: Place, depth: int = 0) -> list[tuple[Const | Text, str]]:
