@@ -570,3 +570,72 @@ def test_library_with_several_nodelets_in_one_description(tmp_path):
     more = DESCRIBED.replace("nav_core::BaseGlobalPlanner", "nodelet::Nodelet")
     extracted = extract_package(make_nodelets(tmp_path, f"<class_libraries>{more}</class_libraries>"))
     assert [artifact.name for artifact in extracted.package.artifacts] == ["crop", "planner"]
+
+
+LOADING = """
+    int main(int argc, char** argv) {
+      ros::init(argc, argv, "both");
+      nodelet::Loader loader(false);
+      nodelet::M_string names;
+      names["cropped"] = "out";
+      loader.load(ros::this_node::getName(), "demo/crop", names, nodelet::V_string());
+      loader.load("/other", "demo/crop", names, nodelet::V_string());
+      loader.load("third", "gone/nodelet", names, nodelet::V_string());
+    }
+    """
+
+
+def test_program_has_the_interfaces_of_the_nodelets_that_it_loads(tmp_path):
+    make_nodelets(tmp_path)
+    (tmp_path / "CMakeLists.txt").write_text(
+        "project(demo)\nadd_library(demo_nodelets src/nodelets.cpp)\nadd_executable(both src/both.cpp)\n"
+    )
+    (tmp_path / "src" / "both.cpp").write_text(LOADING)
+    extracted = extract_package(tmp_path)
+    node = extracted.package.artifacts[0].nodes[0]
+    assert {port.name for port in node.ports} == {"out", "~input", "/other/input"}
+    assert {parameter.name for parameter in node.parameters} == {"size", "/other/size"}
+    assert "it loads the nodelet gone/nodelet, whose source is not here" in str(extracted.nodes["both"].remarks)
+
+
+def make_workspace(folder: Path, monkeypatch) -> tuple[Path, Path]:
+    """Make two packages: a library, and a program that uses its class and a plug-in of it."""
+    library = make_package(folder / "maps", "maps")
+    (library / "include" / "maps").mkdir(parents=True)
+    (library / "include" / "maps" / "store.h").write_text("namespace maps { class Store { public: Store(); }; }\n")
+    (library / "src").mkdir()
+    (library / "src" / "store.cpp").write_text(
+        '#include "maps/store.h"\nmaps::Store::Store() {\n'
+        'ros::NodeHandle nh; nh.advertise<std_msgs::String>("stored", 1); }\n'
+    )
+    (library / "src" / "layer.cpp").write_text(
+        "PLUGINLIB_EXPORT_CLASS(maps::Layer, maps::Base)\n"
+        "class Layer : public maps::Base {\n"
+        ' void start() { ros::NodeHandle nh; nh.subscribe<std_msgs::String>("layer", 1, f); }\n};\n'
+    )
+    program = make_package(folder / "robot", "robot", "project(robot)\nadd_executable(robot src/main.cpp)\n")
+    (program / "src").mkdir()
+    (program / "src" / "main.cpp").write_text(
+        "#include <maps/store.h>\n"
+        "int main(int argc, char** argv) {\n"
+        'ros::init(argc, argv, "robot"); maps::Store store;\n'
+        'pluginlib::ClassLoader<maps::Base> loader("maps", "maps::Base"); loader.createInstance("maps::Layer"); }\n'
+    )
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(folder))
+    return library, program
+
+
+def test_code_and_plugins_of_other_packages_in_the_workspace_are_followed(tmp_path, monkeypatch):
+    _, program = make_workspace(tmp_path, monkeypatch)
+    extracted = extract_package(program)
+    (node,) = extracted.package.artifacts[0].nodes
+    assert {port.name: port.position.file for port in node.ports} == {
+        "stored": "maps/src/store.cpp",
+        "layer": "maps/src/layer.cpp",
+    }
+
+
+def test_package_that_is_not_in_the_workspace_is_not_followed(tmp_path, monkeypatch):
+    _, program = make_workspace(tmp_path, monkeypatch)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(program))
+    assert extract_package(program).package.artifacts[0].nodes[0].ports == ()

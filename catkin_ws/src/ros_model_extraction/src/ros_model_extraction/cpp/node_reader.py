@@ -117,8 +117,14 @@ def node_of(
     for node, place in nodes:
         reader.read(node, place)
     said = unique([*remarks, *reader.remarks])
-    ports, found, nodelets = map(tuple, (reader.ports, reader.parameters, reader.nodelets))
-    return NodeSource(reader.node_name, ports, found, said, reader.position, nodelets)
+    return NodeSource(
+        reader.node_name,
+        tuple(reader.ports),
+        tuple(reader.parameters),
+        said,
+        reader.position,
+        tuple(reader.nodelets),
+    )
 
 
 class _Reader:

@@ -466,9 +466,10 @@ class Program:
                 given = reset_pointer(node)
                 if node.type == "assignment_expression" and text(node.child_by_field_name("operator")) == "=":
                     given = text(child_of(node, "left")), (child_of(node, "right"),)
-                if given and given[0] in found:
-                    kept = [declared for declared in found[given[0]] if declared.values]
-                    found[given[0]] = [*kept, Declared(found[given[0]][0].type, given[1], place)]
+                whole = given[0].partition("[")[0] if given else ""  # an array, for one of its items
+                if given and whole in found:
+                    kept = [declared for declared in found.get(given[0], ()) if declared.values]
+                    found[given[0]] = [*kept, Declared(found[whole][0].type, given[1], place)]
             self._locals[function.id] = dict(found)
         return self._locals[function.id]
 
