@@ -748,3 +748,17 @@ def test_constructor_that_another_one_calls_is_run(tmp_path):
         """
     )
     assert found(read_cpp_node([tmp_path / "main.cpp"], tmp_path)) == {("publisher", "x", "std_msgs/String")}
+
+
+def test_call_that_passes_no_text_for_a_text_is_none_of_the_function(node):
+    before = """
+        void start(std::string name, int count) { ros::NodeHandle a("~/" + name); a.param("p", count, 1); }
+        """
+    code = 'start("one", 1); other->start(NULL, 2); other->start(new Thing(), 2);'
+    assert defaults(node(code, before=before)) == [("~one/p", 1)]
+
+
+def test_names_of_one_line_that_are_not_known_are_one_parameter(node):
+    before = 'void start(std::string name) { ros::NodeHandle a("~/" + name); int b; a.param("p", b, 1); }'
+    declared = node("start(first()); start(second());", before=before).declared()
+    assert [parameter.name for parameter in declared.parameters] == ["{first()}/p@main.cpp:2"]

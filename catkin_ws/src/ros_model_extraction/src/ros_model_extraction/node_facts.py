@@ -124,10 +124,11 @@ class NodeSource:
         parameters: dict[str, ParameterDeclaration] = {}
         for parameter in self.parameters:
             name = private_name(parameter.name)
-            declared = _declared(replace(parameter, name=name))
-            before = parameters.get(name)
+            key = f"{_HOLES.sub('{}', name)}:{parameter.position.column}" if "{" in name else name  # as for ports
+            before = parameters.get(key)
+            declared = _declared(replace(parameter, name=before.name if before else name))
             if before is None or (before.value is None and (declared.value is not None or before.type is None)):
-                parameters[name] = declared
+                parameters[key] = declared
         order = list(PortKind)
         by_kind = sorted(ports.values(), key=lambda port: order.index(port.kind))
         return Node(self.name, tuple(by_kind), tuple(parameters.values()), self.position)

@@ -36,6 +36,7 @@ from ros_model_extraction.python.values import Const, Hole, Text, joined
 MAX_DEPTH = 16
 MAX_VALUES = 16
 
+_TEXT_TYPES = ("std::string", "string")
 _KNOWN_TEXTS = {"ros::this_node::getName": "~", "ros::this_node::getNamespace": ""}
 _SAME_TEXT = ("std::string", "string", "ros::names::resolve", "ros::names::remap", "ros::names::clean")
 _INCLUDED_TYPE = re.compile(r'[<"]([a-z]\w*)/([A-Z]\w*)\.h[>"]')
@@ -229,7 +230,9 @@ class Program:
         needed = len(known) - max(defaults, sum(default is not None for _, _, default in known))
         if not needed <= len(arguments) <= len(known):
             return False
-        pairs = zip(arguments, known, strict=False)
+        pairs = list(zip(arguments, known, strict=False))
+        if any(kind in _TEXT_TYPES and _is_no_text(argument) for argument, (_, kind, _) in pairs):
+            return False
         return all("NodeHandle" not in kind or self._may_be_handle(argument, at) for argument, (_, kind, _) in pairs)
 
     def _may_be_handle(self, argument: Node, at: Place) -> bool:
@@ -475,6 +478,10 @@ class Program:
 
     def _is_local(self, name: str, place: Place) -> bool:
         return place.function is not None and (name in self._local(place) or name in self.parameters(place.function))
+
+
+def _is_no_text(argument: Node) -> bool:
+    return argument.type in ("new_expression", "null", "number_literal") or text(argument) in ("NULL", "nullptr")
 
 
 def _key(place: Place) -> str:
