@@ -442,3 +442,16 @@ def test_published_files_whose_references_are_there_are_clean(check):
     files = [*Path(CORPUS, "rossystem").glob("f1_*"), Path(CORPUS, "rossystem/AcmlStandard.rossystem")]
     assert len(files) == 9
     assert check("--path", f"{CORPUS}/ros", *map(str, files)) == (0, "")
+
+
+def test_names_that_the_source_does_not_tell_are_asked_for():
+    text = """PackageSet { CatkinPackage demo { Artifact a { Node { name a
+        Publishers { Publisher { name '{topic}@src/a.cpp:12' message 'std_msgs.String' } }
+        Parameters { Parameter { name '{key}/rate@src/a.cpp:14' type Double } Parameter { name rate type Double } }
+    } } } }"""
+    asked = [finding for finding in faults(text) if "the source does not tell this name" in finding]
+    assert ["publisher '{topic}@src/a.cpp:12'" in asked[0], "parameter '{key}/rate@src/a.cpp:14'" in asked[1]] == [
+        True,
+        True,
+    ]
+    assert [": warning: " in finding for finding in asked] == [True, True]

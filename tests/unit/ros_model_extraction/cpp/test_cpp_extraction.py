@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 import textwrap
 from pathlib import Path
 
 import pytest
+from ros_model.language.metamodel import Position
+from ros_model_extraction.cpp.node_reader import Entry
 from ros_model_extraction.io.cpp_files import read_cpp_node
-from ros_model_extraction.node_facts import NodeSource, SourceError
+from ros_model_extraction.node_facts import FoundParameter, NodeSource, SourceError
 
 WORKER = """
     #pragma once
@@ -610,3 +613,152 @@ def test_handle_may_be_the_default_of_a_parameter(node):
         };
         """
     assert {name for _, name, _ in found(node("Chain chain;", before))} == {"out", "~own"}
+
+
+def defaults(node: NodeSource) -> list[tuple[str, object]]:
+    return [(parameter.name, parameter.default) for parameter in node.parameters]
+
+
+@pytest.mark.parametrize(
+    ("code", "expected"),
+    [
+        ('double a; pnh.param("p", a, LIMIT);', 2.5),
+        ('double a; pnh.param("p", a, kRate / 2);', 5.0),
+        ('double a[2]; a[0] = 0.5 * 0.5; pnh.param("p", a[0], a[0]);', 0.25),
+        ('double a = 1.0; a = 2.0; double b; pnh.param("p", b, a);', 2.0),
+        ('double a = unknown(); double b; pnh.param("p", b, a);', None),
+        ('double a; pnh.param("p", a, std::pow(2, 3));', 8.0),
+        ('double a; pnh.param("p", a, static_cast<double>(3));', 3),
+        ('double a; pnh.param("p", a, std::numeric_limits<double>::max());', sys.float_info.max),
+        ('bool a; pnh.param("p", a, !true);', False),
+        ('std::string a; pnh.param("p", a, std::string());', ""),
+        ('double a = a; double b; pnh.param("p", b, a);', None),
+        ('int a; pnh.param("p", a, 1 / 0);', None),
+    ],
+)
+def test_default_that_a_constant_holds_is_known(node, code, expected):
+    result = node(code, before="#define LIMIT 2.5\nconst double kRate = 10.0;")
+    assert defaults(result) == [("~p", expected)]
+
+
+def test_default_that_another_parameter_fills_is_its_default(node):
+    code = 'double a, b; pnh.param("slow", a, 0.5); pnh.param("fast", b, a);'
+    assert defaults(node(code)) == [("~slow", 0.5), ("~fast", 0.5)]
+
+
+def test_parameter_that_fills_a_member_of_an_object_has_its_type(node):
+    result = node('Settings s; pnh.getParam("count", s.count);', before="struct Settings { int count; };")
+    assert [(p.name, p.kind) for p in result.parameters] == [("~count", "Integer")]
+
+
+def test_text_that_is_appended_is_part_of_the_name(node):
+    code = """
+        std::string topic("map");
+        if (second) topic += "_2";
+        std::string other(topic);
+        other.append("_metadata");
+        nh.advertise<std_msgs::String>(topic, 1);
+        nh.advertise<std_msgs::String>(other, 1);
+        """
+    assert {name for _, name, _ in found(node(code))} == {"map", "map_2", "map_metadata", "map_2_metadata"}
+
+
+def test_types_that_two_classes_name_alike_are_kept_apart(tmp_path):
+    (tmp_path / "main.cpp").write_text(
+        """
+        #include <ros/ros.h>
+        class Left { typedef demo::LeftConfig Config; dynamic_reconfigure::Server<Config> server_; };
+        class Right { typedef demo::RightConfig Config; dynamic_reconfigure::Server<Config> server_; };
+        int main(int argc, char** argv) { ros::init(argc, argv, "a"); Left left; Right right; }
+        """
+    )
+    known = {f"{side}Config": (FoundParameter(side, 1, Position(), "Integer"),) for side in ("Left", "Right")}
+    result = read_cpp_node([tmp_path / "main.cpp"], tmp_path, None, Entry("", known))
+    assert defaults(result) == [("~Left", 1), ("~Right", 1)]
+
+
+@pytest.mark.parametrize(
+    ("before", "code", "expected"),
+    [
+        (
+            "namespace sm = std_msgs;",
+            'nh.advertise<sm::String>("x", 1);',
+            {("publisher", "x", "std_msgs/String")},
+        ),
+        (
+            "using namespace tf2_ros;",
+            "TransformBroadcaster broadcaster;",
+            {("publisher", "/tf", "tf2_msgs/TFMessage")},
+        ),
+        ("", 'message_filters::Subscriber<std_msgs::String> a(nh, "", 1);', set()),
+        (
+            "",
+            'auto p = image_transport::ImageTransport(pnh).advertiseCamera("image", 1);',
+            {("publisher", "~image", "sensor_msgs/Image"), ("publisher", "~camera_info", "sensor_msgs/CameraInfo")},
+        ),
+        ("", "nodelet::Loader loader(false);", set()),
+        (
+            "",
+            "nodelet::Loader loader;",
+            {
+                ("service server", "~list", "nodelet/NodeletList"),
+                ("service server", "~load_nodelet", "nodelet/NodeletLoad"),
+                ("service server", "~unload_nodelet", "nodelet/NodeletUnload"),
+            },
+        ),
+    ],
+)
+def test_names_and_helpers_of_ros_are_understood(node, before, code, expected):
+    assert found(node(code, before=before)) == expected
+
+
+def test_filter_chain_reads_its_parameter(node):
+    code = 'filters::FilterChain<std_msgs::String> chain("std_msgs::String"); chain.configure("chain", pnh);'
+    assert defaults(node(code)) == [("~chain", None), ("~chain/filter_chain", None)]
+
+
+def test_nodelets_that_a_program_loads_are_told_with_name_and_remappings(node):
+    code = """
+        nodelet::Loader loader(false);
+        nodelet::M_string names;
+        names["old"] = "gone";
+        names.clear();
+        names["input"] = "image";
+        loader.load(ros::this_node::getName() + "_crop", "demo/crop", names, nodelet::V_string());
+        loader.load("second", "demo/crop", names, nodelet::V_string());
+        """
+    first, second = node(code).nodelets
+    assert (first.name, first.loaded_as, first.remappings) == (
+        "{ros::this_node::getName()}_crop",
+        "demo/crop",
+        {"input": "image"},
+    )
+    assert second.name == "second"
+
+
+def test_constructor_that_another_one_calls_is_run(tmp_path):
+    (tmp_path / "main.cpp").write_text(
+        """
+        class A {
+         public:
+          A(int a, int b, int c) : A(a, b) {}
+          A(int a, int b) { ros::NodeHandle nh; nh.advertise<std_msgs::String>("x", 1); }
+        };
+        int main(int argc, char** argv) { ros::init(argc, argv, "a"); A a(1, 2, 3); }
+        """
+    )
+    assert found(read_cpp_node([tmp_path / "main.cpp"], tmp_path)) == {("publisher", "x", "std_msgs/String")}
+
+
+def test_call_that_passes_no_text_for_a_text_is_none_of_the_function(node):
+    before = """
+        void start(std::string name, int count) { ros::NodeHandle a("~/" + name); a.param("p", count, 1); }
+        """
+    code = 'start("one", 1); other->start(NULL, 2); other->start(new Thing(), 2);'
+    assert defaults(node(code, before=before)) == [("~one/p", 1)]
+
+
+def test_names_of_one_line_that_are_not_known_are_one_parameter(node):
+    before = 'void start(std::string name) { ros::NodeHandle a("~/" + name); int b; a.param("p", b, 1); }'
+    declared = node("start(first()); start(second());", before=before).declared()
+    assert [parameter.name for parameter in declared.parameters] == ["{first()}/p@main.cpp:2"]

@@ -497,3 +497,145 @@ def test_messages_of_the_package_itself_are_known(tmp_path, imported, name, has_
     )
     (artifact,) = extract_package(folder).package.artifacts
     assert [(port.name, port.type) for port in artifact.nodes[0].ports] == [("level", "demo/Level")]
+
+
+NODELET = """
+    #include <nodelet/nodelet.h>
+    namespace demo {
+    class Crop : public nodelet::Nodelet {
+      ros::Publisher out_;
+      void onInit() override {
+        out_ = getNodeHandle().advertise<std_msgs::String>("cropped", 1);
+        sub_ = getPrivateNodeHandle().subscribe("input", 1, &Crop::onInput, this);
+        getPrivateNodeHandle().param("size", size_, 3);
+      }
+      void onInput(const std_msgs::String::ConstPtr& text) {}
+      ros::Subscriber sub_;
+      int size_;
+    };
+    class Other : public nodelet::Nodelet {
+      void onInit() override { getNodeHandle().advertise<std_msgs::String>("of_the_other", 1); }
+    };
+    }
+    """
+DESCRIBED = """
+    <library path="lib/libdemo_nodelets">
+      <class name="demo/crop" type="demo::Crop" base_class_type="nodelet::Nodelet"/>
+      <class name="demo/planner" type="demo::Other" base_class_type="nav_core::BaseGlobalPlanner"/>
+    </library>
+    """
+
+
+def make_nodelets(folder: Path, described: str = DESCRIBED) -> Path:
+    make_package(folder, cmake="project(demo)\nadd_library(${PROJECT_NAME}_nodelets src/nodelets.cpp)\n")
+    manifest = (folder / "package.xml").read_text()
+    export = '<export><nodelet plugin="${prefix}/nodelets.xml"/></export></package>'
+    (folder / "package.xml").write_text(manifest.replace("</package>", export))
+    (folder / "nodelets.xml").write_text(described)
+    (folder / "src").mkdir()
+    (folder / "src" / "nodelets.cpp").write_text(NODELET)
+    return folder
+
+
+def test_nodelet_is_a_node_with_what_its_class_can_reach(tmp_path):
+    extracted = extract_package(make_nodelets(tmp_path))
+    assert [artifact.name for artifact in extracted.package.artifacts] == ["crop"]
+    (node,) = extracted.package.artifacts[0].nodes
+    assert node.name == "crop"
+    assert {(p.kind, p.name, p.type) for p in node.ports} == {
+        (PortKind.PUBLISHER, "cropped", "std_msgs/String"),
+        (PortKind.SUBSCRIBER, "~input", "std_msgs/String"),
+    }
+    assert [(p.name, p.value) for p in node.parameters] == [("size", 3)]
+
+
+def test_model_says_how_a_nodelet_is_started(tmp_path):
+    header = extract_package(make_nodelets(tmp_path)).model().header
+    assert "nodelets.xml:3:1: crop is a nodelet, which is started by nodelet load demo/crop MANAGER" in header
+
+
+@pytest.mark.parametrize("described", ["<library", "<!DOCTYPE a><library/>", "<other/>"])
+def test_descriptions_of_nodelets_that_pluginlib_refuses_have_none(tmp_path, described):
+    assert extract_package(make_nodelets(tmp_path, described)).package.artifacts == ()
+
+
+def test_nodelets_that_are_not_there_are_said(tmp_path):
+    make_nodelets(tmp_path, DESCRIBED.replace("libdemo_nodelets", "libgone"))
+    assert "the nodelet demo/crop: no source of the library gone is known" in str(read_package(tmp_path).remarks)
+    (tmp_path / "nodelets.xml").unlink()
+    assert "nodelets.xml, which describes nodelets" in str(read_package(tmp_path).remarks)
+
+
+def test_library_with_several_nodelets_in_one_description(tmp_path):
+    more = DESCRIBED.replace("nav_core::BaseGlobalPlanner", "nodelet::Nodelet")
+    extracted = extract_package(make_nodelets(tmp_path, f"<class_libraries>{more}</class_libraries>"))
+    assert [artifact.name for artifact in extracted.package.artifacts] == ["crop", "planner"]
+
+
+LOADING = """
+    int main(int argc, char** argv) {
+      ros::init(argc, argv, "both");
+      nodelet::Loader loader(false);
+      nodelet::M_string names;
+      names["cropped"] = "out";
+      loader.load(ros::this_node::getName(), "demo/crop", names, nodelet::V_string());
+      loader.load("/other", "demo/crop", names, nodelet::V_string());
+      loader.load("third", "gone/nodelet", names, nodelet::V_string());
+    }
+    """
+
+
+def test_program_has_the_interfaces_of_the_nodelets_that_it_loads(tmp_path):
+    make_nodelets(tmp_path)
+    (tmp_path / "CMakeLists.txt").write_text(
+        "project(demo)\nadd_library(demo_nodelets src/nodelets.cpp)\nadd_executable(both src/both.cpp)\n"
+    )
+    (tmp_path / "src" / "both.cpp").write_text(LOADING)
+    extracted = extract_package(tmp_path)
+    node = extracted.package.artifacts[0].nodes[0]
+    assert {port.name for port in node.ports} == {"out", "~input", "/other/input"}
+    assert {parameter.name for parameter in node.parameters} == {"size", "/other/size"}
+    assert "it loads the nodelet gone/nodelet, whose source is not here" in str(extracted.nodes["both"].remarks)
+
+
+def make_workspace(folder: Path, monkeypatch) -> tuple[Path, Path]:
+    """Make two packages: a library, and a program that uses its class and a plug-in of it."""
+    library = make_package(folder / "maps", "maps")
+    (library / "include" / "maps").mkdir(parents=True)
+    (library / "include" / "maps" / "store.h").write_text("namespace maps { class Store { public: Store(); }; }\n")
+    (library / "src").mkdir()
+    (library / "src" / "store.cpp").write_text(
+        '#include "maps/store.h"\nmaps::Store::Store() {\n'
+        'ros::NodeHandle nh; nh.advertise<std_msgs::String>("stored", 1); }\n'
+    )
+    (library / "src" / "layer.cpp").write_text(
+        "PLUGINLIB_EXPORT_CLASS(maps::Layer, maps::Base)\n"
+        "class Layer : public maps::Base {\n"
+        ' void start() { ros::NodeHandle nh; nh.subscribe<std_msgs::String>("layer", 1, f); }\n};\n'
+    )
+    program = make_package(folder / "robot", "robot", "project(robot)\nadd_executable(robot src/main.cpp)\n")
+    (program / "src").mkdir()
+    (program / "src" / "main.cpp").write_text(
+        "#include <maps/store.h>\n"
+        "int main(int argc, char** argv) {\n"
+        'ros::init(argc, argv, "robot"); maps::Store store;\n'
+        'pluginlib::ClassLoader<maps::Base> loader("maps", "maps::Base"); loader.createInstance("maps::Layer"); }\n'
+    )
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(folder))
+    return library, program
+
+
+def test_code_and_plugins_of_other_packages_in_the_workspace_are_followed(tmp_path, monkeypatch):
+    _, program = make_workspace(tmp_path, monkeypatch)
+    extracted = extract_package(program)
+    (node,) = extracted.package.artifacts[0].nodes
+    assert {port.name: port.position.file for port in node.ports} == {
+        "stored": "maps/src/store.cpp",
+        "layer": "maps/src/layer.cpp",
+    }
+
+
+def test_package_that_is_not_in_the_workspace_is_not_followed(tmp_path, monkeypatch):
+    _, program = make_workspace(tmp_path, monkeypatch)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(program))
+    assert extract_package(program).package.artifacts[0].nodes[0].ports == ()

@@ -89,6 +89,7 @@ def test_every_kind_of_interface_is_found(node):
         ("publisher", "chatter", "std_msgs/String"),
         ("subscriber", "heard", "std_msgs/String"),
         ("service server", "~reset", "std_srvs/Empty"),
+        ("service server", "~tf2_frames", "tf2_msgs/FrameGraph"),
         ("service client", "/clear", "std_srvs/Empty"),
         ("action server", "serve", "move_base_msgs/MoveBaseAction"),
         ("action client", "ask", "move_base_msgs/MoveBaseAction"),
@@ -549,3 +550,46 @@ def test_model_says_what_could_not_be_resolved(package):
     (declared,) = result.package.artifacts[0].nodes[0].ports
     assert (declared.kind, declared.name) == (PortKind.PUBLISHER, "{sys.x}@nodes/talker:5")
     assert result.package.dependencies == ("rospy",) and result.package.external_dependencies == ("numpy",)
+
+
+def test_buffer_without_debugging_has_no_service(node):
+    result = node("import tf2_ros\nrospy.init_node('a')\ntf2_ros.Buffer(debug=False)\n")
+    assert found(result) == set()
+
+
+def test_functions_of_ros_are_known_where_all_names_of_a_module_are_imported(node):
+    result = node(
+        """
+        from interactive_markers.interactive_marker_server import *
+        from rospy import *
+        init_node("a")
+        InteractiveMarkerServer("handles")
+        get_param("~rate", 10)
+        """
+    )
+    assert result.name == "a"
+    assert names(result) == {"handles/update", "handles/update_full", "handles/feedback"}
+    assert [(p.name, p.default) for p in result.parameters] == [("~rate", 10)]
+
+
+def test_server_of_dynamic_reconfigure_has_the_parameters_of_its_cfg_file(package, tmp_path):
+    (tmp_path / "cfg").mkdir()
+    (tmp_path / "cfg" / "Drive.cfg").write_text(
+        "from dynamic_reconfigure.parameter_generator_catkin import *\n"
+        "gen = ParameterGenerator()\n"
+        "gen.add('speed', double_t, 0, 'm/s', 1, 0, 2)\n"
+        "exit(gen.generate('demo', 'demo', 'Drive'))\n"
+    )
+    script = """
+        import rospy
+        from dynamic_reconfigure.server import Server
+        from demo.cfg import DriveConfig
+        rospy.init_node("a")
+        Server(DriveConfig, print)
+        Server(DriveConfig, print, "left")
+        """
+    result = package(textwrap.dedent(script)).nodes["talker"]
+    assert [(p.name, p.default, p.kind) for p in result.parameters] == [
+        ("~speed", 1, "Double"),
+        ("~left/speed", 1, "Double"),
+    ]

@@ -26,6 +26,7 @@ RULES = {
     "wrong-kind": "References and connections lead to ports of the right kind.",
     "connection": "A connection has ends, and they are ports of the system.",
     "type-mismatch": "The ends of a connection have one type.",
+    "unknown-name": "The names of interfaces and parameters are known; rosmodel extract marks those that are not.",
     "unknown-type": "A message, service or action type is declared by a .ros model or an installed package.",
     "definition-differs": "A specification is that of the installed package.",
     "duplicate": "A name stands once.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -74,6 +74,27 @@ class FoundParameter:
     kind: str = ""
 
 
+Configurations = Mapping[str, tuple[FoundParameter, ...]]
+"""Parameters of dynamic_reconfigure by the name of the class that it generates, such as `PlannerConfig`."""
+
+
+@dataclass(frozen=True)
+class LoadedNodelet:
+    """A nodelet that a program loads into itself.
+
+    Attributes:
+        name: its name, which is its private namespace; "~" is the program's own.
+        loaded_as: what it is loaded by, `package/Class`.
+        remappings: names that it finds under others.
+        position: of the call.
+    """
+
+    name: str
+    loaded_as: str
+    remappings: Mapping[str, str]
+    position: Position
+
+
 @dataclass(frozen=True)
 class NodeSource:
     """The node that the code of one executable makes. `name` is "" if no call starts a node."""
@@ -83,6 +104,7 @@ class NodeSource:
     parameters: tuple[FoundParameter, ...] = ()
     remarks: tuple[Remark, ...] = ()
     position: Position = field(default=Position())
+    nodelets: tuple[LoadedNodelet, ...] = ()
 
     @property
     def is_node(self) -> bool:
@@ -102,13 +124,35 @@ class NodeSource:
         parameters: dict[str, ParameterDeclaration] = {}
         for parameter in self.parameters:
             name = private_name(parameter.name)
-            declared = _declared(replace(parameter, name=name))
-            before = parameters.get(name)
+            key = f"{_HOLES.sub('{}', name)}:{parameter.position.column}" if "{" in name else name  # as for ports
+            before = parameters.get(key)
+            declared = _declared(replace(parameter, name=before.name if before else name))
             if before is None or (before.value is None and (declared.value is not None or before.type is None)):
-                parameters[name] = declared
+                parameters[key] = declared
         order = list(PortKind)
         by_kind = sorted(ports.values(), key=lambda port: order.index(port.kind))
         return Node(self.name, tuple(by_kind), tuple(parameters.values()), self.position)
+
+
+def with_nodelet(program: NodeSource, loaded: LoadedNodelet, nodelet: NodeSource) -> NodeSource:
+    """Return a program with the interfaces and parameters of a nodelet that it loads."""
+
+    def renamed(name: str) -> str:
+        if name in loaded.remappings:
+            return loaded.remappings[name]
+        if not name.startswith("~") or loaded.name == "~":
+            return name
+        inside = f"{loaded.name}/{name[1:].lstrip('/')}"
+        return unresolved(inside, loaded.position) if "{" in loaded.name and "@" not in inside else inside
+
+    ports = [replace(port, name=renamed(port.name)) for port in nodelet.ports]
+    parameters = [replace(parameter, name=renamed(parameter.name)) for parameter in nodelet.parameters]
+    return replace(
+        program,
+        ports=(*program.ports, *(port for port in ports if port not in program.ports)),
+        parameters=(*program.parameters, *parameters),
+        remarks=unique([*program.remarks, *nodelet.remarks]),
+    )
 
 
 def private_name(name: str) -> str:

@@ -49,8 +49,12 @@ PYTHON_FIXED = {
     "tf2_ros.TransformBroadcaster": (Made(_PUBLISHER, "/tf", TF),),
     "tf2_ros.StaticTransformBroadcaster": (Made(_PUBLISHER, "/tf_static", TF),),
     "tf2_ros.TransformListener": _LISTENS,
+    "tf2_ros.Buffer": (Made(PortKind.SERVICE_SERVER, "~tf2_frames", "tf2_msgs/FrameGraph"),),
     "diagnostic_updater.Updater": (Made(_PUBLISHER, "/diagnostics", "diagnostic_msgs/DiagnosticArray"),),
 }
+
+PYTHON_UNLESS = {"tf2_ros.Buffer": (1, "debug")}
+"""The argument that is false where a call makes nothing of PYTHON_FIXED (place, keyword)."""
 
 RECONFIGURE_SERVER = (
     Made(_PUBLISHER, "parameter_descriptions", "dynamic_reconfigure/ConfigDescription"),
@@ -107,6 +111,23 @@ CPP_BELOW = {
         inner="controller_manager",
     ),
 }
+
+NODELET_MANAGER = (
+    Made(PortKind.SERVICE_SERVER, "~load_nodelet", "nodelet/NodeletLoad"),
+    Made(PortKind.SERVICE_SERVER, "~unload_nodelet", "nodelet/NodeletUnload"),
+    Made(PortKind.SERVICE_SERVER, "~list", "nodelet/NodeletList"),
+)
+
+PYTHON_CALLS = frozenset(
+    {
+        *("rospy.init_node", "rospy.get_param", "rospy.get_param_cached", "rospy.has_param"),
+        *("dynamic_reconfigure.server.Server", "dynamic_reconfigure.client.Client"),
+        *PYTHON_MAKERS,
+        *PYTHON_FIXED,
+        *PYTHON_BELOW,
+    }
+)
+"""What `from module import *` may bring, by full name."""
 
 COUNTERPART = {end: other for ends in ENDS.values() for end, other in zip(ends, reversed(ends), strict=True)}
 

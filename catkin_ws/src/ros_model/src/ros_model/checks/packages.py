@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from ros_model.checks.values import misfits
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from ros_model.language.library import Library
     from ros_model.language.metamodel import Position
     from ros_model.language.packages import MessageField, Node, Package, PackageSet, Spec
+
+_UNKNOWN = re.compile(r"\{.*\}.*@.+:\d+")
+"""A name of which `rosmodel extract` does not know all: the expression in braces, and its place after the @."""
 
 
 def check_packages(packages: PackageSet, library: Library) -> tuple[Finding, ...]:
@@ -50,6 +54,10 @@ def _node(node: Node, library: Library) -> Iterator[Finding]:
     yield from _twice("", ((f"{port.kind.value} '{port.name}'", port.position) for port in node.ports))
     yield from _twice("parameter", ((parameter.name, parameter.position) for parameter in node.parameters))
     for port in node.ports:
+        yield from _unknown(port.kind.value, port.name, port.position)
+    for parameter in node.parameters:
+        yield from _unknown("parameter", parameter.name, parameter.position)
+    for port in node.ports:
         kind = SpecKind(CONNECTION_OF[port.kind].value)
         problem = library.missing_type(kind, port.type) if port.type else None
         if problem:
@@ -58,6 +66,15 @@ def _node(node: Node, library: Library) -> Iterator[Finding]:
             )
     for parameter in node.parameters:
         yield from misfits(parameter)
+
+
+def _unknown(what: str, name: str, position: Position) -> Iterator[Finding]:
+    if _UNKNOWN.search(name):
+        text = (
+            f"{what} '{name}': the source does not tell this name: write the name that the node has when it runs "
+            "(rosmodel snapshot shows it), or delete it"
+        )
+        yield Finding(text, position, "unknown-name", WARNING)
 
 
 def _spec(spec: Spec, package: str, library: Library) -> Iterator[Finding]:

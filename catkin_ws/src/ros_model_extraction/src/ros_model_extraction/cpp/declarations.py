@@ -84,3 +84,30 @@ def reset_pointer(node: Node) -> tuple[str, tuple[Node, ...]] | None:
         return None
     arguments = arguments_of(node)
     return (text(child_of(function, "argument")), (arguments[0],)) if arguments else None
+
+
+def appended_text(node: Node) -> tuple[str, Node] | None:
+    """Return the variable that `name += value` or `name.append(value)` makes longer, and the value."""
+    if node.type == "assignment_expression" and text(node.child_by_field_name("operator")) == "+=":
+        return text(child_of(node, "left")), child_of(node, "right")
+    function = node.child_by_field_name("function") if node.type == "call_expression" else None
+    arguments = arguments_of(node)
+    if function is None or function.type != "field_expression" or len(arguments) != 1:
+        return None
+    is_append = text(child_of(function, "field")) in ("append", "push_back")
+    return (text(child_of(function, "argument")), arguments[0]) if is_append else None
+
+
+def is_in_branch(node: Node, use: Node) -> bool:
+    """Return whether a node stands in a branch or loop that a later use does not stand in."""
+    around = set()
+    outer: Node | None = use
+    while outer is not None:
+        around.add(outer.id)
+        outer = outer.parent
+    outer = node.parent
+    while outer is not None and outer.id not in around:
+        if outer.type in ("if_statement", "for_statement", "while_statement", "for_range_loop", "switch_statement"):
+            return True
+        outer = outer.parent
+    return False

@@ -53,7 +53,7 @@ class Handles:
     def _named(self, name: str, place: Place, depth: int) -> list[Const | Text]:
         found: list[Const | Text] = []
         for declared in self._program.declared(name, place):
-            kind = self._program.alias(declared.type)
+            kind = self._program.alias(declared.type, declared.place)
             if not _names_handle(kind) and not any("NodeHandle" in text(value) for value in declared.values):
                 continue
             is_handle = kind.endswith(_HANDLES) and not declared.is_indirect  # else it is made elsewhere
@@ -86,7 +86,10 @@ class Handles:
         name = text(node).lstrip("*&").removeprefix("this->")
         if "NodeHandle" in name:
             return True
-        if any("NodeHandle" in self._program.alias(declared.type) for declared in self._program.declared(name, place)):
+        if any(
+            "NodeHandle" in self._program.alias(declared.type, declared.place)
+            for declared in self._program.declared(name, place)
+        ):
             return True
         parameter = parameters(place.function).get(name) if place.function is not None else None
         return parameter is not None and "NodeHandle" in parameter[1]

@@ -2,30 +2,41 @@
 
 from __future__ import annotations
 
-import contextlib
-import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ros_model.language.metamodel import PortKind, Position
 from tree_sitter import Node
 
+from ros_model_extraction.cpp.constants import Constants
 from ros_model_extraction.cpp.declarations import File, Place
 from ros_model_extraction.cpp.handles import Handles, in_namespace
-from ros_model_extraction.cpp.program import MAX_DEPTH, Program
+from ros_model_extraction.cpp.program import Program
 from ros_model_extraction.cpp.syntax import (
     arguments_of,
     child_of,
+    literal_text,
     parameter_types,
+    parameters,
     template_arguments,
     text,
     type_text,
     walk,
 )
-from ros_model_extraction.node_facts import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
+from ros_model_extraction.node_facts import (
+    Configurations,
+    FoundParameter,
+    FoundPort,
+    LoadedNodelet,
+    NodeSource,
+    Remark,
+    unique,
+    unresolved,
+)
 from ros_model_extraction.python.values import Const, Text
-from ros_model_extraction.ros_api import CPP_BELOW, CPP_FIXED, RECONFIGURE_SERVER, Below
+from ros_model_extraction.ros_api import CPP_BELOW, CPP_FIXED, NODELET_MANAGER, RECONFIGURE_SERVER, Below
 
 Name = Const | Text
 
@@ -41,11 +52,14 @@ _KINDS = {
     "bool": "Boolean",
     "string": "String",
 }
-_LOADERS = ("pluginlib::ClassLoader", "nodelet::Loader")
+_LOADER = "nodelet::Loader"
+_LOADERS = ("pluginlib::ClassLoader", _LOADER)
+_FILTER_CHAINS = ("filters::FilterChain", "filters::MultiChannelFilterChain")
 _HANDLE_AND_NAME = {
     "message_filters::Subscriber": PortKind.SUBSCRIBER,
     "realtime_tools::RealtimePublisher": PortKind.PUBLISHER,
 }
+_KNOWN = {*_LOADERS, *CPP_FIXED, *CPP_BELOW, *_ACTIONS, *_HANDLE_AND_NAME, "dynamic_reconfigure::Server"}
 _METHODS = ("advertise", "subscribe", "advertiseService", "serviceClient", "advertiseCamera", "subscribeCamera")
 _OPTIONS = {  # the class whose `create` makes what may be given to a method alone
     "advertise": (PortKind.PUBLISHER, "AdvertiseOptions"),
@@ -64,18 +78,38 @@ _IMAGE = "sensor_msgs/Image"
 _CAMERA_INFO = "sensor_msgs/CameraInfo"
 
 
+@dataclass(frozen=True)
+class Entry:
+    """Where a node's code starts, and what its package adds.
+
+    Attributes:
+        nodelet: the class that is loaded, with its namespaces; "" for a program, which starts at `main`.
+        configurations: the parameters of dynamic_reconfigure by the name of the class that is generated.
+    """
+
+    nodelet: str = ""
+    configurations: Configurations = field(default_factory=dict)
+
+
+PROGRAM = Entry()
+
+
 def node_of(
-    files: Sequence[File], remarks: Iterable[Remark] = (), parameters: Callable[[str], Any] | None = None
+    files: Sequence[File],
+    remarks: Iterable[Remark] = (),
+    parameters: Callable[[str], Any] | None = None,
+    entry: Entry = PROGRAM,
 ) -> NodeSource:
-    """Return what C++ sources make of a node, as far as `main` can reach them.
+    """Return what C++ sources make of a node, as far as `main` or the class of a nodelet can reach them.
 
     Args:
         files: the sources, then the headers that they include.
         remarks: what is to be said of the files.
         parameters: the value of a parameter by its name as the code has it, or KeyError; without it, defaults count.
+        entry: where its code starts.
     """
-    program = Program(files)
-    reader = _Reader(program, parameters)
+    program = Program(files, entry.nodelet)
+    reader = _Reader(program, parameters, entry.configurations)
     nodes = list(program.expressions())
     for node, place in nodes:  # first what parameters fill variables with, which names may depend on
         if node.type == "call_expression":
@@ -83,21 +117,33 @@ def node_of(
     for node, place in nodes:
         reader.read(node, place)
     said = unique([*remarks, *reader.remarks])
-    return NodeSource(reader.node_name, tuple(reader.ports), tuple(reader.parameters), said, reader.position)
+    return NodeSource(
+        reader.node_name,
+        tuple(reader.ports),
+        tuple(reader.parameters),
+        said,
+        reader.position,
+        tuple(reader.nodelets),
+    )
 
 
 class _Reader:
     """Keeps what the calls and declarations of ROS make."""
 
-    def __init__(self, program: Program, parameters: Callable[[str], Any] | None) -> None:
+    def __init__(
+        self, program: Program, parameters: Callable[[str], Any] | None, configurations: Configurations
+    ) -> None:
         self.ports: list[FoundPort] = []
         self.parameters: list[FoundParameter] = []
         self.remarks: list[Remark] = []
+        self.nodelets: list[LoadedNodelet] = []
         self.node_name = ""
         self.position = Position()
         self._program = program
         self._handles = Handles(program)
+        self._constants = Constants(program)
         self._values = parameters
+        self._configurations = configurations
 
     def read(self, node: Node, place: Place) -> None:
         """Look at a node: a call, or the declaration of an object."""
@@ -142,9 +188,11 @@ class _Reader:
             variable = arguments[1] if is_filling and len(arguments) > 1 else None
         position = place.file.position(node)
         kind = self._kind(text(function), variable, place)
-        value = _constant(default if default is not None else _otherwise(node, variable))
+        value = self._constants.of(default if default is not None else _otherwise(node, variable), place)
         for namespace in handles:
             for key, _ in self._program.texts(arguments[0], place):
+                if key == Const(""):  # all of a namespace, or a name that is found at run time
+                    continue
                 shown = self._name("parameter", in_namespace(namespace, key), position)
                 self.parameters.append(FoundParameter(shown, value, position, kind))
         if variable is not None:
@@ -155,7 +203,10 @@ class _Reader:
         """Return the kind of a parameter, by the template argument of the call or by the variable that it fills."""
         kinds = template_arguments(called.replace(" ", ""))
         if variable is not None:
-            kinds += [self._program.alias(declared.type) for declared in self._program.declared(text(variable), place)]
+            kinds += [
+                self._program.alias(declared.type, declared.place)
+                for declared in self._program.declared(text(variable), place)
+            ]
         known = (_KINDS.get(kind.removeprefix("std::"), "") for kind in kinds)
         return next((kind for kind in known if kind), "")
 
@@ -199,10 +250,19 @@ class _Reader:
 
     def _method(self, owner: Node, method: str, arguments: list[Node], node: Node, place: Place) -> None:
         name = method.partition("<")[0].strip()
+        if name == "load" and len(arguments) > 1:
+            self._loaded(owner, arguments, node, place)
+        if name == "configure" and arguments:
+            self._filter_chain(owner, arguments, node, place)
         if name not in _METHODS:
             return
-        kinds = {self._program.alias(declared.type) for declared in self._program.declared(text(owner), place)}
-        if any("ImageTransport" in kind for kind in kinds):
+        kinds = {
+            self._program.alias(declared.type, declared.place)
+            for declared in self._program.declared(text(owner), place)
+        }
+        if any("ImageTransport" in kind for kind in kinds) or text(owner).startswith(
+            "image_transport::ImageTransport("
+        ):
             self._image(name, owner, arguments, node, place)
             return
         if any("message_filters::Subscriber" in kind for kind in kinds) and name == "subscribe":
@@ -233,6 +293,63 @@ class _Reader:
             kind = self._template(method) or self._of_callback(arguments[1:], place)
             self._port(PortKind.SERVICE_SERVER, handles, arguments[0], kind, node, place)
 
+    def _loaded(self, owner: Node, arguments: list[Node], node: Node, place: Place) -> None:
+        """Look at `loader.load(name, "package/Class", remappings, arguments)`."""
+        kinds = {self._program.alias(d.type) for d in self._program.declared(text(owner), place)}
+        if place.function is not None and text(owner) in (given := parameters(place.function)):
+            kinds.add(given[text(owner)][1])
+        if _LOADER not in kinds:
+            return
+        position = place.file.position(node)
+        for number, (name, _) in enumerate(self._program.texts(arguments[0], place)):
+            remappings = self._remappings(arguments[2], node, place, number) if len(arguments) > len("ab") else {}
+            shown = str(name.value) if isinstance(name, Const) else str(name)
+            if shown.startswith("~") and len(shown) > 1:  # the node's own name, and more
+                shown = f"{{ros::this_node::getName()}}{shown[1:]}"
+            for loaded, _ in self._program.texts(arguments[1], place):
+                if isinstance(loaded, Const):
+                    self.nodelets.append(LoadedNodelet(shown, str(loaded.value), remappings, position))
+
+    def _filter_chain(self, owner: Node, arguments: list[Node], node: Node, place: Place) -> None:
+        """Look at `chain.configure(name, node_handle)`: it reads the filters from a parameter."""
+        kinds = (self._program.alias(d.type, d.place) for d in self._program.declared(text(owner), place))
+        if not any(kind.partition("<")[0] in _FILTER_CHAINS for kind in kinds):
+            return
+        position = place.file.position(node)
+        for namespace in self._handles.of(arguments[1] if len(arguments) > 1 else None, place):
+            for name, _ in self._program.texts(arguments[0], place):
+                shown = self._name("parameter", in_namespace(namespace, name), position)
+                ends = ["", "/filter_chain"] if isinstance(name, Const) and name.value else ["/filter_chain"]
+                self.parameters += [FoundParameter(f"{shown}{end}", None, position) for end in ends]
+
+    def _remappings(self, given: Node, call: Node, place: Place, number: int) -> dict[str, str]:
+        """Return what a map of remappings holds at a call, as its function fills it before.
+
+        Args:
+            given: the map.
+            call: where it is given.
+            place: of the call.
+            number: of the call of the function, where it is called several times with other texts.
+        """
+        found: dict[str, str] = {}
+        for node in walk(place.function):
+            if node.start_byte >= call.start_byte:
+                break
+            if node.type == "call_expression" and text(node.child_by_field_name("function")) == f"{text(given)}.clear":
+                found = {}
+            left = node.child_by_field_name("left") if node.type == "assignment_expression" else None
+            if left is None or left.type != "subscript_expression" or text(child_of(left, "argument")) != text(given):
+                continue
+            inside = [n for n in walk(left) if n.type == "string_literal"]
+            values = self._program.texts(child_of(node, "right"), place)
+            if len(inside) == 1 and values:
+                value = values[number if number < len(values) else 0][0]
+                shown = (
+                    str(value.value) if isinstance(value, Const) else unresolved(str(value), place.file.position(node))
+                )
+                found[literal_text(text(inside[0]))] = shown
+        return found
+
     def _options(self, method: str, handles: list[Name], given: Node, place: Place) -> bool:
         """Look at a method that is given options alone; return whether what they are made with is known."""
         kind, options = _OPTIONS[method]
@@ -255,13 +372,16 @@ class _Reader:
         handles: list[Name] = []
         for declared in self._program.declared(text(owner), place):
             handles += self._handles.of(declared.values[0] if declared.values else owner, declared.place)
+        handles = handles or self._handles.of(owner, place)
         self._port(kind, handles, arguments[0], _IMAGE, node, place)
         if name.endswith("Camera"):
             for namespace in handles:
                 for topic, _ in self._program.texts(arguments[0], place):
                     base = in_namespace(namespace, topic)
                     if isinstance(base, Const):
-                        info = f"{str(base.value).rpartition('/')[0]}/camera_info".lstrip("/")
+                        before, between, _ = str(base.value).rpartition("/")
+                        start = "~" if not before and str(base.value).startswith("~") else f"{before}{between}"
+                        info = f"{start}camera_info"
                         self.ports.append(FoundPort(kind, info, _CAMERA_INFO, place.file.position(node)))
 
     def _declaration(self, node: Node, place: Place) -> None:
@@ -279,19 +399,22 @@ class _Reader:
         self, type_name: str, arguments: list[Node], node: Node, place: Place, *, is_member: bool = False
     ) -> None:
         """Look at an object that is made: some of them are interfaces."""
-        kind = self._program.alias(type_name)
-        base = kind.partition("<")[0]
+        kind = self._program.alias(type_name, place)
+        bases = self._program.full_names(kind.partition("<")[0])
+        base = next((name for name in bases if name in _KNOWN), bases[0])
         position = place.file.position(node)
         if base in _LOADERS and node.type != "field_initializer":
             said = f"of the classes that {base} loads, only those of this package count that a text in its source names"
             self.remarks.append(Remark(position, said))
+            if base == _LOADER and not (arguments and text(arguments[0]) == "false"):
+                self._add([FoundPort(made.kind, made.name, made.type, position) for made in NODELET_MANAGER])
         elif base in CPP_FIXED:
             self._add([FoundPort(made.kind, made.name, made.type, position) for made in CPP_FIXED[base]])
         elif base in _ACTIONS and arguments and not is_member:
             handles, rest = self._leading_handle(arguments, place)
             if rest:
                 self._port(_ACTIONS[base], handles, rest[0], self._template(kind), node, place)
-        elif base in _HANDLE_AND_NAME and len(arguments) > 1 and not is_member:
+        elif base in _HANDLE_AND_NAME and len(arguments) > 1 and not is_member and text(arguments[1]) != '""':
             handles = self._handles.of(arguments[0], place)
             self._port(_HANDLE_AND_NAME[base], handles, arguments[1], self._template(kind), node, place)
         elif base in CPP_BELOW and not (is_member and arguments):
@@ -304,6 +427,16 @@ class _Reader:
                 for made in RECONFIGURE_SERVER:
                     shown = self._name(made.kind.value, in_namespace(namespace, Const(made.name)), position)
                     self._add([FoundPort(made.kind, shown, made.type, position)])
+                self._reconfigurable(kind, namespace, position, place)
+
+    def _reconfigurable(self, server: str, namespace: Name, position: Position, place: Place) -> None:
+        """Add the parameters of a server of dynamic_reconfigure, which the package's `.cfg` file lists."""
+        name = self._program.alias(template_arguments(server)[0], place).rpartition("::")[2]
+        if name not in self._configurations:
+            self.remarks.append(Remark(position, f"the parameters of {name} are not known: its .cfg is elsewhere"))
+        for found in self._configurations.get(name, ()):
+            shown = self._name("parameter", in_namespace(namespace, Const(found.name)), position)
+            self.parameters.append(replace(found, name=shown))
 
     def _below(self, below: Below, arguments: list[Node], node: Node, place: Place) -> None:
         """Look at an object that makes interfaces below a namespace."""
@@ -420,46 +553,3 @@ def _otherwise(call: Node, variable: Node | None) -> Node | None:
 
 def _is_null(arguments: Sequence[Node]) -> bool:
     return len(arguments) == 1 and text(arguments[0]) in ("NULL", "nullptr", "0")
-
-
-def _constant(node: Node | None, depth: int = 0) -> Any:
-    """Return the value of a literal, or of numbers that are calculated; None for what is none."""
-    if node is None or depth > MAX_DEPTH:
-        return None
-    shown = text(node)
-    given = arguments_of(node)
-    found: Any = None
-    if node.type == "string_literal":
-        found = shown[1:-1]
-    elif node.type in ("true", "false"):
-        found = node.type == "true"
-    elif node.type in ("number_literal", "unary_expression"):
-        with contextlib.suppress(ValueError):
-            found = float(shown.rstrip("fF")) if re.search(r"[.eE]", shown) else int(shown, 0)
-    elif node.type == "call_expression" and shown.startswith(("std::string(", "string(")) and len(given) == 1:
-        found = _constant(given[0], depth + 1)
-    elif node.type == "parenthesized_expression" and node.named_child_count == 1:
-        found = _constant(node.named_children[0], depth + 1)
-    elif shown == "M_PI":
-        found = math.pi
-    elif node.type == "binary_expression":
-        with contextlib.suppress(OverflowError):
-            found = _calculated(node, depth)
-    return found
-
-
-def _calculated(node: Node, depth: int) -> int | float | None:
-    """Return what a sum or product of numbers is, as C++ has it: integers divide without a rest."""
-    one, other = (_constant(child_of(node, side), depth + 1) for side in ("left", "right"))
-    if not (isinstance(one, int | float) and isinstance(other, int | float)):
-        return None
-    match text(node.child_by_field_name("operator")):
-        case "+":
-            return one + other
-        case "-":
-            return one - other
-        case "*":
-            return one * other
-        case "/" if other:
-            return int(one / other) if isinstance(one, int) and isinstance(other, int) else one / other
-    return None

@@ -9,7 +9,15 @@ from dataclasses import dataclass, field
 
 from tree_sitter import Node
 
-from ros_model_extraction.cpp.declarations import Declared, File, Place, declarations, reset_pointer
+from ros_model_extraction.cpp.declarations import (
+    Declared,
+    File,
+    Place,
+    appended_text,
+    declarations,
+    is_in_branch,
+    reset_pointer,
+)
 from ros_model_extraction.cpp.reachable_code import ReachableCode
 from ros_model_extraction.cpp.syntax import (
     arguments_of,
@@ -28,6 +36,7 @@ from ros_model_extraction.python.values import Const, Hole, Text, joined
 MAX_DEPTH = 16
 MAX_VALUES = 16
 
+_TEXT_TYPES = ("std::string", "string")
 _KNOWN_TEXTS = {"ros::this_node::getName": "~", "ros::this_node::getNamespace": ""}
 _SAME_TEXT = ("std::string", "string", "ros::names::resolve", "ros::names::remap", "ros::names::clean")
 _INCLUDED_TYPE = re.compile(r'[<"]([a-z]\w*)/([A-Z]\w*)\.h[>"]')
@@ -42,7 +51,11 @@ class _Index:
     given: list[tuple[str, tuple[Node, ...], Place]] = field(default_factory=list)
     initialised: list[tuple[str, tuple[Node, ...], Place]] = field(default_factory=list)
     macros: dict[str, str] = field(default_factory=dict)
-    aliases: dict[str, str] = field(default_factory=dict)
+    numbers: dict[str, str] = field(default_factory=dict)
+    namespace_aliases: dict[str, str] = field(default_factory=dict)
+    namespaces: set[str] = field(default_factory=set)
+    aliases: dict[tuple[str, str], str] = field(default_factory=dict)
+    """By the class or file that declares it, and by name; under "" that of any."""
     constructors: dict[str, list[Node]] = field(default_factory=lambda: defaultdict(list))
     message_packages: dict[str, str] = field(default_factory=dict)
     defaults: dict[tuple[str, str, int], int] = field(default_factory=dict)
@@ -52,23 +65,25 @@ class _Index:
 class Program:
     """The sources of an executable, with the headers of its package that they include."""
 
-    def __init__(self, files: Sequence[File]) -> None:
-        """Index the files: sources, then the headers that they include."""
+    def __init__(self, files: Sequence[File], nodelet: str = "") -> None:
+        """Index the files: sources, then the headers that they include; `nodelet` is the class that is loaded."""
         self._files = files
-        self._code = ReachableCode(files)
+        self._code = ReachableCode(files, nodelet)
         self._run: dict[int, bool] = {}
+        self._passed: dict[tuple[int, str], list[tuple[Node, Place]]] = {}
+        self._parameters: dict[int, dict[str, tuple[int, str, Node | None]]] = {}
         self._index = _Index()
         self._locals: dict[int, dict[str, list[Declared]]] = {}
         self._fills: dict[tuple[str, str], list[tuple[Node | str | None, Place, str]]] = defaultdict(list)
         for file in reversed(files):  # headers, which declare, before the sources that include them
             self._index_file(file)
         for name, values, place in self._index.initialised:  # a base class, or a member of some class
-            kinds = {declared.type for declared in self._index.members.get((place.owner, name), ())} or {name}
+            kinds = {declared.type for declared in self._index.members.get((place.owner, name), ())} - {""} or {name}
             for kind in kinds:
                 self._index.calls[last_name(kind)].append((values, place))
-        for alias in list(self._index.aliases):
+        for home, alias in list(self._index.aliases):
             name = last_name(self.alias(alias))
-            if alias in self._index.calls and name != alias:
+            if not home and alias in self._index.calls and name != alias:
                 self._index.calls[name] += self._index.calls[alias]
         for name, values, place in self._index.given:  # only now all declarations are known, wherever they stand
             if self.is_run(place):
@@ -79,14 +94,36 @@ class Program:
         for file in self._files:
             yield from ((node, place) for node, place in self._walk(file.root, Place(file)) if self.is_run(place))
 
-    def alias(self, type_name: str) -> str:
-        """Return a type with the names that `typedef` and `using` gave replaced by what they stand for."""
+    def alias(self, type_name: str, place: Place | None = None) -> str:
+        """Return a type with the names that `typedef` and `using` gave replaced by what they stand for.
+
+        Args:
+            type_name: the type.
+            place: where it is named; several classes may give one name to different types.
+        """
+        homes = [place.owner, place.file.shown, ""] if place else [""]
         for _ in range(MAX_DEPTH):
             base, bracket, rest = type_name.partition("<")
-            if base not in self._index.aliases:
-                return type_name
-            type_name = self._index.aliases[base] + bracket + rest
+            outer, _, name = base.rpartition("::")
+            keys = [(class_name(outer), name)] if outer else [(home, base) for home in homes]
+            known = next((self._index.aliases[key] for key in keys if key in self._index.aliases), None)
+            if known is None:
+                first, colons, rest = type_name.partition("::")
+                return f"{self._index.namespace_aliases.get(first, first)}{colons}{rest}"
+            type_name = known + bracket + rest
         return type_name
+
+    def full_names(self, type_name: str) -> list[str]:
+        """Return a type's names: as it is, and in each namespace that the sources use."""
+        return [type_name, *(f"{namespace}::{type_name}" for namespace in sorted(self._index.namespaces))]
+
+    def filled(self, name: str, place: Place) -> list[tuple[Node | str | None, Place]]:
+        """Return the values that calls like `param(name, variable, value)` fill a variable with."""
+        return [(value, at) for value, at, _ in self._filled(name.removeprefix("this->"), place)]
+
+    def macro(self, name: str) -> str | None:
+        """Return what a macro stands for that has no parameters and is no text; None for none."""
+        return self._index.numbers.get(name)
 
     def message_package(self, name: str) -> str:
         """Return the package of a message that is named without it, by its header; "" for none, and for two."""
@@ -131,6 +168,10 @@ class Program:
             return found
         if place.owner and (found := self._index.members.get((place.owner, plain), [])):
             return found
+        outer, _, inner = plain.replace("->", ".").rpartition(".")
+        if outer and inner.isidentifier():  # a member of an object
+            kinds = {class_name(self.alias(one.type, one.place)) for one in self.declared(outer, place)}
+            return [one for kind in sorted(kinds) for one in self._index.members.get((kind, inner), [])]
         return self._index.globals.get(plain.rpartition("::")[2], [])
 
     def texts(self, node: Node, place: Place, depth: int = 0) -> list[tuple[Const | Text, str]]:
@@ -146,9 +187,24 @@ class Program:
 
         A call that only passes on what nobody passes to it is left out, where there are others.
         """
-        if place.function is None or name not in (known := parameters(place.function)):
+        if place.function is None or name not in self.parameters(place.function):
             return []
-        index, _, default = known[name]
+        key = place.function.id, name
+        if key not in self._passed:
+            self._passed[key] = []  # what is asked for while it is being found: a call of itself
+            self._passed[key] = self._find_passed(name, place, depth)
+        return self._passed[key]
+
+    def parameters(self, function: Node) -> dict[str, tuple[int, str, Node | None]]:
+        """Return place, type and default of a function's parameters by name."""
+        if function.id not in self._parameters:
+            self._parameters[function.id] = parameters(function)
+        return self._parameters[function.id]
+
+    def _find_passed(self, name: str, place: Place, depth: int) -> list[tuple[Node, Place]]:
+        if place.function is None:
+            return []
+        index, _, default = self.parameters(place.function)[name]
         called = function_name(place.function).rpartition("::")[2]
         found = []
         for arguments, at in self._index.calls.get(called, ()):
@@ -164,17 +220,19 @@ class Program:
     def _is_never_passed(self, argument: Node, at: Place, depth: int) -> bool:
         if depth > MAX_DEPTH or argument.type not in ("identifier", "type_identifier") or at.function is None:
             return False
-        return text(argument) in parameters(at.function) and not self.passed(text(argument), at, depth)
+        return text(argument) in self.parameters(at.function) and not self.passed(text(argument), at, depth)
 
     def _takes(self, function: Node, arguments: Sequence[Node], at: Place) -> bool:
         """Return whether a function may be what a call means, by the number of arguments, and by node handles."""
-        known = sorted(parameters(function).values(), key=lambda parameter: parameter[0])
+        known = sorted(self.parameters(function).values(), key=lambda parameter: parameter[0])
         owner, _, name = function_name(function).rpartition("::")
         defaults = self._index.defaults.get((class_name(owner), name, len(known)), 0)
         needed = len(known) - max(defaults, sum(default is not None for _, _, default in known))
         if not needed <= len(arguments) <= len(known):
             return False
-        pairs = zip(arguments, known, strict=False)
+        pairs = list(zip(arguments, known, strict=False))
+        if any(kind in _TEXT_TYPES and _is_no_text(argument) for argument, (_, kind, _) in pairs):
+            return False
         return all("NodeHandle" not in kind or self._may_be_handle(argument, at) for argument, (_, kind, _) in pairs)
 
     def _may_be_handle(self, argument: Node, at: Place) -> bool:
@@ -182,7 +240,7 @@ class Program:
         if "NodeHandle" in name or argument.type in ("number_literal", "string_literal"):
             return "NodeHandle" in name
         kinds = [self.alias(declared.type) for declared in self.declared(name, at)]
-        if at.function is not None and name in (given := parameters(at.function)):
+        if at.function is not None and name in (given := self.parameters(at.function)):
             kinds.append(given[name][1])
         return not kinds or any("NodeHandle" in kind or kind == "auto" for kind in kinds)
 
@@ -265,6 +323,23 @@ class Program:
         if not found:
             for argument, at in self.passed(name, place):
                 found += self.texts(argument, at, depth + 1)
+        return self._appended(node, found, place, depth) if self._is_local(name, place) else found
+
+    def _appended(
+        self, use: Node, found: list[tuple[Const | Text, str]], place: Place, depth: int
+    ) -> list[tuple[Const | Text, str]]:
+        """Return the texts that a local variable may be after what the function appends to it before its use."""
+        for node in walk(place.function):
+            if node.start_byte >= use.start_byte:
+                break
+            given = appended_text(node)
+            if given is None or given[0] != text(use):
+                continue
+            more = self.texts(given[1], place, depth + 1)
+            longer = [
+                (joined([as_text(one), as_text(two)]), note or other) for one, note in found for two, other in more
+            ]
+            found = [*found, *longer] if is_in_branch(node, use) else longer
         return found
 
     def _filled(self, name: str, place: Place) -> list[tuple[Node | str | None, Place, str]]:
@@ -287,23 +362,42 @@ class Program:
                         known = self._index.message_packages.setdefault(match[2], match[1])
                         self._index.message_packages[match[2]] = match[1] if known == match[1] else ""
                 case "preproc_def":
-                    value = text(node.child_by_field_name("value")).strip()
-                    if value.startswith('"') and value.endswith('"') and len(value) > 1:
-                        self._index.macros[text(child_of(node, "name"))] = literal_text(value)
-                case "type_definition" | "alias_declaration":
-                    declarator = node.child_by_field_name("declarator") or node.child_by_field_name("name")
-                    self._index.aliases[text(declarator)] = type_text(child_of(node, "type"))
+                    self._index_macro(text(child_of(node, "name")), text(node.child_by_field_name("value")).strip())
+                case "namespace_alias_definition" | "using_declaration" | "type_definition" | "alias_declaration":
+                    self._index_name(node, place)
                 case "declaration" | "field_declaration":
                     self._index_declaration(node, place)
                 case "call_expression" | "new_expression":
-                    if reset := reset_pointer(node):
-                        self._index.given.append((*reset, place))
-                    name = text(node.child_by_field_name("function") or node.child_by_field_name("type"))
-                    made = re.match(r"(?:\w+::)*make_(?:shared|unique)<(.*)>$", name)
-                    arguments = tuple(arguments_of(node))
-                    self._index.calls[last_name(made[1] if made else name)].append((arguments, place))
-                case "assignment_expression":
+                    self._index_call(node, place)
+                case "assignment_expression" if text(node.child_by_field_name("operator")) == "=":
                     self._index.given.append((text(child_of(node, "left")), (child_of(node, "right"),), place))
+
+    def _index_name(self, node: Node, place: Place) -> None:
+        """Note a name that the code gives to a namespace or type, or a namespace whose names it uses."""
+        if node.type == "namespace_alias_definition":
+            first, *_, last = node.named_children
+            self._index.namespace_aliases[text(first)] = text(last)
+        elif node.type == "using_declaration":
+            if text(node).startswith("using namespace"):
+                self._index.namespaces.add(text(node.named_children[-1]))
+        else:
+            declarator = node.child_by_field_name("declarator") or node.child_by_field_name("name")
+            for home in (place.owner or place.file.shown, ""):
+                self._index.aliases[home, text(declarator)] = type_text(child_of(node, "type"))
+
+    def _index_call(self, node: Node, place: Place) -> None:
+        if reset := reset_pointer(node):
+            self._index.given.append((*reset, place))
+        name = text(node.child_by_field_name("function") or node.child_by_field_name("type"))
+        made = re.match(r"(?:\w+::)*make_(?:shared|unique)<(.*)>$", name)
+        arguments = tuple(arguments_of(node))
+        self._index.calls[last_name(made[1] if made else name)].append((arguments, place))
+
+    def _index_macro(self, name: str, value: str) -> None:
+        if value.startswith('"') and value.endswith('"') and len(value) > 1:
+            self._index.macros[name] = literal_text(value)
+        elif value:
+            self._index.numbers[name] = value
 
     def _index_declaration(self, node: Node, place: Place) -> None:
         if name := function_name(node):
@@ -373,16 +467,21 @@ class Program:
                         found[name].append(declared)
                     continue
                 given = reset_pointer(node)
-                if node.type == "assignment_expression":
+                if node.type == "assignment_expression" and text(node.child_by_field_name("operator")) == "=":
                     given = text(child_of(node, "left")), (child_of(node, "right"),)
-                if given and given[0] in found:
-                    kept = [declared for declared in found[given[0]] if declared.values]
-                    found[given[0]] = [*kept, Declared(found[given[0]][0].type, given[1], place)]
+                whole = given[0].partition("[")[0] if given else ""  # an array, for one of its items
+                if given and whole in found:
+                    kept = [declared for declared in found.get(given[0], ()) if declared.values]
+                    found[given[0]] = [*kept, Declared(found[whole][0].type, given[1], place)]
             self._locals[function.id] = dict(found)
         return self._locals[function.id]
 
     def _is_local(self, name: str, place: Place) -> bool:
-        return place.function is not None and (name in self._local(place) or name in parameters(place.function))
+        return place.function is not None and (name in self._local(place) or name in self.parameters(place.function))
+
+
+def _is_no_text(argument: Node) -> bool:
+    return argument.type in ("new_expression", "null", "number_literal") or text(argument) in ("NULL", "nullptr")
 
 
 def _key(place: Place) -> str:

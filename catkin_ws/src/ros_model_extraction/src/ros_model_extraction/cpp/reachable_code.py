@@ -1,4 +1,4 @@
-"""Which code of a program's C++ sources its `main` can reach: a library may have more than its program uses.
+"""Which code of a program's C++ sources its `main`, or a nodelet's class, can reach: libraries have more than that.
 
 Names decide, not types. So too much may count as reached, but nothing that `main` can call by a name in the sources.
 """
@@ -39,23 +39,25 @@ class _Function:
 
 
 class ReachableCode:
-    """The functions and classes of a program that its `main` can reach; all of them where no source has a `main`."""
+    """The functions and classes that `main` or a nodelet's class can reach; all of them where there is neither."""
 
-    def __init__(self, files: Sequence[File]) -> None:
-        """Follow the names from `main` and from the objects outside of functions."""
+    def __init__(self, files: Sequence[File], nodelet: str = "") -> None:
+        """Follow the names from `main`, or from a nodelet's class, and from the objects outside of functions."""
         self._classes: dict[str, _Class] = defaultdict(_Class)
         self._functions: list[_Function] = []
         self._globals: set[str] = set()
         self._aliases: dict[str, set[str]] = defaultdict(set)
         for file in files:
             self._collect(file.root)
-        self._has_main = any(function.name == "main" and not function.owner for function in self._functions)
+        self._start = class_name(nodelet) or "main"
+        starts = (function.owner if nodelet else function.name for function in self._functions)
+        self._has_start = self._start in starts
         self._words: set[str] = set()
         self._reached: set[int] = set()
-        if self._has_main:
+        if self._has_start:
             self._follow()
         everything = {function.id for function in self._functions}
-        self._unreached = everything - self._reached if self._has_main else set()
+        self._unreached = everything - self._reached if self._has_start else set()
 
     def has_function(self, function: Node) -> bool:
         """Return whether a function, by its definition, can be reached; one within another counts as reached."""
@@ -63,10 +65,10 @@ class ReachableCode:
 
     def has_class(self, name: str) -> bool:
         """Return whether objects of a class can be reached."""
-        return not self._has_main or name not in self._classes or name in self._words
+        return not self._has_start or name not in self._classes or name in self._words
 
     def _follow(self) -> None:
-        self._words = {"main", *self._globals}
+        self._words = {self._start, *self._globals}
         known = -1
         while known != len(self._words) + len(self._reached):
             known = len(self._words) + len(self._reached)

@@ -8,14 +8,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import rospkg
 from catkin_pkg.package import InvalidPackage, parse_package_string
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
 
 from ros_model_extraction.io.source_files import read_source, read_xml
-from ros_model_extraction.node_facts import Remark, SourceError
+from ros_model_extraction.io.workspace import package_folder
+from ros_model_extraction.node_facts import Configurations, Remark, SourceError
 from ros_model_extraction.packages.cmake import Command, commands, sections
+from ros_model_extraction.packages.nodelet_files import nodelets_of
+from ros_model_extraction.packages.reconfigure_files import read_configurations
 
 MANIFEST = "package.xml"
 _CMAKE = "CMakeLists.txt"
@@ -31,12 +33,19 @@ _LINK_WORDS = ("PUBLIC", "PRIVATE", "INTERFACE", "LINK_PUBLIC", "LINK_PRIVATE")
 
 @dataclass(frozen=True)
 class Executable:
-    """A program of a package: a Python script, or what is compiled from C++ sources."""
+    """A program of a package: a Python script, or what is compiled from C++ sources; or a nodelet.
+
+    Attributes:
+        nodelet: the class of a nodelet, with its namespaces; "" for a program.
+        loaded_as: the name that a nodelet is loaded by, `package/Class`.
+    """
 
     name: str
     sources: tuple[Path, ...]
     is_python: bool
     position: Position
+    nodelet: str = ""
+    loaded_as: str = ""
 
 
 @dataclass(frozen=True)
@@ -46,6 +55,7 @@ class CatkinPackage:
     Attributes:
         external_dependencies: what is depended on and is no ROS package that is installed.
         plugins: classes that its own executables may load by name, `module:Class`, from its exports to itself.
+        configurations: the parameters of dynamic_reconfigure.
         remarks: what could not be read or understood.
     """
 
@@ -55,6 +65,7 @@ class CatkinPackage:
     external_dependencies: tuple[str, ...]
     executables: tuple[Executable, ...]
     plugins: tuple[str, ...]
+    configurations: Configurations
     remarks: tuple[Remark, ...]
 
 
@@ -100,9 +111,13 @@ def read_package(folder: Path) -> CatkinPackage:
     except InvalidPackage as error:
         raise ModelError(_first_line(error), Position(str(manifest), *_place(error))) from error
     found = _Executables(folder)
-    found.read()
+    described = [e.attributes["plugin"] for e in package.exports if e.tagname == "nodelet" and "plugin" in e.attributes]
+    found.read(described)
+    configurations, said = read_configurations(folder)
     dependencies = sorted({d.name for d in (*package.exec_depends, *package.build_depends, *package.run_depends)})
-    installed = set(rospkg.RosPack().list())
+    installed = {name: path for name in dependencies if (path := package_folder(name))}
+    for below in installed.values():
+        configurations = {**read_configurations(below)[0], **configurations}
     plugins = tuple(
         value
         for export in package.exports
@@ -117,7 +132,8 @@ def read_package(folder: Path) -> CatkinPackage:
         tuple(name for name in dependencies if name not in installed),
         tuple(sorted(found.executables.values(), key=lambda executable: executable.name)),
         plugins,
-        tuple(found.remarks),
+        configurations,
+        (*found.remarks, *said),
     )
 
 
@@ -133,8 +149,12 @@ class _Executables:
         self._links: dict[str, list[str]] = {}
         self._outputs: dict[str, str] = {}
 
-    def read(self) -> None:
-        """Collect them."""
+    def read(self, nodelets: Sequence[str] = ()) -> None:
+        """Collect them.
+
+        Args:
+            nodelets: the files that describe the package's nodelets, as package.xml names them.
+        """
         path = self._folder / _CMAKE
         if path.is_file():
             for command in commands(self._text(path), self._folder, self._text):
@@ -145,13 +165,36 @@ class _Executables:
             every = tuple(dict.fromkeys([*sources, *linked]))
             self.executables[output] = Executable(output, every, False, position)
         used = {library for name in self._compiled for library in self._reachable(name)}
+        for described in nodelets:
+            used |= self._nodelets(described.replace("${prefix}/", ""))
         for library in sorted(self._libraries.keys() - used):
             if self._libraries[library]:
-                text = f"the library {library} is linked by no executable here, and not looked at (a nodelet, perhaps)"
+                text = f"the library {library} is linked by no executable here, and not looked at (a plug-in, perhaps)"
                 self.remarks.append(Remark(Position(_CMAKE, 1, 1), text))
         for script in _scripts(self._folder, self.remarks):
             relative = str(script.relative_to(self._folder))
             self.executables.setdefault(script.name, Executable(script.name, (script,), True, Position(relative, 1, 1)))
+
+    def _nodelets(self, described: str) -> set[str]:
+        """Collect the nodelets that a file describes, and return the libraries that have them."""
+        path = Path(os.path.normpath(self._folder / described))
+        if not path.is_relative_to(self._folder) or not os.path.isfile(path):
+            self.remarks.append(Remark(Position(MANIFEST, 1, 1), f"not read: {described}, which describes nodelets"))
+            return set()
+        used = set()
+        for found in nodelets_of(path, described):
+            names = [name for name in self._libraries if self._outputs.get(name, name) == found.library]
+            every = list(dict.fromkeys(library for name in names for library in (name, *self._reachable(name))))
+            sources = tuple(dict.fromkeys(source for library in every for source in self._libraries[library]))
+            if not sources:
+                text = f"not read: the nodelet {found.name}: no source of the library {found.library} is known"
+                self.remarks.append(Remark(found.position, text))
+                continue
+            used |= set(every)
+            short = found.name.rpartition("/")[2]
+            name = short if short not in self.executables else f"{short}_nodelet"
+            self.executables[name] = Executable(name, sources, False, found.position, found.type, found.name)
+        return used
 
     def _text(self, path: Path) -> str:
         """Return a CMakeLists.txt of the package; nothing, and a remark, where it can't be read."""

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
 from ros_model.language.packages import Artifact, Package, PackageSet
 
 from ros_model_extraction.io.python_modules import Library
+from ros_model_extraction.io.workspace import package_folder
 from ros_model_extraction.names import node_name
-from ros_model_extraction.node_facts import NodeSource, Remark, SourceError, unique
+from ros_model_extraction.node_facts import LoadedNodelet, NodeSource, Remark, SourceError, unique, with_nodelet
 from ros_model_extraction.packages.catkin_package import CatkinPackage, Executable, read_package
 from ros_model_extraction.packages.message_files import read_specs
 
@@ -67,6 +69,12 @@ def extract_package(folder: Path) -> ExtractedPackage:
     remarks += library.remarks
     for node in nodes.values():
         remarks += node.remarks
+    for executable in package.executables:
+        if executable.nodelet:
+            started = f"nodelet load {executable.loaded_as} MANAGER"
+            remarks.append(
+                Remark(executable.position, f"{executable.name} is a nodelet, which is started by {started}")
+            )
     specs, said = read_specs(folder)
     artifacts = tuple(
         Artifact(name, (named(node, name).declared(),), position=node.position)
@@ -95,10 +103,39 @@ def read_executable(
     if executable.is_python:
         from ros_model_extraction.python.node_reader import read_python_node
 
-        return read_python_node(executable.sources[0], library, package.plugins, parameters)
+        plugins, configurations = package.plugins, package.configurations
+        return read_python_node(executable.sources[0], library, plugins, parameters, configurations)
+    from ros_model_extraction.cpp.node_reader import Entry
     from ros_model_extraction.io.cpp_files import read_cpp_node
 
-    return read_cpp_node(executable.sources, package.folder, parameters)
+    entry = Entry(executable.nodelet, package.configurations)
+    node = read_cpp_node(executable.sources, package.folder, parameters, entry)
+    if executable.nodelet:
+        return replace(node, name=executable.name, position=executable.position)
+    for loaded in node.nodelets:
+        found = _nodelet(package, loaded, library, parameters)
+        if found is None:
+            said = f"it loads the nodelet {loaded.loaded_as}, whose source is not here: its interfaces are missing"
+            node = replace(node, remarks=(*node.remarks, Remark(loaded.position, said)))
+        else:
+            node = with_nodelet(node, loaded, found)
+    return node
+
+
+def _nodelet(
+    package: CatkinPackage, loaded: LoadedNodelet, library: Library, parameters: Parameters | None
+) -> NodeSource | None:
+    """Return the nodelet that a program loads, of its own or of another package; None where it has no source."""
+    owner = package
+    name = loaded.loaded_as.partition("/")[0]
+    if name != package.name:
+        folder = package_folder(name)
+        try:
+            owner = read_package(folder) if folder else package
+        except ModelError:
+            return None
+    found = next((executable for executable in owner.executables if executable.loaded_as == loaded.loaded_as), None)
+    return read_executable(owner, found, library, parameters) if found else None
 
 
 def named(node: NodeSource, executable: str) -> NodeSource:

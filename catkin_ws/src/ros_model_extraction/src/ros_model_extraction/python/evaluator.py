@@ -37,6 +37,7 @@ from ros_model_extraction.python.values import (
     text_of,
     weight,
 )
+from ros_model_extraction.ros_api import PYTHON_CALLS
 
 if TYPE_CHECKING:
     from ros_model_extraction.io.python_modules import Library
@@ -150,7 +151,7 @@ class Evaluator(ExpressionEvaluator):
         """Return what `from module import *` brings under a name."""
         for source in scope.star_imports:
             module = self._library.module(source)
-            if module is None and self._library.has_message(source, name):
+            if module is None and (self._library.has_message(source, name) or f"{source}.{name}" in PYTHON_CALLS):
                 return External(f"{source}.{name}")
             if module and (found := self._module_member(module, name, World())):
                 return found[0][0]

@@ -5,12 +5,21 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ros_model.language.metamodel import Position
 
-from ros_model_extraction.node_facts import FoundParameter, FoundPort, NodeSource, Remark, unique, unresolved
+from ros_model_extraction.node_facts import (
+    Configurations,
+    FoundParameter,
+    FoundPort,
+    NodeSource,
+    Remark,
+    unique,
+    unresolved,
+)
 from ros_model_extraction.python.callers import last_name, root_frame
 from ros_model_extraction.python.calls import Arguments, Given
 from ros_model_extraction.python.evaluator import Evaluator
@@ -37,6 +46,7 @@ from ros_model_extraction.ros_api import (
     PYTHON_BELOW,
     PYTHON_FIXED,
     PYTHON_MAKERS,
+    PYTHON_UNLESS,
     RECONFIGURE_SERVER,
     Maker,
 )
@@ -69,6 +79,7 @@ def read_python_node(
     library: Library,
     plugins: Iterable[str] = (),
     parameters: Callable[[str], Any] | None = None,
+    configurations: Configurations | None = None,
 ) -> NodeSource:
     """Return what a script, with all modules that it imports, makes of a node.
 
@@ -77,6 +88,7 @@ def read_python_node(
         library: finds the modules; it collects remarks about those that can't be read.
         plugins: classes that the node may load by name, `module:Class`.
         parameters: the value of a parameter by its name as the code has it, or KeyError; without it, defaults count.
+        configurations: the parameters of dynamic_reconfigure by the name of the class that is generated.
 
     Raises:
         SourceError: the script can't be read.
@@ -88,7 +100,7 @@ def read_python_node(
     for target in plugins:
         reached.visit_plugin(target)
     evaluator.forget_callers()
-    reader = _Reader(evaluator)
+    reader = _Reader(evaluator, configurations or {})
     for scope in evaluator.program.scopes:
         reader.read(scope)
     remarks = unique([*reached.remarks, *reader.remarks])
@@ -98,13 +110,14 @@ def read_python_node(
 class _Reader:
     """Looks at every call of reached code, and keeps the interfaces that calls of ROS make."""
 
-    def __init__(self, evaluator: Evaluator) -> None:
+    def __init__(self, evaluator: Evaluator, configurations: Configurations) -> None:
         self.ports: list[FoundPort] = []
         self.parameters: list[FoundParameter] = []
         self.remarks: list[Remark] = []
         self.node_name = ""
         self.position = Position()
         self._evaluator = evaluator
+        self._configurations = configurations
 
     def read(self, scope: Scope) -> None:
         """Look at the calls of a scope, and at ROS functions that are handed on as values."""
@@ -163,6 +176,10 @@ class _Reader:
         if name in PYTHON_MAKERS:
             self._port(PYTHON_MAKERS[name], given, call, frame, world)
         elif name in PYTHON_FIXED:
+            if name in PYTHON_UNLESS:
+                values = self._argument(given, PYTHON_UNLESS[name], frame, world, call)
+                if all(value == Const(False) for value, _ in values):
+                    return
             self.ports += [FoundPort(made.kind, made.name, made.type, position) for made in PYTHON_FIXED[name]]
         elif name in PYTHON_BELOW:
             interfaces, place = PYTHON_BELOW[name]
@@ -221,11 +238,22 @@ class _Reader:
             prefix = Text(("~",)) if value == Const(None) else text_of(value) or Text((Hole("namespace"),))
             if not is_client and value != Const(None):
                 prefix = Text(("~", *prefix.parts))
+            inside = "" if value == Const(None) else "/"
             for made in RECONFIGURE_SERVER:
                 kind = COUNTERPART[made.kind] if is_client else made.kind
-                inside = "" if value == Const(None) else "/"
                 name = joined([prefix, Text((f"{inside}{made.name}",))])
                 self._found(kind, name, made.type, w, position)
+            for kind_of, _ in self._argument(given, (0, "type"), frame, w, call) if not is_client else ():
+                self._reconfigurable(kind_of, joined([prefix, Text((inside,))]), position)
+
+    def _reconfigurable(self, kind: Value, prefix: Value, position: Position) -> None:
+        """Add the parameters of a server of dynamic_reconfigure, which the package's `.cfg` file lists."""
+        name = kind.name.rpartition(".")[2] if isinstance(kind, External) else ""
+        shown, _ = ros_name(prefix)
+        if name not in self._configurations or "{" in shown:
+            self.remarks.append(Remark(position, f"the parameters of {name or 'its server'} are not known"))
+            return
+        self.parameters += [replace(found, name=f"{shown}{found.name}") for found in self._configurations[name]]
 
     def _node(self, given: Arguments, call: ast.Call, frame: Frame, world: World) -> None:
         position = frame.scope.module.position(call)
