@@ -336,6 +336,16 @@ def test_while_the_manipulator_is_busy_nothing_is_asked(core, state):
     assert core.step(2.0)[0].to_configuration == "camera_slow"
 
 
+def test_levels_while_nodes_come_back_do_not_count(knowledge_base, counting):
+    core = Mape(knowledge_base, counting, [OBJECTIVE], Settings(cool_down=5.0))
+    core.observe_active(0.0, "f_move", "scan_slow", "STABLE")
+    core.observe_active(1.0, "f_move", "scan_slow", "RECOVERING")
+    assert violate(core, 1.0, 3.0) == []
+    core.observe_active(3.0, "f_move", "scan_slow", "STABLE")
+    ((when, _),) = violate(core, 3.0, 10.0)
+    assert when == pytest.approx(3.0 + 5.0)
+
+
 def test_manipulator_that_stays_busy_is_waited_for_only_so_long(core):
     core.observe_active(1.0, "f_move", "scan_slow", "RECONFIGURING")
     assert fail(core, 1.5, "laser") == []

@@ -175,6 +175,9 @@ class State(View):
             self._run(name, busy_since=running.busy_since if running.state in BUSY else now, drifts={})
         elif running.state in BUSY:
             self._run(name, drifts_from=now + self.settings.restart_grace)
+            if running.state == FunctionGrounding.RECOVERING:  # levels of a design without its nodes tell nothing of it
+                self._run(name, calm_until=max(running.calm_until, now + self.settings.cool_down))
+                self.levels.forget(name)
         if state != running.state and state == FunctionGrounding.FAILED:
             self._run(name, failed_stamp=max(now, 0.0))  # 0: before anything was asked for
             if running.design == configuration and not running.is_broken:
