@@ -246,6 +246,8 @@ class OperatorTest(unittest.TestCase):
             path = Path(folder) / "run.bag"
             manipulator, reasoner = self.system("/bag")
             with reasoner:
+                shown = self.command("explain", "--topic", "/bag/mros1_reasoner/decision")
+                self.assertEqual(shown, "no decision yet\n")
                 self.diagnostics.component("laser", "FALSE")  # before it is recorded
                 reasoner.listener.decided("EXECUTED")
                 with Recorder(path, "/bag") as recorder:

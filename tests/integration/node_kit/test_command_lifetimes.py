@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -9,7 +10,8 @@ from pathlib import Path
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
-from helpers.waiting import DEADLINE_S
+from helpers.ports import reserved_port
+from helpers.waiting import DEADLINE_S, wait_for
 
 PACKAGES = Path(__file__).resolve().parents[3] / "catkin_ws" / "src"
 COMMANDS = {
@@ -76,3 +78,32 @@ def test_master_that_does_not_answer_is_told_in_one_line(tmp_path, commands, ans
     for name, (status, said) in found.items():
         assert status == 2, (name, said)
         assert "does not answer" in said and said.count("\n") == 1, (name, said)
+
+
+NEVER_LOOKS = """
+import threading, rospy.core, rospy.impl.registration as registration
+rospy.core._TIMEOUT_SHUTDOWN_JOIN = None
+registration.RegManager.run = lambda _: threading.Event().wait()
+from node_kit.ros import command
+command.join("command")
+"""
+
+
+def test_command_does_not_wait_for_rospys_threads_at_its_end(tmp_path):
+    with reserved_port() as port:
+        core = f"import rosmaster; rosmaster.rosmaster_main(['--core', '-p', '{port}'])"
+        own = {"ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": str(tmp_path), "ROS_HOME": str(tmp_path)}
+        environment = {**os.environ, **own}
+        with subprocess.Popen([sys.executable, "-c", core], env=environment, stdout=subprocess.DEVNULL) as process:
+            try:
+                wait_for(lambda: answers(port), "the master is there")
+                words = [sys.executable, "-c", NEVER_LOOKS]
+                assert subprocess.run(words, env=environment, timeout=DEADLINE_S, check=False).returncode == 0
+            finally:
+                process.kill()
+
+
+def answers(port):
+    with contextlib.suppress(OSError), socket.create_connection(("localhost", port)):
+        return True
+    return False

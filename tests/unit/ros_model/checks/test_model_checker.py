@@ -64,6 +64,8 @@ def test_sound_model_has_no_findings():
         (parameter("type Struct {b Integer} value { {c {value 1}} }"),
          "has member 'c', Struct { b Integer } has none of that name"),
         (parameter("type Struct {b Integer} value { {b {value x}} }"), "has member 'b', 'x', that is no Integer"),
+        (parameter("type List value '[false, true]'"), "write the table as YAML, with p: [false, true]"),
+        (parameter("type Struct {b Integer} value '{b: 1}'"), "write the table as YAML, with p: {b: 1}"),
         (parameter("type Integer value { 1 }"), "the value [1] of 'p' is no Integer"),
         (parameter("type Base64 value 'no base!'"), "is no Base64"),
         (parameter("type Date value yesterday"), "is no Date"),

@@ -179,6 +179,30 @@ def test_generated_test_fails_until_the_formula_is_written(generated):
     assert after.returncode == 0, after.stdout
 
 
+@pytest.mark.parametrize(
+    "age",
+    [
+        "self.age(scan)",
+        "self.now() - scan.header.stamp.to_sec()",
+        "rospy.get_time() - scan.header.stamp.to_sec()",
+        "(rospy.Time.now() - scan.header.stamp).to_sec()",
+    ],
+)
+def test_generated_test_has_a_clock_for_formulas_that_need_the_time(package, generate, age):
+    folder = package(
+        {**DESCRIPTION, "name": "ScanAgeObserver", "topics": {"scan": "sensor_msgs/LaserScan"}, "range": [0.0, 2.0]}
+    )
+    generate(folder)
+    plugin, test = folder / "src" / folder.name / "scan_age_observer.py", folder / "test" / "test_scan_age_observer.py"
+    formula = plugin.read_text().replace("raise NotImplementedError(", f"return self.status_of({age})  # (")
+    plugin.write_text(formula.replace("import sensor_msgs.msg", "import rospy\nimport sensor_msgs.msg"))
+    stamped = "sensor_msgs.msg.LaserScan(header=std_msgs.msg.Header(stamp=rospy.Time(99)))"
+    cases = test.read_text().replace("sensor_msgs.msg.LaserScan(),), 0.0", f"{stamped},), 0.5")
+    test.write_text(cases.replace("import sensor_msgs.msg", "import sensor_msgs.msg\nimport std_msgs.msg"))
+    done = run_generated_test(folder)
+    assert done.returncode == 0, done.stdout
+
+
 def test_what_the_developer_wrote_is_left_alone(generated, generate):
     write_formula(generated)
     path = generated / "src" / generated.name / "comfort_quality_observer.py"

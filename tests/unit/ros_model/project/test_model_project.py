@@ -1,5 +1,6 @@
 """Projects: metacontrol.yaml, the base, the family of variants, and what each variant requires."""
 
+import itertools
 import re
 
 import pytest
@@ -331,6 +332,32 @@ def test_hierarchy_that_leads_nowhere_is_refused(load, settings, function, messa
     with pytest.raises(ModelError) as caught:
         load()
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("requires", "cycle"),
+    [
+        ({"f_move": ["f_see"], "f_see": ["f_move"]}, {"f_move", "f_see"}),
+        ({"f_move": {"slow": ["f_see"]}, "f_see": ["f_map"], "f_map": ["f_see"]}, {"f_see", "f_map"}),
+        ({"f_move": {"slow": ["f_see"]}, "f_see": ["f_map"], "f_map": ["f_move"]}, {"f_move", "f_see", "f_map"}),
+    ],
+)
+def test_functions_that_require_each_other_are_refused(load, settings, requires, cycle):
+    settings["functions"] |= {"f_see": {"designs": []}, "f_map": {"designs": []}}
+    for function, required in requires.items():
+        settings["functions"][function]["requires"] = required
+    with pytest.raises(ModelError, match="functions require each other") as caught:
+        load()
+    (names,) = re.findall(r"\((.*)\): take one out", str(caught.value))
+    first, *others, last = names.split(" requires ")
+    assert first == last and {first, *others} == cycle
+    assert all(other in str(requires[one]) for one, other in itertools.pairwise([first, *others, last]))
+
+
+def test_functions_that_require_one_twice_over_are_no_cycle(load, settings):
+    settings["functions"] |= {"f_see": {"designs": [], "requires": ["f_map"]}, "f_map": {"designs": []}}
+    settings["functions"]["f_move"]["requires"] = ["f_see", "f_map"]
+    assert load().required_functions("slow") == ("f_see", "f_map")
 
 
 def test_families_are_put_together(load, settings, tmp_path):

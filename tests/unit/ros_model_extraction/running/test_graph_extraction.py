@@ -16,6 +16,7 @@ from ros_model.language.packages_reader import parse_packages
 from ros_model.language.remappings import remappings_of
 from ros_model.language.system_reader import parse_system
 from ros_model.language.system_writer import write_system
+from ros_model.language.typed_values import fault
 from ros_model_extraction.io.live_nodes import executable_of
 from ros_model_extraction.names import as_seen_from
 from ros_model_extraction.running.details import Details, Origin
@@ -229,7 +230,8 @@ def test_value_without_notation_is_left_out_and_said_so():
         ([1, 2.5], "Array"),
         ([1, "a"], "List"),
         ([], "List"),
-        ([{"a": 1}, {"a": 2}], "Array"),
+        ([{"a": 1}, {"a": 2}], "List"),
+        ([[0.1, 0.2], [0.3, 0.4]], "Array"),
         ({"a": {"b": [1]}}, "Struct"),
         (xmlrpc.client.Binary(b"\0\xff"), "Base64"),
         (xmlrpc.client.DateTime(0), "Date"),
@@ -238,6 +240,20 @@ def test_value_without_notation_is_left_out_and_said_so():
 def test_every_kind_of_parameter_has_a_type_that_fits(raw, kind):
     assert typed(raw)[0].kind == kind
     extracted(graph([["/x", ["/a"]]], parameters={"p": raw} if not isinstance(raw, dict) else {"p": [raw]}))
+
+
+FILTERS = [{"name": "range", "params": {"upper": 5.0}}, {"name": "box", "type": "Box"}]
+
+
+@pytest.mark.parametrize("now", [FILTERS, FILTERS[:1], FILTERS[:1] * 2, [1, "a"], [], [[1, 2], ["a"]]])
+@pytest.mark.parametrize("later", [FILTERS, FILTERS[1:], [], [*FILTERS, *FILTERS]])
+def test_list_of_a_moment_is_no_limit_for_other_values(now, later):
+    assert fault(later, typed(now)[0]) is None
+
+
+def test_list_with_bytes_keeps_its_types():
+    kind, value = typed([1, xmlrpc.client.Binary(b"hi")])
+    assert ([element.kind for element in kind.elements], value) == (["Integer", "Base64"], [1, "aGk="])
 
 
 def test_none_and_empty_structs_have_no_notation():

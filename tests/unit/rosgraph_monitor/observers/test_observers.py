@@ -72,6 +72,26 @@ def test_old_input_and_bad_values_are_stale(now, speed, reason):
     assert reason in status.values[0].value
 
 
+class ScanAge(TopicObserver):
+    """The age of a scan's data as its level, in s."""
+
+    qa_name = "scan_age"
+
+    def calculate_attr(self, msgs):
+        return self.qa_status(self.age(msgs[0]))
+
+
+@pytest.mark.parametrize(("stamp", "told"), [(99.5, "1.0"), (0.0, "sensor_msgs/LaserScan has no stamp")])
+def test_age_of_a_message_is_by_its_stamp_and_the_time_of_the_evaluation(stamp, told):
+    observer = ScanAge("ScanAge", 5.0, [("scan", LaserScan)])
+    scan = LaserScan()
+    scan.header.stamp = rospy.Time.from_sec(stamp)
+    observer.receive("scan", scan, 100.0)
+    (status,) = observer.evaluate(100.5)
+    assert told in status.values[0].value
+    assert observer.now() == 100.5
+
+
 def test_missing_input_is_stale_under_the_name_of_the_observer():
     (status,) = PublishedObserver("ComfortQualityObserver").evaluate(0.0)
     assert status.values[0].key == "comfort"

@@ -55,10 +55,20 @@ _PRIMITIVES = {bool: "Boolean", int: "Integer", str: "String"}
 
 
 def _list(items: list[tuple[ParameterType, Value]]) -> tuple[ParameterType, Value]:
+    """Return the type of a list, which may be longer at another time or hold other things, such as a chain of filters.
+
+    It says nothing of the members unless all are alike, or one needs its type to be written as what it is.
+    """
     kinds = [kind for kind, _ in items]
     values = [value for _, value in items]
     if kinds and {kind.kind for kind in kinds} == {"Integer", "Double"}:
         return ParameterType("Array", (ParameterType("Double"),)), values
-    if kinds and all(kind == kinds[0] for kind in kinds):
+    if kinds and all(kind == kinds[0] for kind in kinds) and kinds[0].kind != "Struct":
         return ParameterType("Array", (kinds[0],)), values
-    return ParameterType("List", tuple(kinds)), values
+    return ParameterType("List", tuple(kinds) if any(map(_needs_type, kinds)) else ()), values
+
+
+def _needs_type(kind: ParameterType) -> bool:
+    """Return whether a value of a type, or within it, is text in the language and something else in ROS."""
+    inner = (*kind.elements, *(member for _, member in kind.members))
+    return kind.kind in ("Base64", "Date") or any(map(_needs_type, inner))

@@ -52,6 +52,7 @@ class Observer:
         self._name = name
         self._rate = float(loop_rate_hz)
         self._last_qa_name = ""
+        self._now = 0.0
         self._reported: float | None = None
         self.settings: dict[str, Any] = dict(self.defaults)
 
@@ -117,6 +118,7 @@ class Observer:
 
     def evaluate(self, now: float) -> list[DiagnosticStatus]:
         """Evaluate at ROS time `now` in s. Stale input, or a value that is not a number, becomes "QA stale"."""
+        self._now = now
         try:
             statuses = self.generate_diagnostics(now) if self._timed else self.generate_diagnostics()  # type: ignore[call-arg]
             if isinstance(statuses, DiagnosticArray):  # as some published observers return
@@ -124,6 +126,21 @@ class Observer:
             return [self._checked(status) for status in statuses or []]
         except StaleInputError as error:
             return [self.stale(str(error))]
+
+    def now(self) -> float:
+        """Return the ROS time of this evaluation in s."""
+        return self._now
+
+    def age(self, msg: Any) -> float:
+        """Return how old the data of a message are at this evaluation, in s by the stamp of its header.
+
+        Raises:
+            StaleInputError: the message has no stamp.
+        """
+        stamp = msg.header.stamp.to_sec()
+        if not stamp:
+            raise StaleInputError(f"{msg._type} has no stamp: its age is unknown")
+        return self._now - float(stamp)
 
     def stale(self, reason: str) -> DiagnosticStatus:
         """Return the status that says that the quality attribute is unknown now."""

@@ -14,7 +14,7 @@ from mros1_reasoner.io.reasoner_bag import read_decisions
 @click.command()
 @click.argument("bag", type=click.Path(path_type=Path), required=False)
 @click.option("--topic", default="mros1_reasoner/decision", show_default=True, help="Of a running reasoner.")
-@click.option("--wait", default=3.0, show_default=True, help="For a decision of a running reasoner, s.")
+@click.option("--wait", default=0.5, show_default=True, help="For a decision of a running reasoner, s.")
 @NAMESPACE
 def explain(bag: Path | None, topic: str, wait: float, namespace: str | None) -> None:
     """Explain all decisions in a BAG, or the last decision of the running reasoner if no BAG is given."""
@@ -23,9 +23,10 @@ def explain(bag: Path | None, topic: str, wait: float, namespace: str | None) ->
         from mros1_reasoner.ros.decisions import last_decision  # the only part that needs ROS
 
         try:
-            out.print(render(last_decision(topic, wait)))
+            decision = last_decision(topic, wait)
         except ERRORS as error:
             refuse("explain", error)
+        out.print(render(decision) if decision else "no decision yet")
         return
     try:
         decisions = read_decisions(bag, namespace)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+
 import rospy
 from metacontrol_bags import messages
 from metacontrol_bags.decision import Decision
@@ -13,6 +16,8 @@ from mros1_reasoner.replay.recording import RecordingError
 from mros1_reasoner.ros.messages import fill_decision
 
 _TOPIC = "mros1_reasoner/decision"
+_FIND_TIMEOUT = 3.0  # s, wall, to find the reasoner
+_LOOK_PERIOD = 0.01  # s, wall
 
 
 class DecisionTopic:
@@ -29,23 +34,33 @@ class DecisionTopic:
         self._publisher.publish(message)
 
 
-def last_decision(topic: str, wait: float) -> Decision:
-    """Return the last decision that was published on a latched topic.
+def last_decision(topic: str, wait: float) -> Decision | None:
+    """Return the last decision that was published on a latched topic; None: the reasoner has decided nothing yet.
 
     Args:
         topic: its name.
-        wait: for so long, s.
+        wait: for so long for a decision once the reasoner is connected, s of wall time.
 
     Raises:
-        RecordingError: there is no master, or none has come.
+        RecordingError: there is no master, or no reasoner.
     """
     try:
         command.join("explain")
     except CallError as error:
         raise RecordingError(f"{error}: start roscore or set ROS_MASTER_URI, or name a bag") from error
-    try:
-        return messages.decision(rospy.wait_for_message(topic, msg.Decision, wait), rospy.get_time())
-    except (OSError, rospy.ROSException) as error:
+    found: list[msg.Decision] = []
+    subscriber = rospy.Subscriber(topic, msg.Decision, found.append)
+    if not _becomes(subscriber.get_num_connections, max(_FIND_TIMEOUT, wait)):
         name = rospy.resolve_name(topic)
-        say = f"no decision on {name} within {wait:g} s: no reasoner runs, or it has decided nothing yet"
-        raise RecordingError(f"{say} ({error})") from error
+        raise RecordingError(f"nobody publishes {name}: no reasoner runs there; start it, or name a bag")
+    return messages.decision(found[0], rospy.get_time()) if _becomes(lambda: found, wait) else None
+
+
+def _becomes(condition: Callable[[], object], timeout: float) -> bool:
+    """Wait for a condition, at most for so long, s of wall time; return whether it has come true."""
+    deadline = time.monotonic() + timeout
+    while not condition():
+        if rospy.is_shutdown() or time.monotonic() >= deadline:
+            return False
+        time.sleep(_LOOK_PERIOD)
+    return True

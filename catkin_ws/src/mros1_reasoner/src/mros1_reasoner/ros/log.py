@@ -9,10 +9,11 @@ from metacontrol_bags.decision import EXECUTED, FAILED, Decision
 
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.diagnostics import Remark
-from mros1_reasoner.loop.entries import LevelFact
+from mros1_reasoner.loop.entries import LevelFact, StaleFact
 from mros1_reasoner.planning.log_line import line
 from mros1_reasoner.ros.core_log import PREFIX
 from mros1_reasoner.ros.log_throttle import LogThrottle
+from mros1_reasoner.ros.unobserved import Unobserved
 
 _LONGEST = 1000  # remarks that are told once
 _LEVEL_PERIOD = 30.0
@@ -25,6 +26,7 @@ class Log:
     def __init__(self) -> None:
         """Nothing is told yet."""
         self._warnings, self._levels = LogThrottle(), LogThrottle(_LEVEL_PERIOD, burst=1)
+        self._unobserved = Unobserved()
         self._told: set[str] = set()
 
     def tell(self, text: str) -> None:
@@ -49,6 +51,13 @@ class Log:
         text = f"QA value received!\tTYPE: {fact.quality}\tVALUE: {fact.text}"
         if self._levels.admit(time.monotonic(), fact.quality, text):
             rospy.loginfo(text)
+        if again := self._unobserved.observed(fact.quality):
+            self.tell(again)
+
+    def tell_stale(self, fact: StaleFact) -> None:
+        """Warn of a quality that can't be observed."""
+        if said := self._unobserved.stale(time.monotonic(), fact.quality, fact.reason):
+            rospy.logwarn(PREFIX, said)
 
     def tell_remark(self, remark: Remark) -> None:
         """Warn of a diagnostic that makes no sense; tell once of one that concerns nobody."""

@@ -224,7 +224,7 @@ class ReasonerNode:
             if isinstance(fact, LevelFact) and taken:
                 self._log.tell_level(fact)
             elif isinstance(fact, StaleFact) and not self.core.is_in_reserve(fact.quality):
-                self._log.warn("stale", f"QA {fact.quality} can't be observed: {fact.reason or 'no reason given'}")
+                self._log.tell_stale(fact)
 
     def _take_active(self, active: messages.ActiveConfiguration) -> None:
         running = [function for function in active.functions if function.configuration]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import rosgraph
+import rospy.core
 
 from node_kit.io.xml_rpc import Client
 from node_kit.ros.lifetime import BAD_START, Lifetime
@@ -25,3 +26,5 @@ def join(name: str) -> None:
     life = Lifetime(name)  # not entered: that would take over signals
     life.on_end = lambda reason: life.end(reason, BAD_START)
     life.start(anonymous=True)
+    rospy.core.add_preshutdown_hook(lambda _reason: rospy.core._shutdown_threads.clear())
+    # rospy would wait at the end for its thread of registrations, which looks only every 0.5 s whether it shall end

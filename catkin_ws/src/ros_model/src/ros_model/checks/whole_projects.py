@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ros_model.checks.exported import exported_findings
 from ros_model.checks.families import check_family
 from ros_model.checks.projects import needless_words
 from ros_model.checks.systems import check_system
@@ -48,6 +49,7 @@ def check_project(project: Project, library: Library, sources: Library | None = 
     yield from wrong_arguments(project)
     yield from wrong_launch_files(project, library)
     yield from unknown_observed_types(project, library)
+    yield from exported_findings(project)
 
 
 def _with_other_functions(project: Project, variant: RosSystem) -> RosSystem:

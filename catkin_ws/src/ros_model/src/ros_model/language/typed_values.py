@@ -25,6 +25,7 @@ _FITTING: dict[str, tuple[type, ...]] = {
     "Array": (list,),
     "Struct": (dict,),
 }
+_COMPOUND = ("List", "Array", "Struct")
 _BINARY = re.compile(r"0[bB]([01]+)")  # how the published grammar writes Base64
 _DATE = re.compile(r"\d{4}-?\d{1,2}-?\d{1,2}T\d{1,2}:\d{1,2}:\d{1,2}")  # ISO 8601, as the grammar and XML-RPC write it
 
@@ -47,6 +48,8 @@ def fault(value: Value, declared: ParameterType) -> str | None:
 def misfit(role: str, value: Value, name: str, declared: ParameterType) -> str | None:
     """Return what is told of a parameter whose value, or default, is none of its type; None if it is one."""
     found = fault(value, declared)
+    if found and isinstance(value, str) and value.startswith(("[", "{")) and declared.kind in _COMPOUND:
+        found += f": a cell of a CSV file is text; write the table as YAML, with {name.rpartition('/')[2]}: {value}"
     return f"the {role} {value!r} of '{name}' {found}" if found else None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -120,6 +121,7 @@ def _broken_links(settings: Settings) -> Iterator[ModelError]:
                     yield _no_such(settings, other, "functions", *keys)
                 elif other == name:
                     yield settings.error("a function can't require itself: take it out", *keys)
+    yield from _cycle(settings)
     yield from _unclear_functions(settings)
     for name, objective in content["objectives"].items():
         if objective["function"] not in content["functions"]:
@@ -138,6 +140,21 @@ def _broken_links(settings: Settings) -> Iterator[ModelError]:
                 yield settings.error(
                     "is for an observer that exists: name it as plugin", "observers", number, "outputs"
                 )
+
+
+def _cycle(settings: Settings) -> Iterator[ModelError]:
+    """Yield functions that require each other, directly or through others: none of them could be the first to run."""
+    required: dict[str, set[str]] = {}
+    for name, function in settings.content["functions"].items():
+        requires = function.get("requires", [])
+        lists = requires.values() if isinstance(requires, dict) else [requires]
+        required[name] = {other for others in lists for other in others if other != name}
+    try:
+        TopologicalSorter(required).prepare()
+    except CycleError as error:
+        first, *others = reversed(error.args[1])
+        cycle = " requires ".join([first, *others])
+        yield settings.error(f"functions require each other ({cycle}): take one out", "functions", first, "requires")
 
 
 def _unclear_functions(settings: Settings) -> Iterator[ModelError]:

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import actionlib
@@ -21,9 +22,11 @@ from metacontrol_msgs.msg import (
     MvpReconfigurationAction,
     MvpReconfigurationGoal,
 )
+from node_kit.io.background import in_background
 from node_kit.io.xml_rpc import CallError, GoneError
 from node_kit.ros import command
 from node_kit.ros.action_server import wait_for_server
+from rosgraph_launcher.io.master import NodeApi
 
 from rosgraph_manipulator.change.journal import parse_journal
 from rosgraph_manipulator.configuration.configurations import DEFAULT_FUNCTION, KEYS
@@ -32,6 +35,7 @@ from rosgraph_manipulator.ros.launcher_reports import TOPIC
 from rosgraph_manipulator.ros.requests import CHANGE_FUNCTION
 
 FIND_TIMEOUT = 5.0  # s, wall, to find the manipulator
+_HEAR_PERIOD = 0.01  # s, wall, between two looks at what launchers have told
 _LOOK_PERIOD = 0.1  # s, wall, after which a shutdown is seen
 NODE = "rosgraph_manipulator"
 
@@ -153,6 +157,8 @@ def failures() -> dict[str, str]:
 def launched_functions() -> dict[str, LaunchedFunctions]:
     """Return what each launcher runs, by the launcher's name, as far as they say.
 
+    One that has died stays registered, so a launcher that does not answer is not waited for.
+
     Raises:
         ClientError: the master does not answer.
     """
@@ -165,8 +171,12 @@ def launched_functions() -> dict[str, LaunchedFunctions]:
         awaited = publishers(subscriber.resolved_name)
     except CallError as error:
         raise ClientError(str(error)) from error
-    while not (found and awaited <= set(found)) and time.monotonic() < deadline:
-        time.sleep(_LOOK_PERIOD)
+    answers = {name: in_background(partial(NodeApi.answer, name), f"ask {name}") for name in awaited}
+    while time.monotonic() < deadline:
+        silent = {name for name, answer in answers.items() if answer.done() and answer.result() is None}
+        if found and awaited <= found.keys() | silent:
+            break
+        time.sleep(_HEAR_PERIOD)
     subscriber.unregister()
     return dict(sorted(found.items()))
 
