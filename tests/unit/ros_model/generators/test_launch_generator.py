@@ -218,6 +218,31 @@ def test_connection_is_named_as_a_node_in_a_namespace_resolves_it(connection, re
     assert remaps(system) == remapped
 
 
+@pytest.mark.parametrize(
+    ("name", "connection", "other", "remapped"),
+    [
+        ("/scan", "scan", "/scan", []),
+        ("/scan", "/scan", "scan", []),
+        ("/scan", "scan", "scan", [("/scan", "scan")]),  # the others are in the namespace, too
+        ("/scan", "front/scan", "/scan", [("/scan", "front/scan")]),
+        ("/tf", "tf", "tf", []),
+        ("/tf", "front/tf", "tf", [("/tf", "front/tf")]),
+    ],
+)
+@pytest.mark.parametrize("component", ["laser", "left/laser"])
+def test_connection_called_as_an_absolute_port_is_no_remapping(name, connection, other, remapped, component):
+    ends = (PortPath(component, name),), (PortPath("nav", other), PortPath("map", other))
+    system = of(name=component, ports=(port(name),), connections=(Connection(connection, ConnectionKind.TOPIC, *ends),))
+    outside = "/" if "/" in component else ""
+    assert remaps(system) == [(inside, outside + topic) for inside, topic in remapped if outside + topic != inside]
+
+
+def test_remapping_of_an_absolute_name_into_the_namespace_is_kept():
+    ends = (PortPath("laser", "tf"),), (PortPath("laser", "tf"),)
+    system = of(ports=(port("tf", "/tf"),), connections=(Connection("tf", ConnectionKind.TOPIC, *ends),))
+    assert remaps(system) == [("/tf", "tf")]
+
+
 def test_node_in_a_namespace_publishes_its_connection():
     system = of(name="left/laser", ports=(port("out", "scan"),), connections=connected("left/merged", "left/laser"))
     (node,) = loaded(system).nodes

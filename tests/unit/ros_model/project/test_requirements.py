@@ -226,7 +226,7 @@ def test_what_is_required_and_what_not_is_shown_with_the_way_once_for_all_design
         "and not:",
         "  touch -> wrench -> packer: not_required_by takes it out",
         "seen requires:",
-        "  camera: eye -> image -> packer",
+        "  camera: eye -> head/image -> packer",
         "  hall: force is 5",
         "sort requires no component",
         "not:",
@@ -242,7 +242,7 @@ def test_check_shows_requirements_to_people_and_findings_only_to_programs(load, 
     load()
     status, out, _ = run("check", tmp_path)
     assert status == 0
-    assert "seen requires:\n  head/eye: eye -> image -> packer\n" in out
+    assert "seen requires:\n  head/eye: eye -> head/image -> packer\n" in out
     assert "requires" not in run("check", "--format", "json", tmp_path)[1]
 
 

@@ -5,6 +5,7 @@ import itertools
 import pytest
 from ros_model.checks.systems import check_system
 from ros_model.errors import ModelError
+from ros_model.generators.launch import launch_file
 from ros_model.io.project import read_table
 from ros_model.language.metamodel import ConnectionKind, PortPath, compose
 from ros_model.language.system_reader import parse_system
@@ -296,3 +297,50 @@ def test_wired_port_keeps_its_reference(systems):
     ((_, part),) = systems("v,1,3,clean,unknown,false,0.1,")
     assert part.component("nav").port("scan").reference == BASE.component("nav").port("scan").reference
     assert PortPath("nav", "scan") in {end for connection in part.connections for end in connection.targets}
+
+
+CONNECTED = "TopicConnections { TopicConnection 'NAME' { From ( 'compass.SOURCE' ) To ( 'logger.x' ) } }"
+VESSEL = """RosSystem { Name vessel RosComponents (
+    ComponentInterface { name compass NameSpace '/ship' FromRosNode 'v.compass.compass'
+        RosPublishers { RosPublisher 'SOURCE' { RefPublisher 'v.compass.compass.SOURCE' } } },
+    ComponentInterface { name logger FromRosNode 'v.logger.logger'
+        RosSubscribers { RosSubscriber x { RefSubscriber 'v.logger.logger.x' } } },
+    ComponentInterface { name pilot NameSpace '/ship' FromRosNode 'v.pilot.pilot' SUBSCRIBERS } ) CONNECTED }"""
+SUBSCRIBER = "RosSubscribers { RosSubscriber 'TARGET' { RefSubscriber 'v.pilot.pilot.TARGET' } }"
+
+
+@pytest.mark.parametrize(
+    ("source", "connection", "target", "found"),
+    [
+        ("imu/data", "ship/imu/data", "imu/data", ("ship/imu/data", "imu/data")),
+        ("imu/data", "ship/imu/data", "/ship/imu/data", ("ship/imu/data", "/ship/imu/data")),
+        ("imu/data", "ship/imu/data", None, ("ship/imu/data", "imu/data")),
+        ("imu/data", None, "imu/data", ("ship/imu/data", "imu/data")),
+        ("imu/data", None, None, ("ship/imu/data", "imu/data")),
+        ("/imu/data", None, "/imu/data", ("/imu/data", "/imu/data")),
+        ("~data", None, "compass/data", ("ship/compass/data", "compass/data")),
+        ("imu/data", "imu/data", "imu/data", ("imu/data", "imu/data")),
+    ],
+)
+def test_port_at_the_other_end_of_a_connection_in_a_namespace_is_that_of_the_same_topic(
+    table, source, connection, target, found
+):
+    text = VESSEL.replace("CONNECTED", CONNECTED.replace("NAME", connection) if connection else "")
+    text = text.replace("SUBSCRIBERS", SUBSCRIBER.replace("TARGET", target) if target else "")
+    base = parse_system(text.replace("SOURCE", source), "vessel.rossystem")
+    section = {"component": "pilot", "connections": {"by": {"compass": [f"compass.{source}"], "eye": []}}}
+    ((whole, _), _) = make_systems(base, parse_columns(section), table("name,by\na,compass\nb,eye\n"))
+    topic, port = found
+    assert (topic, f"compass.{source}", f"pilot.{port}") in ends(whole)
+    assert [p.name for p in whole.component("pilot").ports] == [port]
+
+
+@pytest.mark.parametrize("port", ["heading", None])
+def test_new_connection_from_a_namespace_to_the_root_has_the_topic_and_the_port_the_name_in_the_code(table, port):
+    text = VESSEL.replace("CONNECTED", "").replace("name pilot NameSpace '/ship'", "name pilot")
+    text = text.replace("SUBSCRIBERS", SUBSCRIBER.replace("TARGET", port) if port else "")
+    base = parse_system(text.replace("SOURCE", "heading"), "vessel.rossystem")
+    section = {"component": "pilot", "connections": {"by": {"compass": ["compass.heading"]}}}
+    ((whole, part),) = make_systems(base, parse_columns(section), table("name,by\na,compass\n"))
+    assert ends(whole) == {("ship/heading", "compass.heading", "pilot.heading")}
+    assert '<remap from="heading" to="ship/heading" />' in launch_file(part, whole)

@@ -120,7 +120,7 @@ def test_what_every_node_has_is_left_out_and_said_so():
     assert models.system.component("rosout") is None
     assert "~get_loggers" in models.system.header
     everything = extracted(snapshot, everything=True)
-    assert (PortKind.SUBSCRIBER, "clock") in ports(everything.system, "talker")
+    assert (PortKind.SUBSCRIBER, "/clock") in ports(everything.system, "talker")
     assert everything.system.component("rosout")
 
 
@@ -376,6 +376,7 @@ def follower(*remaps, subscribers=("/laser/odom",), sources=NO_SOURCE):
     return models.system, [port.reference.name for port in found.ports if port.reference]
 
 
+OWN_OUT = ("out", "/odom")
 OUTER, OWN = ("/laser/odom", "laser/odom"), ("odometry", "laser/odom")
 
 
@@ -411,6 +412,43 @@ def test_second_name_of_an_action_stays_beside_the_one_that_is_taken():
     (port,) = system.components[0].ports
     assert (port.kind, port.reference.name) == (PortKind.ACTION_SERVER, "~go")
     assert remappings_of(system.header) == {"arm": pairs["/dock"]}
+
+
+@pytest.mark.parametrize(
+    ("topic", "declared", "remaps", "seen", "code"),
+    [
+        ("/odom", ["/odom"], (), "/odom", "/odom"),
+        ("/odom", ["odom"], (), "odom", "odom"),
+        ("/odom", ["/odom", "odom"], (), "odom", "odom"),
+        ("/odom", [], (), "odom", "odom"),
+        ("/odom", ["/odom"], (("/odom", "odom"),), "odom", "/odom"),
+        ("/odom", ["in"], (("in", "/odom"),), "/odom", "in"),
+        ("/odom", ["in"], (("in", "odom"),), "odom", "in"),
+        ("/diagnostics", [], (), "/diagnostics", "/diagnostics"),
+        ("/diagnostics", ["diagnostics"], (), "diagnostics", "diagnostics"),
+        ("/tf", [], (("/tf", "tf"),), "tf", "/tf"),
+        ("/front/tf", [], (), "front/tf", "front/tf"),
+    ],
+)
+def test_name_that_the_code_has_with_a_slash_keeps_it_in_a_snapshot_at_the_root(topic, declared, remaps, seen, code):
+    snapshot = graph([], [[topic, ["/follower"]]])
+    details = Details({"/follower": Origin("carts", "follow.py", remaps)})
+    models = models_of(snapshot, details, "live", sources=source_of("follow.py", declared))
+    (component,) = models.system.components
+    assert [(port.name, port.reference.name) for port in component.ports] == [(seen, code)]
+    node = models.packages.node("carts", "follow.py", "follower")
+    assert node and [port.name for port in node.ports] == [code]
+
+
+@pytest.mark.parametrize(("source", "name"), [(["/odom"], "/odom"), (["odom"], "odom")])
+def test_connection_keeps_the_slash_that_all_its_ends_have(source, name):
+    snapshot = graph([["/odom", ["/wheels"]], ["/tf", ["/wheels"]]], [[end, ["/follower"]] for end in ("/odom", "/tf")])
+    details = Details({"/follower": Origin("carts", "follow.py"), "/wheels": Origin("carts", "drive.py", (OWN_OUT,))})
+    system = models_of(snapshot, details, "live", sources=source_of("follow.py", source)).system
+    assert {(c.name, str(c.sources[0]), str(c.targets[0])) for c in system.connections} == {
+        ("/tf", "wheels./tf", "follower./tf"),
+        (name, "wheels./odom", f"follower.{name}"),
+    }
 
 
 def test_interface_that_the_source_declares_and_the_node_does_not_have_is_told():

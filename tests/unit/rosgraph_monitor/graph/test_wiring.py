@@ -255,3 +255,21 @@ def test_every_finding_says_what_was_expected_and_what_is():
         values = dict(status.values)
         assert values["expected"] != values["actual"]
         assert status.level is (Level.WARN if status.message == "Additional port" else Level.ERROR)
+
+
+@pytest.mark.parametrize("actual", ["m/Pose", "m/Scan"])
+def test_topic_service_and_action_of_one_name_have_types_of_their_own(actual):
+    ends = [(SUB, "m/Pose"), (SRV, "m/SetPose"), (SERVER, "m/MoveAction")]
+    declared = tuple(PortDeclaration("pose", kind, type_name) for kind, type_name in ends)
+    source = PackageSet((Package("p", (Artifact("a", (Node("n", declared),)),)),))
+    parts = action("/pose", ["/laser"], ["/nav"])
+    live = {
+        "pubs": parts["pubs"],
+        "subs": [*parts["subs"], ["/pose", ["/laser"]]],
+        "types": [*parts["types"], ["/pose", actual]],
+        "services": [["/pose", ["/laser"]]],
+        "nodes": ("/laser", "/nav"),
+    }
+    scope = Scope(types=port_types([source]), ignored_nodes=("nav",))
+    found = compare(graph(**live), system(laser=[port("pose", kind) for kind, _ in ends]), dead={}, scope=scope)
+    assert found == ((WrongType("laser", "pose", "m/Pose", actual),) if actual != "m/Pose" else ())

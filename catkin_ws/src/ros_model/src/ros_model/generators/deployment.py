@@ -14,6 +14,7 @@ from ros_model.io.models import files_in
 from ros_model.language.any_language import PACKAGES
 from ros_model.language.metamodel import PortKind, compose
 from ros_model.project.settings import FUNCTION_KEYS
+from ros_model.project.wiring import is_shared
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import RosSystem
@@ -89,16 +90,18 @@ def _deployed(project: Project, name: str) -> dict[str, str]:
 
 
 def _topics(variant: RosSystem, whole: RosSystem) -> list[str]:
-    """Return the topics that connections carry from a variant's components: what others need of it."""
+    """Return the topics that connections carry from a variant's components: what others need of it.
+
+    Topics on which any node may publish, such as /tf, are not among them: they do not show that the variant runs.
+    """
     sources = {str(end) for connection in whole.connections for end in connection.sources}
-    return sorted(
-        {
-            topic_of(component, port, whole)
-            for component in variant.components
-            for port in component.ports
-            if port.kind is PortKind.PUBLISHER and f"{component.name}.{port.name}" in sources
-        }
-    )
+    topics = {
+        topic_of(component, port, whole)
+        for component in variant.components
+        for port in component.ports
+        if port.kind is PortKind.PUBLISHER and f"{component.name}.{port.name}" in sources
+    }
+    return sorted(topic for topic in topics if not is_shared(topic))
 
 
 def reasoner(project: Project) -> dict[str, Any]:

@@ -10,7 +10,8 @@ from ros_model.errors import ModelError
 from ros_model.file_names import safe_file_name
 from ros_model.generators import variant_packages, write_files
 from ros_model.generators.launch_parameters import harmless, parameter_element, sent
-from ros_model.language.metamodel import CONNECTION_OF, PortPath, compose, topic_suffixes
+from ros_model.language.graph_names import ABSOLUTE_TOPICS
+from ros_model.language.metamodel import CONNECTION_OF, ENDS, PortPath, compose, topic_suffixes
 from ros_model.language.packages import Node
 from ros_model.language.remappings import remappings_of
 
@@ -194,7 +195,22 @@ def topic_of(component: Component, port: Port, whole: RosSystem) -> str:
     connection = _connection(component, port, whole)
     if connection is None:
         return port.name.removeprefix("/") if port.namespace is not None else port.name
+    if _stays_absolute(port, connection):
+        return port.name
     return f"/{connection.name.lstrip('/')}" if component.namespace is not None else connection.name
+
+
+def _stays_absolute(port: Port, connection: Connection) -> bool:
+    """Return whether a port has an absolute name, and its connection the same name without the slash.
+
+    That is no remapping: it would move the topic into the namespace in which the node is started. It is one if all
+    other ends have relative names: they are in that namespace, too, and the node would not reach them.
+    """
+    name = port.name
+    if port.namespace is not None or not name.startswith("/") or name[1:] != connection.name.lstrip("/"):
+        return False
+    others = connection.targets if port.kind is ENDS[connection.kind][0] else connection.sources
+    return name in ABSOLUTE_TOPICS or any(end.port.startswith("/") for end in others)
 
 
 def _connection(component: Component, port: Port, whole: RosSystem) -> Connection | None:

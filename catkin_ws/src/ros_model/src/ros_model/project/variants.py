@@ -190,13 +190,15 @@ def _unwired(system: RosSystem, wires: Collection[Wire]) -> tuple[set[PortPath],
 def _wired(system: RosSystem, wire: Wire, names: dict[PortPath, str], where: Position) -> RosSystem:
     """Return the system with one more connection, and the port that takes it up."""
     outlet_kind, component = outlet(system, wire.source), system.component(wire.component)
-    if outlet_kind is None or component is None:
+    source = system.component(wire.source.component)
+    if outlet_kind is None or component is None or source is None:
         missing = wire.source.component if outlet_kind is None else wire.component
         raise ModelError(f"connects {missing!r}, which this variant lacks", where)
     kind, port_kind = TARGET_OF[outlet_kind]
-    name, where = names.get(wire.source, wire.source.port), wire.position or where
-    port = component.find_port(wire.port or name, {port_kind})
-    target = PortPath(wire.component, port.name if port else wire.port or name, where)
+    name, where = names.get(wire.source) or _topic(source, wire.source.port), wire.position or where
+    wanted = [wire.port] if wire.port else _taking(component, name, None if wire.source in names else wire.source.port)
+    port = next(filter(None, (component.find_port(text, {port_kind}) for text in wanted)), None)
+    target = PortPath(wire.component, port.name if port else wanted[-1], where)
     if port is None:
         system = _with_port(system, component, target.port, port_kind, where)
     connections = list(system.connections)
@@ -207,6 +209,30 @@ def _wired(system: RosSystem, wire: Wire, names: dict[PortPath, str], where: Pos
     else:
         connections.append(Connection(name, kind, (wire.source,), (target,), where))
     return replace(system, connections=tuple(connections))
+
+
+def _topic(source: Component, port: str) -> str:
+    """Return the name of a new connection: that of its source in the graph, with a slash where the port has one."""
+    return port if port.startswith("/") else source.resolved(port).lstrip("/")
+
+
+def _taking(component: Component, connection: str, port: str | None) -> list[str]:
+    """Return names of the port by which a component may take up a connection; the last one is that of a new port.
+
+    Args:
+        component: the component.
+        connection: the name of the connection, which begins in no namespace.
+        port: the name of the port at its source, if the connection is new; nobody else has called it otherwise.
+    """
+    inside = connection.lstrip("/")
+    namespace = component.graph_name.rpartition("/")[0] + "/"
+    if port and port[0] not in "/~":
+        seen = port
+    elif namespace != "/" and inside.startswith(namespace):
+        seen = inside.removeprefix(namespace)
+    else:
+        seen = connection
+    return [connection, f"/{inside}", seen]
 
 
 def _with_port(system: RosSystem, component: Component, name: str, kind: PortKind, where: Position) -> RosSystem:

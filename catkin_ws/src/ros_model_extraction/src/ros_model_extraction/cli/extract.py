@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from ros_model.cli import BAD_INPUT
 from ros_model.errors import ModelError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 _INCOMPLETE = 1
 _LAUNCH_FILES = (".launch", ".xml", ".test")
@@ -15,12 +19,13 @@ _LAUNCH_FILES = (".launch", ".xml", ".test")
 
 @click.command()
 @click.argument("path", metavar="PATH")
-@click.argument("arguments", nargs=-1, metavar="[ARG:=VALUE]...")
+@click.argument("arguments", nargs=-1, metavar="[PATH | ARG:=VALUE]...")
 @click.option("-o", "--output", default=".", metavar="FOLDER", help="Where the files go; made if it is missing.")
 def extract(path: str, arguments: tuple[str, ...], output: str) -> int:
     """Write models of what is in PATH: a ROS package, a folder of packages, or a launch file.
 
     A package gives PACKAGE.ros: its executables (rospy and roscpp), their interfaces and parameters, its messages.
+    Several folders are read one after the other.
     A launch file (.launch, .xml, .test), read by roslaunch with the arguments ARG:=VALUE, gives NAME.rossystem and
     NAME.ros.
     What the source does not tell is marked so, with its place, in names and in comments at the top of the files.
@@ -34,9 +39,12 @@ def extract(path: str, arguments: tuple[str, ...], output: str) -> int:
                 f"{path}: no launch file ({known}): give one, or the folder of a ROS package, or of several"
             )
         return _launch_file(Path(path), arguments, output)
-    if arguments:
-        raise ModelError(f"{arguments[0]}: arguments are for a launch file, and {path} is a folder")
-    return _packages(Path(path), output)
+    for argument in arguments:
+        if ":=" in argument:
+            raise ModelError(f"{argument}: arguments are for a launch file, and {path} is a folder")
+        if os.path.isfile(argument):
+            raise ModelError(f"{argument}: not read beside the folder {path}: give folders only, or one launch file")
+    return _all_packages((path, *arguments), output)
 
 
 def _launch_file(path: Path, arguments: tuple[str, ...], output: str) -> int:
@@ -49,6 +57,18 @@ def _launch_file(path: Path, arguments: tuple[str, ...], output: str) -> int:
     nodes = len(models.system.components)
     click.echo(f"{nodes} node{'s' * (nodes != 1)}, {len(models.system.connections)} connections")
     return 0
+
+
+def _all_packages(paths: Iterable[str], output: str) -> int:
+    """Extract from every folder, also after one that can't be read, and return the gravest status."""
+    status = 0
+    for path in paths:
+        try:
+            status = max(status, _packages(Path(path), output))
+        except ModelError as error:
+            click.echo(f"rosmodel: {error}", err=True)
+            status = BAD_INPUT
+    return status
 
 
 def _packages(path: Path, output: str) -> int:

@@ -39,6 +39,7 @@ class LaunchedNode:
     remaps: Mapping[str, str]
     private: Mapping[str, Any]  # parameters given as `_name:=value` among its arguments
     unsaid: tuple[str, ...] = ()  # what a model has no words for
+    pinned: frozenset[str] = frozenset()  # names of a node at the root that are remapped to names with a leading slash
 
 
 def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
@@ -125,9 +126,10 @@ def _launched(node: Any) -> LaunchedNode:
         ("respawn", "true" if node.respawn else ""),
         ("required", "true" if node.required else ""),
     )
-    return LaunchedNode(
-        full, node.package, node.type, resolved, private, tuple(f'{key}="{value}"' for key, value in unsaid if value)
-    )
+    said = tuple(f'{key}="{value}"' for key, value in unsaid if value)
+    is_at_root = not split_name(full)[0]
+    pinned = frozenset(resolve(old, full) for old, new in remaps if is_at_root and new.startswith("/"))
+    return LaunchedNode(full, node.package, node.type, resolved, private, said, pinned)
 
 
 class _Sources:
@@ -177,8 +179,11 @@ def _ends(node: LaunchedNode, source: NodeSource) -> list[End]:
     """Return a node's interfaces by their resolved and remapped names; unresolved names stay as they are."""
     ends: dict[tuple[PortKind, str], End] = {}
     for port in source.ports:
-        name = _remapped(port.kind, resolve(port.name, node.name), node.remaps) if port.is_resolved else port.name
-        ends.setdefault((port.kind, name), End(node.name, port.kind, name, port.type, port.name))
+        full = resolve(port.name, node.name) if port.is_resolved else port.name
+        name = _remapped(port.kind, full, node.remaps) if port.is_resolved else port.name
+        told = {full + suffix for suffix in topic_suffixes(port.kind)} & node.remaps.keys()
+        is_absolute = told <= node.pinned if told else port.name.startswith("/")
+        ends.setdefault((port.kind, name), End(node.name, port.kind, name, port.type, port.name, is_absolute))
     return [end for end in ends.values() if not plumbing.is_plumbing(end)]
 
 

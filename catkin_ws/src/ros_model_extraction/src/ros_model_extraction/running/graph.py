@@ -6,7 +6,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from ros_model.language.graph_names import resolve
+from ros_model.language.graph_names import ABSOLUTE_TOPICS, resolve
 from ros_model.language.library import Library
 from ros_model.language.metamodel import (
     Component,
@@ -41,13 +41,28 @@ NO_PACKAGE = "unknown_package"
 
 @dataclass(frozen=True)
 class End:
-    """An interface of a running node, by its resolved name."""
+    """An interface of a running node, by its resolved name.
+
+    Attributes:
+        node: full name of the node.
+        kind: what it is.
+        name: its resolved name.
+        type: its type, "" if that is not known.
+        declared: its name in the source, where that is known and may be another.
+        absolute: the code, or the remapping, has the name with its leading slash: it is in no namespace.
+    """
 
     node: str
     kind: PortKind
     name: str
     type: str = ""
-    declared: str = ""  # its name in the source, where that is known
+    declared: str = ""
+    absolute: bool = False
+
+    @property
+    def seen(self) -> str:
+        """The name as the node uses it."""
+        return self.name if self.absolute else as_seen_from(self.node, self.name)
 
 
 @dataclass(frozen=True)
@@ -106,6 +121,9 @@ def models_of(
         if origin and origin.remaps:
             instance.ends, unused = as_declared(node, instance.ends, origin.remaps, written)
             remarks.unused_remaps[node] = unused
+        instance.ends = [
+            end if end.declared else replace(end, absolute=_is_absolute(end, written)) for end in instance.ends
+        ]
         remarks.unseen[node] = _unseen(instance, written)
     unowned = share_out(snapshot.parameters, instances)
     if not everything:
@@ -214,18 +232,31 @@ def as_declared(
         suffixes = topic_suffixes(end.kind)
         suffix = suffixes[0]
         fitting = [pair for pair in remaps if resolve(pair[1], node) == end.name + suffix and pair[0].endswith(suffix)]
-        name = ""
+        name = target = ""
         if fitting:
             inside = {pair: resolve(pair[0], node).removesuffix(suffix) for pair in fitting}
             merits = {
                 pair: ((end.kind, full) in declared, pair in unused, full != end.name, pair[0][0] != "/")
                 for pair, full in inside.items()
             }
-            name = max(merits, key=merits.__getitem__)[0].removesuffix(suffix)
+            name, target = max(merits, key=merits.__getitem__)
+            name = name.removesuffix(suffix)
             used = {(resolve(name + part, node), end.name + part) for part in suffixes}
             unused = [pair for pair in unused if (resolve(pair[0], node), resolve(pair[1], node)) not in used]
-        found.append(replace(end, declared=name) if name else end)
+        is_absolute = target.startswith("/") and not split_name(node)[0]
+        found.append(replace(end, declared=name, absolute=is_absolute) if name else end)
     return found, unused
+
+
+def _is_absolute(end: End, written: Iterable[PortDeclaration]) -> bool:
+    """Return whether the code has the name of an interface, which is not remapped, with its leading slash.
+
+    Where no source tells, this is so of the topics that libraries open under absolute names.
+    """
+    names = {port.name for port in written if port.kind is end.kind and resolve(port.name, end.node) == end.name}
+    if names:
+        return all(name.startswith("/") for name in names)
+    return end.kind in (PortKind.PUBLISHER, PortKind.SUBSCRIBER) and end.name in ABSOLUTE_TOPICS
 
 
 def _unseen(instance: Instance, written: Iterable[PortDeclaration]) -> list[str]:
@@ -289,9 +320,8 @@ def share_out(tree: Mapping[str, Any], instances: Mapping[str, Instance]) -> lis
 def _component(instance: Instance, unwritable: dict[str, str]) -> Component:
     reference = instance.reference
     ports = tuple(
-        Port(name, end.kind, replace(reference, name=end.declared or name))
+        Port(end.seen, end.kind, replace(reference, name=end.declared or end.seen))
         for end in sorted(instance.ends, key=_order)
-        for name in [as_seen_from(instance.name, end.name)]
     )
     parameters = []
     for key, raw in instance.parameters:
@@ -309,14 +339,19 @@ def _order(end: End) -> tuple[int, str]:
 
 
 def _connections(instances: Mapping[str, Instance]) -> Iterator[Connection]:
-    """Connect interfaces of the same name: publishers and subscribers, action servers and clients."""
+    """Connect interfaces of the same name: publishers and subscribers, action servers and clients.
+
+    The name of a connection keeps its slash where all its ends have one: it is in no namespace.
+    """
     for kind, source_kind, target_kind in (
         (ConnectionKind.TOPIC, PortKind.PUBLISHER, PortKind.SUBSCRIBER),
         (ConnectionKind.ACTION, PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT),
     ):
         sources, targets = (_paths(instances.values(), end) for end in (source_kind, target_kind))
         for name in sorted(sources.keys() & targets.keys()):
-            yield Connection(name.lstrip("/"), kind, tuple(sources[name]), tuple(targets[name]))
+            is_absolute = all(end.port.startswith("/") for end in (*sources[name], *targets[name]))
+            shown = name if is_absolute else name.lstrip("/")
+            yield Connection(shown, kind, tuple(sources[name]), tuple(targets[name]))
 
 
 def _paths(instances: Iterable[Instance], kind: PortKind) -> dict[str, list[PortPath]]:
@@ -324,7 +359,7 @@ def _paths(instances: Iterable[Instance], kind: PortKind) -> dict[str, list[Port
     for instance in instances:
         for end in instance.ends:
             if end.kind is kind and "{" not in end.name:
-                found[end.name].append(PortPath(instance.label, as_seen_from(instance.name, end.name)))
+                found[end.name].append(PortPath(instance.label, end.seen))
     return found
 
 
@@ -350,7 +385,7 @@ def _packages(instances: Iterable[Instance]) -> tuple[Package, ...]:
         for parameter in instance.declared.parameters if instance.declared else ():
             declaration.parameters.setdefault(parameter.name, parameter)
         for end in sorted(instance.ends, key=_order):
-            name = end.declared or as_seen_from(instance.name, end.name)
+            name = end.declared or end.seen
             declaration.ports.setdefault((end.kind, name), PortDeclaration(name, end.kind, end.type))
         for key, raw in instance.parameters:
             try:

@@ -6,6 +6,8 @@ import fnmatch
 import re
 from typing import TYPE_CHECKING
 
+from ros_model.language.graph_names import ABSOLUTE_TOPICS
+
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
@@ -16,7 +18,7 @@ IGNORED_NODES = (
     *("action_relay", "rosservice*", "rqt*", "diagnostic_aggregator", "diagnostic_names", "roslaunch*", "rostest*"),
 )
 """Nodes that never count as additional: the meta-controller's own, missions and tools."""
-COMMON_TOPICS = ("/rosout", "/rosout_agg", "/clock", "/tf", "/tf_static", "/diagnostics", "/statistics")
+COMMON_TOPICS = ABSOLUTE_TOPICS
 """Topics that any node may have, and that say nothing of what it is for."""
 IGNORED_PORTS = (
     *COMMON_TOPICS,

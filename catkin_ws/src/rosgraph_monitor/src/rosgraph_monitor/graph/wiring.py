@@ -139,7 +139,7 @@ def _component_ports(
             yield MissingPort(name, kind.value, port_name)
         expected = _declared_type(port, types, entry.node.name)
         for topic in present if expected else ():
-            actual = _type(snapshot, topic)
+            actual = _type(snapshot, topic, kind)
             if expected and actual not in _UNKNOWN_TYPES and _stem(actual, kind) != _stem(expected, kind):
                 yield WrongType(name, _shown(topic, namespace), expected, actual)
     for kind, listed in _listed(entry.node).items():
@@ -274,10 +274,12 @@ def _stem(type_name: str, kind: PortKind) -> str:
     return type_name.removesuffix("Action") if kind in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT) else type_name
 
 
-def _type(snapshot: GraphSnapshot, name: str) -> str:
-    if name in snapshot.actions:
-        return snapshot.actions[name].type
-    return snapshot.topics[name].type if name in snapshot.topics else ""
+def _type(snapshot: GraphSnapshot, name: str, kind: PortKind) -> str:
+    """Return the type of a topic or action, which may share its name; "" for a service: the master does not know it."""
+    if kind in (PortKind.ACTION_SERVER, PortKind.ACTION_CLIENT):
+        return snapshot.actions[name].type if name in snapshot.actions else ""
+    is_topic = kind in (PortKind.PUBLISHER, PortKind.SUBSCRIBER)
+    return snapshot.topics[name].type if is_topic and name in snapshot.topics else ""
 
 
 def _shown(name: str, namespace: str) -> str:
