@@ -43,7 +43,7 @@ MODELS = """PackageSet { CatkinPackage trackers {
         Parameters { Parameter { name 'rate' type Double } } } },
     Artifact free { Node { name tracker
         Publishers { Publisher { name 'targets' message 'a.A' } }
-        Subscribers { Subscriber { name '{topic @ free.cpp:3}' message 'a.A' } } } }
+        Subscribers { Subscriber { name '{topic}@free.cpp:3' message 'a.A' } } } }
 } }"""
 FINE, COARSE, FREE = (f"trackers.{name}.tracker" for name in ("fine", "coarse", "free"))
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 from ros_model.checks.values import misfits
 from ros_model.findings import WARNING, Finding, sorted_by_place
 from ros_model.language.library import BUILTIN_TYPES, full_type
 from ros_model.language.metamodel import CONNECTION_OF
-from ros_model.language.packages import SpecKind
+from ros_model.language.packages import SpecKind, is_unknown
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -17,9 +16,6 @@ if TYPE_CHECKING:
     from ros_model.language.library import Library
     from ros_model.language.metamodel import Position
     from ros_model.language.packages import MessageField, Node, Package, PackageSet, Spec
-
-_UNKNOWN = re.compile(r"\{.*\}.*@.+:\d+")
-"""A name of which `rosmodel extract` does not know all: the expression in braces, and its place after the @."""
 
 
 def check_packages(packages: PackageSet, library: Library) -> tuple[Finding, ...]:
@@ -69,7 +65,7 @@ def _node(node: Node, library: Library) -> Iterator[Finding]:
 
 
 def _unknown(what: str, name: str, position: Position) -> Iterator[Finding]:
-    if _UNKNOWN.search(name):
+    if is_unknown(name):
         text = (
             f"{what} '{name}': the source does not tell this name: write the name that the node has when it runs "
             "(rosmodel snapshot shows it), or delete it"

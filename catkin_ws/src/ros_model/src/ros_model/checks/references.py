@@ -6,9 +6,10 @@ import re
 from typing import TYPE_CHECKING
 
 from ros_model.checks.values import first_known, value_place
-from ros_model.findings import WARNING, Finding
+from ros_model.findings import ERROR, WARNING, Finding
 from ros_model.language.library import Library, Unknown, hint
 from ros_model.language.metamodel import RosParameter
+from ros_model.language.packages import is_unknown
 from ros_model.language.typed_values import misfit
 from ros_model.project.wiring import is_shared
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 _PACKAGE = re.compile(r"[A-Za-z0-9_][\w.-]*", re.ASCII)  # and no path
 _SHOWN = 5  # ports of a node that are named
+_MAY_BE = "declares no {} '{}' for sure: it may be one of those whose names the source does not tell"
 
 
 def incomplete(system: RosSystem) -> Iterator[Finding]:
@@ -75,8 +77,8 @@ def followed(system: RosSystem, library: Library) -> Iterator[Finding]:
             elif isinstance(element, RosParameter):
                 yield from _wrong_parameter(element, reference, node)
             elif problem := _wrong_port(element.kind, reference, node, component):
-                text, rule = problem
-                yield Finding(text, _place(reference, element.position), rule)
+                text, rule, severity = problem
+                yield Finding(text, _place(reference, element.position), rule, severity)
 
 
 def not_in_source(system: RosSystem, library: Library, sources: Library) -> Iterator[Finding]:
@@ -124,22 +126,32 @@ def declarations(reference: Reference, node: Node, component: Component) -> list
     return exact or [declared for declared in node.ports if component.resolved(declared.name) == name]
 
 
-def _wrong_port(kind: PortKind, reference: Reference, node: Node, component: Component) -> tuple[str, str] | None:
-    """Return what is wrong with a reference to a port of a node, and the rule that says so."""
+def _wrong_port(kind: PortKind, reference: Reference, node: Node, component: Component) -> tuple[str, str, str] | None:
+    """Return what is wrong with a reference to a port of a node, the rule that says so, and its severity."""
     declared = declarations(reference, node, component)
     where = f"'{reference.package}.{reference.artifact}.{reference.node}'"
     if not declared:
         known = [declaration.name for declaration in node.ports if declaration.kind is kind]
+        if any(map(is_unknown, known)):
+            return f"{where} {_MAY_BE.format(kind.value, reference.name)}", "unknown-reference", WARNING
         meant = hint(reference.name, known) or f": it declares {', '.join(known[:_SHOWN]) or 'none'}"
-        return f"{where} declares no {kind.value} '{reference.name}'{meant}", "unknown-reference"
+        return f"{where} declares no {kind.value} '{reference.name}'{meant}", "unknown-reference", ERROR
     if all(declaration.kind is not kind for declaration in declared):
-        return f"{where} declares '{reference.name}' as a {declared[0].kind.value}, not a {kind.value}", "wrong-kind"
+        return (
+            f"{where} declares '{reference.name}' as a {declared[0].kind.value}, not a {kind.value}",
+            "wrong-kind",
+            ERROR,
+        )
     return None
 
 
 def _wrong_parameter(parameter: RosParameter, reference: Reference, node: Node) -> Iterator[Finding]:
     declared = next((known for known in node.parameters if known.name == reference.name), None)
-    if declared is None:
+    if declared is None and any(is_unknown(known.name) for known in node.parameters):
+        where = f"'{reference.package}.{reference.artifact}.{reference.node}'"
+        text = f"{where} {_MAY_BE.format('parameter', reference.name)}"
+        yield Finding(text, _place(reference, parameter.position), "unknown-reference", WARNING)
+    elif declared is None:
         text = f"'{reference.package}.{reference.artifact}.{reference.node}' declares no parameter '{reference.name}'"
         text += hint(reference.name, (known.name for known in node.parameters))
         yield Finding(text, _place(reference, parameter.position), "unknown-reference")

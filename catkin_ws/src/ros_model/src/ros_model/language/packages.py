@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,14 @@ from ros_model.language.metamodel import Position, TypedParameter
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import PortKind
+
+
+_UNKNOWN = re.compile(r"\{.*\}.*@.+:\d+")
+
+
+def is_unknown(name: str) -> bool:
+    """Tell whether a name is one that the source does not tell: an expression in braces, and the place after an @."""
+    return bool(_UNKNOWN.search(name))
 
 
 @dataclass(frozen=True)

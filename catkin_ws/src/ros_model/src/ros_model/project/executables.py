@@ -24,6 +24,7 @@ from ros_model.language.metamodel import (
     Reference,
     RosSystem,
 )
+from ros_model.language.packages import is_unknown
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -50,7 +51,7 @@ def alternatives(system: RosSystem, component: Component, library: Library) -> l
     for reference, node in library.executables():
         if (reference.package, reference.artifact) == (executable.package, executable.artifact):
             continue
-        known = [port for port in node.ports if "{" not in port.name]
+        known = [port for port in node.ports if not is_unknown(port.name)]
         same = _counterparts(system, component, known, library)
         if outputs <= {port for i, port in same.items() if types.get(_key(component, port), i.type) == i.type}:
             found.append(reference)
@@ -64,7 +65,7 @@ def with_executable(
 
     What both nodes call the same stays as it is: remapped ports, their connections, the values of parameters. Ports and
     parameters that the new node does not declare go. Where its model is not sure, they stay: ports of a kind of which
-    it does not know all names, and parameters if it declares none at all.
+    it does not know all names, and all parameters if it declares none, or does not know all of their names.
 
     Args:
         system: has the component.
@@ -83,13 +84,16 @@ def with_executable(
     if isinstance(declared, Unknown):
         raise ModelError(f"{declared.message}: `rosmodel extract` makes models from source", where)
     interfaces = library.interfaces(node) or ()
-    known = [port for port in interfaces if "{" not in port.name]
+    known = [port for port in interfaces if not is_unknown(port.name)]
     same = _counterparts(system, component, known, library)
     ports = {
         replace(same[port], reference=replace(node, name=port.name)) if port in same else _port(component, port, node)
         for port in known
     }
-    unsure, sure = {port.kind for port in interfaces if "{" in port.name}, {(port.kind, port.name) for port in ports}
+    unsure, sure = (
+        {port.kind for port in interfaces if is_unknown(port.name)},
+        {(port.kind, port.name) for port in ports},
+    )
     for port in component.ports:
         if port.kind in unsure and (port.kind, port.name) not in sure:
             name = port.reference.name if port.reference else port.name
@@ -102,12 +106,12 @@ def with_executable(
         parameters=tuple(
             replace(parameter, reference=replace(node, name=parameter.key))
             for parameter in component.parameters
-            if not parameters or parameter.key in parameters
+            if not parameters or parameter.key in parameters or any(map(is_unknown, parameters))
         ),
     )
     components = tuple(changed if found is component else found for found in system.components)
     kept = tuple(_without_lost_ends(system, changed))
-    return _wired(replace(system, components=components, connections=kept), component, changed)
+    return _wired(replace(system, components=components, connections=kept), component, changed, library)
 
 
 def _counterparts(
@@ -143,6 +147,21 @@ def _types(component: Component, library: Library) -> dict[tuple[PortKind, str],
     """Return the types of what a component's node has, as far as models tell them."""
     own = library.interfaces(component.executable) or () if component.executable else ()
     return {(i.kind, component.resolved(i.name)): i.type for i in own if i.type}
+
+
+def _type_of(system: RosSystem, end: PortPath, kind: PortKind, library: Library) -> str | None:
+    """Return the type of the end of a connection with a port of some kind, as far as models tell it."""
+    component = next(found for found in system.components if found.name == end.component)
+    pair = ENDS[CONNECTION_OF[kind]]
+    other_kind = pair[1] if kind is pair[0] else pair[0]
+    return next(
+        (
+            _types(component, library).get(_key(component, port))
+            for port in component.ports
+            if port.kind is other_kind and port.name == end.port
+        ),
+        None,
+    )
 
 
 def _key(component: Component, port: Port) -> tuple[PortKind, str]:
@@ -185,8 +204,11 @@ def _without_lost_ends(system: RosSystem, changed: Component) -> list[Connection
     return found
 
 
-def _wired(system: RosSystem, former: Component, changed: Component) -> RosSystem:
-    """Return the system with the connections of those ports that the former node did not have."""
+def _wired(system: RosSystem, former: Component, changed: Component, library: Library) -> RosSystem:
+    """Return the system with the connections of those ports that the former node did not have.
+
+    Where models tell another type of the other end, nothing is connected.
+    """
     had = {(port.kind, port.name) for port in former.ports}
     connections = list(system.connections)
     for port in changed.ports:
@@ -194,7 +216,12 @@ def _wired(system: RosSystem, former: Component, changed: Component) -> RosSyste
             continue
         kind = CONNECTION_OF[port.kind]
         out, into = ENDS[kind]
-        others = _named_alike(system, changed, port.name, port.kind)
+        kind_here = _types(changed, library).get(_key(changed, port))
+        others = tuple(
+            end
+            for end in _named_alike(system, changed, port.name, port.kind)
+            if not kind_here or (_type_of(system, end, port.kind, library) or kind_here) == kind_here
+        )
         if not others:
             continue
         here = PortPath(changed.name, port.name)
