@@ -33,11 +33,12 @@ BASE = parse_system(
 )
 MODELS = """PackageSet { CatkinPackage trackers {
     Artifact fine { Node { name tracker
-        Publishers { Publisher { name 'targets' message 'a.A' } }
+        Publishers { Publisher { name 'targets' message 'a.A' }, Publisher { name 'debug' message 'a.A' } }
         Subscribers { Subscriber { name 'image' message 'a.A' } }
         Parameters { Parameter { name 'rate' type Double }, Parameter { name 'model' type String } } } },
     Artifact coarse { Node { name tracker
-        Publishers { Publisher { name 'targets' message 'a.A' }, Publisher { name '~state' message 'a.A' } }
+        Publishers { Publisher { name 'targets' message 'a.A' }, Publisher { name '~state' message 'a.A' },
+                     Publisher { name 'debug' message 'a.A' } }
         Subscribers { Subscriber { name 'depth' message 'a.A' } }
         ServiceClients { ServiceClient { name 'light' service 'a.S' } }
         Parameters { Parameter { name 'rate' type Double } } } },

@@ -63,7 +63,8 @@ def with_executable(
 ) -> RosSystem:
     """Return the system with another node in the place of a component.
 
-    What both nodes call the same stays as it is: remapped ports, their connections, the values of parameters. Ports and
+    What both nodes call the same stays as it is: remapped ports, their connections, the values of parameters, and what
+    the former one declares but does not use. Ports and
     parameters that the new node does not declare go. Where its model is not sure, they stay: ports of a kind of which
     it does not know all names, and all parameters if it declares none, or does not know all of their names.
 
@@ -89,6 +90,7 @@ def with_executable(
     ports = {
         replace(same[port], reference=replace(node, name=port.name)) if port in same else _port(component, port, node)
         for port in known
+        if port in same or not _is_unused(component, port, library)
     }
     unsure, sure = (
         {port.kind for port in interfaces if is_unknown(port.name)},
@@ -178,6 +180,13 @@ def _is_general(component: Component, name: str) -> bool:
 
 def _is_telling(component: Component, name: str) -> bool:
     return not _is_general(component, name) and not component.resolved(name).startswith(f"/{component.graph_name}/")
+
+
+def _is_unused(component: Component, interface: PortDeclaration, library: Library) -> bool:
+    """Tell whether the former node has an interface, too, but does not use it, as where a parameter switches it on."""
+    own = library.interfaces(component.executable) or () if component.executable else ()
+    name = component.resolved(interface.name)
+    return any(known.kind is interface.kind and component.resolved(known.name) == name for known in own)
 
 
 def _port(component: Component, declared: PortDeclaration, node: Reference) -> Port:
