@@ -247,6 +247,20 @@ def test_explain_tells_every_decision_of_a_bag(life, bag):
     assert "utility 0.1 is less than 0.2" in result.output
 
 
+@pytest.mark.parametrize("last", [1, 2, 99])
+def test_explain_tells_the_last_decisions_if_asked(life, bag, last):
+    lived = life(BUSY)
+    known = [record.id for _, record in first_messages(lived.decisions)]
+    output = run(explain, bag(lived), "--last", last).output
+    assert [name for name in known if f" {name}, " in output] == known[-last:]
+
+
+def test_explain_has_one_decision_of_a_running_reasoner():
+    result = run(explain, "--last", 2)
+    assert result.exit_code == 2
+    assert "record its topic" in result.output
+
+
 @pytest.mark.parametrize("command", [explain, replay])
 def test_what_is_no_bag_is_refused_in_one_line(command, tmp_path):
     path = tmp_path / "no.bag"

@@ -43,8 +43,8 @@ def test_folder_is_refused_where_a_file_is_needed(run, model, tmp_path, monkeypa
     assert run(*command, "models") == (2, "", expected)
 
 
-def test_check_of_a_good_file_is_silent(run, model):
-    assert run("check", model(GOOD)) == (0, "", "")
+def test_check_of_a_good_file_says_so(run, model):
+    assert run("check", model(GOOD)) == (0, "nothing is wrong\n", "")
 
 
 def test_check_of_a_faulty_file_names_the_place(run, model):

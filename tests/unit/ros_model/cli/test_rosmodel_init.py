@@ -2,6 +2,7 @@
 
 import errno
 import io
+import itertools
 import subprocess
 from pathlib import Path
 
@@ -79,6 +80,20 @@ def test_table_has_the_values_of_the_base(run, base):
         "joints": [1, 2],
         "rate": None,
     }
+
+
+@pytest.mark.parametrize("keys", list(itertools.permutations(["DWA/freq", "freq", "nav/freq", "nav/nav/freq"])))
+def test_each_parameter_has_a_column_whatever_the_others_are_called(run, base, keys):
+    parameters = ", ".join(
+        f"RosParameter p{number} {{ RefParameter 'p.nav.nav.{key}' value {number} }}" for number, key in enumerate(keys)
+    )
+    nav = f"ComponentInterface {{ name nav FromRosNode 'p.nav.nav' RosParameters {{ {parameters} }} }}"
+    path = base(f"RosSystem {{ Name x RosComponents ( {nav} ) }}")
+    assert run("init", path)[0] == 0
+    columns = yaml.safe_load((path.parent / "metacontrol.yaml").read_text())["variants"]["parameters"]
+    assert sorted(key for (key,) in columns.values()) == sorted(keys)
+    assert columns["freq"] == ["freq"]
+    assert run("check", path.parent)[0] == 0
 
 
 def test_package_is_the_one_around_the_models(run, base):

@@ -79,12 +79,17 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
     if text := FORMATS[form](findings):
         click.echo(text)
     if form == "text":
-        for project in checked.projects:
-            for line in (*requirement_lines(project), *role_lines(project), *repair_lines(project)):
-                click.echo(printable(line))
+        lines = [line for project in checked.projects for line in _designs_lines(project)]
+        for line in lines or ([] if text else ["nothing is wrong"]):
+            click.echo(printable(line))
     if any(finding.severity == ERROR and finding.rule in _UNREADABLE for finding in findings):
         return BAD_INPUT
     return int(any(finding.severity == ERROR for finding in findings))
+
+
+def _designs_lines(project: Project) -> tuple[str, ...]:
+    """Return what designs of a project require, what fills their roles, and how components are repaired."""
+    return (*requirement_lines(project), *role_lines(project), *repair_lines(project))
 
 
 class Check:

@@ -7,7 +7,7 @@ import fnmatch
 import io
 import re
 from dataclasses import dataclass, field
-from itertools import zip_longest
+from itertools import count, zip_longest
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
@@ -18,7 +18,7 @@ from ros_model.project.tables import NAME, typed_cell
 from ros_model.project.yaml_file import flow
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from ros_model.language.metamodel import Component, Reference, RosParameter, RosSystem
 
@@ -325,15 +325,23 @@ def _columns(base: RosSystem, component: Component, patterns: Sequence[str] | No
         chosen = [_Column(component, parameter) for parameter in default_columns(component)]
     else:
         chosen = _chosen(base, component, patterns)
+    keys = {entry.parameter.key for entry in chosen}
     found: dict[str, _Column] = {}
     for entry in chosen:
-        column = entry.parameter.key.rpartition("/")[2]
-        if column in found or column in {NAME, ""}:
-            column = entry.parameter.key
-        if column in found:
-            column = f"{entry.component.name}/{entry.parameter.key}"
-        found.setdefault(column, entry)
+        found[next(name for name in _column_names(entry, keys) if name not in {NAME, "", *found})] = entry
     return found
+
+
+def _column_names(entry: _Column, keys: Collection[str]) -> Iterator[str]:
+    """Yield names that a column may have, the shortest first; a short name is that of the parameter called so."""
+    key = entry.parameter.key
+    short = key.rpartition("/")[2]
+    if short == key or short not in keys:
+        yield short
+    yield key
+    whole = f"{entry.component.name}/{key}"
+    yield whole
+    yield from (f"{whole}_{number}" for number in count(2))
 
 
 def _chosen(base: RosSystem, component: Component, patterns: Sequence[str]) -> list[_Column]:
