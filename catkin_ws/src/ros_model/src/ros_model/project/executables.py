@@ -63,10 +63,10 @@ def with_executable(
 ) -> RosSystem:
     """Return the system with another node in the place of a component.
 
-    What both nodes call the same stays as it is: remapped ports, their connections, the values of parameters, and what
-    the former one declares but does not use. Ports and
-    parameters that the new node does not declare go. Where its model is not sure, they stay: ports of a kind of which
-    it does not know all names, and all parameters if it declares none, or does not know all of their names.
+    What both nodes call the same stays as it is: remapped ports, their connections, the values of parameters; what the
+    former node declares and does not use, the new one does not use either. Ports and parameters that the new node does
+    not declare go. Where its model is not sure, they stay: ports of a kind of which it does not know all names, and all
+    parameters if it declares none, or does not know all of their names.
 
     Args:
         system: has the component.
