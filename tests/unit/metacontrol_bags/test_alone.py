@@ -16,7 +16,7 @@ from metacontrol_bags.metrics import summarise
 from packaging.requirements import Requirement
 
 PACKAGE = Path(__file__).parents[3] / "catkin_ws" / "src" / "metacontrol_bags"
-REQUIREMENTS = Path(__file__).parents[3] / "requirements" / "python.txt"
+REQUIREMENTS = [Path(__file__).parents[3] / "requirements" / name for name in ("python-robot.txt", "python.txt")]
 NEEDED = re.findall(r'"(\w+)"', re.search(r"install_requires=\[(.*)\]", (PACKAGE / "setup.py").read_text())[1])
 FOREIGN = ("rospy", "rosgraph", "genpy", "metacontrol_msgs", "mros1_reasoner", "catkin_pkg")
 
@@ -111,7 +111,7 @@ def command(tmp_path_factory):
     kept["PATH"] = "/usr/bin:/bin"
     run("/usr/bin/python3", "-m", "venv", folder / "environment", env=kept)
     python = folder / "environment/bin/python"
-    pinned = ("--constraint", REQUIREMENTS)  # the versions that are tested
+    pinned = [f"--constraint={path}" for path in REQUIREMENTS]  # the versions that are tested
     run(python, "-m", "pip", "install", "--disable-pip-version-check", *pinned, folder / "metacontrol_bags", env=kept)
     seen = run(python, "-c", f"import importlib.util as u; print([n for n in {FOREIGN!r} if u.find_spec(n)])", env=kept)
     assert seen == "[]\n"
@@ -136,5 +136,6 @@ def test_every_command_works_in_an_environment_with_nothing_else(command, missio
 
 
 def test_libraries_that_it_needs_are_those_that_set_up_installs():
-    pinned = {line.partition("==")[0].lower() for line in REQUIREMENTS.read_text().splitlines() if "==" in line}
+    lines = [line for path in REQUIREMENTS for line in path.read_text().splitlines()]
+    pinned = {line.partition("==")[0].lower() for line in lines if "==" in line}
     assert set(NEEDED) <= pinned
