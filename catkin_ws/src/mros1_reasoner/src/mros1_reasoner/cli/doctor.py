@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 import rosgraph
 from ros_model.cli.check import Check
-from ros_model.cli.ranges import FiniteRange
+from ros_model.cli.ranges import timeout_option
 from ros_model.errors import ModelError, printable
 from ros_model.findings import ERROR
 from ros_model.project.settings import FILE_NAME
@@ -19,21 +19,12 @@ if TYPE_CHECKING:
 
     from mros1_reasoner.doctor.complaints import Complaint
 
-_LONGEST = 3600.0  # s
-
 
 @click.command()
 @click.argument("models", default=".", metavar="[FOLDER]")
 @click.option("--master", metavar="URI", help="Address of the ROS master; else $ROS_MASTER_URI.")
 @click.option("--namespace", metavar="NAME", help="Where the robot lives; else $ROS_NAMESPACE, else /.")
-@click.option(
-    "--timeout",
-    type=FiniteRange(min=0, min_open=True, max=_LONGEST),
-    default=2.0,
-    show_default=True,
-    metavar="S",
-    help="Patience with the master.",
-)
+@timeout_option("Patience with the master.")
 def doctor(models: str, master: str | None, namespace: str | None, timeout: float) -> int:
     """Look at the running system and at the project in FOLDER before the meta-controller starts for the first time.
 

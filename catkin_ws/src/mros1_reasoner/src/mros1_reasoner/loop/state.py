@@ -28,8 +28,9 @@ _RELAPSE = 5.0  # times the calm after which a better design was taken again: a 
 _HISTORY = 100  # decisions that are kept
 _CHANGES = 10  # of which the durations are kept
 VIOLATED = "did not keep a limit while deployed"
-UNLESS_GONE = " unless the cause of that is gone before"
 """Why a design is not tried again that was left because of a quality."""
+UNLESS_GONE = " unless the cause of that is gone before"
+"""What ends that earlier than the time that is told."""
 
 
 class State(View):

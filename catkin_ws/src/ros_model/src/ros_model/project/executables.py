@@ -25,6 +25,7 @@ from ros_model.language.metamodel import (
     RosSystem,
 )
 from ros_model.language.packages import is_unknown
+from ros_model.project.wiring import is_shared
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 _PORT_ORDER = list(PortKind)
 _OUTPUTS = frozenset(out for out, _ in ENDS.values())
-_GENERAL = ("tf", "tf_static", "rosout", "diagnostics", "clock")
-"""Topics that tell nothing of what a node is for."""
 
 
 def alternatives(system: RosSystem, component: Component, library: Library) -> list[Reference]:
@@ -133,11 +132,11 @@ def _counterparts(
     left_ports: dict[tuple[PortKind, str], list[Port]] = defaultdict(list)
     for port in component.ports:
         kind = types.get(_key(component, port))
-        if port not in taken and kind and not _is_general(component, port.name):
+        if port not in taken and kind and not is_shared(component.resolved(port.name)):
             left_ports[port.kind, kind].append(port)
     left: dict[tuple[PortKind, str], list[PortDeclaration]] = defaultdict(list)
     for interface in interfaces:
-        if interface not in found and not _is_general(component, interface.name):
+        if interface not in found and not is_shared(component.resolved(interface.name)):
             left[interface.kind, interface.type].append(interface)
     for key, ports in left_ports.items():
         if len(ports) == len(left[key]) == 1 and not _named_alike(system, component, left[key][0].name, key[0]):
@@ -154,8 +153,7 @@ def _types(component: Component, library: Library) -> dict[tuple[PortKind, str],
 def _type_of(system: RosSystem, end: PortPath, kind: PortKind, library: Library) -> str | None:
     """Return the type of the end of a connection with a port of some kind, as far as models tell it."""
     component = next(found for found in system.components if found.name == end.component)
-    pair = ENDS[CONNECTION_OF[kind]]
-    other_kind = pair[1] if kind is pair[0] else pair[0]
+    other_kind = _other_end(kind)
     return next(
         (
             _types(component, library).get(_key(component, port))
@@ -166,6 +164,12 @@ def _type_of(system: RosSystem, end: PortPath, kind: PortKind, library: Library)
     )
 
 
+def _other_end(kind: PortKind) -> PortKind:
+    """Return the kind of port at the other end of a connection."""
+    out, into = ENDS[CONNECTION_OF[kind]]
+    return out if kind is into else into
+
+
 def _key(component: Component, port: Port) -> tuple[PortKind, str]:
     return port.kind, component.resolved(_in_code(port))
 
@@ -174,12 +178,10 @@ def _in_code(port: Port) -> str:
     return port.reference.name if port.reference and port.reference.name else port.name
 
 
-def _is_general(component: Component, name: str) -> bool:
-    return component.resolved(name).strip("/") in _GENERAL
-
-
 def _is_telling(component: Component, name: str) -> bool:
-    return not _is_general(component, name) and not component.resolved(name).startswith(f"/{component.graph_name}/")
+    return not is_shared(component.resolved(name)) and not component.resolved(name).startswith(
+        f"/{component.graph_name}/"
+    )
 
 
 def _is_unused(component: Component, interface: PortDeclaration, library: Library) -> bool:
@@ -249,8 +251,7 @@ def _wired(system: RosSystem, former: Component, changed: Component, library: Li
 
 def _named_alike(system: RosSystem, component: Component, name: str, kind: PortKind) -> tuple[PortPath, ...]:
     """Return the ports of others at the other end of what a component calls so."""
-    out, into = ENDS[CONNECTION_OF[kind]]
-    other_end = out if kind is into else into
+    other_end = _other_end(kind)
     full = component.resolved(name)
     return tuple(
         PortPath(other.name, end.name)

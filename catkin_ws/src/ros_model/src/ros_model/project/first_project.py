@@ -150,7 +150,7 @@ def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> 
     Raises:
         ModelError: the base has no component that could vary, or not the one chosen.
     """
-    component = _varying(base, choices.component)
+    component = varying(base, choices.component)
     columns = _columns(base, component, choices.vary)
     variant = re.sub(r"[^A-Za-z0-9_]+", "_", base.name).strip("_").lower() or "base"
     what = re.sub(r"\W+", "_", component.name, flags=re.ASCII).strip("_")
@@ -197,15 +197,6 @@ def first_project(base: RosSystem, file: str, folder: str, choices: Choices) -> 
     unnamed = [name for key, name in others.items() if key not in nodes]
     remarks = (*_left_out(component, columns, choices), *_copies(base, component), *_unnamed(unnamed))
     return FirstProject(texts, remarks, f"{variant}_default")
-
-
-def varying(base: RosSystem, name: str | None = None) -> Component:
-    """Return the component that is to vary: the one chosen, by its name or that of its node, else the likeliest.
-
-    Raises:
-        ModelError: the base has no component that could vary, or not the one chosen.
-    """
-    return _varying(base, name)
 
 
 def parameters_of(component: Component) -> list[RosParameter]:
@@ -294,8 +285,14 @@ def _unnamed(nodes: Sequence[str]) -> Iterator[str]:
         yield f"{', '.join(nodes)}: no name that ROS allows, so it is not among the components: rename it in the model"
 
 
-def _varying(base: RosSystem, name: str | None) -> Component:
-    """Return the component that was chosen, else the one that most looks like it: by actions, parameters, inputs."""
+def varying(base: RosSystem, name: str | None) -> Component:
+    """Return the component that is to vary: the one chosen, by its name or that of its node, else the likeliest.
+
+    Actions, parameters and inputs tell how likely.
+
+    Raises:
+        ModelError: the base has no component that could vary, or not the one chosen.
+    """
     candidates = [component for component in base.components if component.executable and component.executable.node]
     if name is not None:
         named = [component for component in candidates if name in {component.name, component.graph_name}]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 import click
-from ros_model.cli.ranges import FiniteRange
+from ros_model.cli.ranges import timeout_option
 from ros_model.errors import ModelError
 from ros_model.language.packages import OBSERVED
 
@@ -19,21 +19,13 @@ if TYPE_CHECKING:
     from ros_model_extraction.running.graph import Models
 
 _MASTER = "http://localhost:11311"
-_LONGEST = 3600.0  # s
 
 
 @click.command()
 @click.option("-o", "--output", default=".", metavar="FOLDER", help="Where the two files go; made if it is missing.")
 @click.option("--master", metavar="URI", help=f"Address of the ROS master; else $ROS_MASTER_URI, else {_MASTER}.")
 @click.option("--name", default="snapshot", show_default=True, help="Name of the system and of the files.")
-@click.option(
-    "--timeout",
-    type=FiniteRange(min=0, min_open=True, max=_LONGEST),
-    default=2.0,
-    show_default=True,
-    metavar="S",
-    help="Patience with the master and each node.",
-)
+@timeout_option("Patience with the master and each node.")
 @click.option("--all", "everything", is_flag=True, help="Leave nothing out: /rosout, ~get_loggers, ...")
 def snapshot(output: str, master: str | None, name: str, timeout: float, everything: bool) -> None:
     """Write NAME.ros and NAME.rossystem of the running system.
