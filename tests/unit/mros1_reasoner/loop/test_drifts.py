@@ -201,3 +201,13 @@ def test_journal_has_drifts(cell):
     apply(cell.core, Entry(cell.now, DriftFact(GRIPPER, "force", "by_touch,by_eye", 1.5)))
     (decision,) = cell.core.step(cell.now)
     assert (decision.trigger, decision.stamp_monitored) == ("parameter:arm/gripper", 1.5)
+
+
+def test_parameters_are_put_back_though_the_design_has_failed_before(make):
+    """Another design would fit, but a drift alone is no reason for it."""
+    cell = make()
+    cell.run(1.0)
+    cell.core._state.note_in_vain(cell.now, "by_eye", "o_pick", "dropped what it held")
+    cell.drifted = {GRIPPER: "force"}
+    assert cell.run(5.0) == [(DECIDED, "by_eye")]
+    assert "with its parameters put back" in cell.told[-1].explanation

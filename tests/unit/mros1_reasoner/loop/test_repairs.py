@@ -70,6 +70,25 @@ def test_quick_repair_comes_first(loop):
     assert all(candidate.lost_because for candidate in decision.candidates)
 
 
+def test_levels_of_the_time_without_the_component_lead_to_no_change(loop):
+    core = loop(limits={"performance": 0.5}, history=5, violation_window=2.0, cool_down=1.0)
+    for now in range(10):
+        core.observe_level(now, "performance", 0.9)
+    core.observe_component(10.0, "valve", "FALSE")
+    (repair,) = core.step(10.0)
+    core.observe_level(10.5, "performance", 0.4)
+    core.observe_level(11.0, "performance", 0.1)
+    core.observe_component(11.1, "valve", "TRUE")
+    assert [d.id for d in core.step(11.1)] == [repair.id]
+    core.observe_level(11.5, "performance", 0.3)  # it fills up again
+    seconds = [12.0 + 0.5 * number for number in range(20)]
+    decided = []
+    for now in seconds:
+        core.observe_level(now, "performance", 0.9)
+        decided += core.step(now, heartbeat=True)
+    assert decided == []
+
+
 def test_nothing_else_is_decided_while_the_repair_goes_on(loop):
     core = loop()
     core.observe_component(10.0, "valve", "FALSE")

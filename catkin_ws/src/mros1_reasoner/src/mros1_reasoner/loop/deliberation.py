@@ -14,7 +14,7 @@ from mros1_reasoner.knowledge.scale import Correction
 from mros1_reasoner.loop import lasting
 from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance, is_drift, is_relief
 from mros1_reasoner.loop.readable_state import Running
-from mros1_reasoner.loop.state import UNLESS_GONE, VIOLATED, State
+from mros1_reasoner.loop.state import AT_FAULT, UNLESS_GONE, VIOLATED, State
 from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan, without_makeshift
 from mros1_reasoner.planning.repairing import Stakes, loss_of_change, loss_of_repair, worth_of_nothing
 
@@ -340,7 +340,7 @@ class Deliberation:
             reason = f"its task failed while it was deployed ({running.task_failure[1] or 'no reason given'})"
             self._state.note_in_vain(now, running.design, name, reason)
         elif running.design and self._keeps_not(name, now):
-            self._state.note_in_vain(now, running.design, name, VIOLATED)
+            self._state.note_in_vain(now, running.design, name, self._own_fault(name, now) or VIOLATED)
         found = v.IN_ERROR_COMPONENT if self._state.rule_finds(name, v.IN_ERROR_COMPONENT) else ""
         found = v.IN_ERROR_NFR if self._state.rule_counts(name, now) else found
         # A design that can't be deployed needs no entry, and may come back at once when it can.
@@ -364,6 +364,32 @@ class Deliberation:
         key = self._state.running[name].design or "", name
         is_known = key in self._state.facts.tried and v.IN_ERROR_NFR not in result.causes
         return key in self._state.analysis.tried and not is_known
+
+    def _own_fault(self, name: str, now: float) -> str:
+        """Return why the running design itself is held to be the cause of a violation; empty where it is not."""
+        running = self._state.running[name]
+        if self._implausible(name, now):
+            return f"{AT_FAULT}: its levels were further from the expected ones than anything outside of it explains"
+        is_again = self._state.is_relapse(name, now) and running.relapses + 1 >= self._state.settings.relapse_limit
+        if is_again or self._state.was_at_fault(running.design or "", name):
+            return f"{AT_FAULT}: it did so again soon after it had come back"
+        return ""
+
+    def _implausible(self, name: str, now: float) -> frozenset[str]:
+        """Return qualities whose levels are further from the expected ones than a cause that all designs share explains.
+
+        Where the usual level is known, rare peaks may be as high as they like.
+        """
+        design = self._state.kb.designs.get(self._state.running[name].design or "")
+        if design is None:
+            return frozenset()
+        found = set()
+        for (quality, group), plausible in self.corrections(name, now).items():
+            scale = self._state.scale(quality, self._state.objectives[name].limits[quality])
+            seen = self._strain(now, name, quality, group)
+            if seen and group == design.group(quality) and not self._state.kb.qualities[quality].typical:
+                found |= {quality} if scale.is_relieved(seen, plausible, self._state.settings.relief) else set()
+        return frozenset(found)
 
     def _causes(self, name: str, now: float) -> list[Cause]:
         """Return all causes for an adaptation of an objective itself: errors first, then chances."""
@@ -418,12 +444,14 @@ class Deliberation:
             desired=self._state.settings.desired if running.design is None else "",
             observed=self._state.levels.high(now, name),
             corrections=self.corrections(name, now),
+            implausible=self._implausible(name, now) if name in self._state.running else frozenset(),
             worth=self._state.settings.worth,
             relief=self._relief(name, now),
             indifference=self._state.settings.indifference,
         )
         is_lame = running.failed_nodes or running.to_put_back
-        if is_lame and not is_tried and self._needs_only_a_restart(name, situation):
+        may_stay = not (is_tried and running.failed_nodes)
+        if is_lame and may_stay and self._needs_only_a_restart(name, situation):
             same = plan(
                 objective, [self._state.kb.designs[running.design or ""]], situation, self._utility, self._distance
             )

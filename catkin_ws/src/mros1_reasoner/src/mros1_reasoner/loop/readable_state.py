@@ -23,6 +23,8 @@ from mros1_reasoner.loop.surroundings import Surroundings
 
 BUSY = (FunctionGrounding.RECONFIGURING, FunctionGrounding.RECOVERING)
 
+_RELAPSE = 5.0  # times the calm after which a better design was taken again: a violation then is a new one
+
 
 class MapeError(Exception):
     """A fact, a report or a command does not fit; one line that says why."""
@@ -375,6 +377,10 @@ class View:
         """Return whether the causes for which designs of an objective were left have been gone for long enough."""
         gone = self.levels.gone_since(now, name)
         return gone is not None and now - gone >= self.calm(name)
+
+    def is_relapse(self, name: str, now: float) -> bool:
+        """Return whether a violation now comes soon after the return to a better design."""
+        return now - self.running[name].returned_at <= _RELAPSE * self.calm(name)
 
     def calm(self, name: str) -> float:
         """Return how long those causes must be gone, s."""

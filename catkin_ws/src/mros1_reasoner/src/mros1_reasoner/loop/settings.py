@@ -37,6 +37,8 @@ class Settings:
             expected levels where these are on no ratio scale.
         calm: how long that cause must be gone before a better design is taken again; doubled with each time that the
             same happens again soon after.
+        relapse_limit: how often in a row a limit is violated again soon after the return to a better design until the
+            design itself is held to be the cause: then it is one that failed.
         always_improve: adapt also when a clearly better design becomes available, because a component works again,
             the cause of a violation is gone, a design that failed may be tried again, or the operator has changed a
             limit; the setting of an objective takes precedence. A design that failed may be tried again in place of a
@@ -75,6 +77,7 @@ class Settings:
     desired: str = ""
     relief: float = 0.2
     calm: float = 1.0
+    relapse_limit: float = 1.0
     always_improve: bool = True
     improvement: float = 0.05
     indifference: float = 0.0

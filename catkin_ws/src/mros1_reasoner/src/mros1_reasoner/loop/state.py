@@ -23,12 +23,12 @@ from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.loop.surroundings import Surroundings
 from mros1_reasoner.planning.planner import Utility
 
-_RELAPSE = 5.0  # times the calm after which a better design was taken again: a violation then is a new one
-
 _HISTORY = 100  # decisions that are kept
 _CHANGES = 10  # of which the durations are kept
 VIOLATED = "did not keep a limit while deployed"
 """Why a design is not tried again that was left because of a quality."""
+AT_FAULT = "did not keep a limit, and is itself the cause"
+"""Beginning of the reason why a design is not tried again whose levels are low wherever it runs."""
 UNLESS_GONE = " unless the cause of that is gone before"
 """What ends that earlier than the time that is told."""
 
@@ -73,6 +73,7 @@ class State(View):
         self.history: deque[Past] = deque(maxlen=_HISTORY)
         self.retries: dict[tuple[str, str], tuple[float, str]] = {}
         self._failures: dict[tuple[str, str], int] = {}  # in a row, by design and objective
+        self._at_fault: set[tuple[str, str]] = set()  # these failures were violations of their own making
         self.locked: set[str] = set()
         self.paused = False
         self.proposal: Decision | None = None
@@ -126,8 +127,19 @@ class State(View):
 
     def note_component(self, now: float, name: str, status: str, stamp: float) -> None:
         """Note another status of a component."""
+        known = self.components.get(name)
+        if known and known.status == v.FAILED != status:
+            self._mute_what_requires(now, name)
         self.components[name] = Component(status, stamp)
         self.repairs.note(now, name, works=status != v.FAILED)
+
+    def _mute_what_requires(self, now: float, component: str) -> None:
+        """Forget levels of what runs with a component that did not work; while it comes back, they tell nothing."""
+        for name, running in self.running.items():
+            design = self.kb.designs.get(running.design or "")
+            if design and component in {*design.components, *design.nodes, *design.bindings.values()}:
+                self._run(name, calm_until=max(running.calm_until, now + self.settings.cool_down))
+                self.levels.forget(name)
 
     def note_drift(self, now: float, name: str, node: str, parameters: str, stamp: float) -> None:
         """Note that parameters of what runs for an objective have drifted; while it changes, that tells nothing."""
@@ -204,6 +216,7 @@ class State(View):
             self._run(name, brief=0)
             if (running.design, name) not in self.error_log:  # it has not ended by a failure
                 self._failures.pop((running.design or "", name), None)
+                self._at_fault.discard((running.design or "", name))
         self._run(name, way=() if self.wanted.get(name, design) == design else running.way)
         self._run(name, design=design, degraded=False, binding_error=False, task_failure=None, refusal=())
         self._run(name, replaced=None, ending="", ruled_since=None)
@@ -435,7 +448,7 @@ class State(View):
 
     def note_in_vain(self, now: float, design: str, objective: str, reason: str) -> None:
         """Put a design that failed for an objective into the error log."""
-        key = design, objective
+        key, expiry = (design, objective), now + self.settings.error_log_expiry
         if reason != VIOLATED:  # that may be tried again when the cause is gone
             running = self.running.get(objective, Running())
             has_lasted = running.design == design and not lasting.is_brief(running, self.settings, now)
@@ -443,7 +456,10 @@ class State(View):
             # As long as an entry is there, it is the same failure.
             failures = self._failures[key] = max(before + (key not in self.error_log), 1)
             self.retries[key] = now + self.settings.retry_after(failures - 1), reason
-        self.error_log[key] = now + self.settings.error_log_expiry, reason
+        if reason.startswith(AT_FAULT):
+            self._at_fault.add(key)
+            expiry = self.retries[key][0]  # no other design's violation is a reason to try it sooner
+        self.error_log[key] = expiry, reason
 
     def forgive(self, name: str) -> None:
         """Let designs of an objective be tried again that did not keep a limit: its cause is gone."""
@@ -455,14 +471,21 @@ class State(View):
         if running is None:
             return
         violated = [cause.quality for cause in causes if cause.quality and not is_chance(cause)]
-        for quality in violated:
-            self.levels.blame(now, (name, quality))
+        if not self.why_failed(name, running.design).startswith(AT_FAULT):  # that cause goes with the design
+            for quality in violated:
+                self.levels.blame(now, (name, quality))
         if any(is_relief(cause) for cause in causes) and not violated:
             self.levels.acquit(name)
             self._run(name, returned_at=now)
         elif violated:
-            is_relapse = now - running.returned_at <= _RELAPSE * self.calm(name)
-            self._run(name, relapses=running.relapses + 1 if is_relapse else 0, returned_at=-math.inf)
+            relapses = running.relapses + 1 if self.is_relapse(name, now) else 0
+            self._run(name, relapses=relapses, returned_at=-math.inf)
+        elif not all(is_chance(cause) for cause in causes):  # what runs next is not what it returned to
+            self._run(name, returned_at=-math.inf)
+
+    def was_at_fault(self, design: str, objective: str) -> bool:
+        """Return whether a design has violated limits of its own making, and has not kept them for long since."""
+        return (design, objective) in self._at_fault
 
     def propose(self, decision: Decision | None) -> None:
         """Have a decision wait for approval; None: have none wait."""

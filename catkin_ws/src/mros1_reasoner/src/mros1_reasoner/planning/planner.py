@@ -57,6 +57,8 @@ class Situation:
         desired: name of the design that is taken first, if it keeps every limit, or if no design does.
         observed: levels that were observed with the deployed design; they replace its expected levels.
         corrections: of the expected levels of a quality, for a group of designs.
+        implausible: qualities of which levels of the deployed design are further from the expected ones than the greatest
+            correction explains.
         worth: by how much better another design must keep a limit, or less violate limits, as a share of a limit; less
             is no difference.
         relief: distance by which another design is to keep the limit of a quality, if one does: the limit is violated,
@@ -74,6 +76,7 @@ class Situation:
     desired: str = ""
     observed: Mapping[str, float] = field(default_factory=dict)
     corrections: Mapping[tuple[str, str], Correction] = field(default_factory=dict)
+    implausible: Collection[str] = ()
     worth: float = 0.0
     relief: Mapping[str, float] = field(default_factory=dict)
     indifference: float = 0.0
@@ -270,7 +273,8 @@ def _judge(objective: Objective, design: Design, situation: Situation, utility: 
         excesses.append(kind.excess(level, limit) / (abs(limit) or 1.0))
         relieves &= kind.excess(level, limit) <= -situation.relief.get(quality, -math.inf)
         # A lucky or unlucky moment of the deployed design must not weigh more than what is expected of the others.
-        lasting = kind.direction.better(level, expected.get(quality, level)) if quality in corrections else level
+        is_lasting = quality not in corrections or quality in situation.implausible
+        lasting = level if is_lasting else kind.direction.better(level, expected.get(quality, level))
         violation += max(0.0, kind.excess(lasting, limit)) / (abs(limit) or 1.0)
     keeps_limits = len(reasons) == int(name in situation.tried)
     return _Judged(design, utility(design), violation, "; ".join(reasons), keeps_limits, relieves, excesses, levels)
