@@ -12,6 +12,7 @@ from threading import Thread
 import rospy
 from node_kit.parameters import ParameterError
 from node_kit.ros.lifetime import Lifetime
+from node_kit.ros.parts import watch_parts
 from ros_model.errors import ModelError
 
 from mros1_reasoner.io.parameters import Parameters
@@ -48,7 +49,9 @@ def run(early: Popen[bytes] | None) -> None:
         rest.join()
         from mros1_reasoner.ros.reasoner import ReasonerNode
 
-        ReasonerNode(parameters, knowledge_base, objectives, reasoner).run()
+        node = ReasonerNode(parameters, knowledge_base, objectives, reasoner)
+        watch_parts("reasoner")
+        node.run()
 
 
 def _warm_up(knowledge_base: KnowledgeBase, reasoner: Reasoner, objectives: tuple[Objective, ...]) -> None:

@@ -27,6 +27,10 @@ from node_kit.ros.quick_start import quick_start
 BAD_START = 2
 """Exit status of a start that failed. The loss of the master ends a node with 0: it has done all it could."""
 
+STAYS = "NODE_KIT_STAYS"
+"""Environment variable, to be set beside `respawn="true"`: a node that can't start says so once, and then waits for its
+end. Its start would fail again and again otherwise."""
+
 LONGEST_END = 3.0
 """Wall s for a node to end; then its process is cut off, because rospy calls the master without a deadline."""
 
@@ -65,6 +69,7 @@ class Lifetime:
         """The same after the loss of the master. A node that has to end other processes sets more."""
         self.watch = MasterWatch(self._tell, self._on_loss)
         self._name = name
+        self._stays = bool(os.environ.pop(STAYS, ""))  # not for those that this node starts
         self._refusals = (*refusals, _StartError)
         self._claim = threading.Lock()  # held for ever by whoever ends the process
         self._status = 0
@@ -108,6 +113,10 @@ class Lifetime:
             self.end("the master is lost")
         if isinstance(error, self._refusals):
             self.say(" ".join(str(error).split()))
+            if self._stays:
+                self.say("it waits, since it would only be started again and again: mend that, and start it anew")
+                while True:
+                    time.sleep(LONGEST_END)
             self.end("it can't start", BAD_START)
         with contextlib.suppress(OSError, ValueError):  # nobody reads any more
             traceback.print_exception(kind, error, trace)

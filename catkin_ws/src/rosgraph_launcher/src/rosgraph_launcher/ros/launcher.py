@@ -28,6 +28,7 @@ from metacontrol_msgs.srv import (
 from node_kit.io.inbox import ClosedError, Inbox
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import LONGEST_END, Lifetime
+from node_kit.ros.parts import watch_parts
 
 from rosgraph_launcher.io.launcher import Launcher, LauncherError
 from rosgraph_launcher.io.ownership import launcher_mark
@@ -177,4 +178,6 @@ def main() -> None:
         life.start()
         options = read_options()
         rospy.set_param("~addresses", addresses(str(rospy.get_param("~host", ""))))
-        LauncherNode(options, life).spin()
+        node = LauncherNode(options, life)
+        watch_parts("launcher")
+        node.spin()

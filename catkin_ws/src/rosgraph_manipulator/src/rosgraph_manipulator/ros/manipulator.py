@@ -18,6 +18,7 @@ from node_kit.io.xml_rpc import CallError
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.plugins import PluginError
 from node_kit.ros.lifetime import Lifetime
+from node_kit.ros.parts import watch_parts
 from rosgraph_launcher.launching.report import FAILED, LauncherReport
 
 from rosgraph_manipulator.change.deployment import (
@@ -372,4 +373,5 @@ def main() -> None:
                 rospy.logwarn("%s is refused when it is requested: %s", configuration.name, configuration.problem)
         initial = options.one_per_function(rospy.get_param("~initial_configuration", ""), "~initial_configuration")
         manipulator = Manipulator(options, load_tactics(), initial)
+        watch_parts("manipulator")
         manipulator.run(life.watch)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from metacontrol_msgs.msg import DiagnosticWords as Words
 from metacontrol_msgs.msg import FunctionGrounding
+from node_kit.parts import Parts
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 _FORGET = 3.0
 """Wall s after which a finding that is not repeated is over."""
+_SILENT = 2.0
+"""Wall s without a sign of life after which a part of the meta-controller is silent."""
 _STYLE = {s.Level.OK: "green", s.Level.WARN: "yellow", s.Level.ERROR: "bold red", s.Level.STALE: "magenta"}
 _THRESHOLD = "nfr_"
 
@@ -40,6 +43,8 @@ class Overview:
     usage: dict[tuple[str, str], str] = field(default_factory=dict)
     functions: dict[str, tuple[str, str]] = field(default_factory=dict)
     """The configuration of each, and its state."""
+    parts: Parts = field(default_factory=Parts)
+    """The parts of the meta-controller, by their signs of life."""
 
     def take_configuration(self, message: Any) -> None:
         """Take in what the manipulator runs (metacontrol_msgs/ActiveConfiguration)."""
@@ -70,8 +75,21 @@ class Overview:
             now: wall time in s.
         """
         self.findings = {key: row for key, row in self.findings.items() if now - row.at <= _FORGET}
-        tables = (self._nodes(nodes), self._qualities(thresholds(parameters), now), self._findings())
-        return Group(*([self._functions()] if self.functions else []), *tables)
+        tables = (self._nodes(nodes, now), self._qualities(thresholds(parameters), now), self._findings())
+        return Group(self._meta_controller(now), *([self._functions()] if self.functions else []), *tables)
+
+    def _meta_controller(self, now: float) -> Table:
+        table = Table("part", "node", "state", title="Meta-controller", title_justify="left")
+        for node, standing in self.parts.known.items():
+            silent = now - standing.heard
+            level, text = (s.Level.OK, "runs") if silent < _SILENT else (s.Level.ERROR, f"silent for {silent:.0f} s")
+            table.add_row(Text(standing.sign.part), Text(node), Text(text, _STYLE[level]))
+        if not self._is_watched(now):
+            table.add_row(Text("monitor"), "", Text("not heard: nobody watches what is below", _STYLE[s.Level.ERROR]))
+        return table
+
+    def _is_watched(self, now: float) -> bool:
+        return any(p.sign.part == "monitor" and now - p.heard < _SILENT for p in self.parts.known.values())
 
     def _functions(self) -> Table:
         table = Table("function", "configuration", "state", title="Functions", title_justify="left")
@@ -80,13 +98,14 @@ class Overview:
             table.add_row(Text(name), Text(configuration), Text(state, style))
         return table
 
-    def _nodes(self, nodes: Iterable[str]) -> Table:
+    def _nodes(self, nodes: Iterable[str], now: float) -> Table:
         table = Table("node or component", "status", "CPU %", "MB", title="Nodes", title_justify="left")
         names = {name.lstrip("/") for name in nodes}
         gone = {name: message for name, message, _ in self.findings if message == Words.MISSING_NODE}
         for name in sorted(names | gone.keys() | self.components.keys()):
             row = self.components.get(name)
-            level, text = (s.Level.OK, "registered") if row is None else (row.level, row.text)
+            unseen = (s.Level.OK, "registered") if self._is_watched(now) else (s.Level.STALE, "registered, not watched")
+            level, text = unseen if row is None else (row.level, row.text)
             if name in gone:
                 level, text = s.Level.ERROR, self._reason(name)
             table.add_row(

@@ -16,6 +16,7 @@ from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.master import PATIENCE
 from node_kit.parameters import ParameterError
 from node_kit.ros.lifetime import Lifetime
+from node_kit.ros.parts import watch_parts
 from ros_model.errors import ModelError
 from ros_model.file_names import safe_file_name
 from ros_model.io.files import resolve
@@ -267,7 +268,9 @@ def command(load: tuple[str, ...], more: tuple[str, ...]) -> None:
     with Lifetime(NAME, ParameterError, ModelError) as life:
         life.start()
         life.watch.patience = parameters_node.number("master_patience", PATIENCE)
-        MonitorNode((*load, *more)).run()
+        node = MonitorNode((*load, *more))
+        watch_parts("monitor")
+        node.run()
 
 
 def _message(status: Status) -> DiagnosticStatus:

@@ -12,12 +12,14 @@ from typing import NoReturn
 import click
 import rosgraph
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from metacontrol_bags import ownership
 from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.io.xml_rpc import CallError
 from node_kit.ros.connections import connect_to_all
 from node_kit.ros.lifetime import BAD_START, LONGEST_END, Lifetime
+from node_kit.ros.parts import TOPIC as SIGNS
+from node_kit.ros.parts import sign_of
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from ros_model.graph.snapshot import GraphSnapshot
@@ -65,7 +67,12 @@ def command(once: float | None) -> None:
         with lock:
             overview.take_configuration(message)
 
+    def take_sign(status: DiagnosticStatus) -> None:
+        with lock:
+            overview.parts.hear(sign_of(status), time.monotonic())
+
     rospy.Subscriber(ownership.TOPIC, DiagnosticArray, take, queue_size=100)
+    rospy.Subscriber(SIGNS, DiagnosticStatus, take_sign, queue_size=50)
     rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, take_configuration)
 
     def tables(graph: GraphSnapshot) -> Group:

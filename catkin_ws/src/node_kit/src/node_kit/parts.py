@@ -1,0 +1,117 @@
+"""Nodes that watch over each other: which parts of a system are lost, and which of the others tells it.
+
+Each part gives a sign of life now and then. One that gives none is asked, and lost when it does not answer. Of the parts
+that are left, the first one tells. Times are wall s of one clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+PERIOD = 0.5
+"""s between two signs of life."""
+SILENCE = 1.2
+"""s without a sign after which a part is asked."""
+HANGS_AFTER = 4.0
+"""s without a sign or an answer after which a part hangs; one at whose address nobody listens is lost at once."""
+
+
+@dataclass(frozen=True)
+class Sign:
+    """A sign of life.
+
+    Attributes:
+        node: resolved name of the node that gives it.
+        part: what it is in the system.
+        uri: address of its XML-RPC API.
+        ends: whether it is the last one: the node was asked to end.
+    """
+
+    node: str
+    part: str = ""
+    uri: str = ""
+    ends: bool = False
+
+
+class Answer(Enum):
+    """What came of asking a part."""
+
+    LIVES = "it answers"
+    GONE = "its process has ended"
+    SILENT = "it does not answer"
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a part stands.
+
+    Attributes:
+        sign: its last one.
+        heard: when it was heard of last, by a sign or an answer.
+        lost: why it is lost; empty while it is not.
+    """
+
+    sign: Sign
+    heard: float
+    lost: str = ""
+
+
+class Parts:
+    """What one part knows of the others."""
+
+    def __init__(self, own: str = "") -> None:
+        """Know nobody.
+
+        Args:
+            own: resolved name of one's own node; empty where one only looks on.
+        """
+        self._own = own
+        self._known: dict[str, Standing] = {}
+        self._told: set[str] = set()
+
+    @property
+    def known(self) -> dict[str, Standing]:
+        """How each part stands that was ever heard of and has not ended by itself, by the node's name."""
+        return dict(sorted(self._known.items()))
+
+    def hear(self, sign: Sign, now: float) -> None:
+        """Take in a sign of life."""
+        if sign.node == self._own:
+            return
+        if sign.ends:
+            self._known.pop(sign.node, None)
+        else:
+            self._known[sign.node] = Standing(sign, now)
+
+    def doubtful(self, now: float) -> list[Sign]:
+        """Return the last signs of those to ask whether they are there, because they have given none for too long."""
+        return [standing.sign for standing in self._known.values() if now - standing.heard > SILENCE]
+
+    def note(self, node: str, answer: Answer, now: float) -> None:
+        """Take in what came of asking a part."""
+        standing = self._known.get(node)
+        if standing is None:
+            return
+        if answer is Answer.LIVES:
+            if not standing.lost:
+                self._known[node] = replace(standing, heard=now)
+        elif answer is Answer.GONE or now - standing.heard >= HANGS_AFTER:
+            self._known[node] = replace(standing, lost=answer.value)
+
+    def lost(self) -> dict[str, str]:
+        """Return which nodes are lost, and why."""
+        return {node: standing.lost for node, standing in self.known.items() if standing.lost}
+
+    def to_tell(self) -> dict[str, str]:
+        """Return what one's own part is to tell: the nodes that are lost, and why; empty for those that are back.
+
+        The first by name of those that are left tells of a loss. Who has told it tells the return, once: a node that has
+        just come back knows nothing yet.
+        """
+        lost = self.lost()
+        returned = dict.fromkeys(sorted(self._told - lost.keys()), "")
+        self._told &= lost.keys()
+        if all(standing.lost or self._own < node for node, standing in self._known.items()):
+            self._told |= lost.keys()
+        return {**returned, **{node: why for node, why in lost.items() if node in self._told}}

@@ -1,0 +1,97 @@
+#!/usr/bin/env python3
+"""Parts of one of two robots' meta-controllers die: the others tell it, they come back, and the robot still adapts."""
+
+import os
+import signal
+import subprocess
+import unittest
+from pathlib import Path
+from xmlrpc.client import ServerProxy
+
+import rosgraph
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray
+from helpers.waiting import DEADLINE_S, wait_for
+from metacontrol_msgs.msg import ActiveConfiguration, Decision
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+PARTS = ("rosgraph_monitor", "reasoner", "rosgraph_manipulator", "rosgraph_launcher")
+MESSAGE = "Part of the meta-controller"
+
+
+class PartsTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        rospy.init_node("parts_test")
+
+    def setUp(self):
+        self.active, self.executed, self.told = {}, {}, []
+        for robot in ("/amber", "/basil"):
+            rospy.Subscriber(
+                f"{robot}/rosgraph_manipulator/active_configuration", ActiveConfiguration, self.take_active, robot
+            )
+            rospy.Subscriber(f"{robot}/mros1_reasoner/decision", Decision, self.take_decision, robot, queue_size=100)
+        rospy.Subscriber("/diagnostics", DiagnosticArray, self.take, queue_size=100)
+        paths = {
+            "ROS_PACKAGE_PATH": f"{EXAMPLES / 'talker_listener'}:{EXAMPLES / 'two_robots'}",
+            "PYTHONPATH": EXAMPLES / "talker_listener" / "src",
+        }
+        environment = {name: f"{path}:{os.environ.get(name, '')}" for name, path in paths.items()}
+        process = subprocess.Popen(
+            ["roslaunch", "--wait", "two_robots", "two_robots.launch"],
+            env={**os.environ, **environment},
+            stdin=subprocess.DEVNULL,
+        )
+        self.addCleanup(process.wait, DEADLINE_S)
+        self.addCleanup(process.send_signal, signal.SIGINT)
+
+    def take_active(self, message, robot):
+        self.active[robot] = [(f.configuration, f.state) for f in message.functions]
+
+    def take_decision(self, decision, robot):
+        if decision.state == "EXECUTED":
+            self.executed.setdefault(robot, []).append(decision.to_configuration)
+
+    def take(self, array):
+        self.told += [(s.name, s.level) for s in array.status if s.message == MESSAGE]
+
+    def process_of(self, node):
+        """Return the process of a node, 0 where none answers."""
+        try:
+            return ServerProxy(rosgraph.Master("/test").lookupNode(node)).getPid("/test")[2]
+        except (OSError, rosgraph.MasterException):
+            return 0
+
+    def test_each_part_that_dies_is_told_and_comes_back(self):
+        frugal = [("frugal", "STABLE")]
+        wait_for(lambda: self.active == {"/amber": frugal, "/basil": frugal}, "both robots talk")
+        for part in PARTS:
+            node = f"/amber/{part}"
+            wait_for(lambda node=node: self.process_of(node), f"{node} runs")
+            dead = self.process_of(node)
+            rospy.sleep(1.0)  # not a condition: signs of life of all parts have gone out by then, as in any running system
+            self.told.clear()
+            os.kill(dead, signal.SIGKILL)
+            wait_for(lambda node=node: (node, 2) in self.told, f"somebody tells that {node} is lost")
+            wait_for(lambda node=node: (node, 0) in self.told, f"somebody tells that {node} is there again")
+            wait_for(lambda node=node, dead=dead: self.process_of(node) not in (0, dead), f"another {node} runs")
+        self.assertFalse([node for node, _ in self.told if node.startswith("/basil")])
+        wait_for(lambda: self.active["/amber"] == frugal, "amber talks")
+        os.kill(self.process_of("/amber/talker"), signal.SIGSTOP)
+        wait_for(lambda: "fast" in self.executed.get("/amber", []), "amber adapts")
+        self.assertNotIn("/basil", self.executed)
+
+    def test_part_that_is_asked_to_end_is_not_lost(self):
+        wait_for(lambda: len(self.active) == 2, "both robots are told of")
+        dead = self.process_of("/basil/reasoner")
+        wait_for(lambda: self.process_of("/basil/reasoner"), "the reasoner runs")
+        dead = self.process_of("/basil/reasoner")
+        self.told.clear()
+        os.kill(dead, signal.SIGTERM)
+        wait_for(lambda: self.process_of("/basil/reasoner") not in (0, dead), "roslaunch starts it again")
+        self.assertEqual(self.told, [])
+
+
+if __name__ == "__main__":
+    rostest.rosrun("metacontrol_tests", "parts", PartsTest)

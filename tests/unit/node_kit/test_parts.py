@@ -1,0 +1,78 @@
+"""Parts that watch over each other: who is lost, and who tells it."""
+
+import pytest
+from node_kit.parts import HANGS_AFTER, SILENCE, Answer, Parts, Sign
+
+MONITOR, REASONER = Sign("/greenhouse/rosgraph_monitor", "monitor", "http://a:1"), Sign("/greenhouse/reasoner", "reasoner", "http://a:2")
+
+
+@pytest.fixture
+def parts():
+    """Return what the manipulator knows, which has heard of two others."""
+    parts = Parts("/greenhouse/rosgraph_manipulator")
+    for sign in (MONITOR, REASONER, Sign("/greenhouse/rosgraph_manipulator")):
+        parts.hear(sign, 0.0)
+    return parts
+
+
+def test_who_gives_signs_is_not_asked(parts):
+    assert parts.doubtful(SILENCE) == []
+    parts.hear(MONITOR, 1.0)
+    assert parts.doubtful(SILENCE + 0.1) == [REASONER]
+
+
+def test_who_answers_without_signs_is_not_lost(parts):
+    parts.note(REASONER.node, Answer.LIVES, 2.0)
+    assert parts.lost() == {}
+    assert parts.doubtful(1.9 + SILENCE) == [MONITOR]
+
+
+def test_who_is_gone_is_lost_at_once(parts):
+    parts.note(MONITOR.node, Answer.GONE, 2.0)
+    assert parts.lost() == {MONITOR.node: "its process has ended"}
+    parts.hear(Sign(MONITOR.node, "monitor", "http://a:9"), 5.0)
+    assert parts.lost() == {}
+
+
+def test_an_answer_from_the_address_of_before_brings_nobody_back(parts):
+    """A port may be somebody else's by then."""
+    parts.note(MONITOR.node, Answer.GONE, 2.0)
+    parts.note(MONITOR.node, Answer.LIVES, 3.0)
+    assert parts.lost()
+
+
+def test_who_hangs_is_lost_after_a_while(parts):
+    parts.note(MONITOR.node, Answer.SILENT, HANGS_AFTER - 0.1)
+    assert parts.lost() == {}
+    parts.note(MONITOR.node, Answer.SILENT, HANGS_AFTER)
+    assert parts.lost() == {MONITOR.node: "it does not answer"}
+
+
+def test_who_was_asked_to_end_is_not_lost(parts):
+    parts.hear(Sign(MONITOR.node, ends=True), 1.0)
+    assert MONITOR.node not in parts.known
+    parts.note(MONITOR.node, Answer.GONE, 2.0)  # it had been asked meanwhile
+    assert parts.lost() == {}
+
+
+def test_the_first_that_is_left_tells(parts):
+    parts.note(MONITOR.node, Answer.GONE, 2.0)
+    assert parts.to_tell() == {}, "the reasoner's name comes before the manipulator's"
+    parts.note(REASONER.node, Answer.GONE, 2.0)
+    assert list(parts.to_tell()) == [REASONER.node, MONITOR.node]
+    assert list(parts.to_tell()) == [REASONER.node, MONITOR.node], "it is told again and again"
+
+
+def test_who_has_told_a_loss_tells_the_return_once(parts):
+    """The one that is back is the first by name now, but has not heard of anything."""
+    parts.note(REASONER.node, Answer.GONE, 2.0)
+    parts.to_tell()
+    parts.hear(Sign(REASONER.node, "reasoner", "http://a:9"), 5.0)
+    assert parts.to_tell() == {REASONER.node: ""}
+    assert parts.to_tell() == {}
+
+
+def test_who_only_looks_on_hears_all():
+    parts = Parts()
+    parts.hear(MONITOR, 0.0)
+    assert list(parts.known) == [MONITOR.node]
