@@ -124,10 +124,14 @@ class State(View):
         """Forget the levels of a quality."""
         self.levels.forget(quality=quality)
 
-    def note_component(self, now: float, name: str, status: str, stamp: float) -> None:
-        """Note another status of a component."""
-        self.components[name] = Component(status, stamp)
+    def note_component(self, now: float, name: str, status: str, stamp: float, reason: str = "") -> None:
+        """Note another status of a component, and why it has failed."""
+        self.components[name] = Component(status, stamp, reason)
         self.repairs.note(now, name, works=status != v.FAILED)
+
+    def note_reason(self, name: str, reason: str) -> None:
+        """Note another reason why a component has failed, whose status stays as it is."""
+        self.components[name] = replace(self.components[name], reason=reason)
 
     def note_drift(self, now: float, name: str, node: str, parameters: str, stamp: float) -> None:
         """Note that parameters of what runs for an objective have drifted; while it changes, that tells nothing."""
