@@ -22,7 +22,7 @@ _TELLS = {
 }
 _TELLS_OF_ANY_ROBOT = {
     "/diagnostics": "components and qualities",
-    "/mros1_reasoner/decision": "decisions",
+    "/mros1_reasoner/decision": "decisions, if any",
     "/rosgraph_manipulator/active_configuration": "configurations",
 }
 _NAMED = 4
