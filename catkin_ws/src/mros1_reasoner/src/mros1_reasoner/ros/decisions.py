@@ -26,14 +26,13 @@ _LOOK_PERIOD = 0.01  # s, wall
 
 
 class DecisionTopic:
-    """Publishes decisions; a new subscriber gets the last one, and a service tells the last hundred."""
+    """Publishes decisions; a new subscriber gets the last one."""
 
     def __init__(self) -> None:
-        """Offer topic and service."""
+        """Offer the topic."""
         self._kept: dict[str, msg.Decision] = {}  # the last message about each, by its id
         self._lock = threading.Lock()
         self._publisher = rospy.Publisher(_TOPIC, msg.Decision, queue_size=10, latch=True)
-        self._service = rospy.Service(f"{_TOPIC}{_PLURAL}", LastDecisions, self._tell_last)
 
     def publish(self, decision: Decision) -> None:
         """Publish a decision."""
@@ -44,6 +43,10 @@ class DecisionTopic:
             if len(self._kept) > _KEPT:
                 del self._kept[next(iter(self._kept))]
         self._publisher.publish(message)
+
+    def offer_last(self) -> None:
+        """Offer the service that tells the last hundred: only one node of a robot can."""
+        self._service = rospy.Service(f"{_TOPIC}{_PLURAL}", LastDecisions, self._tell_last)
 
     def _tell_last(self, request: Any) -> LastDecisionsResponse:
         with self._lock:
