@@ -5,13 +5,14 @@ import math
 
 import pytest
 from click.testing import CliRunner
+from metacontrol_bags.adaptation import describe_adaptation
 from metacontrol_bags.bag import read_record
 from metacontrol_bags.bag_file import BagError
 from metacontrol_bags.cli.main import bag as group
 from metacontrol_bags.metrics import summarise
 from metacontrol_bags.side_by_side import short_names
 from metacontrol_experiments.cli.main import metacontrol
-from metacontrol_msgs.msg import Candidate, Cause, Decision, ExpectedQA
+from metacontrol_msgs.msg import ActiveConfiguration, Candidate, Cause, Decision, ExpectedQA, FunctionGrounding
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import String
 
@@ -87,7 +88,10 @@ def test_info_of_a_bag_without_index_counts_the_same(path, unfinished, mission_b
 
 def test_metrics_are_those_of_the_summary(path):
     (entry,) = told("metrics", path)
-    assert entry == {"bag": str(path), "problems": [], "summary": summarise(read_record(path))}
+    record = read_record(path)
+    assert (entry["bag"], entry["problems"]) == (str(path), [])
+    assert entry["summary"] == summarise(record)
+    assert entry["adaptation"] == describe_adaptation(record)
     text = call("metrics", path).stdout
     assert "component:front_laser" in text and "10.00 s" in text
 
@@ -225,3 +229,77 @@ def test_plot_into_a_folder_that_is_not_there_is_refused(path, tmp_path):
     result = call("plot", path, "--output", tmp_path / "nowhere" / "figure.png")
     assert result.exit_code == 2
     one_line(result, "nowhere", "No such file")
+
+
+@pytest.fixture
+def two_pumps(bag, tmp_path):
+    """Return a bag of two robots, in their namespaces, that know neither move_base nor a ground truth."""
+    for robot, failed in (("north", "valve"), ("south", "filter")):
+        of_robot = f"robot:/{robot}"
+        for stamp, configuration, state in ((10.0, "brisk", "STABLE"), (14.0, "gentle", "RECONFIGURING")):
+            functions = [FunctionGrounding("f_pump", configuration, state)]
+            topic = f"/{robot}/rosgraph_manipulator/active_configuration"
+            bag.add(stamp, topic, ActiveConfiguration(functions=functions))
+        bag.diagnostic(13.0, "Component status", failed, "FALSE", hardware_id=of_robot)
+        bag.diagnostic(15.5, "Component status", failed, "RECOVERED", hardware_id=of_robot)
+        bag.diagnostic(10.0, "QA status", "pressure", 0.2 if robot == "north" else 0.9, hardware_id=of_robot)
+        for stamp, state in ((13.5, "DECIDED"), (14.5, "EXECUTED")):
+            cause = Cause(trigger="qa:pressure", text="pressure 0.2 < 0.4 for 1 s", quality="pressure")
+            cause.level, cause.limit, cause.excess = 0.2, 0.4, 0.5
+            message = Decision(id=robot, state=state, trigger="qa:pressure", objective="o_pump", reasons=[cause])
+            message.from_configuration, message.to_configuration = "brisk", "gentle"
+            message.stamp_executed = message.header.stamp
+            bag.add(stamp, f"/{robot}/mros1_reasoner/decision", message)
+    bag.add(20.0, "/chat", String("the end"))
+    return bag.write(tmp_path / "pumps.bag")
+
+
+def test_metrics_of_any_robot_tell_what_its_meta_controller_did(two_pumps):
+    (entry,) = told("metrics", "--namespace", "north", two_pumps)
+    assert (entry["summary"], entry["problems"]) == (None, [])
+    figures = entry["adaptation"]
+    assert figures["duration_s"] == 10.0
+    assert figures["configurations"] == {
+        "f_pump": {"brisk": {"s": 4.0, "changing_s": 0.0}, "gentle": {"s": 6.0, "changing_s": 6.0}}
+    }
+    assert figures["decisions"]["by_state"] == {"EXECUTED": 1}
+    assert figures["reconfiguration_s"] == {"mean": 1.0, "max": 1.0}
+    assert figures["components"] == {"valve": [{"stamp_s": 3.0, "recovered_s": 2.5}]}
+    pressure = figures["qualities"]["pressure"]
+    assert (pressure["limit"], pressure["violated"], pressure["violated_s"]) == (0.4, "below", 10.0)
+    shown = call("metrics", "--namespace", "/south", two_pumps).stdout
+    assert "f_pump: gentle" in shown
+    assert "failures of filter" in shown
+    assert "valve" not in shown
+    assert "safety" not in shown
+
+
+@pytest.mark.parametrize("command", ["metrics", "compare", "decisions"])
+def test_bag_of_several_robots_asks_for_one(two_pumps, command):
+    result = call(command, two_pumps)
+    assert result.exit_code == 2
+    one_line(result, "/north, /south", "--namespace")
+    result = call(command, "--namespace", "west", two_pumps)
+    assert result.exit_code == 2
+    one_line(result, "no robot in /west", "/north")
+
+
+def test_the_only_robot_of_a_bag_needs_no_namespace(bag, tmp_path):
+    functions = [FunctionGrounding("f_pump", "brisk", "STABLE")]
+    bag.add(1.0, "/hall/pump/rosgraph_manipulator/active_configuration", ActiveConfiguration(functions=functions))
+    bag.add(3.0, "/chat", String("the end"))
+    path = bag.write(tmp_path / "pump.bag")
+    result = call("compare", path)
+    assert "f_pump: brisk" in result.stdout
+    one_line(result, "no /diagnostics (components and qualities)", "no /mros1_reasoner/decision (decisions, if any)")
+
+
+def test_function_that_is_released_and_deployed_again_does_not_count_between(bag, tmp_path):
+    topic = "/rosgraph_manipulator/active_configuration"
+    grip, look = FunctionGrounding("f_grip", "firm", "STABLE"), FunctionGrounding("f_look", "far", "STABLE")
+    for stamp, functions in ((1.0, [grip, look]), (3.0, [look]), (7.0, [grip, look])):
+        bag.add(stamp, topic, ActiveConfiguration(functions=functions))
+    bag.add(8.0, "/chat", String("the end"))
+    (entry,) = told("metrics", bag.write(tmp_path / "cell.bag"))
+    shares = entry["adaptation"]["configurations"]
+    assert (shares["f_grip"]["firm"]["s"], shares["f_look"]["far"]["s"]) == (3.0, 7.0)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from metacontrol_bags.bag import read_record
-from metacontrol_bags.ownership import hardware_id_of, is_of_another, is_own, robot_of, robots_inside
+from metacontrol_bags.ownership import hardware_id_of, is_of_another, is_own, marked, robot_of, robots_inside
 
 NAMES = st.text("ab_1", min_size=1, max_size=3)
 NAMESPACES = st.lists(NAMES, max_size=3).map(lambda parts: "/" + "/".join(parts))
@@ -92,3 +92,15 @@ def test_record_of_a_mission_lacks_what_other_robots_say(mission_bag, tmp_path):
     after = read_record(mission_bag.write(tmp_path / "beside.bag"))
     components = [{report.component for report in record.components} for record in (before, after)]
     assert components[1] - components[0] == {"wheel"}
+
+
+def test_observers_of_two_robots_are_told_apart_in_a_bag_that_a_third_node_plays():
+    player = "/play_1764"
+    amber, root = marked("FreshnessObserver", "/amber/"), marked("FreshnessObserver", "/")
+    assert is_own("/amber", player, amber)
+    assert not is_own("/basil", player, amber)
+    assert not is_own("/", player, amber)
+    assert is_own("/", player, root)
+    assert not is_own("/amber", player, root)
+    assert marked("", "/amber") == marked("robot:/amber", "/") == "robot:/amber"
+    assert root == "FreshnessObserver"

@@ -246,3 +246,52 @@ def test_component_with_a_node_and_a_drivers_status_needs_both(life, driver, sta
 def test_battery_is_a_component():
     told = said(monitor().evaluate(BOTH, ALIVE, DESIRED, 0.0, others={"battery": NodeCondition.FAILED}))
     assert ("battery", "Component status", "FALSE") in told
+
+
+def why(statuses, component):
+    (values,) = [s.values[1:] for s in statuses if (s.message, s.name) == ("Component status", component)]
+    return dict(values).get("reason")
+
+
+def test_component_says_why_its_node_counts_as_failed():
+    watched = monitor()
+    assert why(watched.evaluate(BOTH, ALIVE, DESIRED, 0.0), "laser_resender") is None
+    hung = ALIVE | lives(front_laser=Life.HUNG, move_base=Life.DEAD)
+    statuses = watched.evaluate(BOTH, hung, DESIRED, 0.1)
+    assert why(statuses, "laser_resender") == f"node front_laser: {Life.HUNG.value}"
+    assert why(statuses, "move_base") == Life.DEAD.value
+    unknown = watched.evaluate(BOTH, ALIVE | lives(front_laser=Life.UNKNOWN), DESIRED, 0.2)
+    assert why(unknown, "laser_resender") == f"node front_laser: {Life.HUNG.value}"
+    ended = watched.evaluate(graph("/move_base"), ALIVE, DESIRED, 0.3)
+    assert why(ended, "laser_resender") == f"node front_laser: {Life.HUNG.value}"  # and so it was ended
+    well = watched.evaluate(BOTH, ALIVE, DESIRED, 0.4)
+    assert why(well, "laser_resender") is None
+    assert why(watched.evaluate(graph("/move_base"), ALIVE, DESIRED, 9.0), "laser_resender").startswith(
+        "node front_laser: ended"
+    )
+
+
+def test_component_says_which_topic_or_driver_tells_that_it_has_failed():
+    watched = GraphEvaluator({"sonar_driver": "sonar"}, patience=Patience(5.0, 1.0, 1.0))
+    running = graph("/sonar_driver")
+    known = lives(sonar_driver=Life.ALIVE)
+    spec = TopicSpec("cell/range", max_age=0.5, component="sonar")
+    silent = TopicVerdict(spec, "Silent topic", "last message 3.1 s ago", "max_age 0.5", "3.1")
+    failed = {"sonar": NodeCondition.FAILED}
+    said_by = {"sonar": "its driver says sonar: echo: no echo"}
+    topic = watched.evaluate(running, known, Desired(None), 0.0, topics=[silent])
+    assert why(topic, "sonar") == "Silent topic cell/range (max_age 0.5)"
+    more = {"others": failed, "reasons": said_by}
+    both = watched.evaluate(running, known, Desired(None), 0.1, topics=[silent], **more)
+    assert why(both, "sonar") == "Silent topic cell/range (max_age 0.5); its driver says sonar: echo: no echo"
+    driver = watched.evaluate(running, known, Desired(None), 0.2, topics=[TopicVerdict(spec)], **more)
+    assert why(driver, "sonar") == "its driver says sonar: echo: no echo"
+
+
+def test_publisher_of_a_silent_topic_says_which():
+    watched = GraphEvaluator({}, patience=Patience(5.0, 1.0, 1.0))
+    system = Desired(RosSystem("rover", components=(Component("filter"),)))
+    running = build_snapshot([[["/scan_filtered", ["/filter"]]], [], []], [], {}, {"/filter": "http://host/filter"})
+    silent = TopicVerdict(TopicSpec("scan_filtered", max_age=1.0), "Silent topic", "none", "messages", "none")
+    statuses = watched.evaluate(running, lives(filter=Life.ALIVE), system, 0.0, topics=[silent])
+    assert why(statuses, "filter") == "Silent topic scan_filtered (no message yet)"

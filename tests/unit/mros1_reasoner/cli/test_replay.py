@@ -255,10 +255,12 @@ def test_explain_tells_the_last_decisions_if_asked(life, bag, last):
     assert [name for name in known if f" {name}, " in output] == known[-last:]
 
 
-def test_explain_has_one_decision_of_a_running_reasoner():
+def test_explain_without_a_master_says_so_in_one_line(monkeypatch):
+    monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:9")
     result = run(explain, "--last", 2)
     assert result.exit_code == 2
-    assert "record its topic" in result.output
+    assert "start roscore" in result.output
+    assert result.output.count("\n") == 1
 
 
 @pytest.mark.parametrize("command", [explain, replay])

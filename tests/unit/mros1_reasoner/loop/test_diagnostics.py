@@ -201,3 +201,17 @@ def test_only_the_newest_goal_counts():
 
 def test_without_goals_nothing_is_known():
     assert newest_goal(goals()) is None
+
+
+def test_reason_of_a_failed_component_comes_along():
+    why = ("reason", "hung: its process does not answer")
+    missing = status("Missing node", ("reason", "another"), level=2, name="/laser")
+    (fact,) = facts(status("Component status", ("laser", "FALSE"), why), missing)
+    assert fact == ComponentFact("laser", "FALSE", reason=why[1])
+    assert facts(status("Component status", ("laser", "TRUE"), why)) == [ComponentFact("laser", "TRUE")]
+
+
+def test_foreign_reason_is_short_and_on_one_line():
+    (fact,) = facts(status("Component status", ("laser", "FALSE"), ("reason", "a\nb" + "x" * 1000)))
+    assert fact.reason.isprintable()
+    assert len(fact.reason) < 250

@@ -161,3 +161,18 @@ def test_hung_node_of_a_requirement_is_restarted_without_a_change_above(make):
     assert set(D1) >= {"FD2.2"}
     robot.core.observe_component(robot.now, "finder", "FALSE", robot.now)
     assert robot.run(10.0) == [("o_F2", "FD2.1", ("finder",))]
+
+
+def test_decision_says_why_a_node_or_a_component_does_not_work(cell):
+    cell.core.observe_component(cell.now, "eye", "FALSE", cell.now, "node camera: dead")
+    cell.core.observe_component(cell.now, "eye", "FALSE", cell.now)  # a reader that knows no reason
+    (decision,) = cell.core.step(cell.now)
+    assert decision.causes == ("component eye, which by_eye requires, does not work (node camera: dead)",)
+    assert decision.explanation.startswith(f"o_pick: {decision.causes[0]}: by_eye -> by_touch")
+    cell.core.report(cell.now, decision.id, True)
+    cell.now += 5.0
+    cell.core.observe_component(cell.now, "picker", "FALSE", cell.now, "hung")
+    cell.core.observe_component(cell.now, "picker", "FALSE", cell.now + 0.1, "ended")
+    (decision,) = cell.core.step(cell.now + 0.2)
+    assert decision.causes == ("node picker of by_touch does not work (ended)",)
+    assert decision.stamp_monitored == cell.now

@@ -40,6 +40,7 @@ WRITTEN = [  # as bags have them
     ("level", ("safety", "0.2", "fg", "1.0"), LevelFact("safety", 0.2, "fg", 1.0)),
     ("stale", ("safety",), StaleFact("safety")),
     ("component", ("laser", "FALSE", "0.9"), ComponentFact("laser", "FALSE", 0.9)),
+    ("component", ("laser", "FALSE", "0.9", "hung"), ComponentFact("laser", "FALSE", 0.9, "hung")),
     ("drift", ("arm/nav", "rate,speed", "scan_slow", "0.5"), DriftFact("arm/nav", "rate,speed", "scan_slow", 0.5)),
     ("binding", ("fg_o_move_scan_slow", "1"), BindingFact("fg_o_move_scan_slow", True)),
     ("task", ("o_move", "1", "0.0", "goal aborted"), TaskFact("o_move", True, 0.0, "goal aborted")),

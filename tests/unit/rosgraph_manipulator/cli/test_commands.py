@@ -138,3 +138,8 @@ def test_help_is_there(run, command, option):
     code, output, _ = run(command, option)
     assert code == 0
     assert output.startswith("Usage: ")
+
+
+def test_status_tells_failed_components_and_why_as_far_as_it_is_known():
+    assert status.failure_lines({}) == []
+    assert status.failure_lines({"sonar": "hung", "arm": ""}) == ["failed components:", "  arm", "  sonar: hung"]

@@ -60,3 +60,17 @@ def test_entries_of_components_name_the_status():
 def test_bad_entry_is_refused(entry):
     with pytest.raises(ValueError, match="components/left_arm"):
         parse_components({"left_arm": entry})
+
+
+def test_reason_is_what_the_driver_said_when_its_status_became_an_error():
+    statuses = DriverStatuses({"arm": "arm_driver", "lamp": "lamp"})
+    statuses.take("arm_driver: heat", Level.ERROR, "81 degrees")
+    statuses.take("arm_driver: heat", Level.ERROR, "82 degrees")
+    statuses.take("arm_driver: brake", Level.ERROR)
+    statuses.take("lamp: bulb", Level.WARN, "old")
+    assert statuses.reasons == {"arm": "error of arm_driver: brake; its driver says arm_driver: heat: 81 degrees"}
+    statuses.take("arm_driver: brake", Level.OK)
+    statuses.take("arm_driver: heat", Level.OK)
+    assert statuses.reasons == {}
+    statuses.take("arm_driver: heat", Level.ERROR, "90 degrees")
+    assert statuses.reasons == {"arm": "its driver says arm_driver: heat: 90 degrees"}

@@ -62,6 +62,9 @@ TOPICS = (
 )
 """What a mission records: published topics, ground truth, frames, plans, every adaptation; no clouds or scans."""
 
+_OF_A_META_CONTROLLER = ("/rosgraph_manipulator/active_configuration", "/mros1_reasoner/decision")
+"""Topics that tell in which namespaces a bag has a meta-controller."""
+
 _OCCUPIED = 50
 """Cells of an OccupancyGrid from this value on are drawn as obstacles (unknown is -1, free 0, occupied 100)."""
 
@@ -75,7 +78,7 @@ class Salvaged:
 
     Attributes:
         record: of the mission.
-        topics: all topics of the bag.
+        topics: all topics of the bag; those of the robot as they are called in the root namespace.
         problems: what is lost, each in words; empty where nothing is.
     """
 
@@ -114,9 +117,23 @@ def salvage(path: Path, topics: Collection[str] = (), namespace: str = "/") -> S
     wanted = set(topics or builder.handlers)
     with BagFile(path) as bag:
         lost = decode(bag, lambda connection: builder.topic_of(connection) in wanted, builder.take)
-        held = frozenset(bag.connections[number].topic for number, count in bag.counts.items() if count)
+        connections = (bag.connections[number] for number, count in bag.counts.items() if count)
+        held = frozenset(builder.topic_of(connection) or connection.topic for connection in connections)
         record = builder.build((bag.first or 0) * 1e-9, (bag.last or 0) * 1e-9)
     return Salvaged(record, held, (*bag.problems, *lost))
+
+
+def robots(path: Path) -> tuple[str, ...]:
+    """Return the namespaces of the robots with a meta-controller that a bag holds.
+
+    Raises:
+        BagError: the file is missing, unreadable or no bag.
+    """
+    with BagFile(path) as bag:
+        bag.scan()
+        topics = [bag.connections[number].topic for number, count in bag.counts.items() if count]
+    found = {topic.removesuffix(end) or "/" for topic in topics for end in _OF_A_META_CONTROLLER if topic.endswith(end)}
+    return tuple(sorted(found))
 
 
 class _Builder:

@@ -20,6 +20,11 @@ _TELLS = {
     "/move_base/goal": "goals",
     "/rosgraph_manipulator/active_configuration": "configurations",
 }
+_TELLS_OF_ANY_ROBOT = {
+    "/diagnostics": "components and qualities",
+    "/mros1_reasoner/decision": "decisions, if any",
+    "/rosgraph_manipulator/active_configuration": "configurations",
+}
 _NAMED = 4
 """Topics of a bag of something else that a line names."""
 
@@ -30,10 +35,21 @@ def is_mission(record: MissionRecord) -> bool:
     return any((*told, record.contacts, *record.true_quality.values(), len(record.poses)))
 
 
+def is_d2(record: MissionRecord) -> bool:
+    """Return whether a record is of a mission of D2, or of a robot without a meta-controller, as published bags are."""
+    began = record.event(MissionEvent.MISSION_START)
+    if began is not None:
+        return began.values.get("mission", "D2") == "D2"
+    return any(record.true_quality.values()) or not (record.decisions or record.configurations)
+
+
 def gaps(found: Salvaged) -> tuple[str, ...]:
     """Return what is lost or was not recorded, each in words."""
-    absent = [f"{topic} ({what})" for topic, what in _TELLS.items() if topic not in found.topics]
     told = list(found.problems)
+    if not is_d2(found.record):
+        absent = [f"{topic} ({what})" for topic, what in _TELLS_OF_ANY_ROBOT.items() if topic not in found.topics]
+        return (*told, *([f"it has no {', no '.join(absent)}: record these, too"] if absent else []))
+    absent = [f"{topic} ({what})" for topic, what in _TELLS.items() if topic not in found.topics]
     if absent:
         told.append(
             f"it has no {', no '.join(absent)}: what follows from these is unknown, `metacontrol run` records all"

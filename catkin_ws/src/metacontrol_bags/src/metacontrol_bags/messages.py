@@ -66,7 +66,8 @@ def diagnostics(
     reports: list[DiagnosticReport] = []
     for status in ownership.own(message.status, namespace, publisher):
         if status.message == DiagnosticWords.COMPONENT_STATUS:
-            reports += (ComponentReport(stamp, pair.key, pair.value) for pair in status.values)
+            told = (pair for n, pair in enumerate(status.values) if n == 0 or pair.key != DiagnosticWords.REASON)
+            reports += (ComponentReport(stamp, pair.key, pair.value) for pair in told)
         elif status.message == DiagnosticWords.QA_STALE:
             reports += (QualityReport(stamp, pair.key, None) for pair in status.values)
         elif status.message == DiagnosticWords.QA_STATUS:

@@ -35,6 +35,15 @@ def robot_of(hardware_id: str) -> str | None:
     return _absolute(hardware_id.removeprefix(_OWNER)) if hardware_id.startswith(_OWNER) else None
 
 
+def marked(hardware_id: str, namespace: str) -> str:
+    """Return the hardware_id of a status of the robot in a namespace, given what its author has set.
+
+    In `/`, the author's is left: nobody else's robot takes it for its own.
+    """
+    is_left = hardware_id and (_absolute(namespace) == "/" or robot_of(hardware_id) is not None)
+    return hardware_id if is_left else hardware_id_of(namespace)
+
+
 def robots_inside(namespace: str, nodes: Iterable[str]) -> frozenset[str]:
     """Return the namespaces of other robots inside a robot's namespace: those with a meta-controller of their own.
 

@@ -18,9 +18,22 @@ def table(summaries: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
     Args:
         summaries: as `metrics.summarise` makes them, by the name of the column.
     """
-    columns = [_column(summary) for summary in summaries.values()]
-    labels = dict.fromkeys(label for column in columns for label in column)
-    return [["", *summaries], *([label, *(column.get(label, UNKNOWN) for column in columns)] for label in labels)]
+    return _rows({name: _column(summary) for name, summary in summaries.items()})
+
+
+def adaptation_table(runs: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
+    """Return the rows of a table, the first one with the names of the runs.
+
+    Args:
+        runs: as `adaptation.describe_adaptation` makes them, by the name of the column.
+    """
+    return _rows({name: _adaptation_column(run) for name, run in runs.items()})
+
+
+def _rows(columns: Mapping[str, Mapping[str, str]]) -> list[list[str]]:
+    labels = dict.fromkeys(label for column in columns.values() for label in column)
+    cells = ([label, *(column.get(label, UNKNOWN) for column in columns.values())] for label in labels)
+    return [["", *columns], *cells]
 
 
 def markdown(rows: Sequence[Sequence[str]]) -> str:
@@ -74,6 +87,40 @@ def _column(summary: Mapping[str, Any]) -> dict[str, str]:
         "control periods missed": _share(control["periods_missed"]),
         "simulated / wall time": _number(summary["real_time_factor"]),
     }
+
+
+def _adaptation_column(run: Mapping[str, Any]) -> dict[str, str]:
+    decisions, spans = run["decisions"], run["reconfiguration_s"]
+    rows = {"outcome": run["outcome"]} if run["outcome"] else {}
+    rows["duration"] = _number(run["duration_s"], "s")
+    for function, shares in run["configurations"].items():
+        for name, share in shares.items():
+            changing = f", {share['changing_s']:.2f} s of it changing" if share["changing_s"] else ""
+            rows[f"{function}: {name}"] = f"{share['s']:.2f} s{changing}"
+    states = ", ".join(f"{count} {state}" for state, count in decisions["by_state"].items())
+    rows["decisions"] = f"{decisions['count']}{f': {states}' if states else ''}"
+    rows |= {f"decisions by {trigger}": str(count) for trigger, count in decisions["by_trigger"].items()}
+    rows |= {
+        "degraded decisions": str(decisions["degraded"]),
+        "reconfigurations": str(len(run["reconfigurations"])),
+        "reconfigurations that failed": str(len(run["reconfigurations_failed"])),
+        "duration of a reconfiguration, mean": _number(spans["mean"], "s"),
+        "duration of a reconfiguration, longest": _number(spans["max"], "s"),
+    }
+    for name, quality in run["qualities"].items():
+        rows[f"mean {name}, as observed"] = _number(quality["mean"])
+        if quality["limit"] is not None:
+            rows[f"{name} {quality['violated']} {quality['limit']:g}"] = _number(quality["violated_s"], "s")
+        if quality["stale_s"]:
+            rows[f"{name} could not be observed"] = _number(quality["stale_s"], "s")
+    for name, failures in run["components"].items():
+        rows[f"failures of {name}"] = ", ".join(map(_failure, failures))
+    return rows
+
+
+def _failure(failure: Mapping[str, float | None]) -> str:
+    again = failure["recovered_s"]
+    return f"at {failure['stamp_s']:.2f} s, {'not back' if again is None else f'back after {again:.2f} s'}"
 
 
 def _violations(found: Sequence[Mapping[str, Any]] | None) -> str:

@@ -16,6 +16,7 @@ class DiagnosticWords:
     COMPONENT_TRUE = "TRUE"
     COMPONENT_FALSE = "FALSE"
     COMPONENT_RECOVERED = "RECOVERED"
+    REASON = "reason"
     CPU_USAGE = "CPU Usage"
     MEMORY_USAGE = "Memory Usage"
 

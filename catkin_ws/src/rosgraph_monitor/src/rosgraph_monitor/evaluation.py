@@ -12,7 +12,13 @@ from rosgraph_monitor.graph.comparison import NOT_REGISTERED, Scope, compare, ru
 from rosgraph_monitor.graph.findings import Finding, MissingNode, finding_statuses
 from rosgraph_monitor.graph.names import instance, relative, resolved
 from rosgraph_monitor.graph.settling import Look, Settling
-from rosgraph_monitor.health.components import DEFAULT_RECOVERY, ComponentTracker, NodeCondition, component_statuses
+from rosgraph_monitor.health.components import (
+    DEFAULT_RECOVERY,
+    ComponentStatus,
+    ComponentTracker,
+    NodeCondition,
+    component_statuses,
+)
 from rosgraph_monitor.health.liveness import Life
 from rosgraph_monitor.health.topics import TopicVerdict, verdict_statuses
 
@@ -71,6 +77,7 @@ class GraphEvaluator:
         self._settling = Settling(patience.startup, patience.ports)
         self._gone: dict[str, tuple[str, str]] = {}  # how each node that is missing has gone
         self._publisher: dict[str, str] = {}
+        self._reasons: dict[str, str] = {}  # why each component that has failed has done so
         self._last: tuple[tuple[Any, ...], Look] | None = None
 
     def evaluate(
@@ -82,6 +89,7 @@ class GraphEvaluator:
         *,
         topics: Sequence[TopicVerdict] = (),
         others: Mapping[str, NodeCondition] | None = None,
+        reasons: Mapping[str, str] | None = None,
         is_fresh: bool = True,
     ) -> list[Status]:
         """Judge the graph.
@@ -93,6 +101,7 @@ class GraphEvaluator:
             now: wall seconds.
             topics: what is wrong with topics.
             others: conditions of components that other things than nodes and topics tell, by name of the component.
+            reasons: why such a component has failed, by its name.
             is_fresh: whether the snapshot is newer than what is known of the nodes. Else a node that seems dead may
                 have unregistered since, so that the next evaluation says that it has ended.
 
@@ -111,7 +120,10 @@ class GraphEvaluator:
             excused=desired.excused,
             patience=dict.fromkeys(desired.variant_nodes, self._patience.restart),
         )
-        statuses = component_statuses(components)
+        failed = [name for name, status in components if status is ComponentStatus.FALSE]
+        found = {name: self._why(name, conditions, life, topics, reasons or {}, is_fresh) for name in failed}
+        self._reasons = {name: why for name in failed if (why := found[name] or self._reasons.get(name))}
+        statuses = component_statuses(components, self._reasons)
         if desired.problem:
             statuses.append(graph_problem(f"desired model: {desired.problem}"))
         findings = self._findings(snapshot, life, desired, now, is_fresh)
@@ -172,12 +184,38 @@ class GraphEvaluator:
         """Return the finding with the reason: the node has ended, has died, or never came."""
         if not isinstance(finding, MissingNode):
             return finding
-        state, reason = finding.state, finding.reason
-        if (state, reason) == NOT_REGISTERED and self._tracker.has_run(finding.node):
-            state, reason = self._gone.get(finding.node, _ENDED)
-        elif (state, reason) != NOT_REGISTERED and is_fresh:
-            self._gone[finding.node] = state, reason
-        return MissingNode(finding.node, state, reason)
+        return MissingNode(finding.node, *self._how_gone(finding.node, (finding.state, finding.reason), is_fresh))
+
+    def _how_gone(self, node: str, found: tuple[str, str], is_fresh: bool) -> tuple[str, str]:
+        """Return state and reason of a node that is missing, given those that the graph alone tells."""
+        if found == NOT_REGISTERED and self._tracker.has_run(node):
+            return self._gone.get(node, _ENDED)
+        if found != NOT_REGISTERED and is_fresh:
+            self._gone[node] = found
+        return found
+
+    def _why(
+        self,
+        component: str,
+        conditions: Mapping[str, NodeCondition],
+        life: Mapping[str, Life],
+        topics: Sequence[TopicVerdict],
+        reasons: Mapping[str, str],
+        is_fresh: bool,
+    ) -> str:
+        """Return why a component has failed, without figures that change all the time; empty: as before."""
+        key = self._key_of(component)
+        if conditions.get(key) is NodeCondition.GONE:
+            dead = {name: (known.name.lower(), known.value) for name, known in life.items() if known not in _CONDITION}
+            name = instance(resolved(key, self._scope.namespace), dead)
+            _, reason = self._how_gone(key, dead.get(name or "", NOT_REGISTERED), is_fresh)
+            return reason if key == component else f"node {key}: {reason}"
+        if conditions.get(key) is not NodeCondition.FAILED:
+            return ""
+        owners = ((verdict, verdict.spec.component or self._publisher.get(verdict.spec.name)) for verdict in topics)
+        bad = (verdict for verdict, owner in owners if verdict.message and owner in (component, key))
+        told = [f"{verdict.message} {verdict.spec.name} ({_limit(verdict)})" for verdict in bad]
+        return "; ".join([*told, *([reasons[component]] if component in reasons else [])])
 
     def _conditions(self, life: Mapping[str, Life], desired: Desired) -> dict[str, NodeCondition]:
         expected = dict.fromkeys(
@@ -239,3 +277,8 @@ class GraphEvaluator:
 
     def _relative(self, node: str) -> str:
         return relative(node, self._scope.namespace) or node
+
+
+def _limit(verdict: TopicVerdict) -> str:
+    """Return the limit that a topic breaks."""
+    return "no message yet" if verdict.actual == "none" else verdict.expected

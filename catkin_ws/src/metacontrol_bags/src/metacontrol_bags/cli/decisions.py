@@ -8,7 +8,17 @@ from typing import Any
 import click
 
 from metacontrol_bags.bag import BagError, salvage
-from metacontrol_bags.cli.output import BAGS, JSON, console, of_each, printable, show_json, tell_problems
+from metacontrol_bags.cli.output import (
+    BAGS,
+    JSON,
+    NAMESPACE,
+    console,
+    of_each,
+    printable,
+    robot_of,
+    show_json,
+    tell_problems,
+)
 from metacontrol_bags.decision_tables import render
 
 _TOPIC, _EVENTS = "/mros1_reasoner/decision", "/mission/event"
@@ -16,10 +26,11 @@ _TOPIC, _EVENTS = "/mros1_reasoner/decision", "/mission/event"
 
 @click.command()
 @BAGS
+@NAMESPACE
 @JSON
-def decisions(bags: tuple[Path, ...], as_json: bool) -> None:
+def decisions(bags: tuple[Path, ...], namespace: str | None, as_json: bool) -> None:
     """Tell why each adaptation in each BAG was made: causes, candidates, choice and result."""
-    found, status = of_each(bags, _told)
+    found, status = of_each(bags, lambda bag: _told(bag, namespace))
     if as_json:
         show_json([{key: value for key, value in entry.items() if key != "since"} for entry in found])
         raise click.exceptions.Exit(status)
@@ -34,9 +45,9 @@ def decisions(bags: tuple[Path, ...], as_json: bool) -> None:
     raise click.exceptions.Exit(status)
 
 
-def _told(bag: Path) -> dict[str, Any]:
+def _told(bag: Path, namespace: str | None) -> dict[str, Any]:
     """Return the decisions of a bag, each as its last message has it."""
-    found = salvage(bag, (_TOPIC, _EVENTS))
+    found = salvage(bag, (_TOPIC, _EVENTS), robot_of(bag, namespace))
     last = {decision.id: decision for decision in found.record.decisions}
     if not last and not found.record.events:
         lost = f" ({'; '.join(found.problems)})" if found.problems else ""

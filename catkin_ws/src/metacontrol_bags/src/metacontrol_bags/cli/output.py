@@ -15,12 +15,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from metacontrol_bags.bag import BagError, Salvaged, salvage
+from metacontrol_bags.bag import BagError, Salvaged, robots, salvage
 from metacontrol_bags.gaps import gaps, is_mission, nothing_of_a_mission
 from metacontrol_bags.metrics import MetricsError
 
 BAGS = click.argument("bags", metavar="BAG...", nargs=-1, required=True, type=click.Path(path_type=Path))
 JSON = click.option("--json", "as_json", is_flag=True, help="Print a JSON list with an object for each bag.")
+
+NAMESPACE = click.option("--namespace", help="Of the robot, where a bag holds several.")
 
 _REFUSED = 2  # exit status
 _WIDTH = 150  # characters, where the output is no terminal
@@ -48,13 +50,34 @@ def of_each(bags: Iterable[Path], tell: Callable[[Path], Told]) -> tuple[list[To
     return told, status
 
 
-def mission(bag: Path) -> Salvaged:
-    """Read a mission from a bag; a line on stderr says what is missing.
+def robot_of(bag: Path, namespace: str | None) -> str:
+    """Return the namespace of the robot to tell of: the given one, else that of the only robot in a bag.
 
     Raises:
-        BagError: it holds nothing of a mission.
+        BagError: the bag has several robots, or none of this name.
     """
-    found = salvage(bag)
+    known = robots(bag)
+    if namespace is not None:
+        wanted = "/" + namespace.strip("/")
+        if known and wanted not in known:
+            raise BagError(f"{bag}: has no robot in {wanted}, but in {', '.join(known)}: give one of these")
+        return wanted
+    if len(known) > 1 and "/" not in known:
+        raise BagError(f"{bag}: has robots in {', '.join(known)}: choose one by --namespace")
+    return "/" if "/" in known or not known else known[0]
+
+
+def mission(bag: Path, namespace: str | None = None) -> Salvaged:
+    """Read a mission from a bag; a line on stderr says what is missing.
+
+    Args:
+        bag: its file.
+        namespace: of the robot; that of the only one, where it is None.
+
+    Raises:
+        BagError: it holds nothing of a mission, or several robots.
+    """
+    found = salvage(bag, namespace=robot_of(bag, namespace))
     if not is_mission(found.record):
         raise BagError(f"{bag}: {nothing_of_a_mission(found)}")
     tell_problems(bag, gaps(found))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,14 +19,23 @@ if TYPE_CHECKING:
     from ros_model.project.project import Project
 
     from mros1_reasoner.doctor.complaints import Complaint
+    from mros1_reasoner.doctor.facts import SystemFacts
 
 
 @click.command()
 @click.argument("models", default=".", metavar="[FOLDER]")
 @click.option("--master", metavar="URI", help="Address of the ROS master; else $ROS_MASTER_URI.")
 @click.option("--namespace", metavar="NAME", help="Where the robot lives; else $ROS_NAMESPACE, else /.")
+@click.option(
+    "--listen",
+    type=click.FloatRange(min=0.0),
+    default=2.0,
+    show_default=True,
+    metavar="S",
+    help="For so long to topics, to see which are periodic; 0: not.",
+)
 @timeout_option("Patience with the master.")
-def doctor(models: str, master: str | None, namespace: str | None, timeout: float) -> int:
+def doctor(models: str, master: str | None, namespace: str | None, listen: float, timeout: float) -> int:
     """Look at the running system and at the project in FOLDER before the meta-controller starts for the first time.
 
     FOLDER is that of a package with models/, or that of metacontrol.yaml. Each line says what is wrong, where, and the
@@ -38,7 +48,7 @@ def doctor(models: str, master: str | None, namespace: str | None, timeout: floa
     told = _Told()
     project = _checked(folder, told)
     if project is not None:
-        _look(project, master or rosgraph.get_master_uri(), _absolute(namespace), timeout, told)
+        _look(project, master or rosgraph.get_master_uri(), _absolute(namespace), timeout, listen, told)
     click.echo(told.summary())
     return int(told.count > 0)
 
@@ -85,7 +95,7 @@ def _checked(folder: Path, told: _Told) -> Project | None:
     return next(iter(checked.projects), None)
 
 
-def _look(project: Project, master: str, namespace: str, timeout: float, told: _Told) -> None:
+def _look(project: Project, master: str, namespace: str, timeout: float, listen: float, told: _Told) -> None:
     """Tell what is wrong with the package, then with the running system.
 
     Raises:
@@ -104,4 +114,18 @@ def _look(project: Project, master: str, namespace: str, timeout: float, told: _
     except CallError as error:
         raise ModelError(f"{error}: start the robot, or set ROS_MASTER_URI or --master") from error
     system = look_at_system(project, snapshot, namespace, master)
-    told.add_all(system_complaints(project, package, system, scope_of(project)))
+    complaints = system_complaints(project, package, system, scope_of(project))
+    told.add_all([*complaints, *_silences(project, system, master, listen)])
+
+
+def _silences(project: Project, system: SystemFacts, master: str, duration: float) -> list[Complaint]:
+    """Return notes about topics that are not watched, after listening to them."""
+    from mros1_reasoner.doctor.silence import silence_complaints, unwatched_topics
+
+    topics = unwatched_topics(project, system)
+    if not topics or not duration:
+        return []
+    os.environ["ROS_MASTER_URI"] = master
+    from mros1_reasoner.ros.arrivals import listen
+
+    return list(silence_complaints(project, replace(system, arrivals=listen(topics, duration))))

@@ -79,6 +79,7 @@ class SystemFacts:
         lost: node -> its host, whose name does not resolve here.
         launched: how the nodes that variants bring were started, where that is known.
         address: why others can't reach nodes that are started in this shell; empty if they can.
+        arrivals: topic -> when messages came on it, s of ROS time, where that was listened to.
     """
 
     snapshot: GraphSnapshot
@@ -88,3 +89,4 @@ class SystemFacts:
     lost: Mapping[str, str] = field(default_factory=dict)
     launched: Mapping[str, Launched] = field(default_factory=dict)
     address: str = ""
+    arrivals: Mapping[str, tuple[float, ...]] = field(default_factory=dict)

@@ -113,7 +113,7 @@ def _component_errors(view: View, name: str, now: float) -> list[Cause]:
     found = []
     for component in view.analysis.unrealisable.get(design, ()):
         known = view.components.get(component)
-        words = f"component {component}, which {running.design} requires, does not work"
+        words = f"component {component}, which {running.design} requires, {known.failure if known else 'does not work'}"
         stamp = known.stamp if known else now
         found.append(Cause(stamp, f"component:{component}", words, _rules_of(view.kb.designs[design], component)))
     for need in view.kb.designs[design].needs:
@@ -123,7 +123,7 @@ def _component_errors(view: View, name: str, now: float) -> list[Cause]:
             words = f"{words}, which {running.design} needs"
             found.append(Cause(stamp, f"environment:{need.attribute}", words, "E1, E2, E3, S1a"))
     for node in running.failed_nodes:
-        words = f"node {node} of {running.design} does not work"
+        words = f"node {node} of {running.design} {view.components[node].failure}"
         found.append(Cause(view.components[node].stamp, f"component:{node}", words, "S1a"))
     if not found and view.rule_finds(name, v.IN_ERROR_COMPONENT):
         words = f"{view.kb.rules_for(v.IN_ERROR_COMPONENT)} finds an error of a component"

@@ -110,7 +110,7 @@ class Deliberation:
     def _repair_for(self, name: str, design: str, component: str, timing: Timing) -> Decision:
         """Return the decision to repair a component of a design that does not run."""
         known, running = self._state.components.get(component), self._state.running[name].design
-        text = f"component {component}, which {design} requires, does not work"
+        text = f"component {component}, which {design} requires, {known.failure if known else 'does not work'}"
         cause = Cause(known.stamp if known else timing.now, f"component:{component}", text)
         reason = f"{component} is repaired ({self._state.repairs.attempt(component)}) while {running or 'nothing'} runs"
         decision = self._decision(

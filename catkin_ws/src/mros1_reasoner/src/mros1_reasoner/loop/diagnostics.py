@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from actionlib_msgs.msg import GoalStatus
@@ -27,6 +27,7 @@ TASK_KEYS = ("objetive_error", "objective_error")
 """Keys with which a "QA status" says that a task failed; the published observer of /obj_error writes the first."""
 _FAILED = (GoalStatus.ABORTED, GoalStatus.REJECTED, GoalStatus.LOST)
 _SHOWN = 60  # characters of foreign text in a warning
+_LONGEST_REASON = 200  # characters
 _OPEN = ("level", "binding", "task", "drift")  # facts with a foreign name
 _EXPECTED = "expected/"  # before the name of a wrong parameter, in the key of the value that it should have
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
@@ -109,6 +110,7 @@ class DiagnosticsReader:
                         remarks[found] = None
                 case _:
                     key = subject(found)
+                    found = _with_reason(found, facts.get(key))
                     if facts.pop(key, None) is None and key[0] in _OPEN:
                         names += 1
                     if names <= self.MAX_NAMES or key[0] not in _OPEN:
@@ -147,7 +149,8 @@ class DiagnosticsReader:
         if not key or text not in v.COMPONENT_STATUSES:
             say = f"Component status ({shown(key)}, {shown(value)}) is left out: expected (component, "
             return Remark(Words.COMPONENT_STATUS, say + "TRUE|FALSE|RECOVERED)")
-        return self._known(key, text, stamp)
+        why = next((value.value for value in status.values[1:] if value.key == Words.REASON), "")
+        return self._known(key, text, stamp, _plain(why.strip(), _LONGEST_REASON) if text == v.FAILED else "")
 
     def _missing(self, status: Any, stamp: float) -> Fact | Remark | None:
         if _level(status) < DiagnosticStatus.ERROR:
@@ -164,12 +167,12 @@ class DiagnosticsReader:
             return None  # it belongs to nothing that can be deployed again
         return DriftFact(status.name.strip("/"), _plain(",".join(wrong)), ",".join(names), stamp)
 
-    def _known(self, name: str, status: str, stamp: float) -> Fact | Remark:
+    def _known(self, name: str, status: str, stamp: float, reason: str = "") -> Fact | Remark:
         component = name if name in self._components else name.strip("/")
         if component not in self._components:  # nothing in the model requires it
             say = f"component {_plain(name)} is not in the model: its status is left out"
             return Remark("unknown component", say, is_warning=False)
-        return ComponentFact(component, status, stamp)
+        return ComponentFact(component, status, stamp, reason)
 
     @staticmethod
     def _binding(status: Any, _stamp: float) -> Fact | Remark:
@@ -184,14 +187,21 @@ def newest_goal(statuses: Any) -> tuple[str, bool] | None:
     return None if newest is None else (newest.goal_id.id, newest.status in _FAILED)
 
 
-def shown(text: str) -> str:
+def shown(text: str, longest: int = _SHOWN) -> str:
     """Return foreign text in quotes, shortened, on one line."""
-    return repr(text if len(text) <= _SHOWN else text[:_SHOWN] + "...")
+    return repr(text if len(text) <= longest else text[:longest] + "...")
 
 
-def _plain(text: str) -> str:
+def _plain(text: str, longest: int = _SHOWN) -> str:
     """Return foreign text unchanged if it is short and printable, else as `shown`."""
-    return text if len(text) <= _SHOWN and text.isprintable() else shown(text)
+    return text if len(text) <= longest and text.isprintable() else shown(text, longest)
+
+
+def _with_reason(fact: Fact, earlier: Fact | None) -> Fact:
+    """Return a fact; one that a component has failed keeps the reason that an earlier one had."""
+    if isinstance(fact, ComponentFact) and isinstance(earlier, ComponentFact) and fact.status == earlier.status:
+        return replace(fact, reason=fact.reason or earlier.reason)
+    return fact
 
 
 def _task(name: str, key: str, value: str, stamp: float) -> Fact | Remark:

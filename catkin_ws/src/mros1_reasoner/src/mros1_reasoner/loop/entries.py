@@ -37,11 +37,12 @@ class StaleFact:
 
 @dataclass(frozen=True)
 class ComponentFact:
-    """A component has a status; the diagnostic has a stamp, s."""
+    """A component has a status; the diagnostic has a stamp, s, and may tell why the component has failed."""
 
     component: str
     status: str
     stamp: float = 0.0
+    reason: str = ""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@
 |---|---|
 | level | quality, level, grounding, stamp of the diagnostic |
 | stale | quality |
-| component | component, status, stamp of the diagnostic |
+| component | component, status, stamp of the diagnostic, and, if it is known, why it has failed |
 | drift | node, parameters, configurations that set them, stamp of the diagnostic |
 | binding | grounding, in error |
 | task | objective or its function, failed, stamp, message; any other name means the only root objective |
@@ -74,6 +74,8 @@ def values_of(content: entries.Content) -> tuple[str, ...]:
             return (name, function, *_limit_texts(limits))
         case entries.Pursue(name, function, limits, improve):
             return (name, function, "" if improve is None else _text(improve), *_limit_texts(limits))
+        case entries.ComponentFact(component, status, stamp, reason=""):
+            return (component, status, _text(stamp))
     return tuple(_text(getattr(content, name)) for name, _ in _written(type(content)))
 
 
@@ -97,6 +99,8 @@ def read_entry(now: float, kind: str, values: Sequence[str]) -> entries.Entry:
         improve = values[2] == _YES if values[2] else None
         return entries.Entry(now, entries.Pursue(values[0], values[1], _limits(values[3:]), improve))
     written = _written(content)
+    if content is entries.ComponentFact and len(values) == len(written) - 1:
+        values = (*values, "")
     is_without = not values and content in (entries.Lock, entries.Unlock)
     if len(values) != len(written) and not is_without:
         raise unfit

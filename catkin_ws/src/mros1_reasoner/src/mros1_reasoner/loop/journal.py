@@ -42,7 +42,7 @@ def apply(core: Mape, entry: Entry) -> list[Decision]:
         case entries.StaleFact():
             core.observe_stale(content.quality)
         case entries.ComponentFact():
-            core.observe_component(now, content.component, content.status, content.stamp)
+            core.observe_component(now, content.component, content.status, content.stamp, content.reason)
         case entries.DriftFact():
             core.observe_drift(now, content.node, content.parameters, content.configurations.split(","), content.stamp)
         case entries.BindingFact():

@@ -167,8 +167,8 @@ class Mape:
         for limit in self._kb.limits_by(quality):
             self._state.forget_levels(limit)
 
-    def observe_component(self, now: float, component: str, status: str, stamp: float = 0.0) -> None:
-        """Take in the status of a component; TRUE after FALSE counts as RECOVERED.
+    def observe_component(self, now: float, component: str, status: str, stamp: float = 0.0, reason: str = "") -> None:
+        """Take in the status of a component, and why it has failed; TRUE after FALSE counts as RECOVERED.
 
         Raises:
             MapeError: the component or the status is unknown.
@@ -186,7 +186,9 @@ class Mape:
         if status == v.RECOVERED and component in self._kb.own_nodes:
             status = v.WORKS  # no design waits for it
         if known is None or status != before:
-            self._state.note_component(now, component, status, stamp or now)
+            self._state.note_component(now, component, status, stamp or now, reason)
+        elif reason:
+            self._state.note_reason(component, reason)
 
     def observe_drift(
         self, now: float, node: str, parameters: str, configurations: Collection[str], stamp: float = 0.0

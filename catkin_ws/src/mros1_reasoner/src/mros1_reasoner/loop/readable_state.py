@@ -32,10 +32,16 @@ class MapeError(Exception):
 
 @dataclass(frozen=True)
 class Component:
-    """The last status of a component, and the stamp of the diagnostic that reported it first."""
+    """The last status of a component, the stamp of the diagnostic that reported it first, and why it has failed."""
 
     status: str
     stamp: float
+    reason: str = ""
+
+    @property
+    def failure(self) -> str:
+        """That it does not work, in words, and why, if that is known."""
+        return f"does not work ({self.reason})" if self.reason else "does not work"
 
 
 @dataclass(frozen=True)

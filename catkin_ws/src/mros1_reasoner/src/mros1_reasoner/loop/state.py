@@ -125,12 +125,12 @@ class State(View):
         """Forget the levels of a quality."""
         self.levels.forget(quality=quality)
 
-    def note_component(self, now: float, name: str, status: str, stamp: float) -> None:
-        """Note another status of a component."""
+    def note_component(self, now: float, name: str, status: str, stamp: float, reason: str = "") -> None:
+        """Note another status of a component, and why it has failed."""
         known = self.components.get(name)
         if known and known.status == v.FAILED != status:
             self._mute_what_requires(now, name)
-        self.components[name] = Component(status, stamp)
+        self.components[name] = Component(status, stamp, reason)
         self.repairs.note(now, name, works=status != v.FAILED)
 
     def _mute_what_requires(self, now: float, component: str) -> None:
@@ -140,6 +140,10 @@ class State(View):
             if design and component in {*design.components, *design.nodes, *design.bindings.values()}:
                 self._run(name, calm_until=max(running.calm_until, now + self.settings.cool_down))
                 self.levels.forget(name)
+
+    def note_reason(self, name: str, reason: str) -> None:
+        """Note another reason why a component has failed, whose status stays as it is."""
+        self.components[name] = replace(self.components[name], reason=reason)
 
     def note_drift(self, now: float, name: str, node: str, parameters: str, stamp: float) -> None:
         """Note that parameters of what runs for an objective have drifted; while it changes, that tells nothing."""

@@ -85,6 +85,7 @@ class ReasonerNode:
         self._goals: dict[str, tuple[str, bool]] = {}  # newest goal of an objective's task, and whether it failed
         self._journal = JournalTopic(name, parameters, knowledge_base.files)
         self._decisions = DecisionTopic()
+        self._decisions.offer_last()
         self._requests = None
         self._repairs = None
         if parameters.asks and not settings.dry_run:

@@ -1,4 +1,4 @@
-"""`rosrun rosgraph_manipulator status`: what runs, and how the last change went."""
+"""`rosrun rosgraph_manipulator status`: what runs, how the last change went, and which components have failed."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from rosgraph_manipulator.ros import client
 
 @click.command(context_settings=HELP)
 def status() -> None:
-    """Print what runs, and how the last change went."""
+    """Print what runs, how the last change went, and which components have failed."""
     client.join_or_refuse("status")
+    monitor = client.MonitorListener()
     active, launchers = client.active_configuration(), client.launched_functions()
     if active is None and not launchers:
         raise client.ClientError("neither manipulator nor launcher answers: start manipulator.launch")
@@ -26,6 +27,8 @@ def status() -> None:
         of = "" if len(launchers) == 1 else f" of {name}"
         lines = process_lines(launcher.functions)
         click.echo("\n".join([f"processes{of}:{'' if lines else ' none'}", *lines]))
+    for line in failure_lines(monitor.failed()):
+        click.echo(line)
 
 
 def function_lines(active: ActiveConfiguration, failures: Mapping[str, str]) -> list[str]:
@@ -43,6 +46,12 @@ def function_lines(active: ActiveConfiguration, failures: Mapping[str, str]) -> 
         is_told = active.message and (active.message in reason or reason in active.message)
         lines += [f"{function}: {state}", *([f"  {reason}"] if reason and not is_told else [])]
     return lines
+
+
+def failure_lines(failed: Mapping[str, str]) -> list[str]:
+    """Return the components that have failed, in lines, each with the reason where it is known."""
+    lines = [f"  {name}{f': {reason}' if reason else ''}" for name, reason in sorted(failed.items())]
+    return ["failed components:", *lines] if lines else []
 
 
 def process_lines(functions: Iterable[LaunchedFunction]) -> list[str]:

@@ -14,6 +14,8 @@ import rosgraph
 import rospy
 from actionlib import CommState
 from actionlib_msgs.msg import GoalID, GoalStatus
+from diagnostic_msgs.msg import DiagnosticArray
+from metacontrol_bags import ownership
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
     ChangeFunctionAction,
@@ -22,6 +24,7 @@ from metacontrol_msgs.msg import (
     MvpReconfigurationAction,
     MvpReconfigurationGoal,
 )
+from metacontrol_msgs.msg import DiagnosticWords as Words
 from node_kit.io.background import in_background
 from node_kit.io.xml_rpc import CallError, GoneError
 from node_kit.ros import command
@@ -38,6 +41,8 @@ FIND_TIMEOUT = 5.0  # s, wall, to find the manipulator
 _HEAR_PERIOD = 0.01  # s, wall, between two looks at what launchers have told
 _LOOK_PERIOD = 0.1  # s, wall, after which a shutdown is seen
 NODE = "rosgraph_manipulator"
+_MONITOR = "rosgraph_monitor"
+_MONITOR_TIMEOUT = 2.0  # s, wall, for a look of the monitor at the graph
 
 
 class ClientError(Exception):
@@ -179,6 +184,43 @@ def launched_functions() -> dict[str, LaunchedFunctions]:
         time.sleep(_HEAR_PERIOD)
     subscriber.unregister()
     return dict(sorted(found.items()))
+
+
+class MonitorListener:
+    """Hears from the monitor which components have failed."""
+
+    def __init__(self) -> None:
+        """Subscribe: the monitor tells at each of its looks at the graph."""
+        self._failed: dict[str, str] | None = None
+        self._subscriber = rospy.Subscriber(ownership.TOPIC, DiagnosticArray, self._receive, queue_size=100)
+
+    def failed(self) -> dict[str, str]:
+        """Return the components that have failed, and why as far as it is known; none where no monitor tells.
+
+        Raises:
+            ClientError: the master does not answer.
+        """
+        name = rospy.resolve_name(_MONITOR)
+        try:
+            runs = name in publishers(self._subscriber.resolved_name) and NodeApi.answer(name) is not None
+        except CallError as error:
+            raise ClientError(str(error)) from error
+        deadline = time.monotonic() + _MONITOR_TIMEOUT
+        while runs and self._failed is None and time.monotonic() < deadline:
+            time.sleep(_HEAR_PERIOD)
+        self._subscriber.unregister()
+        return self._failed or {}
+
+    def _receive(self, message: DiagnosticArray) -> None:
+        publisher = message._connection_header["callerid"]
+        told = [status for status in message.status if status.message == Words.COMPONENT_STATUS and status.values]
+        if told and publisher == rospy.resolve_name(_MONITOR):
+            values = {status.values[0].key: status.values for status in told}
+            self._failed = {
+                name: next((pair.value for pair in pairs[1:] if pair.key == Words.REASON), "")
+                for name, pairs in values.items()
+                if pairs[0].value == Words.COMPONENT_FALSE
+            }
 
 
 def _latest(topic: str, kind: Any) -> Any:

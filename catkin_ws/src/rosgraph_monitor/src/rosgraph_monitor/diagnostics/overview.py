@@ -56,7 +56,8 @@ class Overview:
             level = _level(status)
             first = status.values[0] if status.values else None
             if status.message == Words.COMPONENT_STATUS and first:
-                self.components[first.key] = _Row(now, level, first.value)
+                why = next((value.value for value in status.values[1:] if value.key == Words.REASON), "")
+                self.components[first.key] = _Row(now, level, f"{first.value}: {why}" if why else first.value)
             elif status.message in (Words.QA_STATUS, Words.QA_STALE) and first:
                 self.qualities[first.key] = _Row(now, level, first.value)
             elif status.message in (Words.CPU_USAGE, Words.MEMORY_USAGE) and first:

@@ -38,12 +38,12 @@ class StatusText:
     def take_diagnostics(self, message: Any) -> None:
         """Take a diagnostic_msgs/DiagnosticArray."""
         for status in message.status:
-            for pair in status.values:
+            for number, pair in enumerate(status.values):
                 if status.message == DiagnosticWords.QA_STATUS:
                     self._take_level(pair.key, pair.value)
                 elif status.message == DiagnosticWords.QA_STALE:
                     self._levels[pair.key] = None
-                elif status.message == DiagnosticWords.COMPONENT_STATUS:
+                elif status.message == DiagnosticWords.COMPONENT_STATUS and number == 0:
                     (self._failed.add if pair.value == DiagnosticWords.COMPONENT_FALSE else self._failed.discard)(
                         pair.key
                     )

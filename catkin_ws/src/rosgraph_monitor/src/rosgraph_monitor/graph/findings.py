@@ -124,7 +124,7 @@ def finding_statuses(
 def _status(finding: MissingNode | AdditionalNode | PortFinding) -> Status:
     match finding:
         case MissingNode(node, state, reason):
-            values = (("reason", reason), ("expected", "running"), ("actual", state))
+            values = ((str(Words.REASON), reason), ("expected", "running"), ("actual", state))
             return Status(Level.ERROR, node, Words.MISSING_NODE, values)
         case AdditionalNode(node):
             return Status(Level.WARN, node, Words.ADDITIONAL_NODE, (("expected", "not running"), ("actual", "running")))

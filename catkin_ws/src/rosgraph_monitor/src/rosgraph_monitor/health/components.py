@@ -212,14 +212,22 @@ class ComponentTracker:
         return replace(before, absent_since=since), None
 
 
-def component_statuses(components: Iterable[tuple[str, ComponentStatus]]) -> list[Status]:
-    """Return the statuses of components in the published form."""
+def component_statuses(
+    components: Iterable[tuple[str, ComponentStatus]], reasons: Mapping[str, str] | None = None
+) -> list[Status]:
+    """Return the statuses of components in the published form.
+
+    Args:
+        components: name and status of each.
+        reasons: why a component has failed, by its name.
+    """
+    why = reasons or {}
     return [
         Status(
             Level.ERROR if status is ComponentStatus.FALSE else Level.OK,
             component,
             Words.COMPONENT_STATUS,
-            ((component, status.value),),
+            ((component, status.value), *(((Words.REASON, why[component]),) if component in why else ())),
         )
         for component, status in components
     ]

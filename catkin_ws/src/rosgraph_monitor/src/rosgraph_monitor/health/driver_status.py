@@ -28,16 +28,31 @@ class DriverStatuses:
         """
         self._names = dict(names)
         self._heard: dict[str, dict[str, NodeCondition]] = {component: {} for component in names}
+        self._errors: dict[str, str] = {}  # what each status that is an error said when it became one
 
     @property
     def conditions(self) -> dict[str, NodeCondition]:
         """The condition of each component; UNKNOWN until something was heard."""
         return {component: _worst(heard.values()) for component, heard in self._heard.items()}
 
-    def take(self, name: str, level: int) -> bool:
+    @property
+    def reasons(self) -> dict[str, str]:
+        """What the drivers say of each component that has failed."""
+        return {
+            component: "; ".join(self._errors[name] for name in sorted(heard) if heard[name] is NodeCondition.FAILED)
+            for component, heard in self._heard.items()
+            if _worst(heard.values()) is NodeCondition.FAILED
+        }
+
+    def take(self, name: str, level: int, message: str = "") -> bool:
         """Take a status; return whether the condition of a component has changed.
 
         A stale status changes nothing: whoever says so knows no more either.
+
+        Args:
+            name: of the status.
+            level: of the status.
+            message: its text. Of an error, the first one is kept, because numbers in it may change all the time.
         """
         name = name.lstrip("/")
         condition = _CONDITIONS.get(level)
@@ -47,6 +62,8 @@ class DriverStatuses:
         for component, wanted in self._names.items():
             if name == wanted or name.partition(":")[0].rstrip() == wanted:
                 before = _worst(self._heard[component].values())
+                if condition is NodeCondition.FAILED and self._heard[component].get(name) is not condition:
+                    self._errors[name] = f"its driver says {name}: {message}" if message else f"error of {name}"
                 self._heard[component][name] = condition
                 changed |= _worst(self._heard[component].values()) is not before
         return changed

@@ -18,7 +18,8 @@ class DiagnosticsTopic:
     """Publishes statuses of the robot in this node's namespace.
 
     Attributes:
-        robot: the hardware_id of statuses that name no other hardware.
+        robot: the hardware_id of statuses that name no other hardware. In a namespace, all statuses get it, also
+            those of observers, which name themselves: in a bag that is played, nothing else tells whose they are.
     """
 
     def __init__(self) -> None:
@@ -33,7 +34,7 @@ class DiagnosticsTopic:
             rospy.ROSException: the node ends.
         """
         for status in statuses:
-            status.hardware_id = status.hardware_id or self.robot
+            status.hardware_id = ownership.marked(status.hardware_id, rospy.get_namespace())
         array = DiagnosticArray(status=list(statuses))
         array.header.stamp = stamp
         self._publisher.publish(array)

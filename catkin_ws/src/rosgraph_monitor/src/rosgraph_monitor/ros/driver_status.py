@@ -38,6 +38,11 @@ class DriverStatusListener:
         """The condition of each component."""
         return self._statuses.conditions
 
+    @property
+    def reasons(self) -> dict[str, str]:
+        """What the drivers say of each component that has failed."""
+        return self._statuses.reasons
+
     def _receive(self, msg: Any) -> None:
         publisher = msg._connection_header.get("callerid", "")
         try:
@@ -45,6 +50,6 @@ class DriverStatusListener:
         except (TypeError, genpy.DeserializationError) as error:
             rospy.logwarn_throttle(10.0, f"{TOPIC}: {error}: left out")
             return
-        changes = [self._statuses.take(s.name, s.level) for s in own(msg.status, self._namespace, publisher)]
+        changes = [self._statuses.take(s.name, s.level, s.message) for s in own(msg.status, self._namespace, publisher)]
         if any(changes):
             self._on_change()

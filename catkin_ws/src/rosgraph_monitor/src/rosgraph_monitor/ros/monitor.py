@@ -185,6 +185,7 @@ class MonitorNode:
             now,
             topics=verdicts,
             others={**self._batteries.conditions, **self._drivers.conditions},
+            reasons={**self._batteries.reasons, **self._drivers.reasons},
             is_fresh=is_fresh,
         )
         if now >= self._observers_due:

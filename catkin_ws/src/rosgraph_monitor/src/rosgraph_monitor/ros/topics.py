@@ -115,10 +115,17 @@ class BatteryListener:
         """Subscribe to the batteries' topics; `on_change` is called when a condition changes."""
         self._on_change = on_change
         self.conditions: dict[str, NodeCondition] = {}
+        specs = tuple(specs)
+        self._low = {spec.component: f"the charge on {spec.topic} is below {spec.below:g}" for spec in specs}
         self._subscribers = []
         for spec in specs:
             self.conditions[spec.component] = NodeCondition.UNKNOWN
             self._subscribers.append(rospy.Subscriber(spec.topic, BatteryState, self._receive, spec, queue_size=1))
+
+    @property
+    def reasons(self) -> dict[str, str]:
+        """Why each component that has failed has done so."""
+        return {name: self._low[name] for name, found in self.conditions.items() if found is NodeCondition.FAILED}
 
     def _receive(self, msg: Any, spec: BatterySpec) -> None:
         try:
