@@ -14,6 +14,7 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_msgs.msg import ActiveConfiguration, Decision
+from std_srvs.srv import Trigger
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 PARTS = ("rosgraph_monitor", "reasoner", "rosgraph_manipulator", "rosgraph_launcher")
@@ -26,7 +27,7 @@ class PartsTest(unittest.TestCase):
         rospy.init_node("parts_test")
 
     def setUp(self):
-        self.active, self.executed, self.told = {}, {}, []
+        self.active, self.executed, self.refused, self.told = {}, {}, [], []
         for robot in ("/amber", "/basil"):
             rospy.Subscriber(
                 f"{robot}/rosgraph_manipulator/active_configuration", ActiveConfiguration, self.take_active, robot
@@ -50,11 +51,22 @@ class PartsTest(unittest.TestCase):
         self.active[robot] = [(f.configuration, f.state) for f in message.functions]
 
     def take_decision(self, decision, robot):
+        if decision.state == "FAILED":
+            self.refused.append(decision.explanation)
         if decision.state == "EXECUTED":
             self.executed.setdefault(robot, []).append(decision.to_configuration)
 
     def take(self, array):
         self.told += [(s.name, s.level) for s in array.status if s.message == MESSAGE]
+
+    def ask(self, service):
+        return rospy.ServiceProxy(f"/amber/reasoner/{service}", Trigger)()
+
+    def locks_all(self):
+        try:
+            return self.ask("lock").success
+        except rospy.ServiceException:
+            return False
 
     def process_of(self, node):
         """Return the process of a node, 0 where none answers."""
@@ -70,8 +82,12 @@ class PartsTest(unittest.TestCase):
             node = f"/amber/{part}"
             wait_for(lambda node=node: self.process_of(node), f"{node} runs")
             dead = self.process_of(node)
-            rospy.sleep(1.0)  # not a condition: signs of life of all parts have gone out by then, as in any running system
+            rospy.sleep(
+                1.0
+            )  # not a condition: signs of life of all parts have gone out by then, as in any running system
             self.told.clear()
+            if part == "reasoner":
+                wait_for(self.locks_all, "the reasoner is locked")
             os.kill(dead, signal.SIGKILL)
             wait_for(lambda node=node: (node, 2) in self.told, f"somebody tells that {node} is lost")
             wait_for(lambda node=node: (node, 0) in self.told, f"somebody tells that {node} is there again")
@@ -79,12 +95,13 @@ class PartsTest(unittest.TestCase):
         self.assertFalse([node for node, _ in self.told if node.startswith("/basil")])
         wait_for(lambda: self.active["/amber"] == frugal, "amber talks")
         os.kill(self.process_of("/amber/talker"), signal.SIGSTOP)
+        wait_for(lambda: any("locked by the operator" in d for d in self.refused), "the second reasoner is locked, too")
+        self.ask("unlock")
         wait_for(lambda: "fast" in self.executed.get("/amber", []), "amber adapts")
         self.assertNotIn("/basil", self.executed)
 
     def test_part_that_is_asked_to_end_is_not_lost(self):
         wait_for(lambda: len(self.active) == 2, "both robots are told of")
-        dead = self.process_of("/basil/reasoner")
         wait_for(lambda: self.process_of("/basil/reasoner"), "the reasoner runs")
         dead = self.process_of("/basil/reasoner")
         self.told.clear()

@@ -3,7 +3,8 @@
 import pytest
 from node_kit.parts import HANGS_AFTER, SILENCE, Answer, Parts, Sign
 
-MONITOR, REASONER = Sign("/greenhouse/rosgraph_monitor", "monitor", "http://a:1"), Sign("/greenhouse/reasoner", "reasoner", "http://a:2")
+MONITOR = Sign("/greenhouse/rosgraph_monitor", "monitor", "http://a:1")
+REASONER = Sign("/greenhouse/reasoner", "reasoner", "http://a:2")
 
 
 @pytest.fixture

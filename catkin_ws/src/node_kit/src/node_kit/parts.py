@@ -1,7 +1,7 @@
 """Nodes that watch over each other: which parts of a system are lost, and which of the others tells it.
 
-Each part gives a sign of life now and then. One that gives none is asked, and lost when it does not answer. Of the parts
-that are left, the first one tells. Times are wall s of one clock.
+Each part gives a sign of life now and then. One that gives none is asked, and lost when it does not answer. Of the
+parts that are left, the first one tells. Times are wall s of one clock.
 """
 
 from __future__ import annotations
@@ -106,8 +106,8 @@ class Parts:
     def to_tell(self) -> dict[str, str]:
         """Return what one's own part is to tell: the nodes that are lost, and why; empty for those that are back.
 
-        The first by name of those that are left tells of a loss. Who has told it tells the return, once: a node that has
-        just come back knows nothing yet.
+        The first by name of those that are left tells of a loss. Who has told it tells the return, once: a node that
+        has just come back knows nothing yet.
         """
         lost = self.lost()
         returned = dict.fromkeys(sorted(self._told - lost.keys()), "")

@@ -67,6 +67,11 @@ class Parameters:
         return Path(given or rospkg.get_ros_home()).expanduser().resolve()
 
     @property
+    def asked(self) -> object:
+        """What an operator had asked of a reasoner of this name that has died, as `loop.asked` writes it."""
+        return self.values.get("asked")
+
+    @property
     def nodes(self) -> dict[str, str]:
         """Component by node, from `~components`: {component: {node: name}}."""
         return {

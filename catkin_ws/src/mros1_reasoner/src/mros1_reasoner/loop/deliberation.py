@@ -376,7 +376,7 @@ class Deliberation:
         return ""
 
     def _implausible(self, name: str, now: float) -> frozenset[str]:
-        """Return qualities whose levels are further from the expected ones than a cause that all designs share explains.
+        """Return qualities whose levels are further from the expected ones than a shared cause explains.
 
         Where the usual level is known, rare peaks may be as high as they like.
         """

@@ -57,8 +57,8 @@ class Situation:
         desired: name of the design that is taken first, if it keeps every limit, or if no design does.
         observed: levels that were observed with the deployed design; they replace its expected levels.
         corrections: of the expected levels of a quality, for a group of designs.
-        implausible: qualities of which levels of the deployed design are further from the expected ones than the greatest
-            correction explains.
+        implausible: qualities of which levels of the deployed design are further from the expected ones than the
+            greatest correction explains.
         worth: by how much better another design must keep a limit, or less violate limits, as a share of a limit; less
             is no difference.
         relief: distance by which another design is to keep the limit of a quality, if one does: the limit is violated,

@@ -23,6 +23,7 @@ from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.loop import entries, journal
+from mros1_reasoner.loop.asked import Asked
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark, newest_goal
 from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Released, Result, StaleFact, Step, TaskFact
 from mros1_reasoner.loop.entry_text import kind_of, values_of
@@ -42,6 +43,8 @@ _FASTEST = 10.0  # ROS time may run so much faster than wall time
 _LONGEST_WAIT = 1.0  # s, wall, until it is seen that somebody has asked the node to end
 _QUEUE = 1000  # diagnostics that wait at most
 _ANSWER_DEADLINE = 60.0  # s, wall, for a service; an analysis may have to start Pellet again
+
+_ASKED = "~asked"  # the parameter that keeps what an operator has asked for
 
 _T = TypeVar("_T")
 
@@ -101,10 +104,12 @@ class ReasonerNode:
             )
         self._listen(parameters.task_actions)
         self._services = Services(self, parameters.save_folder)
-        self._asked = Goals(self.core, self.command)
-        self._tasks = ObjectiveAction(self._asked, self._inbox.put, self._log.tell)
+        self._asked = Asked()
+        self._goals_asked = Goals(self.core, lambda command: self.command(command, lasts=False))
+        self._tasks = ObjectiveAction(self._goals_asked, self._inbox.put, self._log.tell)
         for objective in objectives:
             self._log.tell_objective(objective)
+        self._take_up(Asked.from_parameter(parameters.asked))
         self._log.tell("Reasoner Initialization Ok")
 
     def _listen(self, task_actions: dict[str, str]) -> None:
@@ -145,7 +150,7 @@ class ReasonerNode:
         """Return the wall time of the next look at what the core or a request waits for."""
         ros_now, request = rospy.get_time(), self._requests.next_look if self._requests else math.inf
         request = min(request, self._repairs.next_look if self._repairs else math.inf)
-        times = [moment for moment in (self.core.due(ros_now), self._asked.due()) if moment is not None]
+        times = [moment for moment in (self.core.due(ros_now), self._goals_asked.due()) if moment is not None]
         if not times:
             return request
         return min(request, time.monotonic() + max(_TIMER_PERIOD, (min(times) - ros_now) / _FASTEST))
@@ -161,18 +166,35 @@ class ReasonerNode:
         """
         return self._inbox.call(work, _ANSWER_DEADLINE)
 
-    def command(self, command: entries.Command) -> None:
+    def _take_up(self, asked: Asked) -> None:
+        """Carry out what was asked of a reasoner of this name that has died."""
+        for command in asked.commands:
+            if isinstance(command, entries.RemoveObjective) and command.name not in self.core.roots:
+                continue
+            try:
+                self.command(command)
+            except (MapeError, KnowledgeBaseError, ReasonerError) as error:
+                self._log.warn(kind_of(command), f"asked of the reasoner before, left out: {error}")
+
+    def command(self, command: entries.Command, *, lasts: bool = True) -> None:
         """Apply an operator's command in the loop's thread.
+
+        Args:
+            command: what to do.
+            lasts: whether it holds also for a reasoner that takes this one's place; a goal ends with its server.
 
         Raises:
             MapeError, ReasonerError: it does not fit.
         """
         self._announce(self._applied(command))
+        if lasts:
+            self._asked.heed(command)
+            rospy.set_param(_ASKED, self._asked.as_parameter())
         self._log.tell(f"operator: {' '.join((kind_of(command), *values_of(command)))}".strip())
         if isinstance(command, entries.AddObjective):
             self._log.tell_objective(self.core.objectives[command.name])
         elif isinstance(command, entries.SetNfr):
-            self._asked.heed_limit(command.objective, command.quality, command.limit)
+            self._goals_asked.heed_limit(command.objective, command.quality, command.limit)
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         publisher = array._connection_header.get("callerid", "")
@@ -247,7 +269,7 @@ class ReasonerNode:
         """Publish decisions, and have carried out those that need it."""
         for decision in decisions:
             self._decisions.publish(decision)
-            self._asked.heed_decision(decision)
+            self._goals_asked.heed_decision(decision)
             self._log.tell_decision(decision)
             if decision.repair:
                 self._heed_repair(decision)

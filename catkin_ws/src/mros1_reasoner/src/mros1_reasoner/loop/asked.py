@@ -1,0 +1,67 @@
+"""What an operator has asked for and still holds: a reasoner that takes the place of one that died begins with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from mros1_reasoner.loop import entries
+from mros1_reasoner.loop.entries import Command
+from mros1_reasoner.loop.entry_text import kind_of, read_entry, values_of
+
+
+class Asked:
+    """The commands that still hold, in the order in which they came; a later one replaces what it takes back."""
+
+    def __init__(self, commands: Iterable[Command] = ()) -> None:
+        """Begin with the commands that hold already."""
+        self._commands: list[Command] = []
+        for command in commands:
+            self.heed(command)
+
+    @property
+    def commands(self) -> tuple[Command, ...]:
+        """The commands that hold."""
+        return tuple(self._commands)
+
+    def heed(self, command: Command) -> None:
+        """Take in a command that was carried out."""
+        if isinstance(command, entries.Approve | entries.Reject):
+            return
+        self._commands = [before for before in self._commands if not _replaces(command, before)]
+        if not isinstance(command, entries.Resume | entries.Unlock):
+            self._commands.append(command)
+        elif isinstance(command, entries.Unlock) and any(isinstance(c, entries.Lock) for c in self._commands):
+            self._commands.append(command)  # all are locked but this one
+
+    def as_parameter(self) -> list[list[str]]:
+        """Return the commands as a value of a parameter: of each, its kind and values."""
+        return [[kind_of(command), *values_of(command)] for command in self._commands]
+
+    @classmethod
+    def from_parameter(cls, value: object) -> Asked:
+        """Return the commands that a parameter has; those that can't be read are left out."""
+        found: list[Command] = []
+        for item in value if isinstance(value, Sequence) and not isinstance(value, str) else ():
+            if not isinstance(item, list) or not item:
+                continue
+            try:
+                content = read_entry(0.0, str(item[0]), [str(part) for part in item[1:]]).content
+            except ValueError:
+                continue
+            if isinstance(content, Command):
+                found.append(content)
+        return cls(found)
+
+
+def _replaces(command: Command, before: Command) -> bool:
+    """Return whether a command makes one before it void."""
+    match command, before:
+        case entries.Pause() | entries.Resume(), entries.Pause():
+            return True
+        case entries.Lock(name) | entries.Unlock(name), entries.Lock(other) | entries.Unlock(other):
+            return name in ("", other)
+        case entries.SetNfr(name, quality, _), entries.SetNfr(other, same, _):
+            return quality == same and name in ("", other)
+        case entries.RemoveObjective(name), _:
+            return name in (getattr(before, "objective", ""), getattr(before, "name", ""))
+    return False

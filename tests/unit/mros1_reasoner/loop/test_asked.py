@@ -1,0 +1,50 @@
+"""What an operator has asked for and still holds."""
+
+import pytest
+from mros1_reasoner.loop.asked import Asked
+from mros1_reasoner.loop.entries import (
+    AddObjective,
+    Approve,
+    Lock,
+    Pause,
+    RemoveObjective,
+    Resume,
+    SetNfr,
+    Unlock,
+)
+
+WATER = AddObjective("o_water", "f_water", {"flow": 2.0})
+FLOW = SetNfr("", "flow", 1.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "holds"),
+    [
+        ([Pause(), Pause()], [Pause()]),
+        ([Pause(), Resume()], []),
+        ([Approve("decision-3")], []),
+        ([Lock("o_water"), Lock("o_light"), Unlock("o_water")], [Lock("o_light"), Unlock("o_water")]),
+        ([Lock("o_water"), Unlock("o_water")], []),
+        ([Lock(), Unlock("o_water")], [Lock(), Unlock("o_water")]),
+        ([Lock("o_water"), Lock(), Unlock()], []),
+        ([FLOW, SetNfr("o_water", "flow", 3.0)], [FLOW, SetNfr("o_water", "flow", 3.0)]),
+        ([SetNfr("o_water", "flow", 3.0), FLOW], [FLOW]),
+        ([FLOW, SetNfr("", "warmth", 1.0)], [FLOW, SetNfr("", "warmth", 1.0)]),
+        ([WATER, Lock("o_water"), RemoveObjective("o_water")], [RemoveObjective("o_water")]),
+        ([RemoveObjective("o_water"), WATER], [RemoveObjective("o_water"), WATER]),
+    ],
+)
+def test_later_commands_replace_what_they_take_back(given, holds):
+    assert Asked(given).commands == tuple(holds)
+
+
+def test_it_is_the_same_from_a_parameter():
+    asked = Asked([WATER, Pause(), SetNfr("o_water", "flow", 0.1), Lock("o_water")])
+    assert Asked.from_parameter(asked.as_parameter()).commands == asked.commands
+
+
+@pytest.mark.parametrize(
+    "value", [None, "pause", 3, {}, [[]], [["pause", "now"]], ["pause"], [["level", "flow", "1"]], [["x"]]]
+)
+def test_what_can_not_be_read_is_left_out(value):
+    assert Asked.from_parameter(value).commands == ()
