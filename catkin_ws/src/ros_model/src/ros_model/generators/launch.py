@@ -14,6 +14,7 @@ from ros_model.language.graph_names import ABSOLUTE_TOPICS
 from ros_model.language.metamodel import CONNECTION_OF, ENDS, PortPath, compose, topic_suffixes
 from ros_model.language.packages import Node
 from ros_model.language.remappings import remappings_of
+from ros_model.language.typed_values import type_for
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -131,11 +132,11 @@ def private_name(parameter: RosParameter) -> str:
 
 
 def declared_type(parameter: RosParameter, library: Library | None) -> ParameterType | None:
-    """Return the type that the node's model declares for a parameter; None where none does."""
+    """Return the type that the node's model declares for a parameter with this value; None where none does."""
     node = library.node(parameter.reference) if library and parameter.reference else None
     key = parameter.key.strip("/~")
     declared = node.parameters if isinstance(node, Node) else ()
-    return next((found.type for found in declared if found.name.strip("/~") == key), None)
+    return next((type_for(parameter.value, found) for found in declared if found.name.strip("/~") == key), None)
 
 
 def remaps(component: Component, whole: RosSystem, kept: Remappings = ()) -> Iterable[tuple[str, str]]:
