@@ -33,11 +33,12 @@ def check_project(project: Project, library: Library, sources: Library | None = 
         library: what is known of packages, those beside the project included.
         sources: what of it is from models of the nodes' source.
     """
-    yield from check_system(project.whole_base, library=library, installed=library.installed, sources=sources)
+    base, started = project.whole_base, {part.name for variant in project.variants for part in variant.components}
+    yield from check_system(base, library=library, installed=library.installed, sources=sources, started=started)
     for variant in project.variants:
         # Where nothing is known of packages, the base has told so.
         whole = compose(_with_other_functions(project, variant), variant)
-        yield from check_system(variant, whole, library or None, library.installed, sources)
+        yield from check_system(variant, whole, library or None, library.installed, sources, started)
     solving = {design.name for function in project.settings["functions"] for design in project.designs(function)}
     for variant in project.variants:
         if variant.name not in solving:

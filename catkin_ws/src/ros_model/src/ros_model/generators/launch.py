@@ -163,7 +163,7 @@ def _of_ports(component: Component, whole: RosSystem) -> Iterator[tuple[str, str
     seen: set[str] = set()
     for port in component.ports:
         inside = port.reference.name if port.reference and port.reference.name else port.name
-        topic = _target(component, port, whole)
+        topic = told_topic(component, port, whole)
         if inside == topic or inside in seen:
             continue
         seen.add(inside)
@@ -184,7 +184,7 @@ def _followed(component: Component, outside: str, whole: RosSystem) -> str:
         name = component.resolved(port.name)
         for suffix in topic_suffixes(port.kind):
             if full == name + suffix:
-                return _target(component, port, whole) + suffix
+                return told_topic(component, port, whole) + suffix
     return outside
 
 
@@ -221,7 +221,7 @@ def _connection(component: Component, port: Port, whole: RosSystem) -> Connectio
     return next((found for found in alike if end in (*found.sources, *found.targets)), None)
 
 
-def _target(component: Component, port: Port, whole: RosSystem) -> str:
+def told_topic(component: Component, port: Port, whole: RosSystem) -> str:
     """Return `topic_of` a port as the node has to be told it: a node resolves names in its own namespace.
 
     A component `arm/driver` has a namespace in its name, and the connection's name does not begin there. The name is
