@@ -45,6 +45,35 @@ def models(tmp_path):
     return write
 
 
+def test_variant_without_its_component_has_an_empty_launch_file_and_the_monitor_expects_no_such_node(
+    run, models, tmp_path
+):
+    section = {"component": "guard", "table": "v.yaml", "nodes": {"guard": {"yes": "p.guard.guard", "no": []}}}
+    folder = models({"safe": {"guard": "yes"}, "bold": {"guard": "no"}}, variants=section)
+    (folder / "p.ros").write_text(
+        "PackageSet { CatkinPackage p { Artifact guard { Node { name guard "
+        "Subscribers { Subscriber { name odom message 'nav_msgs.Odometry' } } } }, "
+        "Artifact robot { Node { name robot Publishers { Publisher { name odom message 'nav_msgs.Odometry' } } } }, "
+        "Artifact nav { Node { name nav Parameters { Parameter { name speed type Double } } } } } }"
+    )
+    assert run("check", folder)[0] == 0
+    assert run("generate", "all", folder, "-o", tmp_path)[0] == 0
+    monitor = yaml.safe_load((tmp_path / "config/rosgraph_monitor.yaml").read_text())
+    assert monitor["desired_rossystem"] == "package://robot/models/base.core.rossystem"
+    core = read_system(folder / "base.core.rossystem")
+    expected = {
+        name: [c.name for c in compose(core, read_system(folder / "variants" / f"{name}.rossystem")).components]
+        for name in ("safe", "bold")
+    }
+    assert expected == {"safe": ["robot", "nav", "guard"], "bold": ["robot", "nav"]}
+    nodes = {
+        name: [node.name for node in launch_files.read(tmp_path / f"launch/variants/{name}.launch").nodes]
+        for name in ("safe", "bold")
+    }
+    assert nodes == {"safe": ["guard"], "bold": []}
+    assert run("check", folder)[0] == 0
+
+
 def test_optional_component_is_no_part_of_the_base_that_the_monitor_expects(run, models, tmp_path):
     section = {**SETTINGS["variants"], "components": {"guarded": ["guard"]}}
     table = {"safe": {"speed": 1, "guarded": True}, "bold": {"speed": 2.5, "guarded": False}}

@@ -121,6 +121,12 @@ def test_what_the_model_of_the_other_node_does_not_know_stays(variants):
     assert (PortPath("camera", "image"), PortPath("tracker", "image")) in ends(part)
 
 
+def test_value_without_a_node_takes_the_component_out_of_the_variant(variants):
+    whole, part = variants("a,none", nodes={"coarse": COARSE, "none": []})["a"]
+    assert {component.name for component in whole.components} == {"camera", "gate"}
+    assert (part.components, part.connections) == ((), ())
+
+
 @pytest.mark.parametrize(
     ("row", "nodes", "message"),
     [
