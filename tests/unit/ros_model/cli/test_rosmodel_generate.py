@@ -36,7 +36,7 @@ SETTINGS = {
 def models(tmp_path):
     def write(table, base_text=BASE, folder="models", **settings):
         path = tmp_path / folder
-        path.mkdir(exist_ok=True)
+        path.mkdir(parents=True, exist_ok=True)
         (path / "base.rossystem").write_text(base_text)
         (path / "v.yaml").write_text(yaml.safe_dump(table))
         (path / "metacontrol.yaml").write_text(yaml.safe_dump(SETTINGS | settings))
@@ -72,6 +72,41 @@ def test_variant_without_its_component_has_an_empty_launch_file_and_the_monitor_
     }
     assert nodes == {"safe": ["guard"], "bold": []}
     assert run("check", folder)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("place", "options"),
+    [
+        ("launch/variants/safe.launch", []),
+        ("models/variants/safe.rossystem", []),
+        ("config/reasoner.yaml", []),
+        ("safe/package.xml", ["--packages"]),
+    ],
+)
+def test_file_of_the_user_is_not_replaced_by_a_generated_one(run, models, tmp_path, place, options):
+    folder = models({"safe": {"speed": 1}, "bold": {"speed": 2}}, folder="robot/models" if options else "models")
+    mine = tmp_path / place
+    mine.parent.mkdir(parents=True, exist_ok=True)
+    mine.write_text("<!-- mine -->")
+    status, _, err = run("generate", "all", folder, "-o", tmp_path, *options)
+    assert status == 2
+    assert f"{place}: is there, and rosmodel has not generated it" in err
+    assert mine.read_text() == "<!-- mine -->"
+    mine.unlink()
+    for _ in range(2):  # what was generated is replaced
+        assert run("generate", "all", folder, "-o", tmp_path, *options)[0] == 0
+
+
+def test_variant_with_the_name_of_a_launch_file_of_the_package_is_told(run, models, tmp_path):
+    folder = models({"safe": {"speed": 1}, "bold": {"speed": 2}})
+    (tmp_path / "launch").mkdir()
+    (tmp_path / "launch" / "bold.launch").write_text("<launch/>")
+    status, out, _ = run("generate", "launch", folder, "-o", tmp_path)
+    assert status == 0
+    assert [line.split(" has the name of ")[0] for line in out.splitlines()[1:]] == [
+        f"  {tmp_path}/launch/variants/bold.launch"
+    ]
+    assert "`roslaunch robot bold.launch` refuses both: rename the variant" in out
 
 
 def test_optional_component_is_no_part_of_the_base_that_the_monitor_expects(run, models, tmp_path):
