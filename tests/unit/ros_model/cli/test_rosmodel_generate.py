@@ -71,7 +71,10 @@ def test_variant_without_its_component_has_an_empty_launch_file_and_the_monitor_
         for name in ("safe", "bold")
     }
     assert nodes == {"safe": ["guard"], "bold": []}
-    assert run("check", folder)[0] == 0
+    status, out, _ = run("check", folder)
+    assert status == 0
+    assert out.count("variant bold starts no node, so the manipulator refuses it") == 1
+    assert "variant safe starts no node" not in out
 
 
 @pytest.mark.parametrize(
