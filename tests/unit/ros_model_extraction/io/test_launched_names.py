@@ -115,4 +115,4 @@ def test_nodelet_without_a_manager_has_its_interfaces_itself(started):
 
 def test_nodelet_of_a_manager_that_is_started_elsewhere_is_told(started):
     header = started(manager="/elsewhere/host").system.header
-    assert "the interfaces of the nodelet /hall/damper: its manager /elsewhere/host, which has them" in header
+    assert "the interfaces of the nodelet /hall/damper: its manager /elsewhere/host has them" in header

@@ -69,7 +69,8 @@ def names_that_differ(connection: Connection, whole: RosSystem, started: Collect
     for ends, kind in zip((connection.sources, connection.targets), ENDS[connection.kind], strict=True):
         for end in ends:
             component = whole.component(end.component)
-            port = next((p for p in component.ports if (p.name, p.kind) == (end.port, kind)), None) if component else None
+            ports = component.ports if component else ()
+            port = next((p for p in ports if (p.name, p.kind) == (end.port, kind)), None)
             if component and port and port.namespace is None:
                 is_started = component.name in (started or ())
                 name = told_topic(component, port, whole) if is_started else port.name
@@ -77,13 +78,13 @@ def names_that_differ(connection: Connection, whole: RosSystem, started: Collect
     if len(by_name) < 2:
         return
     if started is None:
-        names = {end.port for ends in by_name.values() for end in ends}
+        names = {end.port for alike in by_name.values() for end in alike}
         if not any(f"/{name}" in names for name in names):
             return
-    (one, ends), (other, others), *_ = by_name.items()
+    (one, here), (other, there), *_ = by_name.items()
     text = (
-        f"connection '{connection.name}': '{ends[0]}' is {one} in the graph, but '{others[0]}' is {other}: they meet only "
-        "if a launch file remaps one; else correct a name"
+        f"connection '{connection.name}': '{here[0]}' is {one} in the graph, but '{there[0]}' is {other}: they meet "
+        "only if a launch file remaps one; else correct a name"
     )
     yield Finding(text, connection.position, "connection", WARNING)
 

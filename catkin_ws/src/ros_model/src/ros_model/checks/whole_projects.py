@@ -68,7 +68,7 @@ def without_nodes(project: Project) -> Iterator[Finding]:
     """Yield variants that start no node; the manipulator refuses their launch files."""
     for variant in project.variants:
         if not variant.components:
-            text = f"variant {variant.name} starts no node, so the manipulator refuses it: let it bring one, or take it out"
+            text = f"variant {variant.name} starts no node, so the manipulator refuses it: add one, or take it out"
             yield Finding(text, variant.position, "settings", WARNING)
 
 

@@ -188,11 +188,11 @@ def with_types_by_value(found: PackageSet) -> PackageSet:
         return found
 
     def marked(node: Node, names: Collection[str]) -> Node:
-        parameters = (
-            replace(p, is_by_value=p.type is not None and has_integer(p.type) and (found.is_observed or p.name in names))
-            for p in node.parameters
-        )
-        return replace(node, parameters=tuple(parameters))
+        def is_by_value(parameter: ParameterDeclaration) -> bool:
+            is_told = found.is_observed or parameter.name in names
+            return is_told and parameter.type is not None and has_integer(parameter.type)
+
+        return replace(node, parameters=tuple(replace(p, is_by_value=is_by_value(p)) for p in node.parameters))
 
     packages = []
     for package in found.packages:

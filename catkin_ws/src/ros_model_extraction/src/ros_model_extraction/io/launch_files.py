@@ -118,13 +118,11 @@ def _with_nodelet(instances: Mapping[str, Instance], name: str, manager: str, en
     Their names and remappings are those of the node that loads it, which has its parameters, too.
     """
     if manager not in instances:
-        yield f"Left out: the interfaces of the nodelet {name}: its manager {manager}, which has them, is not started here."
+        yield f"Left out: the interfaces of the nodelet {name}: its manager {manager} has them, started elsewhere."
     elif ends:
         owner = instances[manager]
         known = {(end.kind, end.name) for end in owner.ends}
-        owner.ends += [
-            replace(end, node=manager, declared="") for end in ends if (end.kind, end.name) not in known
-        ]
+        owner.ends += [replace(end, node=manager, declared="") for end in ends if (end.kind, end.name) not in known]
         yield f"{manager} has the interfaces of the nodelet {name}, as in the running graph."
 
 
@@ -173,8 +171,8 @@ def _launched(node: Any) -> LaunchedNode:
     said = tuple(f'{key}="{value}"' for key, value in unsaid if value)
     is_at_root = not split_name(full)[0]
     pinned = frozenset(resolve(old, full) for old, new in remaps if is_at_root and new.startswith("/"))
-    words = tuple(word for word in plain if not word.startswith("-"))
-    return LaunchedNode(full, node.package, node.type, resolved, private, said, pinned, words)
+    said_plainly = tuple(word for word in plain if not word.startswith("-"))
+    return LaunchedNode(full, node.package, node.type, resolved, private, said, pinned, said_plainly)
 
 
 class _Sources:
