@@ -36,13 +36,80 @@ SETTINGS = {
 def models(tmp_path):
     def write(table, base_text=BASE, folder="models", **settings):
         path = tmp_path / folder
-        path.mkdir(exist_ok=True)
+        path.mkdir(parents=True, exist_ok=True)
         (path / "base.rossystem").write_text(base_text)
         (path / "v.yaml").write_text(yaml.safe_dump(table))
         (path / "metacontrol.yaml").write_text(yaml.safe_dump(SETTINGS | settings))
         return path
 
     return write
+
+
+def test_variant_without_its_component_has_an_empty_launch_file_and_the_monitor_expects_no_such_node(
+    run, models, tmp_path
+):
+    section = {"component": "guard", "table": "v.yaml", "nodes": {"guard": {"yes": "p.guard.guard", "no": []}}}
+    folder = models({"safe": {"guard": "yes"}, "bold": {"guard": "no"}}, variants=section)
+    (folder / "p.ros").write_text(
+        "PackageSet { CatkinPackage p { Artifact guard { Node { name guard "
+        "Subscribers { Subscriber { name odom message 'nav_msgs.Odometry' } } } }, "
+        "Artifact robot { Node { name robot Publishers { Publisher { name odom message 'nav_msgs.Odometry' } } } }, "
+        "Artifact nav { Node { name nav Parameters { Parameter { name speed type Double } } } } } }"
+    )
+    assert run("check", folder)[0] == 0
+    assert run("generate", "all", folder, "-o", tmp_path)[0] == 0
+    monitor = yaml.safe_load((tmp_path / "config/rosgraph_monitor.yaml").read_text())
+    assert monitor["desired_rossystem"] == "package://robot/models/base.core.rossystem"
+    core = read_system(folder / "base.core.rossystem")
+    expected = {
+        name: [c.name for c in compose(core, read_system(folder / "variants" / f"{name}.rossystem")).components]
+        for name in ("safe", "bold")
+    }
+    assert expected == {"safe": ["robot", "nav", "guard"], "bold": ["robot", "nav"]}
+    nodes = {
+        name: [node.name for node in launch_files.read(tmp_path / f"launch/variants/{name}.launch").nodes]
+        for name in ("safe", "bold")
+    }
+    assert nodes == {"safe": ["guard"], "bold": []}
+    status, out, _ = run("check", folder)
+    assert status == 0
+    assert out.count("variant bold starts no node, so the manipulator refuses it") == 1
+    assert "variant safe starts no node" not in out
+
+
+@pytest.mark.parametrize(
+    ("place", "options"),
+    [
+        ("launch/variants/safe.launch", []),
+        ("models/variants/safe.rossystem", []),
+        ("config/reasoner.yaml", []),
+        ("safe/package.xml", ["--packages"]),
+    ],
+)
+def test_file_of_the_user_is_not_replaced_by_a_generated_one(run, models, tmp_path, place, options):
+    folder = models({"safe": {"speed": 1}, "bold": {"speed": 2}}, folder="robot/models" if options else "models")
+    mine = tmp_path / place
+    mine.parent.mkdir(parents=True, exist_ok=True)
+    mine.write_text("<!-- mine -->")
+    status, _, err = run("generate", "all", folder, "-o", tmp_path, *options)
+    assert status == 2
+    assert f"{place}: is there, and rosmodel has not generated it" in err
+    assert mine.read_text() == "<!-- mine -->"
+    mine.unlink()
+    for _ in range(2):  # what was generated is replaced
+        assert run("generate", "all", folder, "-o", tmp_path, *options)[0] == 0
+
+
+def test_variant_with_the_name_of_a_launch_file_of_the_package_is_told(run, models, tmp_path):
+    folder = models({"safe": {"speed": 1}, "bold": {"speed": 2}})
+    (tmp_path / "launch").mkdir()
+    (tmp_path / "launch" / "bold.launch").write_text("<launch/>")
+    status, out, _ = run("generate", "launch", folder, "-o", tmp_path)
+    assert status == 0
+    assert [line.split(" has the name of ")[0] for line in out.splitlines()[1:]] == [
+        f"  {tmp_path}/launch/variants/bold.launch"
+    ]
+    assert "`roslaunch robot bold.launch` refuses both: rename the variant" in out
 
 
 def test_optional_component_is_no_part_of_the_base_that_the_monitor_expects(run, models, tmp_path):

@@ -1,5 +1,7 @@
 """Ranges and choices are read from cfg files that are not run."""
 
+import math
+
 from ros_model.io.dynamic_parameters import ranges_of
 
 CFG = """#!/usr/bin/env python3
@@ -33,6 +35,7 @@ def test_ranges_and_choices_are_told_in_words(tmp_path, monkeypatch):
         "gain": f"0.1 to 2.0 {where}",
         "depth": f"-4 to 9 {where}",
         "mode": f"one of 0, 3 {where}",
+        "limit": f"0.1 to {math.pi} {where}",
     }
 
 

@@ -8,6 +8,7 @@ from ros_model.language.metamodel import PortPath
 from ros_model.language.packages_reader import parse_packages
 from ros_model.language.system_reader import parse_system
 from ros_model.project.columns import parse_columns
+from ros_model.project.executables import alternatives
 from ros_model.project.variants import make_systems
 
 BASE = parse_system(
@@ -44,9 +45,11 @@ MODELS = """PackageSet { CatkinPackage trackers {
         Parameters { Parameter { name 'rate' type Double } } } },
     Artifact free { Node { name tracker
         Publishers { Publisher { name 'targets' message 'a.A' } }
-        Subscribers { Subscriber { name '{topic}@free.cpp:3' message 'a.A' } } } }
+        Subscribers { Subscriber { name '{topic}@free.cpp:3' message 'a.A' } }
+        Parameters { Parameter { name '{key}@free.cpp:4' } } } },
+    Artifact plain { Node { name tracker Publishers { Publisher { name 'targets' message 'a.A' } } } }
 } }"""
-FINE, COARSE, FREE = (f"trackers.{name}.tracker" for name in ("fine", "coarse", "free"))
+FINE, COARSE, FREE, PLAIN = (f"trackers.{name}.tracker" for name in ("fine", "coarse", "free", "plain"))
 
 
 @pytest.fixture
@@ -56,7 +59,7 @@ def variants(tmp_path):
     def make(*rows, nodes=None, header="name,tracker"):
         path = tmp_path / "variants.csv"
         path.write_text("\n".join((header, *rows)) + "\n")
-        chosen = nodes or {"fine": FINE, "coarse": COARSE, "free": FREE}
+        chosen = nodes or {"fine": FINE, "coarse": COARSE, "free": FREE, "plain": PLAIN}
         section = {"component": "tracker", "nodes": {"tracker": chosen}}
         library = Library(parse_packages(MODELS, "trackers.ros").packages)
         made = make_systems(BASE, parse_columns(section), read_table(path), library=library)
@@ -97,6 +100,19 @@ def test_row_may_set_a_parameter_of_the_other_node(variants):
     assert (rate.value, str(rate.reference)) == (2.0, "trackers.coarse.tracker.rate")
 
 
+def test_node_without_parameters_gets_none(variants):
+    whole, _ = variants("a,plain")["a"]
+    assert whole.component("tracker").parameters == ()
+
+
+def test_executable_that_runs_elsewhere_in_the_system_is_no_alternative_by_its_types_alone():
+    camera = """PackageSet { CatkinPackage cameras { Artifact camera { Node { name camera
+        Publishers { Publisher { name 'raw' message 'a.A' } } } } } }"""
+    packages = (package for text in (MODELS, camera) for package in parse_packages(text).packages)
+    found = alternatives(BASE, BASE.component("tracker"), Library(packages))
+    assert {reference.artifact for reference in found} == {"coarse", "free", "plain"}
+
+
 def test_what_the_model_of_the_other_node_does_not_know_stays(variants):
     _, part = variants("a,free")["a"]
     (tracker,) = part.components
@@ -105,10 +121,16 @@ def test_what_the_model_of_the_other_node_does_not_know_stays(variants):
     assert (PortPath("camera", "image"), PortPath("tracker", "image")) in ends(part)
 
 
+def test_value_without_a_node_takes_the_component_out_of_the_variant(variants):
+    whole, part = variants("a,none", nodes={"coarse": COARSE, "none": []})["a"]
+    assert {component.name for component in whole.components} == {"camera", "gate"}
+    assert (part.components, part.connections) == ((), ())
+
+
 @pytest.mark.parametrize(
     ("row", "nodes", "message"),
     [
-        ("a,other", None, "column 'tracker' is 'other', must be fine or coarse or free"),
+        ("a,other", None, "column 'tracker' is 'other', must be fine or coarse or free or plain"),
         ("a,odd", {"odd": "trackers.odd.tracker"}, "declares no artifact 'odd': `rosmodel extract`"),
         ("a,odd", {"odd": "trackers.odd"}, "write PACKAGE.EXECUTABLE.NODE"),
     ],

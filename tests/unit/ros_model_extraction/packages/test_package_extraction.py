@@ -499,6 +499,15 @@ def test_messages_of_the_package_itself_are_known(tmp_path, imported, name, has_
     assert [(port.name, port.type) for port in artifact.nodes[0].ports] == [("level", "demo/Level")]
 
 
+def test_header_keeps_which_types_follow_from_whole_numbers_alone(tmp_path):
+    make_package(tmp_path)
+    (tmp_path / "nodes").mkdir()
+    code = "import rospy\nrospy.init_node('a')\nrospy.get_param('~rate', 10)\nrospy.get_param('~gain', 0.1)\n"
+    make_script(tmp_path / "nodes" / "a", f"#!/usr/bin/env python3\n{code}")
+    model = extract_package(tmp_path).model()
+    assert "Whole numbers alone tell types of demo.a.a: rate." in model.header.splitlines()
+
+
 NODELET = """
     #include <nodelet/nodelet.h>
     namespace demo {

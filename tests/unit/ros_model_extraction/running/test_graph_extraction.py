@@ -66,6 +66,18 @@ def test_publisher_and_subscriber_of_a_topic_are_connected_and_typed():
     assert declared and declared.ports[0].type == "sensor_msgs/LaserScan"
 
 
+@pytest.mark.parametrize(("written", "kind"), [("Double", "Double"), ("Integer", "Integer"), (None, "Integer")])
+def test_whole_number_is_a_double_where_the_source_says_so(written, kind):
+    declared = f"Parameters {{ Parameter {{ name power type {written} }} }}" if written else ""
+    text = f"PackageSet {{ CatkinPackage wells {{ Artifact pump {{ Node {{ name any_name {declared} }} }} }} }}"
+    details = Details(origins={"/well/pump": Origin("wells", "pump")})
+    snapshot = graph([["/flow", ["/well/pump"]]], parameters={"well": {"pump": {"power": 10}}})
+    models = models_of(snapshot, details, "live", sources=Library(parse_packages(text).packages))
+    (parameter,) = models.packages.node("wells", "pump", "pump").parameters
+    assert parameter.type.kind == kind
+    assert parameter.is_by_value == (written is None)
+
+
 def test_five_topics_become_an_action_and_a_watcher_of_its_result_stays_a_subscriber():
     models = extracted(
         graph(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ros_model.language.metamodel import ParameterType, PortKind, Position
-from ros_model.language.packages import Node, ParameterDeclaration, PortDeclaration
+from ros_model.language.packages import Node, ParameterDeclaration, PortDeclaration, has_integer
 
 from ros_model_extraction.values import UnwritableValueError, typed
 
@@ -185,4 +185,5 @@ def _declared(parameter: FoundParameter) -> ParameterDeclaration:
         kind, value = typed(default)
     except UnwritableValueError:
         return ParameterDeclaration(name, declared, position=position)
-    return ParameterDeclaration(name, kind, value, position=position)
+    is_by_value = not parameter.kind and has_integer(kind)
+    return ParameterDeclaration(name, kind, value, position=position, is_by_value=is_by_value)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from typing import TYPE_CHECKING
 
 from ros_model.checks.references import declarations
-from ros_model.findings import Finding
+from ros_model.findings import WARNING, Finding
+from ros_model.generators.launch import told_topic
 from ros_model.language.library import Library, Unknown, hint
 from ros_model.language.metamodel import ENDS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from ros_model.language.metamodel import (
         Connection,
@@ -49,6 +51,42 @@ def _end(end: PortPath, kind: PortKind, whole: RosSystem) -> tuple[str, str] | N
         found = " and ".join(sorted(k.value for k in kinds))
         return f"'{end}' is a {found}, must be a {kind.value}", "wrong-kind"
     return None
+
+
+def names_that_differ(connection: Connection, whole: RosSystem, started: Collection[str] | None) -> Iterator[Finding]:
+    """Yield that ends of a connection do not meet in the graph, because their names resolve to different ones.
+
+    A launch file made from the model gives a component the name of the connection. Other components run already, and
+    have the names of their ports.
+
+    Args:
+        connection: the connection; an end that is no port of the system does not count.
+        whole: the system that it is in.
+        started: components that launch files made from models start; None: those of the whole system, or it runs
+            already. Then only an absolute and a relative name are told, which are the same but for the namespace.
+    """
+    by_name: dict[str, list[PortPath]] = defaultdict(list)
+    for ends, kind in zip((connection.sources, connection.targets), ENDS[connection.kind], strict=True):
+        for end in ends:
+            component = whole.component(end.component)
+            ports = component.ports if component else ()
+            port = next((p for p in ports if (p.name, p.kind) == (end.port, kind)), None)
+            if component and port and port.namespace is None:
+                is_started = component.name in (started or ())
+                name = told_topic(component, port, whole) if is_started else port.name
+                by_name[component.resolved(name)].append(end)
+    if len(by_name) < 2:
+        return
+    if started is None:
+        names = {end.port for alike in by_name.values() for end in alike}
+        if not any(f"/{name}" in names for name in names):
+            return
+    (one, here), (other, there), *_ = by_name.items()
+    text = (
+        f"connection '{connection.name}': '{here[0]}' is {one} in the graph, but '{there[0]}' is {other}: they meet "
+        "only if a launch file remaps one; else correct a name"
+    )
+    yield Finding(text, connection.position, "connection", WARNING)
 
 
 def wrong_types(connection: Connection, whole: RosSystem, library: Library) -> Iterator[Finding]:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ros_model.checks.values import first_known, value_place
+from ros_model.errors import short
 from ros_model.findings import ERROR, WARNING, Finding
 from ros_model.language.library import Library, Unknown, hint
 from ros_model.language.metamodel import RosParameter
+from ros_model.language.notation import type_text
 from ros_model.language.packages import is_unknown
-from ros_model.language.typed_values import misfit
+from ros_model.language.typed_values import misfit, type_for
 from ros_model.project.wiring import is_shared
 
 if TYPE_CHECKING:
@@ -156,8 +159,16 @@ def _wrong_parameter(parameter: RosParameter, reference: Reference, node: Node) 
         text += hint(reference.name, (known.name for known in node.parameters))
         yield Finding(text, _place(reference, parameter.position), "unknown-reference")
     elif parameter.value is not None and declared.type:
-        problem = misfit("value", parameter.value, reference.name, declared.type)
-        yield from [Finding(f"{problem}, as it is declared", value_place(parameter), "value")] if problem else ()
+        counting = type_for(parameter.value, declared) or declared.type
+        if problem := misfit("value", parameter.value, reference.name, counting):
+            yield Finding(f"{problem}, as it is declared", value_place(parameter), "value")
+        elif counting != declared.type:
+            place = first_known(declared.position, value_place(parameter))
+            text = (
+                f"'{reference}' counts as {short(type_text(replace(counting, default=None), place))}: only whole "
+                "numbers were seen of it, and it is given one with a point: write this type here"
+            )
+            yield Finding(text, place, "value", WARNING)
 
 
 def _elements(component: Component) -> tuple[Port | RosParameter, ...]:

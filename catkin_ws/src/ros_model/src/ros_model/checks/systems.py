@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ros_model.checks.connections import wrong_ends, wrong_types
+from ros_model.checks.connections import names_that_differ, wrong_ends, wrong_types
 from ros_model.checks.executables import missing_executables
 from ros_model.checks.launch import check_launch
 from ros_model.checks.references import followed, incomplete, not_followed, not_in_source
@@ -13,7 +13,7 @@ from ros_model.findings import WARNING, Finding, sorted_by_place
 from ros_model.language.library import Installed, Library
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from ros_model.language.metamodel import (
         Component,
@@ -31,6 +31,7 @@ def check_system(
     library: Library | None = None,
     installed: Installed | None = None,
     sources: Library | None = None,
+    started: Collection[str] | None = None,
 ) -> tuple[Finding, ...]:
     """Return what is wrong with a system, in the order of the file.
 
@@ -40,6 +41,7 @@ def check_system(
         library: what is known of packages; without it, references are not followed.
         installed: knows the executables of this machine; without it, they are not looked for.
         sources: what models of the nodes' source declare; without it, remapped names are not looked up there.
+        started: components that launch files made from models start; None if that is not known.
     """
     whole = whole or system
     findings = [*_twice(system), *incomplete(system), *_values(system), *check_launch(system, whole, library)]
@@ -53,6 +55,7 @@ def check_system(
     for connection in system.connections:
         problems = [*wrong_ends(connection, whole)]
         findings += problems or (wrong_types(connection, whole, library) if library else ())
+        findings += () if problems else names_that_differ(connection, whole, started)
     return sorted_by_place(findings)
 
 

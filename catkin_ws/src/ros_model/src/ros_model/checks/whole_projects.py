@@ -10,7 +10,7 @@ from ros_model.checks.families import check_family
 from ros_model.checks.projects import needless_words
 from ros_model.checks.systems import check_system
 from ros_model.errors import ModelError
-from ros_model.findings import Finding
+from ros_model.findings import WARNING, Finding
 from ros_model.generators.launch_parameters import harmless
 from ros_model.language.metamodel import compose
 from ros_model.language.packages import SpecKind
@@ -33,11 +33,12 @@ def check_project(project: Project, library: Library, sources: Library | None = 
         library: what is known of packages, those beside the project included.
         sources: what of it is from models of the nodes' source.
     """
-    yield from check_system(project.whole_base, library=library, installed=library.installed, sources=sources)
+    base, started = project.whole_base, {part.name for variant in project.variants for part in variant.components}
+    yield from check_system(base, library=library, installed=library.installed, sources=sources, started=started)
     for variant in project.variants:
         # Where nothing is known of packages, the base has told so.
         whole = compose(_with_other_functions(project, variant), variant)
-        yield from check_system(variant, whole, library or None, library.installed, sources)
+        yield from check_system(variant, whole, library or None, library.installed, sources, started)
     solving = {design.name for function in project.settings["functions"] for design in project.designs(function)}
     for variant in project.variants:
         if variant.name not in solving:
@@ -45,6 +46,7 @@ def check_project(project: Project, library: Library, sources: Library | None = 
             yield Finding(text, project.source.at("functions"), "settings")
     for function in project.settings["functions"]:  # designs of one function are compared, and only with each other
         yield from check_family(project.designs(function))
+    yield from without_nodes(project)
     yield from needless_words(project)
     yield from wrong_arguments(project)
     yield from wrong_launch_files(project, library)
@@ -60,6 +62,14 @@ def _with_other_functions(project: Project, variant: RosSystem) -> RosSystem:
         component.name: component for system in (*reversed(others), project.base) for component in system.components
     }
     return replace(project.base, components=tuple(known.values()))
+
+
+def without_nodes(project: Project) -> Iterator[Finding]:
+    """Yield variants that start no node; the manipulator refuses their launch files."""
+    for variant in project.variants:
+        if not variant.components:
+            text = f"variant {variant.name} starts no node, so the manipulator refuses it: add one, or take it out"
+            yield Finding(text, variant.position, "settings", WARNING)
 
 
 def wrong_arguments(project: Project) -> Iterator[Finding]:

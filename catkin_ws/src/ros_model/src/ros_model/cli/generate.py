@@ -13,7 +13,7 @@ from ros_model.cli.check import Check
 from ros_model.errors import Gathered, ModelError
 from ros_model.file_names import safe_file_name
 from ros_model.findings import ERROR
-from ros_model.generators import MARK, find_generators, write_file
+from ros_model.generators import find_generators, is_generated, write_file
 from ros_model.io.project import load_project
 from ros_model.project.settings import FILE_NAME
 
@@ -27,7 +27,6 @@ ALL = "all"
 _FIRST = ("variants", "launch", "observer", "deployment")  # in `generate all`; others follow by name. The monitor reads
 # the models of observers, so its configuration names them.
 _SYSTEM = ".rossystem"
-_HEAD = 200  # bytes, in which generated files say that they are
 
 
 def _complete(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
@@ -102,6 +101,11 @@ def run_generators(what: str, models: str, output: str, *, as_packages: bool = F
         click.echo(f"{name}: {len(written)} file{'s' * (len(written) != 1)} in {_common(written, output)}")
         for path in _stale(written):
             click.echo(f"  {path} was generated once and is not any more: delete it")
+        for path, other in _namesakes(written, package):
+            click.echo(
+                f"  {path} has the name of {other}: `roslaunch {project.package} {path.name}` refuses both: rename the "
+                "variant, or give roslaunch the path"
+            )
         if name == "observer":
             _tell_of_observers(project, package)
 
@@ -145,7 +149,14 @@ def _stale(written: list[Path]) -> list[Path]:
     """Return files of variants that were generated, beside those that are now, but belong to none any more."""
     folders = {(path.parent, path.suffix) for path in written if path.parent.name == "variants"}
     found = (path for folder, suffix in folders for path in folder.glob(f"*{suffix}") if path not in set(written))
-    return sorted(path for path in found if MARK.encode() in path.read_bytes()[:_HEAD])
+    return sorted(path for path in found if is_generated(path))
+
+
+def _namesakes(written: list[Path], package: Path) -> list[tuple[Path, Path]]:
+    """Return the launch files that were written, each with another of its name in the package."""
+    launch_files = [path for path in written if path.suffix == ".launch"]
+    others = [path for path in (package / "launch").rglob("*.launch") if path not in set(written)]
+    return [(path, other) for path in launch_files for other in others if path.name == other.name]
 
 
 def _tell_of_observers(project: Project, package: Path) -> None:

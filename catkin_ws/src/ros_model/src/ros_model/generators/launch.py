@@ -14,6 +14,7 @@ from ros_model.language.graph_names import ABSOLUTE_TOPICS
 from ros_model.language.metamodel import CONNECTION_OF, ENDS, PortPath, compose, topic_suffixes
 from ros_model.language.packages import Node
 from ros_model.language.remappings import remappings_of
+from ros_model.language.typed_values import type_for
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -131,11 +132,11 @@ def private_name(parameter: RosParameter) -> str:
 
 
 def declared_type(parameter: RosParameter, library: Library | None) -> ParameterType | None:
-    """Return the type that the node's model declares for a parameter; None where none does."""
+    """Return the type that the node's model declares for a parameter with this value; None where none does."""
     node = library.node(parameter.reference) if library and parameter.reference else None
     key = parameter.key.strip("/~")
     declared = node.parameters if isinstance(node, Node) else ()
-    return next((found.type for found in declared if found.name.strip("/~") == key), None)
+    return next((type_for(parameter.value, found) for found in declared if found.name.strip("/~") == key), None)
 
 
 def remaps(component: Component, whole: RosSystem, kept: Remappings = ()) -> Iterable[tuple[str, str]]:
@@ -162,7 +163,7 @@ def _of_ports(component: Component, whole: RosSystem) -> Iterator[tuple[str, str
     seen: set[str] = set()
     for port in component.ports:
         inside = port.reference.name if port.reference and port.reference.name else port.name
-        topic = _target(component, port, whole)
+        topic = told_topic(component, port, whole)
         if inside == topic or inside in seen:
             continue
         seen.add(inside)
@@ -183,7 +184,7 @@ def _followed(component: Component, outside: str, whole: RosSystem) -> str:
         name = component.resolved(port.name)
         for suffix in topic_suffixes(port.kind):
             if full == name + suffix:
-                return _target(component, port, whole) + suffix
+                return told_topic(component, port, whole) + suffix
     return outside
 
 
@@ -220,7 +221,7 @@ def _connection(component: Component, port: Port, whole: RosSystem) -> Connectio
     return next((found for found in alike if end in (*found.sources, *found.targets)), None)
 
 
-def _target(component: Component, port: Port, whole: RosSystem) -> str:
+def told_topic(component: Component, port: Port, whole: RosSystem) -> str:
     """Return `topic_of` a port as the node has to be told it: a node resolves names in its own namespace.
 
     A component `arm/driver` has a namespace in its name, and the connection's name does not begin there. The name is

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import ast
 from typing import TYPE_CHECKING
 
 import rospkg
 
 from ros_model.errors import ModelError
 from ros_model.io.files import read_text
+from ros_model.language.reconfigure import ReconfigureError, parse_reconfigure
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
-
-_ADD = ("name", "paramtype", "level", "description", "default", "min", "max", "edit_method")
-"""Arguments of `ParameterGenerator.add`, in their order."""
 
 
 def ranges_of(package: str) -> dict[str, str]:
@@ -34,35 +31,11 @@ def ranges_of(package: str) -> dict[str, str]:
 
 def _ranges(path: Path) -> Iterator[tuple[str, str]]:
     try:
-        module = ast.parse(read_text(path))
-    except (ModelError, SyntaxError, ValueError, RecursionError, MemoryError):
+        parameters = parse_reconfigure(read_text(path)).parameters
+    except (ModelError, ReconfigureError):
         return
-    choices = dict(_choices(module))
-    for node in ast.walk(module):
-        if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "add"):
-            continue
-        given = dict(zip(_ADD, node.args, strict=False)) | {word.arg: word.value for word in node.keywords if word.arg}
-        name, low, high = (_constant(given.get(key)) for key in ("name", "min", "max"))
-        method = given.get("edit_method")
-        if isinstance(name, str) and isinstance(method, ast.Name) and method.id in choices:
-            yield name, f"one of {', '.join(choices[method.id])}"
-        elif isinstance(name, str) and low is not None and high is not None:
-            yield name, f"{low} to {high}"
-
-
-def _choices(module: ast.Module) -> Iterator[tuple[str, list[str]]]:
-    """Yield the variables that hold an enumeration, with the values of its constants."""
-    for node in ast.walk(module):
-        match node:
-            case ast.Assign([ast.Name(variable)], ast.Call(ast.Attribute(_, "enum"), [ast.List(constants), *_])):
-                values = [_constant(c.args[2]) for c in constants if isinstance(c, ast.Call) and len(c.args) > 2]
-                if values and None not in values:
-                    yield variable, [str(value) for value in values]
-
-
-def _constant(node: ast.expr | None) -> object:
-    """Return a literal; None for an expression."""
-    try:
-        return None if node is None else ast.literal_eval(node)
-    except (ValueError, TypeError, SyntaxError, RecursionError, MemoryError):
-        return None
+    for parameter in parameters:
+        if parameter.choices:
+            yield parameter.name, f"one of {', '.join(map(str, parameter.choices))}"
+        elif parameter.range:
+            yield parameter.name, "{} to {}".format(*parameter.range)

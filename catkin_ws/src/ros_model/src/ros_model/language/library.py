@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
-    from ros_model.language.packages import MessageField, PortDeclaration
+    from ros_model.language.packages import MessageField, ParameterDeclaration, PortDeclaration
 
 BUILTIN_TYPES = frozenset(
     ["bool", "byte", "char", "string", "time", "duration", "float32", "float64", "Header"]
@@ -150,6 +150,13 @@ class Library:
         nodes = self._nodes.get(reference.package, {}).get(reference.artifact)
         return None if nodes is None else tuple(port for node in nodes.values() for port in node.ports)
 
+    def parameters(self, reference: Reference) -> dict[str, ParameterDeclaration]:
+        """Return the parameters that are declared of an executable, under any name of its node, by their names."""
+        joined: Node | None = None
+        for node in self._nodes.get(reference.package, {}).get(reference.artifact, {}).values():
+            joined = _joined(joined, node) if joined else node
+        return {parameter.name: parameter for parameter in joined.parameters} if joined else {}
+
     def executables(self) -> Iterator[tuple[Reference, Node]]:
         """Yield each executable that models declare, with what is declared of it, under the first name of its node."""
         for package, artifacts in self._nodes.items():
@@ -212,11 +219,18 @@ def full_type(declared: str, package: str) -> str:
 
 
 def _joined(first: Node, second: Node) -> Node:
-    """Return a node with what two models declare of it; where both do, the first one's."""
+    """Return a node with what two models declare of it; where both do, the first one's.
+
+    A type that follows from a whole number alone gives way to one that is declared.
+    """
     ports = {(port.kind, port.name) for port in first.ports}
-    parameters = {parameter.name for parameter in first.parameters}
+    parameters = {parameter.name: parameter for parameter in first.parameters}
+    for known in second.parameters:
+        before = parameters.setdefault(known.name, known)
+        if before.is_by_value and known.type and not known.is_by_value:
+            parameters[known.name] = known
     return replace(
         first,
         ports=(*first.ports, *(port for port in second.ports if (port.kind, port.name) not in ports)),
-        parameters=(*first.parameters, *(known for known in second.parameters if known.name not in parameters)),
+        parameters=tuple(parameters.values()),
     )

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import enum
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from ros_model.language.metamodel import Position, TypedParameter
+from ros_model.language.metamodel import Position, Reference, TypedParameter
 
 if TYPE_CHECKING:
-    from ros_model.language.metamodel import PortKind
+    from collections.abc import Collection, Iterable, Iterator
+
+    from ros_model.language.metamodel import ParameterType, PortKind
 
 
 _UNKNOWN = re.compile(r"\{.*\}.*@.+:\d+")
@@ -34,7 +36,13 @@ class PortDeclaration:
 
 @dataclass(frozen=True)
 class ParameterDeclaration(TypedParameter):
-    """A parameter that a node reads, with its declared type and default value."""
+    """A parameter that a node reads, with its declared type and default value.
+
+    Attributes:
+        is_by_value: a whole number is all that tells the type: it may be a Double that had no point.
+    """
+
+    is_by_value: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -143,3 +151,57 @@ class PackageSet:
             ),
             None,
         )
+
+
+_BY_VALUE = "Whole numbers alone tell types of "
+_BY_VALUE_LINE = re.compile(rf"\s*{_BY_VALUE}(\S+): (.+)\.")
+
+
+def has_integer(declared: ParameterType) -> bool:
+    """Return whether a type, or one within it, is Integer."""
+    inner = (*declared.elements, *(member for _, member in declared.members))
+    return declared.kind == "Integer" or any(map(has_integer, inner))
+
+
+def remarks_on_types(packages: Iterable[Package]) -> Iterator[str]:
+    """Yield the lines of a header that keep which types follow from whole numbers alone, one for each node."""
+    for package in packages:
+        for artifact in package.artifacts:
+            for node in artifact.nodes:
+                names = [p.name for p in node.parameters if p.is_by_value and not is_unknown(p.name)]
+                if names:
+                    reference = Reference(package.name, artifact.name, node.name)
+                    yield f"{_BY_VALUE}{reference}: {', '.join(names)}."
+
+
+def with_types_by_value(found: PackageSet) -> PackageSet:
+    """Return packages with marks at the parameters of which the header says that whole numbers alone tell their types.
+
+    In the model of a running system, these are all that have an Integer.
+    """
+    told = {
+        match[1]: frozenset(match[2].split(", "))
+        for line in found.header.splitlines()
+        if (match := _BY_VALUE_LINE.match(line))
+    }
+    if not told and not found.is_observed:
+        return found
+
+    def marked(node: Node, names: Collection[str]) -> Node:
+        def is_by_value(parameter: ParameterDeclaration) -> bool:
+            is_told = found.is_observed or parameter.name in names
+            return is_told and parameter.type is not None and has_integer(parameter.type)
+
+        return replace(node, parameters=tuple(replace(p, is_by_value=is_by_value(p)) for p in node.parameters))
+
+    packages = []
+    for package in found.packages:
+        artifacts = []
+        for artifact in package.artifacts:
+            nodes = (
+                marked(node, told.get(str(Reference(package.name, artifact.name, node.name)), ()))
+                for node in artifact.nodes
+            )
+            artifacts.append(replace(artifact, nodes=tuple(nodes)))
+        packages.append(replace(package, artifacts=tuple(artifacts)))
+    return replace(found, packages=tuple(packages))

@@ -19,6 +19,7 @@ from ros_model.language.packages import (
     PortDeclaration,
     Spec,
     SpecKind,
+    with_types_by_value,
 )
 from ros_model.language.parser import Parser
 
@@ -52,7 +53,7 @@ class _Builder(Builder):
     """Builds a set of packages: one method for each rule of the grammar."""
 
     def package_set(self, items: list[Any]) -> PackageSet:
-        return PackageSet(tuple(items[1:]), self.header)
+        return with_types_by_value(PackageSet(tuple(items[1:]), self.header))
 
     def package(self, items: list[Any]) -> Package:
         keyword, name, *rest = items

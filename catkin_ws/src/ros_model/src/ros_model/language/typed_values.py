@@ -13,6 +13,7 @@ from ros_model.language.notation import type_text
 
 if TYPE_CHECKING:
     from ros_model.language.metamodel import ParameterType, Value
+    from ros_model.language.packages import ParameterDeclaration
 
 _FITTING: dict[str, tuple[type, ...]] = {
     "Integer": (int,),
@@ -51,6 +52,26 @@ def misfit(role: str, value: Value, name: str, declared: ParameterType) -> str |
     if found and isinstance(value, str) and value.startswith(("[", "{")) and declared.kind in _COMPOUND:
         found += f": a cell of a CSV file is text; write the table as YAML, with {name.rpartition('/')[2]}: {value}"
     return f"the {role} {value!r} of '{name}' {found}" if found else None
+
+
+def type_for(value: Value | None, declared: ParameterDeclaration) -> ParameterType | None:
+    """Return the type that counts for a value of a declared parameter.
+
+    Where whole numbers alone tell the type, a number with a point makes it wider: every Integer becomes a Double.
+    """
+    if value is None or declared.type is None or not declared.is_by_value or fault(value, declared.type) is None:
+        return declared.type
+    wider = _widened(declared.type)
+    return declared.type if fault(value, wider) else wider
+
+
+def _widened(declared: ParameterType) -> ParameterType:
+    return replace(
+        declared,
+        kind="Double" if declared.kind == "Integer" else declared.kind,
+        elements=tuple(map(_widened, declared.elements)),
+        members=tuple((name, _widened(member)) for name, member in declared.members),
+    )
 
 
 def element_types(declared: ParameterType, count: int) -> tuple[ParameterType, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Never
 
 from ros_model.errors import Gathered, ModelError
 from ros_model.language.library import hint
@@ -64,7 +64,7 @@ class Columns:
         component: the component that varies, where a column doesn't say another.
         parameters: column -> parameters.
         wires: column -> its value -> connections.
-        nodes: column -> its value -> the node that the component is then.
+        nodes: column -> its value -> the node that the component is then; None: the variant lacks the component.
         presence: column -> components that are there where it is true.
         expected: column -> quality attribute whose expected level it holds.
         ignored: columns that set nothing.
@@ -74,7 +74,7 @@ class Columns:
     component: str | None = None
     parameters: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
     wires: Mapping[str, Mapping[str, tuple[Wire, ...]]] = field(default_factory=dict)
-    nodes: Mapping[str, Mapping[str, Reference]] = field(default_factory=dict)
+    nodes: Mapping[str, Mapping[str, Reference | None]] = field(default_factory=dict)
     presence: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     expected: Mapping[str, str] = field(default_factory=dict)
     ignored: frozenset[str] = frozenset()
@@ -88,7 +88,9 @@ class Columns:
     @property
     def optional(self) -> frozenset[str]:
         """Components that some variants lack."""
-        return frozenset(name for names in self.presence.values() for name in names)
+        named = frozenset(name for names in self.presence.values() for name in names)
+        is_absent = any(node is None for choices in self.nodes.values() for node in choices.values())
+        return named | {self.component} if is_absent and self.component else named
 
     @property
     def varied(self) -> frozenset[str]:
@@ -129,8 +131,10 @@ def parse_columns(section: Mapping[str, Any], where: Where = _nowhere) -> Column
         target = PortPath.parse(entry["to"])
         return Wire(PortPath.parse(entry["from"]), target.component, target.port, where(*keys))
 
-    def node(column: str, value: str, text: str) -> Reference:
+    def node(column: str, value: str, text: str | list[Never]) -> Reference | None:
         default("nodes", column, value)
+        if isinstance(text, list):
+            return None
         try:
             return Reference.parse(text)
         except ValueError as error:
@@ -179,6 +183,8 @@ def with_implied(columns: Columns, table: Table, base: RosSystem) -> Columns:
             expected[column] = column.removeprefix(_EXPECTED)
         else:
             told = f"nothing says what column {column!r} sets: map it, or name it COMPONENT.PARAMETER"
+            if base.component(column):
+                told += f"; for a node that some variants lack, `components: {{{column}: [{column}]}}`, true or false"
             wrong.add([ModelError(told, first_line)])
     for column in sorted(columns.names - columns.ignored - set(table.columns)):
         told = f"the mapped column {column!r} is missing: add it, or remove its mapping"

@@ -40,10 +40,13 @@ _OUTPUTS = frozenset(out for out, _ in ENDS.values())
 def alternatives(system: RosSystem, component: Component, library: Library) -> list[Reference]:
     """Return the executables of the models that publish and serve all that a component does.
 
-    What is below the component's own name tells of this node alone, and does not count.
+    What is below the component's own name tells of this node alone, and does not count. An executable that another
+    component of the system runs has its own part there: it must have the same names, and not only the same types.
     """
     outputs = {port for port in component.ports if port.kind in _OUTPUTS and _is_telling(component, port.name)}
     executable, found = component.executable, []
+    others = {(c.executable.package, c.executable.artifact) for c in system.components if c.executable}
+    names = {(port.kind, component.resolved(name)) for port in outputs for name in (port.name, _in_code(port))}
     if executable is None or not outputs:
         return []
     types = _types(component, library)
@@ -52,6 +55,8 @@ def alternatives(system: RosSystem, component: Component, library: Library) -> l
             continue
         known = [port for port in node.ports if not is_unknown(port.name)]
         same = _counterparts(system, component, known, library)
+        if (reference.package, reference.artifact) in others:
+            same = {i: port for i, port in same.items() if (i.kind, component.resolved(i.name)) in names}
         if outputs <= {port for i, port in same.items() if types.get(_key(component, port), i.type) == i.type}:
             found.append(reference)
     return found
@@ -65,7 +70,7 @@ def with_executable(
     What both nodes call the same stays as it is: remapped ports, their connections, the values of parameters; what the
     former node declares and does not use, the new one does not use either. Ports and parameters that the new node does
     not declare go. Where its model is not sure, they stay: ports of a kind of which it does not know all names, and all
-    parameters if it declares none, or does not know all of their names.
+    parameters if it does not know all of their names.
 
     Args:
         system: has the component.
@@ -107,7 +112,7 @@ def with_executable(
         parameters=tuple(
             replace(parameter, reference=replace(node, name=parameter.key))
             for parameter in component.parameters
-            if not parameters or parameter.key in parameters or any(map(is_unknown, parameters))
+            if parameter.key in parameters or any(map(is_unknown, parameters))
         ),
     )
     components = tuple(changed if found is component else found for found in system.components)

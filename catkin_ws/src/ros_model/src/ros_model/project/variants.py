@@ -137,16 +137,19 @@ def _part(whole: RosSystem, names: Collection[str]) -> RosSystem:
 
 
 def _absent(row: Row, columns: Columns) -> frozenset[str]:
-    return frozenset(name for column, names in columns.presence.items() if not row.cells[column] for name in names)
+    absent = frozenset(name for column, names in columns.presence.items() if not row.cells[column] for name in names)
+    lacks = any(choices[_key(row.cells[column])] is None for column, choices in columns.nodes.items())
+    return absent | {columns.component} if lacks and columns.component else absent
 
 
 def _with_nodes(system: RosSystem, columns: Columns, row: Row, library: Library) -> RosSystem:
     """Return the system with the nodes that the row chooses; a component that the variant lacks stays away."""
     for column, choices in columns.nodes.items():
         value = _key(row.cells[column])
-        if columns.component and system.component(columns.component):
+        node = choices[value]
+        if node and columns.component and system.component(columns.component):
             where = columns.where("nodes", column, value)
-            system = with_executable(system, columns.component, choices[value], library, where)
+            system = with_executable(system, columns.component, node, library, where)
     return system
 
 

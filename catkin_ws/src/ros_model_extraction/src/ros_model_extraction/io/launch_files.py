@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,26 @@ class LaunchedNode:
     private: Mapping[str, Any]  # parameters given as `_name:=value` among its arguments
     unsaid: tuple[str, ...] = ()  # what a model has no words for
     pinned: frozenset[str] = frozenset()  # names of a node at the root that are remapped to names with a leading slash
+    words: tuple[str, ...] = ()  # its arguments but for remappings, parameters and options
+
+    @property
+    def nodelet(self) -> str:
+        """What it loads a nodelet by, `package/Class`; "" where it is no nodelet."""
+        match (self.package, self.type, *self.words):
+            case ("nodelet", "nodelet", "load" | "standalone", kind, *_):
+                return kind
+        return ""
+
+    @property
+    def source_package(self) -> str:
+        """The package that has its source."""
+        return self.nodelet.partition("/")[0] or self.package
+
+    @property
+    def manager(self) -> str:
+        """The full name of the node that has its interfaces in the graph: that of a nodelet is its manager."""
+        is_loaded = self.nodelet and self.words[0] == "load" and len(self.words) > 2
+        return resolve(self.words[2], self.name) if is_loaded else self.name
 
 
 def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
@@ -61,6 +81,7 @@ def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
         for name, value in node.private.items():
             _put(tree, f"{node.name}/{name}", value)
     names = [node.name for node in nodes]
+    managed: dict[str, tuple[str, list[End]]] = {}
     for node in nodes:
         source = sources.node(node, tree)
         reference = Reference(node.package, node.type, node_name(split_name(node.name)[1]))
@@ -68,12 +89,19 @@ def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
         if source is None or not source.is_node:
             lines.append(f"The interfaces of {node.name} are not known: {sources.problem(node)}.")
         else:
-            instance.reference = Reference(node.package, node.type, named(source, node.type).name)
+            if not node.nodelet:
+                instance.reference = Reference(node.package, node.type, named(source, node.type).name)
             instance.declared = named(source, node.type).declared()
             instance.ends = _ends(node, source)
-            lines += [f"{node.package}/{remark}" for remark in source.remarks]
+            lines += [f"{node.source_package}/{remark}" for remark in source.remarks]
+        if node.manager != node.name:
+            managed[node.name] = node.manager, instance.ends
+            instance.declared = replace(instance.declared, ports=()) if instance.declared else None
+            instance.ends = []
         instances[node.name] = instance
         lines += _beside(node, instance.ends)
+    for name, (manager, ends) in managed.items():
+        lines += _with_nodelet(instances, name, manager, ends)
     unowned = [(key, value) for key, value in share_out(tree, instances) if not plumbing.is_roslaunch_parameter(key)]
     given = f" with {' '.join(arguments)}" if arguments else ""
     title = [
@@ -82,6 +110,20 @@ def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
     ]
     name = re.sub(r"[^A-Za-z0-9_-]", "_", path.name.partition(".")[0]) or "launch"
     return assemble(name, instances, unowned, [*title, *dict.fromkeys(lines)])
+
+
+def _with_nodelet(instances: Mapping[str, Instance], name: str, manager: str, ends: Sequence[End]) -> Iterator[str]:
+    """Give the interfaces of a nodelet to its manager, which has them in the graph; yield what is to be said.
+
+    Their names and remappings are those of the node that loads it, which has its parameters, too.
+    """
+    if manager not in instances:
+        yield f"Left out: the interfaces of the nodelet {name}: its manager {manager} has them, started elsewhere."
+    elif ends:
+        owner = instances[manager]
+        known = {(end.kind, end.name) for end in owner.ends}
+        owner.ends += [replace(end, node=manager, declared="") for end in ends if (end.kind, end.name) not in known]
+        yield f"{manager} has the interfaces of the nodelet {name}, as in the running graph."
 
 
 def load(path: Path, arguments: Sequence[str]) -> tuple[list[LaunchedNode], dict[str, Any]]:
@@ -129,7 +171,8 @@ def _launched(node: Any) -> LaunchedNode:
     said = tuple(f'{key}="{value}"' for key, value in unsaid if value)
     is_at_root = not split_name(full)[0]
     pinned = frozenset(resolve(old, full) for old, new in remaps if is_at_root and new.startswith("/"))
-    return LaunchedNode(full, node.package, node.type, resolved, private, said, pinned)
+    said_plainly = tuple(word for word in plain if not word.startswith("-"))
+    return LaunchedNode(full, node.package, node.type, resolved, private, said, pinned, said_plainly)
 
 
 class _Sources:
@@ -143,13 +186,15 @@ class _Sources:
 
     def node(self, node: LaunchedNode, tree: Mapping[str, Any]) -> NodeSource | None:
         """Return what the source of a node makes of it with these parameters; None where there is no source."""
-        package = self._package(node.package)
+        kind = node.nodelet
+        package = self._package(node.source_package)
         if isinstance(package, str):
             self._problems[node.name] = package
             return None
-        executable = next((e for e in package.executables if e.name == node.type), None)
+        known = (e for e in package.executables if (e.loaded_as == kind if kind else e.name == node.type))
+        executable = next(known, None)
         if executable is None:
-            self._problems[node.name] = f"the source of {node.type} is not in {package.folder}"
+            self._problems[node.name] = f"the source of {kind or node.type} is not in {package.folder}"
             return None
         library = self._libraries.setdefault(
             package.name, Library([package.folder / "src"], package.folder, package.name)

@@ -9,7 +9,7 @@ from typing import Any
 
 from ros_model.errors import ModelError
 from ros_model.language.metamodel import Position
-from ros_model.language.packages import Artifact, Package, PackageSet
+from ros_model.language.packages import Artifact, Package, PackageSet, remarks_on_types
 
 from ros_model_extraction.io.python_modules import Library
 from ros_model_extraction.io.workspace import package_folder
@@ -43,6 +43,7 @@ class ExtractedPackage:
         lines = [f"The package {self.package.name}, from its source. Written by rosmodel extract.", *_LEGEND]
         if no_nodes:
             lines.append(f"Executables that start no ROS node: {', '.join(no_nodes)}.")
+        lines += remarks_on_types([self.package])
         return PackageSet((self.package,), "\n".join([*lines, *map(str, self.remarks)]))
 
     @property

@@ -21,8 +21,18 @@ from ros_model.language.metamodel import (
     SystemParameter,
     topic_suffixes,
 )
-from ros_model.language.packages import Artifact, Node, Package, PackageSet, ParameterDeclaration, PortDeclaration
+from ros_model.language.packages import (
+    Artifact,
+    Node,
+    Package,
+    PackageSet,
+    ParameterDeclaration,
+    PortDeclaration,
+    has_integer,
+    remarks_on_types,
+)
 from ros_model.language.remappings import remark_lines
+from ros_model.language.typed_values import fault
 
 from ros_model_extraction import ros_defaults as plumbing
 from ros_model_extraction.names import as_seen_from, is_known_type, node_name, split_name
@@ -84,6 +94,7 @@ class Instance:
     declared: Node | None = None
     ends: list[End] = field(default_factory=list)
     parameters: list[tuple[str, Any]] = field(default_factory=list)  # relative to the node
+    written: Mapping[str, ParameterDeclaration] = field(default_factory=dict)  # parameters in models from source
 
 
 def models_of(
@@ -118,6 +129,7 @@ def models_of(
     for node, instance in instances.items():
         origin = details.origins.get(node)
         written = sources.interfaces(instance.reference) or ()
+        instance.written = sources.parameters(instance.reference)
         if origin and origin.remaps:
             instance.ends, unused = as_declared(node, instance.ends, origin.remaps, written)
             remarks.unused_remaps[node] = unused
@@ -189,7 +201,10 @@ def assemble(
     )
     said = [f"Left out: the value of the parameter {name}: {why}." for name, why in sorted(unwritable.items())]
     header = "\n".join([*lines, *said])
-    return Models(PackageSet(_packages(instances.values()), header), replace(system, header=header))
+    found = PackageSet(_packages(instances.values()), header)
+    if not found.is_observed:  # of a running system, all are seen by their values
+        found = replace(found, header="\n".join([*lines, *said, *remarks_on_types(found.packages)]))
+    return Models(found, replace(system, header=header))
 
 
 def interfaces(snapshot: GraphSnapshot, details: Details) -> Iterator[End]:
@@ -388,11 +403,7 @@ def _packages(instances: Iterable[Instance]) -> tuple[Package, ...]:
             name = end.declared or end.seen
             declaration.ports.setdefault((end.kind, name), PortDeclaration(name, end.kind, end.type))
         for key, raw in instance.parameters:
-            try:
-                kind = typed(raw)[0]
-            except UnwritableValueError:
-                kind = None
-            declaration.parameters.setdefault(key, ParameterDeclaration(key, kind))
+            declaration.parameters.setdefault(key, _parameter(key, raw, instance.written.get(key)))
     return tuple(
         Package(
             package,
@@ -409,6 +420,19 @@ def _packages(instances: Iterable[Instance]) -> tuple[Package, ...]:
         )
         for package, artifacts in sorted(declared.items())
     )
+
+
+def _parameter(key: str, raw: Any, written: ParameterDeclaration | None) -> ParameterDeclaration:
+    """Return the declaration of a parameter by its value; a Double of the source is one, too, if it has no point."""
+    try:
+        kind, value = typed(raw)
+    except UnwritableValueError:
+        return ParameterDeclaration(key)
+    if not has_integer(kind):
+        return ParameterDeclaration(key, kind)
+    if written and written.type and not written.is_by_value and fault(value, written.type) is None:
+        return ParameterDeclaration(key, replace(written.type, default=None))
+    return ParameterDeclaration(key, kind, is_by_value=True)
 
 
 @dataclass
