@@ -60,7 +60,7 @@ def test_the_decision_says_that_the_design_itself_is_the_cause(robot):
     robot = robot({"scan_slow": 2.2}).start("scan_slow").run(60)
     (decision,) = [d for _, to, d in robot.changes[2:] if to == "scan_slower"]
     (left,) = [c for c in decision.candidates if c.name == "scan_slow"]
-    assert "is itself the cause: it did so again soon after it had come back, not again for" in left.refused_because
+    assert "did so again soon after it had come back: it is itself the cause, not again for" in left.refused_because
 
 
 def test_a_design_that_works_again_when_it_is_tried_again_stays(robot):
@@ -77,14 +77,45 @@ def test_more_returns_where_that_is_wanted(robot):
     assert len(many.start("scan_slow").run(600).changes) > 2 * len(few.start("scan_slow").run(600).changes)
 
 
-def test_levels_that_nothing_outside_explains_are_the_designs_own(robot):
-    """1.0 is five times the expected 0.2, of which 2.5 is what a cause that all designs share may make: no return."""
-    objective = Objective("o_move", "f_move", {"safety": 0.9})
-    robot = robot({"scan_slower": 5.0}, objective).start("scan_slower").run(50)
-    _, other, decision = robot.changes[0]
-    (left,) = [c for c in decision.candidates if c.name == "scan_slower"]
-    assert "further from the expected ones than anything outside of it explains" in left.refused_because
-    assert returns(robot, "scan_slower") == [], other
+def test_levels_far_from_the_expected_ones_alone_are_no_fault(robot):
+    """An estimate may be far too good: the limit is ten times as high as what is expected."""
+    robot = robot({"scan_slow": 2.2}).start("scan_slow").run(10)
+    assert robot.running == "scan_slower"
+    robot.factors = {}
+    robot.run(2 * CALM)
+    assert robot.running == "scan_slow"
+
+
+def test_that_a_level_will_soon_pass_the_limit_is_no_fault(robot):
+    """0.53 and 0.57 by turns scatter too much for a limit of 0.6, but keep it."""
+    robot = robot({}).start("scan_slow")
+    for _ in range(120):
+        robot.factors = {"scan_slow": 1.76}
+        robot.run(0.5)
+        robot.factors = {"scan_slow": 1.92}
+        robot.run(0.5)
+    reasons = [c.refused_because for _, _, d in robot.changes for c in d.candidates if c.name == "scan_slow"]
+    assert len(robot.changes) >= 3, "it is left, and comes back"
+    assert not any("itself the cause" in reason for reason in reasons)
+
+
+def test_once_it_is_left_the_best_of_the_others_is_taken_when_its_limit_seems_kept_again(robot):
+    """At first the correction speaks against all but the safest one."""
+    objective = Objective("o_move", "f_move", {"safety": 0.45})
+    robot = robot({"scan_slow": 2.4}, objective, relapse_limit=0.0).start("scan_slow").run(120)
+    assert [to for _, to, _ in robot.changes][0] != "scan_slow"
+    assert robot.running == "scan_slower", "the most useful of the others"
+
+
+def test_another_design_between_two_returns_does_not_hide_whose_fault_it_is(robot):
+    """The level of scan_slower looks back: at first it is still that of the design before it."""
+    robot = robot({"scan_slow": 2.2}).start("scan_slow")
+    for _ in range(1200):
+        changed_at = robot.changes[-1][0] if robot.changes else -10.0
+        robot.factors = {"scan_slow": 2.2, "scan_slower": 3.5 if robot.now - changed_at < 2.5 else 1.0}
+        robot.run(0.5)
+    assert "camera_slow" in [to for _, to, _ in robot.changes], "scan_slower is left, too"
+    assert len(returns(robot, "scan_slow")) <= 5, "600 s"
 
 
 def test_where_no_design_keeps_the_limit_a_broken_one_is_left_for_a_makeshift(robot):

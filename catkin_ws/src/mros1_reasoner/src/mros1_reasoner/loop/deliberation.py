@@ -14,8 +14,10 @@ from mros1_reasoner.knowledge.scale import Correction
 from mros1_reasoner.loop import lasting
 from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance, is_drift, is_relief
 from mros1_reasoner.loop.readable_state import Running
-from mros1_reasoner.loop.state import AT_FAULT, UNLESS_GONE, VIOLATED, State
+from mros1_reasoner.loop.state import AGAIN, UNEXPLAINED, UNLESS_GONE, VIOLATED, State
 from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan, without_makeshift
+
+_NO_BOUND = 1e6  # the greatest correction where the model says which designs have the same strain
 from mros1_reasoner.planning.repairing import Stakes, loss_of_change, loss_of_repair, worth_of_nothing
 
 
@@ -77,6 +79,10 @@ class Deliberation:
         self._note_failure(name, timing.now)
         began = self._wall()
         level, outcome = self._choose(name, timing.now, climbs=not improves_only)
+        if outcome.degraded and running.design and self._implausible(name, timing.now):
+            self._state.note_in_vain(
+                timing.now, running.design, name, UNEXPLAINED
+            )  # others must not lead back to it soon
         stays = not self._is_change(level, outcome)
         if lost:
             repairs_first, outcome = self._compare_with_repair(level, outcome, lost, timing.now)
@@ -340,7 +346,7 @@ class Deliberation:
             reason = f"its task failed while it was deployed ({running.task_failure[1] or 'no reason given'})"
             self._state.note_in_vain(now, running.design, name, reason)
         elif running.design and self._keeps_not(name, now):
-            self._state.note_in_vain(now, running.design, name, self._own_fault(name, now) or VIOLATED)
+            self._state.note_in_vain(now, running.design, name, AGAIN if self._is_own_fault(name, now) else VIOLATED)
         found = v.IN_ERROR_COMPONENT if self._state.rule_finds(name, v.IN_ERROR_COMPONENT) else ""
         found = v.IN_ERROR_NFR if self._state.rule_counts(name, now) else found
         # A design that can't be deployed needs no entry, and may come back at once when it can.
@@ -365,15 +371,18 @@ class Deliberation:
         is_known = key in self._state.facts.tried and v.IN_ERROR_NFR not in result.causes
         return key in self._state.analysis.tried and not is_known
 
-    def _own_fault(self, name: str, now: float) -> str:
-        """Return why the running design itself is held to be the cause of a violation; empty where it is not."""
-        running = self._state.running[name]
-        if self._implausible(name, now):
-            return f"{AT_FAULT}: its levels were further from the expected ones than anything outside of it explains"
+    def _is_own_fault(self, name: str, now: float) -> bool:
+        """Return whether the running design itself is held to be the cause of a violation.
+
+        Most of the last levels must pass the limit: that a level will soon do so is not sure enough.
+        """
+        running, limits = self._state.running[name], self._state.objectives[name].limits
+        violated = [quality for other, quality in self._state.violations(now) if other == name and quality in limits]
+        usual = {quality: self._state.levels.usual((name, quality)) for quality in violated}
+        if not any(self._state.kb.qualities[q].violates(level, limits[q]) for q, level in usual.items()):
+            return False
         is_again = self._state.is_relapse(name, now) and running.relapses + 1 >= self._state.settings.relapse_limit
-        if is_again or self._state.was_at_fault(running.design or "", name):
-            return f"{AT_FAULT}: it did so again soon after it had come back"
-        return ""
+        return is_again or self._state.was_at_fault(running.design or "", name)
 
     def _implausible(self, name: str, now: float) -> frozenset[str]:
         """Return qualities whose levels are further from the expected ones than a shared cause explains.
@@ -527,7 +536,8 @@ class Deliberation:
                 strain = self._strain(now, name, quality, group)
                 if strain is not None and quality in self._state.kb.qualities:
                     scale = self._state.scale(quality, objective.limits[quality])
-                    found[quality, group] = scale.bounded(strain, most)
+                    # That designs of a named group have the same strain, the model says itself.
+                    found[quality, group] = scale.bounded(strain, _NO_BOUND if group else most)
         return found
 
     def _strain(self, now: float, name: str, quality: str, group: str) -> Correction | None:

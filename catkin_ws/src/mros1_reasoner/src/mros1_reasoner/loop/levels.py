@@ -166,6 +166,10 @@ class Levels:
             self._strains[key, against.group] = _Strain(strain, now)
             self._relieve(now, key, against)
 
+    def usual(self, key: Key) -> float:
+        """Return the median of the last levels."""
+        return statistics.median(level for _, level in self._levels[key].history)
+
     def forget(self, objective: str = "", quality: str = "") -> None:
         """Forget levels, but keep how they compared with the expected ones.
 

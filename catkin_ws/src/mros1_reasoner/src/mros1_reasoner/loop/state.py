@@ -27,8 +27,10 @@ _HISTORY = 100  # decisions that are kept
 _CHANGES = 10  # of which the durations are kept
 VIOLATED = "did not keep a limit while deployed"
 """Why a design is not tried again that was left because of a quality."""
-AT_FAULT = "did not keep a limit, and is itself the cause"
-"""Beginning of the reason why a design is not tried again whose levels are low wherever it runs."""
+AGAIN = "did not keep a limit, and did so again soon after it had come back: it is itself the cause"
+UNEXPLAINED = "did not keep a limit, by more than a cause outside of it explains"
+AT_FAULT = (AGAIN, UNEXPLAINED)
+"""Why a design is not tried again that is held to be the cause itself."""
 UNLESS_GONE = " unless the cause of that is gone before"
 """What ends that earlier than the time that is told."""
 
@@ -249,7 +251,6 @@ class State(View):
     def ask_anew(self, objective: Objective) -> None:
         """Ask for an objective with other limits; a design that is expected not to keep them is a makeshift now."""
         is_makeshift = bool(self.beyond(objective))
-        self.forgive(objective.name)
         if not objective.limits.keys() >= set(self.levels.blamed(objective.name)):  # that cause is never gone
             self.levels.acquit(objective.name)
         self.replace_limits(objective, f"{objective.name} is asked for with other limits")
@@ -268,6 +269,7 @@ class State(View):
             why: in words.
         """
         name, before = objective.name, self.objectives[objective.name]
+        self.forgive(name, (VIOLATED, *AT_FAULT))
         self.objectives[name] = objective
         for quality in {**before.limits, **objective.limits}:
             if before.limits.get(quality) != objective.limits.get(quality):
@@ -460,14 +462,17 @@ class State(View):
             # As long as an entry is there, it is the same failure.
             failures = self._failures[key] = max(before + (key not in self.error_log), 1)
             self.retries[key] = now + self.settings.retry_after(failures - 1), reason
-        if reason.startswith(AT_FAULT):
+        if reason in AT_FAULT:
             self._at_fault.add(key)
             expiry = self.retries[key][0]  # no other design's violation is a reason to try it sooner
         self.error_log[key] = expiry, reason
 
-    def forgive(self, name: str) -> None:
-        """Let designs of an objective be tried again that did not keep a limit: its cause is gone."""
-        self.error_log = {key: entry for key, entry in self.error_log.items() if key[1] != name or entry[1] != VIOLATED}
+    def forgive(self, name: str, reasons: Collection[str] = (VIOLATED,)) -> None:
+        """Let designs of an objective be tried again that did not keep a limit: its cause is gone, or the limit is."""
+        kept = {key for key, (_, reason) in self.error_log.items() if key[1] != name or reason not in reasons}
+        self._at_fault -= self.error_log.keys() - kept
+        self.retries = {key: entry for key, entry in self.retries.items() if key in kept or key not in self.error_log}
+        self.error_log = {key: entry for key, entry in self.error_log.items() if key in kept}
 
     def note_blame(self, now: float, name: str, causes: Iterable[Cause]) -> None:
         """Note for which qualities the design of an objective is left, or that it is left for a better one."""
@@ -475,9 +480,8 @@ class State(View):
         if running is None:
             return
         violated = [cause.quality for cause in causes if cause.quality and not is_chance(cause)]
-        if not self.why_failed(name, running.design).startswith(AT_FAULT):  # that cause goes with the design
-            for quality in violated:
-                self.levels.blame(now, (name, quality))
+        for quality in violated:
+            self.levels.blame(now, (name, quality))
         if any(is_relief(cause) for cause in causes) and not violated:
             self.levels.acquit(name)
             self._run(name, returned_at=now)
