@@ -103,7 +103,7 @@ def test_once_it_is_left_the_best_of_the_others_is_taken_when_its_limit_seems_ke
     """At first the correction speaks against all but the safest one."""
     objective = Objective("o_move", "f_move", {"safety": 0.45})
     robot = robot({"scan_slow": 2.4}, objective, relapse_limit=0.0).start("scan_slow").run(120)
-    assert [to for _, to, _ in robot.changes][0] != "scan_slow"
+    assert next(to for _, to, _ in robot.changes) != "scan_slow"
     assert robot.running == "scan_slower", "the most useful of the others"
 
 

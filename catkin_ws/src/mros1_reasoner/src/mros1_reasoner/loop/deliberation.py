@@ -16,9 +16,9 @@ from mros1_reasoner.loop.causes import chances, errors, heeds_chances, is_chance
 from mros1_reasoner.loop.readable_state import Running
 from mros1_reasoner.loop.state import AGAIN, UNEXPLAINED, UNLESS_GONE, VIOLATED, State
 from mros1_reasoner.planning.planner import Distance, Plan, Situation, Utility, plan, without_makeshift
+from mros1_reasoner.planning.repairing import Stakes, loss_of_change, loss_of_repair, worth_of_nothing
 
 _NO_BOUND = 1e6  # the greatest correction where the model says which designs have the same strain
-from mros1_reasoner.planning.repairing import Stakes, loss_of_change, loss_of_repair, worth_of_nothing
 
 
 @dataclass(frozen=True)
