@@ -217,6 +217,7 @@ def test_what_is_watched_and_repaired_is_there(project):
             "a, b: are older than the models: rosmodel generate all /ws/barn/models -o /ws/barn",
         ),
         ({"java": "no Java runtime found"}, "reasoner: no Java runtime found"),
+        ({"other_clone": "/old/monitor"}, "ROS_PACKAGE_PATH: rospack finds rosgraph_monitor in /old/monitor, which"),
         ({"missing_types": {"a.msg.B": "can't be imported"}}, "goal_msg_type a.msg.B: can't be imported"),
         ({"observers": (ObserverFacts("X", "no package exports it"),)}, "observer X: no package exports it: export it"),
     ],

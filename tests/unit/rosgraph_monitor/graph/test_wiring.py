@@ -107,6 +107,16 @@ def test_additional_ports_but_not_those_that_all_nodes_have():
     assert AdditionalPort("laser", "publisher", "laser/own") in compare(graph(**live), MODEL, dead={}, scope=strict)
 
 
+@pytest.mark.parametrize("namespace", ["/", "/rover"])
+def test_parts_of_a_node_that_are_reconfigured_come_and_go(namespace):
+    inner = [port("laser/range/set_parameters", SRV), port("laser/range/parameter_updates", PUB)]
+    model = system(laser=[*inner, port("nav/range/set_parameters", SRV), port("laser/range/reset", SRV)])
+    node = f"/{namespace.strip('/')}/laser".replace("//", "/")
+    found = compare(graph(nodes=(node,)), model, dead={}, scope=Scope(namespace=namespace))
+    missing = [finding.name for finding in found if isinstance(finding, MissingPort)]
+    assert missing == ["nav/range/set_parameters", "laser/range/reset"]
+
+
 def test_component_without_ports_in_the_model_is_not_judged():
     assert findings(system(laser=[]), pubs=[["/scan", ["/laser"]]], nodes=("/laser",)) == ()
 

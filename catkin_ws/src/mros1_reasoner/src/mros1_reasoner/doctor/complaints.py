@@ -115,6 +115,9 @@ def _unusable(facts: PackageFacts) -> Iterator[Complaint]:
             yield Complaint(f"observer {observer.name}", observer.problem, remedy)
     for name, why in facts.missing_types.items():
         yield Complaint(f"goal_msg_type {name}", why, "correct it, or install and source the package of the action")
+    if facts.other_clone:
+        what = f"rospack finds rosgraph_monitor in {facts.other_clone}, which is not below MROS_ROOT"
+        yield Complaint("ROS_PACKAGE_PATH", what, "build the robot's workspace anew after sourcing this clone only")
     if facts.java:
         yield Complaint("reasoner", facts.java, "then run this command again")
 

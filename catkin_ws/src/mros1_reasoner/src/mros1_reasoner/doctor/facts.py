@@ -54,6 +54,7 @@ class PackageFacts:
         generator: why generated files could not be compared; empty if they were.
         missing_types: types of goals that can't be imported, with the reason.
         java: why Pellet can't run; empty if it can, or is not wanted.
+        other_clone: where rospack finds rosgraph_monitor, if that is not below MROS_ROOT; else empty.
         observers: those of metacontrol.yaml.
     """
 
@@ -64,6 +65,7 @@ class PackageFacts:
     generator: str = ""
     missing_types: Mapping[str, str] = field(default_factory=dict)
     java: str = ""
+    other_clone: str = ""
     observers: tuple[ObserverFacts, ...] = ()
 
 

@@ -62,6 +62,7 @@ def look_at_package(project: Project) -> PackageFacts:
         generator=why,
         missing_types=_missing_types(project),
         java=_java(project),
+        other_clone=_other_clone(os.environ.get("MROS_ROOT"), _found("rosgraph_monitor")),
         observers=tuple(_observers(project)),
     )
 
@@ -98,6 +99,13 @@ def _found(package: str) -> str | None:
         return str(Path(rospkg.RosPack().get_path(package)).resolve())
     except rospkg.ResourceNotFound:
         return None
+
+
+def _other_clone(root: str | None, monitor: str | None) -> str:
+    """Return the folder of the monitor if it is not below the clone that the shell is set up for; else empty."""
+    if not root or not monitor or Path(monitor).is_relative_to(Path(root).resolve()):
+        return ""
+    return monitor
 
 
 def _differences(project: Project, folder: Path) -> tuple[tuple[str, ...], tuple[str, ...], str]:

@@ -26,6 +26,8 @@ IGNORED_PORTS = (
 )
 """Interfaces that never count as additional: those that most nodes have, and what lies under a node's own name."""
 
+_RECONFIGURED = ("/set_parameters", "/parameter_descriptions", "/parameter_updates")
+
 # rospy: NAME_PID_MILLISECONDS; roscpp: NAME_NANOSECONDS (and tools with epoch seconds, such as /rviz_1700000000).
 _ANONYMOUS = re.compile(r"(?P<stem>.+?)(_\d+)?_\d{10,}")
 
@@ -61,6 +63,11 @@ def is_ignored_port(name: str, node: str, patterns: Iterable[str]) -> bool:
     """
     own = f"~{name.removeprefix(node + '/')}" if name.startswith(node + "/") else ""
     return any(fnmatch.fnmatchcase(own if p.startswith("~") else name, p) for p in patterns)
+
+
+def is_reconfigured_part(name: str, node: str) -> bool:
+    """Return whether a resolved name is one that dynamic_reconfigure makes below a node: its parts may come and go."""
+    return name.startswith(f"{node}/") and name.endswith(_RECONFIGURED)
 
 
 def instance(name: str, nodes: Collection[str]) -> str | None:

@@ -15,7 +15,7 @@ from rosgraph_monitor.graph.findings import (
     PortFinding,
     WrongType,
 )
-from rosgraph_monitor.graph.names import COMMON_TOPICS, is_ignored_port, relative, resolved
+from rosgraph_monitor.graph.names import COMMON_TOPICS, is_ignored_port, is_reconfigured_part, relative, resolved
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -135,7 +135,7 @@ def _component_ports(
             continue
         present = names & has[kind]
         may_lack = kind is PortKind.ACTION_CLIENT or any(_is_of_client(kind, topic, served) for topic in names)
-        if not present and not may_lack:
+        if not present and not may_lack and not all(is_reconfigured_part(topic, entry.node.name) for topic in names):
             yield MissingPort(name, kind.value, port_name)
         expected = _declared_type(port, types, entry.node.name)
         for topic in present if expected else ():
