@@ -79,9 +79,11 @@ def life(model, pellet):
 def bag(tmp_path):
     """Return a function that writes what a recorder that came late has of a life."""
 
-    def write(life, joined=0.0, space=""):
+    def write(life, joined=0.0, space="", bare=False):
         path = tmp_path / "mission.bag"
         journal, decision = f"{space}/mros1_reasoner/journal", f"{space}/mros1_reasoner/decision"
+        if bare:
+            journal, decision = journal.lstrip("/"), decision.lstrip("/")
         before = [e for e in life.entries if e.now < START + joined]
         with Bag(path) as bag:
             bag.journal(START + joined, before, 0, NAME, PARAMETERS, life.files, topic=journal)
@@ -354,3 +356,17 @@ def test_two_reasoners_in_a_bag_need_a_namespace(life, bag):
     result = run(replay, with_two)
     assert result.exit_code == 2
     assert "--namespace" in result.output
+
+
+def test_topics_recorded_without_a_slash_are_found(life, bag):
+    lived = life()
+    path = bag(lived, bare=True)
+    assert [found.id for found in read_decisions(path)] == list(dict.fromkeys(found.id for _, found in lived.decisions))
+    assert run(replay, path).exit_code == 0
+
+
+def test_model_may_be_a_file_of_a_package(life, bag):
+    path = bag(life())
+    missing = run(replay, path, "--model", "package://mros1_reasoner/owl/nowhere.owl")
+    assert (missing.exit_code, "mros1_reasoner/owl/nowhere.owl" in missing.output) == (2, True)
+    assert "package://" not in missing.output

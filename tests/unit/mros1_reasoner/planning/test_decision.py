@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 from bag_helpers import Types
 from metacontrol_bags import messages
+from metacontrol_bags.decision import RELIEF, Candidate, Cause
 from metacontrol_bags.decision_tables import render
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.settings import Settings
@@ -87,3 +88,21 @@ def test_brackets_in_foreign_names_are_no_markup(decide):
     console = Console(width=160, record=True, file=io.StringIO())
     console.print(render(record.__class__(**{**record.__dict__, "candidates": (odd,)})))
     assert "[bold]x[/bold]" in console.export_text()
+
+
+def test_return_of_a_design_passes_no_limit(decide):
+    gone = Cause(1.0, "qa:glare", "what made glare violate the limit has been gone for 5.0 s", RELIEF, quality="glare")
+    record = replace(decide(), reasons=(gone,), causes=(gone.text,))
+    console = Console(width=160, record=True, file=io.StringIO())
+    console.print(render(record))
+    assert "limit passed" not in line(record)
+    assert "0%" not in console.export_text()
+
+
+def test_table_says_what_a_number_in_brackets_is(decide):
+    legend = "level that counted (level that the model expects)"
+    for counted, is_told in ((0.0323, True), (0.05, False)):
+        candidate = Candidate("dim_lamp", {"glare": 0.05}, {"glare": counted}, chosen=True)
+        console = Console(width=160, record=True, file=io.StringIO())
+        console.print(render(replace(decide(), candidates=(candidate,))))
+        assert (legend in console.export_text()) == is_told

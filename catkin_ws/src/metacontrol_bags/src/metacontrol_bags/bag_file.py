@@ -247,7 +247,8 @@ class BagFile:
         )
         topic, *others = (text.decode(errors="replace") for text in texts)
         parts = "/".join(filter(None, topic.split("/")))
-        self.connections[number] = Connection(number, f"/{parts}" if topic.startswith("/") else parts, *others)
+        # `rosbag record NAME` keeps a name as it was typed, also without the slash.
+        self.connections[number] = Connection(number, f"/{parts}", *others)
         return self.connections[number]
 
     def saw(self, stamp: int) -> None:

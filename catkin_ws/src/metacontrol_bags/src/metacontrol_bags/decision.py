@@ -14,6 +14,9 @@ EXECUTED = words.Decision.EXECUTED
 FAILED = words.Decision.FAILED
 """States of a decision; `metacontrol_msgs/Decision` says what each means."""
 
+RELIEF = "relief"
+"""The rule by which the end of a violation's cause is a cause."""
+
 
 @dataclass(frozen=True)
 class Cause:
@@ -38,6 +41,11 @@ class Cause:
     level: float = 0.0
     limit: float = 0.0
     excess: float = 0.0
+
+    @property
+    def passes_limit(self) -> bool:
+        """Whether a level passes its limit; not where the cause of a violation is gone."""
+        return bool(self.quality) and self.rules != RELIEF
 
 
 @dataclass(frozen=True)

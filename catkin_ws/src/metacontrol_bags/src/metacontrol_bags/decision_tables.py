@@ -32,7 +32,11 @@ def render(decision: Decision, since: float = 0.0) -> Group:
         since: moment from which its time is counted, s of ROS time.
     """
     return Group(
-        _heading(decision, since), *_causes(decision.reasons, decision.causes), _candidates(decision), _times(decision)
+        _heading(decision, since),
+        *_causes(decision.reasons, decision.causes),
+        _candidates(decision),
+        *_legend(decision),
+        _times(decision),
     )
 
 
@@ -52,7 +56,9 @@ def _causes(reasons: Iterable[Cause], words: Iterable[str]) -> list[Any]:
     table = Table("cause", "level", "limit", "passed by", "rules", box=None, header_style="dim")
     rows = 0
     for cause in reasons:
-        levels = (f"{cause.level:.3g}", f"{cause.limit:g}", f"{cause.excess:.0%}") if cause.quality else ("", "", "")
+        levels = (
+            (f"{cause.level:.3g}", f"{cause.limit:g}", f"{cause.excess:.0%}") if cause.passes_limit else ("", "", "")
+        )
         table.add_row(escape(cause.text), *levels, escape(cause.rules))
         rows += 1
     if not rows:  # an older decision
@@ -79,6 +85,13 @@ def _level(candidate: Candidate, quality: str) -> str:
     if expected is None or counted is None:
         return "-"
     return f"{counted:.3g}" if f"{counted:.3g}" == f"{expected:.3g}" else f"{counted:.3g} ({expected:.3g})"
+
+
+def _legend(decision: Decision) -> list[Text]:
+    """Return what a number in brackets is, if there is one."""
+    shown = (_level(candidate, name) for candidate in decision.candidates for name in candidate.expected)
+    text = "level that counted (level that the model expects)"
+    return [Text(text, style="dim")] if any("(" in level for level in shown) else []
 
 
 def _times(decision: Decision) -> Text:

@@ -17,6 +17,7 @@ from node_kit.parameters import ParameterError
 from node_kit.yaml_text import YamlError, parse_yaml
 from rich.console import Console
 from rich.table import Table
+from ros_model.io.files import resolve
 
 from mros1_reasoner.cli.output import ERRORS, NAMESPACE, console, refuse
 from mros1_reasoner.io.parameters import Parameters
@@ -39,7 +40,7 @@ _OUTCOME = {"state", "objective", "from_configuration", "to_configuration", "deg
 @click.argument("bag", type=click.Path(path_type=Path))
 @click.option("--nfr", "nfrs", multiple=True, metavar="QA=LIMIT", help="Another limit, for all objectives.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Another value of a parameter, as YAML.")
-@click.option("--model", "models", multiple=True, type=click.Path(path_type=Path), help="Another ontology.")
+@click.option("--model", "models", multiple=True, metavar="FILE", help="Another ontology; also package://PACKAGE/path.")
 @click.option("--initial", help="Configuration that ran at first, for a bag that does not tell.")
 @click.option("--duration", type=float, help="Of a reconfiguration in s; as in the bag by default.")
 @click.option("--verbose", "-v", is_flag=True, help="Explain each decision in full.")
@@ -48,7 +49,7 @@ def replay(
     bag: Path,
     nfrs: tuple[str, ...],
     settings: tuple[str, ...],
-    models: tuple[Path, ...],
+    models: tuple[str, ...],
     initial: str | None,
     duration: float | None,
     verbose: bool,
@@ -64,10 +65,11 @@ def replay(
     try:
         changes = {f"nfr_{name}": value for name, value in _assignments(nfrs)} | dict(_assignments(settings))
         recording = read_recording(bag, namespace)
+        files = [resolve(model) for model in models]
         first = recording.runs[0].parameters if recording.runs else {}
         reasoner = make_reasoner(Parameters({**first, **changes}).reasoner)
         found = [
-            _replay_run(recording, run, changes, models, initial, duration, reasoner)
+            _replay_run(recording, run, changes, files, initial, duration, reasoner)
             for run in recording.runs or [Run("replay")]
         ]
     except ERRORS as error:

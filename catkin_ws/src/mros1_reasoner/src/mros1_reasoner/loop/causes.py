@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from metacontrol_bags.decision import Cause
+from metacontrol_bags.decision import RELIEF, Cause
 from metacontrol_msgs.msg import DiagnosticWords as Words
 
 from mros1_reasoner.knowledge import vocabulary as v
@@ -14,9 +14,6 @@ from mros1_reasoner.loop.readable_state import Running, View
 
 RECOVERY = "compRecov"
 """The rule by which the return of a component is a cause."""
-
-RELIEF = "relief"
-"""The rule by which the end of a violation's cause is a cause."""
 
 OPERATOR = "operator"
 """Trigger of a cause that an operator gave."""

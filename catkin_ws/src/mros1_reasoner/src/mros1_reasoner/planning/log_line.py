@@ -16,7 +16,7 @@ def line(decision: Decision) -> str:
     for correction in decision.corrections:
         text = text.replace(f"; {correction}", "")
     parts = [text]
-    if excesses := [f"{cause.quality} by {cause.excess:.0%}" for cause in decision.reasons if cause.quality]:
+    if excesses := [f"{cause.quality} by {cause.excess:.0%}" for cause in decision.reasons if cause.passes_limit]:
         parts.append(f"limit passed: {', '.join(excesses)}")
     if decision.state in _STATES:
         parts.insert(0, _STATES[decision.state])
