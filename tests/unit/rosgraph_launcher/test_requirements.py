@@ -8,7 +8,7 @@ import pytest
 from catkin_pkg.package import parse_package
 
 SOURCES = Path(__file__).parents[3] / "catkin_ws" / "src"
-OF_ROS = {"catkin_pkg", "genpy", "psutil", "rosgraph", "roslaunch", "rospkg", "rospy", "yaml"}
+OF_ROS = {"catkin_pkg", "diagnostic_msgs", "genpy", "psutil", "rosgraph", "roslaunch", "rospkg", "rospy", "yaml"}
 """What `ros-noetic-ros-base` of Ubuntu 20.04 and the Debian packages of ROS bring, and psutil."""
 OURS = {"metacontrol_msgs", "node_kit", "rosgraph_launcher"}
 

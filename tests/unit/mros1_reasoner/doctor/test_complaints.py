@@ -225,3 +225,10 @@ def test_what_is_watched_and_repaired_is_there(project):
 def test_package_that_is_not_ready(project, change, begin):
     (line,) = package_complaints(project(), replace(FOUND, **change))
     assert str(line).startswith(begin)
+
+
+def test_launch_file_that_begins_with_a_variant_of_before_is_told(project):
+    facts = replace(FOUND, initial=(("launch/barn.launch", "snapshot_default"), ("launch/other.launch", "slow")))
+    (complaint,) = package_complaints(project(), facts)
+    assert str(complaint).startswith("launch/barn.launch: initial_configuration names snapshot_default, which is no")
+    assert str(complaint).endswith("name one of slow, or none")

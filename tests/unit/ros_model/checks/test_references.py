@@ -461,3 +461,11 @@ def test_names_that_the_source_does_not_tell_are_asked_for():
         True,
     ]
     assert [": warning: " in finding for finding in asked] == [True, True]
+
+
+def test_many_names_that_the_source_does_not_tell_are_asked_for_at_once():
+    """Other people's code has hundreds of them."""
+    names = " ".join(f"Parameter {{ name '{{p{n}}}@src/a.cpp:{n}' type Double }}" for n in range(1, 41))
+    text = f"PackageSet {{ CatkinPackage demo {{ Artifact a {{ Node {{ name a Parameters {{ {names} }} }} }} }} }}"
+    (asked,) = [finding for finding in faults(text) if ": warning: " in finding]
+    assert "40 names in this file are not told by the source, of which this is the first: parameter '{p1}" in asked

@@ -58,7 +58,7 @@ class Complaint:
 
 def package_complaints(project: Project, facts: PackageFacts) -> list[Complaint]:
     """Return what is wrong with a project that needs no running system to be seen."""
-    return [*_package(project, facts), *_files(facts), *_unusable(facts)]
+    return [*_package(project, facts), *_files(facts), *_begins(project, facts), *_unusable(facts)]
 
 
 def system_complaints(project: Project, package: PackageFacts, system: SystemFacts, scope: Scope) -> list[Complaint]:
@@ -106,6 +106,14 @@ def _files(facts: PackageFacts) -> Iterator[Complaint]:
     for names, what in ((facts.missing, "not generated yet"), (facts.outdated, "older than the models")):
         if names:
             yield Complaint(_listed(names), f"{'is' if len(names) == 1 else 'are'} {what}", remedy)
+
+
+def _begins(project: Project, facts: PackageFacts) -> Iterator[Complaint]:
+    known = [variant.name for variant in project.variants]
+    for file, named in facts.initial:
+        if unknown := [name for name in map(str.strip, named.split(",")) if name and name not in known]:
+            what = f"initial_configuration names {_listed(unknown)}, which is no variant"
+            yield Complaint(file, what, f"name one of {', '.join(known)}, or none")
 
 
 def _unusable(facts: PackageFacts) -> Iterator[Complaint]:

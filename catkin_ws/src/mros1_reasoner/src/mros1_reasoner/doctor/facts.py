@@ -56,6 +56,7 @@ class PackageFacts:
         java: why Pellet can't run; empty if it can, or is not wanted.
         other_clone: where rospack finds rosgraph_monitor, if that is not below MROS_ROOT; else empty.
         observers: those of metacontrol.yaml.
+        initial: launch files of the package, and the configurations to begin with that each names, with commas.
     """
 
     folder: str | None
@@ -67,6 +68,7 @@ class PackageFacts:
     java: str = ""
     other_clone: str = ""
     observers: tuple[ObserverFacts, ...] = ()
+    initial: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True)

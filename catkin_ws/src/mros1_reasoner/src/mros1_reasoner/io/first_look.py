@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
+from xml.etree import ElementTree
 
 import psutil
 import rosgraph.network
@@ -50,6 +51,11 @@ _PUBLISHED_LAYOUT = "command: roslaunch"
 """How config/rosgraph_manipulator.yaml names variants that are packages of their own."""
 
 
+_WITH_VALUE = ("-p", "--port", "-w", "--numworkers", "-t", "--timeout", "-c", "--child", "-u", "--server_uri", "--pid")
+"""Options of roslaunch that have a value as a word of its own."""
+_INITIAL = "initial_configuration"
+
+
 def look_at_package(project: Project) -> PackageFacts:
     """Return what is known of a project without the running system. Its generators and observers are run."""
     folder = project.folder.parent if project.folder.name == "models" else project.folder
@@ -64,6 +70,7 @@ def look_at_package(project: Project) -> PackageFacts:
         java=_java(project),
         other_clone=_other_clone(os.environ.get("MROS_ROOT"), _found("rosgraph_monitor")),
         observers=tuple(_observers(project)),
+        initial=tuple(_initial(folder)),
     )
 
 
@@ -140,6 +147,16 @@ def _differences(project: Project, folder: Path) -> tuple[tuple[str, ...], tuple
 
 def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+
+
+def _initial(folder: Path) -> Iterator[tuple[str, str]]:
+    """Yield each launch file of a package that names configurations to begin with, and what it names."""
+    for path in sorted(folder.glob("launch/*.launch")):
+        with contextlib.suppress(OSError, ElementTree.ParseError):  # the launch itself will say so
+            for element in ElementTree.parse(path).getroot().iter("arg"):  # noqa: S314 - the project's own file
+                named = element.get("default") or element.get("value") or ""
+                if element.get("name") == _INITIAL and named and "$(" not in named:
+                    yield f"launch/{path.name}", named
 
 
 def _missing_types(project: Project) -> dict[str, str]:
@@ -229,7 +246,9 @@ def _arguments(words: Sequence[str]) -> list[str] | None:
     """Return the arguments of a roslaunch without its options; None if the command line is none."""
     for number, word in enumerate(words[:3]):
         if Path(word).name == "roslaunch":
-            return [other for other in words[number + 1 :] if not other.startswith("-") and not other.startswith("__")]
+            before = (words[number], *words[number + 1 : -1])  # the word in front of each
+            pairs = zip(before, words[number + 1 :], strict=True)
+            return [word for option, word in pairs if option not in _WITH_VALUE and not word.startswith(("-", "__"))]
     return None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ros_model.checks.values import misfits
@@ -11,11 +12,15 @@ from ros_model.language.metamodel import CONNECTION_OF
 from ros_model.language.packages import SpecKind, is_unknown
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
     from ros_model.language.library import Library
     from ros_model.language.metamodel import Position
     from ros_model.language.packages import MessageField, Node, Package, PackageSet, Spec
+
+
+_UNKNOWN = "unknown-name"
+_EACH = 3  # so many are told one by one
 
 
 def check_packages(packages: PackageSet, library: Library) -> tuple[Finding, ...]:
@@ -28,7 +33,21 @@ def check_packages(packages: PackageSet, library: Library) -> tuple[Finding, ...
     findings = [*_twice("package", ((package.name, package.position) for package in packages.packages))]
     for package in packages.packages:
         findings += _package(package, library)
-    return sorted_by_place(findings)
+    return sorted_by_place(_told_at_once(findings))
+
+
+def _told_at_once(findings: Collection[Finding]) -> list[Finding]:
+    """Return findings in which many names that the source does not tell are one: other people's code has hundreds."""
+    unknown = [finding for finding in findings if finding.rule == _UNKNOWN]
+    if len(unknown) <= _EACH:
+        return list(findings)
+    first = sorted_by_place(unknown)[0]
+    example = first.message.partition(":")[0]
+    text = (
+        f"{len(unknown)} names in this file are not told by the source, of which this is the first: {example}: where a "
+        "design uses the node, write the names that it has when it runs (rosmodel snapshot shows them), or delete them"
+    )
+    return [*(finding for finding in findings if finding.rule != _UNKNOWN), replace(first, message=text)]
 
 
 def _package(package: Package, library: Library) -> Iterator[Finding]:
@@ -70,7 +89,7 @@ def _unknown(what: str, name: str, position: Position) -> Iterator[Finding]:
             f"{what} '{name}': the source does not tell this name: write the name that the node has when it runs "
             "(rosmodel snapshot shows it), or delete it"
         )
-        yield Finding(text, position, "unknown-name", WARNING)
+        yield Finding(text, position, _UNKNOWN, WARNING)
 
 
 def _spec(spec: Spec, package: str, library: Library) -> Iterator[Finding]:
