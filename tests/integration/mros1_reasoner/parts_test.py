@@ -6,7 +6,6 @@ import signal
 import subprocess
 import unittest
 from pathlib import Path
-from xmlrpc.client import ServerProxy
 
 import rosgraph
 import rospy
@@ -14,6 +13,7 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_msgs.msg import ActiveConfiguration, Decision
+from node_kit.io.xml_rpc import CallError, Client
 from std_srvs.srv import Trigger
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -56,6 +56,17 @@ class PartsTest(unittest.TestCase):
         if decision.state == "EXECUTED":
             self.executed.setdefault(robot, []).append(decision.to_configuration)
 
+    def refuses_to_change(self):
+        self.stop_talker()
+        return any("locked by the operator" in text for text in self.refused)
+
+    def has_changed(self):
+        if "fast" in self.executed.get("/amber", []):
+            return True
+        if self.active["/amber"] == [("frugal", "STABLE")]:
+            self.stop_talker()
+        return False
+
     def take(self, array):
         self.told += [(s.name, s.level) for s in array.status if s.message == MESSAGE]
 
@@ -71,9 +82,16 @@ class PartsTest(unittest.TestCase):
     def process_of(self, node):
         """Return the process of a node, 0 where none answers."""
         try:
-            return ServerProxy(rosgraph.Master("/test").lookupNode(node)).getPid("/test")[2]
-        except (OSError, rosgraph.MasterException):
+            with Client(rosgraph.Master("/test").lookupNode(node), "/test", timeout=1.0) as client:
+                return client.call("getPid")
+        except (CallError, OSError, rosgraph.MasterException):
             return 0
+
+    def stop_talker(self):
+        """Have the talker of amber hang that runs now; a launcher that has come back may have started another."""
+        process = self.process_of("/amber/talker")
+        if process:
+            os.kill(process, signal.SIGSTOP)
 
     def test_each_part_that_dies_is_told_and_comes_back(self):
         frugal = [("frugal", "STABLE")]
@@ -88,16 +106,16 @@ class PartsTest(unittest.TestCase):
             self.told.clear()
             if part == "reasoner":
                 wait_for(self.locks_all, "the reasoner is locked")
-            os.kill(dead, signal.SIGKILL)
+            os.kill(dead, signal.SIGSTOP)  # roslaunch might start a dead one again before anybody misses it
             wait_for(lambda node=node: (node, 2) in self.told, f"somebody tells that {node} is lost")
+            os.kill(dead, signal.SIGKILL)
             wait_for(lambda node=node: (node, 0) in self.told, f"somebody tells that {node} is there again")
             wait_for(lambda node=node, dead=dead: self.process_of(node) not in (0, dead), f"another {node} runs")
         self.assertFalse([node for node, _ in self.told if node.startswith("/basil")])
         wait_for(lambda: self.active["/amber"] == frugal, "amber talks")
-        os.kill(self.process_of("/amber/talker"), signal.SIGSTOP)
-        wait_for(lambda: any("locked by the operator" in d for d in self.refused), "the second reasoner is locked, too")
+        wait_for(self.refuses_to_change, "the second reasoner is locked, too")
         self.ask("unlock")
-        wait_for(lambda: "fast" in self.executed.get("/amber", []), "amber adapts")
+        wait_for(self.has_changed, "amber adapts")
         self.assertNotIn("/basil", self.executed)
 
     def test_part_that_is_asked_to_end_is_not_lost(self):

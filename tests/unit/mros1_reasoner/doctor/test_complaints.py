@@ -230,5 +230,5 @@ def test_package_that_is_not_ready(project, change, begin):
 def test_launch_file_that_begins_with_a_variant_of_before_is_told(project):
     facts = replace(FOUND, initial=(("launch/barn.launch", "snapshot_default"), ("launch/other.launch", "slow")))
     (complaint,) = package_complaints(project(), facts)
-    assert str(complaint).startswith("launch/barn.launch: initial_configuration names snapshot_default, which is no")
-    assert str(complaint).endswith("name one of slow, or none")
+    assert str(complaint).startswith("note: launch/barn.launch: initial_configuration names snapshot_default, which")
+    assert str(complaint).endswith("name one of slow, there or at each launch")

@@ -113,7 +113,7 @@ def _begins(project: Project, facts: PackageFacts) -> Iterator[Complaint]:
     for file, named in facts.initial:
         if unknown := [name for name in map(str.strip, named.split(",")) if name and name not in known]:
             what = f"initial_configuration names {_listed(unknown)}, which is no variant"
-            yield Complaint(file, what, f"name one of {', '.join(known)}, or none")
+            yield Complaint(file, what, f"name one of {', '.join(known)}, there or at each launch", is_note=True)
 
 
 def _unusable(facts: PackageFacts) -> Iterator[Complaint]:
