@@ -10,7 +10,7 @@ from pathlib import Path
 import rosgraph
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_msgs.msg import ActiveConfiguration, Decision
 from node_kit.io.xml_rpc import CallError, Client
@@ -34,6 +34,9 @@ class PartsTest(unittest.TestCase):
             )
             rospy.Subscriber(f"{robot}/mros1_reasoner/decision", Decision, self.take_decision, robot, queue_size=100)
         rospy.Subscriber("/diagnostics", DiagnosticArray, self.take, queue_size=100)
+        self.signs = []
+        for robot in ("/amber", "/basil"):
+            rospy.Subscriber(f"{robot}/metacontrol_parts", DiagnosticStatus, self.take_sign, queue_size=100)
         paths = {
             "ROS_PACKAGE_PATH": f"{EXAMPLES / 'talker_listener'}:{EXAMPLES / 'two_robots'}",
             "PYTHONPATH": EXAMPLES / "talker_listener" / "src",
@@ -67,6 +70,9 @@ class PartsTest(unittest.TestCase):
             self.stop_talker()
         return False
 
+    def take_sign(self, status):
+        self.signs.append(status.name)
+
     def take(self, array):
         self.told += [(s.name, s.level) for s in array.status if s.message == MESSAGE]
 
@@ -87,6 +93,18 @@ class PartsTest(unittest.TestCase):
         except (CallError, OSError, rosgraph.MasterException):
             return 0
 
+    def is_heard(self, node):
+        """Return whether a part has given signs of life since all other parts, and this test, have been connected."""
+        topic = f"{node.rpartition('/')[0]}/metacontrol_parts"
+        try:
+            with Client(rosgraph.Master("/test").lookupNode(node), "/test", timeout=1.0) as client:
+                links = client.call("getBusInfo")
+        except (CallError, OSError, rosgraph.MasterException):
+            return False
+        if sum(link[2] == "o" and link[4] == topic for link in links) < len(PARTS) + 1:  # a node hears itself, too
+            self.signs.clear()
+        return self.signs.count(node) >= 2
+
     def stop_talker(self):
         """Have the talker of amber hang that runs now; a launcher that has come back may have started another."""
         process = self.process_of("/amber/talker")
@@ -100,9 +118,7 @@ class PartsTest(unittest.TestCase):
             node = f"/amber/{part}"
             wait_for(lambda node=node: self.process_of(node), f"{node} runs")
             dead = self.process_of(node)
-            rospy.sleep(
-                1.0
-            )  # not a condition: signs of life of all parts have gone out by then, as in any running system
+            wait_for(lambda node=node: self.is_heard(node), f"all others hear {node}")
             self.told.clear()
             if part == "reasoner":
                 wait_for(self.locks_all, "the reasoner is locked")

@@ -35,6 +35,18 @@ def test_who_is_gone_is_lost_at_once(parts):
     assert parts.lost() == {}
 
 
+def test_who_is_lost_is_not_asked_again(parts):
+    parts.note(MONITOR.node, Answer.GONE, 2.0)
+    assert parts.doubtful(2.0) == [REASONER]
+
+
+def test_who_hung_and_ends_is_not_there_again(parts):
+    parts.note(REASONER.node, Answer.GONE, 2.0)
+    assert REASONER.node in parts.to_tell()
+    parts.hear(Sign(REASONER.node, "reasoner", ends=True), 3.0)
+    assert parts.to_tell() == {}
+
+
 def test_an_answer_from_the_address_of_before_brings_nobody_back(parts):
     """A port may be somebody else's by then."""
     parts.note(MONITOR.node, Answer.GONE, 2.0)

@@ -81,12 +81,16 @@ class Parts:
             return
         if sign.ends:
             self._known.pop(sign.node, None)
+            self._told.discard(sign.node)  # it has not come back
         else:
             self._known[sign.node] = Standing(sign, now)
 
     def doubtful(self, now: float) -> list[Sign]:
-        """Return the last signs of those to ask whether they are there, because they have given none for too long."""
-        return [standing.sign for standing in self._known.values() if now - standing.heard > SILENCE]
+        """Return the last signs of those to ask whether they are there, because they have given none for too long.
+
+        One that is lost is not asked: the next sign tells that it is back.
+        """
+        return [known.sign for known in self._known.values() if not known.lost and now - known.heard > SILENCE]
 
     def note(self, node: str, answer: Answer, now: float) -> None:
         """Take in what came of asking a part."""

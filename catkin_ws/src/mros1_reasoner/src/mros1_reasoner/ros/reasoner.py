@@ -104,12 +104,12 @@ class ReasonerNode:
             )
         self._listen(parameters.task_actions)
         self._services = Services(self, parameters.save_folder)
-        self._asked = Asked()
+        self._asked = Asked.from_parameter(parameters.asked)
         self._goals_asked = Goals(self.core, lambda command: self.command(command, lasts=False))
         self._tasks = ObjectiveAction(self._goals_asked, self._inbox.put, self._log.tell)
         for objective in objectives:
             self._log.tell_objective(objective)
-        self._take_up(Asked.from_parameter(parameters.asked))
+        self._take_up_what_was_asked()
         self._log.tell("Reasoner Initialization Ok")
 
     def _listen(self, task_actions: dict[str, str]) -> None:
@@ -166,13 +166,13 @@ class ReasonerNode:
         """
         return self._inbox.call(work, _ANSWER_DEADLINE)
 
-    def _take_up(self, asked: Asked) -> None:
+    def _take_up_what_was_asked(self) -> None:
         """Carry out what was asked of a reasoner of this name that has died."""
-        for command in asked.commands:
+        for command in self._asked.commands:
             if isinstance(command, entries.RemoveObjective) and command.name not in self.core.roots:
                 continue
             try:
-                self.command(command)
+                self.command(command, lasts=False)  # it is kept already
             except (MapeError, KnowledgeBaseError, ReasonerError) as error:
                 self._log.warn(kind_of(command), f"asked of the reasoner before, left out: {error}")
 
