@@ -3,15 +3,16 @@
 import pytest
 from node_kit.parts import HANGS_AFTER, SILENCE, Answer, Parts, Sign
 
-MONITOR = Sign("/greenhouse/rosgraph_monitor", "monitor", "http://a:1")
-REASONER = Sign("/greenhouse/reasoner", "reasoner", "http://a:2")
+MONITOR = Sign("/greenhouse/rosgraph_monitor", "monitor", "http://a:1", 300.0)
+REASONER = Sign("/greenhouse/reasoner", "reasoner", "http://a:2", 100.0)
+OWN = "/greenhouse/rosgraph_manipulator"
 
 
 @pytest.fixture
 def parts():
     """Return what the manipulator knows, which has heard of two others."""
-    parts = Parts("/greenhouse/rosgraph_manipulator")
-    for sign in (MONITOR, REASONER, Sign("/greenhouse/rosgraph_manipulator")):
+    parts = Parts(OWN, 200.0)
+    for sign in (MONITOR, REASONER, Sign(OWN, "manipulator", "http://a:3", 200.0)):
         parts.hear(sign, 0.0)
     return parts
 
@@ -68,19 +69,33 @@ def test_who_was_asked_to_end_is_not_lost(parts):
     assert parts.lost() == {}
 
 
-def test_the_first_that_is_left_tells(parts):
+def test_the_one_that_has_run_for_longest_tells(parts):
     parts.note(MONITOR.node, Answer.GONE, 2.0)
-    assert parts.to_tell() == {}, "the reasoner's name comes before the manipulator's"
+    assert parts.to_tell() == {}, "the reasoner has run for longer"
     parts.note(REASONER.node, Answer.GONE, 2.0)
     assert list(parts.to_tell()) == [REASONER.node, MONITOR.node]
     assert list(parts.to_tell()) == [REASONER.node, MONITOR.node], "it is told again and again"
 
 
+def test_of_two_that_were_started_at_once_the_first_by_name_tells():
+    parts = Parts(OWN, 100.0)
+    parts.hear(REASONER, 0.0)
+    parts.hear(MONITOR, 0.0)
+    parts.note(MONITOR.node, Answer.GONE, 2.0)
+    assert parts.to_tell() == {}
+
+
+def test_one_that_was_started_after_the_loss_keeps_nobody_from_telling_it(parts):
+    """It can't know of it."""
+    parts.hear(Sign(REASONER.node, "reasoner", "http://a:9", 900.0), 1.0)
+    parts.note(MONITOR.node, Answer.GONE, 2.0)
+    assert list(parts.to_tell()) == [MONITOR.node]
+
+
 def test_who_has_told_a_loss_tells_the_return_once(parts):
-    """The one that is back is the first by name now, but has not heard of anything."""
     parts.note(REASONER.node, Answer.GONE, 2.0)
     parts.to_tell()
-    parts.hear(Sign(REASONER.node, "reasoner", "http://a:9"), 5.0)
+    parts.hear(Sign(REASONER.node, "reasoner", "http://a:9", 900.0), 5.0)
     assert parts.to_tell() == {REASONER.node: ""}
     assert parts.to_tell() == {}
 

@@ -1,7 +1,7 @@
 """Nodes that watch over each other: which parts of a system are lost, and which of the others tells it.
 
 Each part gives a sign of life now and then. One that gives none is asked, and lost when it does not answer. Of the
-parts that are left, the first one tells. Times are wall s of one clock.
+parts that are left, the one that has run for longest tells: it has heard of all others. Times are wall s of one clock.
 """
 
 from __future__ import annotations
@@ -25,12 +25,14 @@ class Sign:
         node: resolved name of the node that gives it.
         part: what it is in the system.
         uri: address of its XML-RPC API.
+        started: when it was started, wall s since 1970.
         ends: whether it is the last one: the node was asked to end.
     """
 
     node: str
     part: str = ""
     uri: str = ""
+    started: float = 0.0
     ends: bool = False
 
 
@@ -60,13 +62,14 @@ class Standing:
 class Parts:
     """What one part knows of the others."""
 
-    def __init__(self, own: str = "") -> None:
+    def __init__(self, own: str = "", started: float = 0.0) -> None:
         """Know nobody.
 
         Args:
             own: resolved name of one's own node; empty where one only looks on.
+            started: when it was started, as the signs of the others tell it.
         """
-        self._own = own
+        self._own, self._started = own, started
         self._known: dict[str, Standing] = {}
         self._told: set[str] = set()
 
@@ -110,12 +113,13 @@ class Parts:
     def to_tell(self) -> dict[str, str]:
         """Return what one's own part is to tell: the nodes that are lost, and why; empty for those that are back.
 
-        The first by name of those that are left tells of a loss. Who has told it tells the return, once: a node that
-        has just come back knows nothing yet.
+        Of those that are left, the one that has run for longest tells of a loss: a node that has just been started may
+        not know who was there before. Who has told a loss tells the return, once.
         """
         lost = self.lost()
         returned = dict.fromkeys(sorted(self._told - lost.keys()), "")
         self._told &= lost.keys()
-        if all(standing.lost or self._own < node for node, standing in self._known.items()):
+        others = ((known.sign.started, node) for node, known in self._known.items() if not known.lost)
+        if all((self._started, self._own) < other for other in others):
             self._told |= lost.keys()
         return {**returned, **{node: why for node, why in lost.items() if node in self._told}}

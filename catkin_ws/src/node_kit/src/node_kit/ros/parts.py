@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 import time
 
@@ -36,13 +37,19 @@ def watch_parts(part: str) -> None:
 def sign_of(status: DiagnosticStatus) -> Sign:
     """Return the sign of life in a message of the topic."""
     values = {value.key: value.value for value in status.values}
-    return Sign(status.name, values.get("part", ""), values.get("uri", ""), status.level == DiagnosticStatus.STALE)
+    try:
+        started = float(values.get("started", ""))
+    except ValueError:
+        started = math.inf
+    ends = status.level == DiagnosticStatus.STALE
+    return Sign(status.name, values.get("part", ""), values.get("uri", ""), started, ends)
 
 
 class _Watch:
     def __init__(self, part: str) -> None:
         self._part = part
-        self._parts = Parts(rospy.get_name())
+        self._started = time.time()
+        self._parts = Parts(rospy.get_name(), self._started)
         self._inbox = Inbox()
         self._signs = rospy.Publisher(TOPIC, DiagnosticStatus, queue_size=5)
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=5)
@@ -99,7 +106,8 @@ class _Watch:
 
     def _give(self, *, ends: bool = False) -> None:
         level = DiagnosticStatus.STALE if ends else DiagnosticStatus.OK
-        values = [KeyValue("part", self._part), KeyValue("uri", rospy.get_node_uri() or "")]
+        told = {"part": self._part, "uri": rospy.get_node_uri() or "", "started": repr(self._started)}
+        values = [KeyValue(*pair) for pair in told.items()]
         with contextlib.suppress(rospy.ROSException):  # the node ends
             self._signs.publish(DiagnosticStatus(level, rospy.get_name(), MESSAGE, "", values))
 
