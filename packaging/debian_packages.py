@@ -24,6 +24,7 @@ from xml.etree import ElementTree
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / "catkin_ws" / "src"
 REQUIREMENTS = [ROOT / "requirements" / "python-robot.txt", ROOT / "requirements" / "python.txt"]
+HASHES = ROOT / "requirements" / "hashes.txt"
 
 ENVIRONMENT = Path("usr/lib/mros")
 """Where the virtual environment is installed, from the root."""
@@ -50,7 +51,7 @@ TOOLS = [
 """Commands that the documents use: rosrun, rospack, rostopic and so on."""
 
 META_CONTROLLER = (
-    *("mros1_reasoner", "ros_model", "ros_model_extraction"),
+    *("metacontrol_dashboard", "mros1_reasoner", "ros_model", "ros_model_extraction"),
     *("rosgraph_launcher", "rosgraph_manipulator", "rosgraph_monitor"),
 )
 """What goes beside a robot. The rest is the demonstrator, with its own robot and its stand-in for move_base."""
@@ -321,10 +322,18 @@ def compile_modules(stage: Path) -> None:
         run(sys.executable, "-m", "compileall", "-q", "-s", str(stage), "-p", "/", str(folder))
 
 
+def with_hashes() -> str:
+    """Return the pinned packages, each with the hashes of its files."""
+    pins = {line for path in REQUIREMENTS for line in path.read_text().splitlines() if "==" in line}
+    lines = [line for line in HASHES.read_text().splitlines() if line.partition(" ")[0] in pins]
+    return "\n".join(lines)
+
+
 def install_python(stage: Path, manifest: Manifest) -> Control:
     """Install the virtual environment, and return the control data of its package."""
     say("installing the Python packages that Debian has not")
-    environment = stage / ENVIRONMENT
+    environment, requirements = stage / ENVIRONMENT, stage / "requirements.txt"
+    requirements.write_text(with_hashes())
     run("/usr/bin/python3", "-m", "venv", "--system-site-packages", "--without-pip", "--symlinks", str(environment))
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", str(environment / "bin" / "python3"))
     run(
@@ -333,8 +342,10 @@ def install_python(stage: Path, manifest: Manifest) -> Control:
         "--ignore-installed",
         "--no-deps",
         "--no-compile",
-        *[f"--requirement={path}" for path in REQUIREMENTS],
+        "--require-hashes",
+        f"--requirement={requirements}",
     )
+    requirements.unlink()
     for path in (environment / "bin").iterdir():
         if not path.name.startswith("python"):
             path.unlink()  # commands of the packages, and scripts that name this folder

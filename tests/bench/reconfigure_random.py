@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from metacontrol_experiments.io.processes import ProcessTree, free_port
+from metacontrol_experiments.io.processes import ProcessTree, reserved_port
 from support.figures import entry
 
 _REQUESTS = 200
@@ -20,8 +20,7 @@ _TEST = "manipulator_changes_test.ChangesTest.test_many_random_requests_leave_no
 
 def run() -> list[dict[str, Any]]:
     """Return the mean time of a request, s; it fails where the test does."""
-    port = free_port()
-    with tempfile.TemporaryDirectory() as folder:
+    with reserved_port() as port, tempfile.TemporaryDirectory() as folder:
         own = {"ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": folder, "ROS_HOME": folder}
         tree = ProcessTree(own)
         try:

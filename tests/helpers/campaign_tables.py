@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from metacontrol_experiments.campaign.matrix import Run
 from metacontrol_experiments.campaign.progress import Attempt, Result, Status, row
 from metacontrol_experiments.io.campaign_folder import write_result, write_table
+from metacontrol_experiments.mission.settings import LOG_NAME
 from metacontrol_experiments.report.missions import Mission, missions_of
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def write(folder: Path, results: Sequence[Result], campaign: str = "", logs: dic
     for found in results:
         log = (logs or {}).get(found.run.name)
         if log is not None:
-            write_result(folder, found, log)
+            write_result(folder, found, {LOG_NAME: log.encode()})
     named = {found.run.name: found for found in results}
     folder.mkdir(parents=True, exist_ok=True)
     return write_table(folder, [found.run for found in results], named, {"campaign": campaign})

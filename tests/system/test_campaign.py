@@ -9,8 +9,9 @@ from pathlib import Path
 
 import psutil
 import pytest
+from helpers.ports import free_port
 from helpers.waiting import wait_for
-from metacontrol_experiments.io.processes import free_port
+from metacontrol_bags.bag import read_record
 from pyarrow import parquet
 
 SOURCES = Path(__file__).parents[2] / "catkin_ws" / "src"
@@ -138,12 +139,13 @@ def test_campaign_of_the_tests_leaves_a_table_from_which_a_report_is_made(ended,
 
 
 def test_runs_on_ros_side_by_side_have_masters_of_their_own(ended, tmp_path):
-    text = CAMPAIGN.replace("timeout: 2", "timeout: 2\nengine: ros").replace("{none: 2, respawn: 2}", "{none: 1}")
+    text = f"engine: ros\nlogs: true{CAMPAIGN}".replace("{none: 2, respawn: 2}", "{none: 1}")
     command = campaign(ended, tmp_path, "--jobs", "2", text=text)
     assert command.wait(150) == 0
     table = parquet.read_table(tmp_path / "out" / "results.parquet").to_pylist()
     assert [row["status"] for row in table] == ["done", "done"]
     assert {json.loads(row["summary"])["engine"] for row in table} == {"ros"}
+    assert len([read_record(bag) for bag in (tmp_path / "out" / "runs").rglob("mission.bag")]) == 2
 
 
 def test_scheduler_that_is_not_there_is_named(tmp_path, ended):

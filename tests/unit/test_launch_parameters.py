@@ -1,14 +1,22 @@
 """What a start by launch file leaves on a parameter server that an earlier start has used."""
 
+import re
+from pathlib import Path
+
 import pytest
 import yaml
+from mros1_reasoner.io import parameters as reasoner
 from ros_model.io.files import resolve
+from rosgraph_launcher.ros import launcher
 from rosgraph_manipulator.configuration.configurations import KEYS
+from rosgraph_manipulator.ros import manipulator
+from rosgraph_monitor.ros import parameters as monitor
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.launch import _unify_clear_params
 from roslaunch.xmlloader import XmlLoader
 from rosmaster.paramserver import ParamDictionary
 
+ROOT = Path(__file__).resolve().parents[2]
 MANIPULATOR = "rosgraph_manipulator/launch/manipulator.launch"
 MONITOR = "rosgraph_monitor/launch/monitor.launch"
 
@@ -106,3 +114,19 @@ def test_one_launch_file_starts_the_meta_controller_of_a_project(server, tmp_pat
     }
     assert server.get("/rosgraph_manipulator/initial_configuration") == "careful"
     assert server.get("/reasoner/cool_down") == 3
+
+
+@pytest.mark.parametrize(
+    ("executable", "known", "elsewhere"),
+    [
+        ("rosgraph_monitor/monitor", monitor.PARAMETERS, set()),
+        ("mros1_reasoner/reasoner", reasoner.PARAMETERS, set()),
+        ("rosgraph_manipulator/rosgraph_manipulator", manipulator.PARAMETERS, set()),
+        ("rosgraph_launcher/rosgraph_launcher", launcher.PARAMETERS, {"addresses"}),
+    ],
+)
+def test_every_parameter_of_the_reference_is_known_to_its_node(executable, known, elsewhere):
+    """Any other is told as misspelt; the page itself is checked against what the nodes read."""
+    page = (ROOT / "docs" / "reference" / "nodes.md").read_text()
+    section = page.split(f"### {executable}\n")[1].split("\n### ")[0]
+    assert set(known) == set(re.findall(r"^\| parameter \| `~(\w+)`", section, re.MULTILINE)) | elsewhere

@@ -2,6 +2,7 @@
 
 import ast
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -44,3 +45,9 @@ def test_a_package_declares_the_packages_of_the_project_that_it_imports(package)
     manifest = PACKAGES[package]
     declared = {dependency.name for dependency in [*manifest.build_export_depends, *manifest.exec_depends]}
     assert imported(package) & set(PACKAGES) - {package} <= declared
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="an archive of the source has no index")
+def test_nothing_that_is_made_is_committed():
+    command = ["git", "-C", str(ROOT), "ls-files", "--cached", "--ignored", "--exclude-standard"]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == ""

@@ -2,11 +2,13 @@
 
 import contextlib
 import os
+import signal
 import socket
 import subprocess
 import sys
 import threading
 from pathlib import Path
+from xmlrpc.client import ServerProxy
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
@@ -89,18 +91,73 @@ command.join("command")
 """
 
 
-def test_command_does_not_wait_for_rospys_threads_at_its_end(tmp_path):
+@contextlib.contextmanager
+def real_master(folder):
+    """Start a master; give the environment of its nodes."""
     with reserved_port() as port:
         core = f"import rosmaster; rosmaster.rosmaster_main(['--core', '-p', '{port}'])"
-        own = {"ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": str(tmp_path), "ROS_HOME": str(tmp_path)}
+        own = {"ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": str(folder), "ROS_HOME": str(folder)}
         environment = {**os.environ, **own}
         with subprocess.Popen([sys.executable, "-c", core], env=environment, stdout=subprocess.DEVNULL) as process:
             try:
                 wait_for(lambda: answers(port), "the master is there")
-                words = [sys.executable, "-c", NEVER_LOOKS]
-                assert subprocess.run(words, env=environment, timeout=DEADLINE_S, check=False).returncode == 0
+                yield environment
             finally:
                 process.kill()
+
+
+def test_command_does_not_wait_for_rospys_threads_at_its_end(tmp_path):
+    with real_master(tmp_path) as environment:
+        words = [sys.executable, "-c", NEVER_LOOKS]
+        assert subprocess.run(words, env=environment, timeout=DEADLINE_S, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("command", [("rosgraph_monitor", "watch"), ("mros1_reasoner", "feasible", "--wait", "600")])
+def test_command_that_is_asked_to_end_leaves_the_graph(tmp_path, command, number):
+    package, script, *arguments = command
+    with real_master(tmp_path) as environment, ServerProxy(environment["ROS_MASTER_URI"]) as graph:
+
+        def nodes():
+            return {node for part in graph.getSystemState("/test")[2] for _, names in part for node in names}
+
+        words = [sys.executable, str(PACKAGES / package / "nodes" / script), *arguments]
+        with subprocess.Popen(words, env=environment, stdout=subprocess.DEVNULL) as process:
+            wait_for(nodes, "it is in the graph")
+            process.send_signal(number)
+            assert process.wait(DEADLINE_S) == 128 + number
+        assert not nodes()
+
+
+SWALLOWS = """
+import time
+from node_kit.ros.command import leaving_by_signals
+
+def wait():
+    while True:
+        time.sleep(0.01)  # a signal just before a long sleep would be seen at its end
+
+with leaving_by_signals():
+    pass
+try:
+    try:
+        print("ready", flush=True)
+        wait()
+    except:
+        print("swallowed", flush=True)
+    wait()
+finally:
+    print("in order", flush=True)
+"""
+
+
+def test_signal_that_is_swallowed_comes_again():
+    with subprocess.Popen([sys.executable, "-c", SWALLOWS], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.terminate()
+        said, _ = process.communicate(timeout=DEADLINE_S)
+    assert process.returncode == 128 + signal.SIGTERM
+    assert said == "swallowed\nin order\n"
 
 
 def answers(port):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import yaml
 from mros1_reasoner.loop import journal
 from mros1_reasoner.loop.entries import ActiveFact, Entry, Result, Step
@@ -14,7 +15,7 @@ from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 MESSAGES = Path(__file__).parents[3] / "catkin_ws" / "src" / "metacontrol_msgs" / "msg"
-NEEDED = ("ExpectedQA", "Candidate", "Cause", "Decision", "JournalEntry", "ReasonerJournal")
+NEEDED = ("ExpectedQA", "Candidate", "Cause", "Decision", "JournalEntry", "ReasonerJournal", "MissionEvent")
 DIAGNOSTICS = "diagnostic_msgs/msg/"
 
 
@@ -104,6 +105,24 @@ class Bag:
         ]
         array = types[f"{DIAGNOSTICS}DiagnosticArray"](header=self.types.header(stamp), status=found)
         self.write("/diagnostics", f"{DIAGNOSTICS}DiagnosticArray", array, stamp, publisher)
+
+    def image(self, stamp, shade, topic):
+        kind = "sensor_msgs/msg/Image"
+        size = {"height": 6, "width": 8, "step": 8}
+        data = np.full(48, shade, dtype=np.uint8)
+        header = self.types.header(stamp)
+        image = self.types.store.types[kind](header=header, encoding="mono8", is_bigendian=0, data=data, **size)
+        self.write(topic, kind, image, stamp)
+
+    def event(self, stamp, kind, space="", **values):
+        pairs = self.types.store.types[f"{DIAGNOSTICS}KeyValue"]
+        message = self.types.MissionEvent(
+            header=self.types.header(stamp),
+            kind=kind,
+            name="",
+            values=[pairs(key=key, value=value) for key, value in values.items()],
+        )
+        self.write(f"{space}/mission/event", "metacontrol_msgs/msg/MissionEvent", message, stamp)
 
     def active(self, stamp, function, configuration, state="STABLE", space=""):
         grounding = self.types.FunctionGrounding(function=function, configuration=configuration, state=state)

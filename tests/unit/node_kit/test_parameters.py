@@ -152,3 +152,12 @@ def test_entries_have_the_names_of_the_file_also_where_the_server_made_levels_of
 
 def test_empty_entry_is_an_entry():
     assert list(named_entries({"lift": {"driver": {}}})) == [("lift/driver", {})]
+
+
+def test_parameter_that_nobody_reads_is_told_with_what_it_may_mean():
+    tree = ParameterTree({"rate": 1.0, "cool_dwn": 3, "xyz": 1, "nfr_comfort": 1}, "/plant/reasoner")
+    told = tree.strangers(("rate", "cool_down"), ("nfr_",))
+    assert told == [
+        "parameter /plant/reasoner/cool_dwn is left out, because nothing reads it: did you mean cool_down?",
+        "parameter /plant/reasoner/xyz is left out, because nothing reads it: known are cool_down, rate",
+    ]

@@ -1,7 +1,7 @@
 """Parts that watch over each other: who is lost, and who tells it."""
 
 import pytest
-from node_kit.parts import HANGS_AFTER, SILENCE, Answer, Parts, Sign
+from node_kit.parts import HANGS_AFTER, SILENCE, STARTS_WITHIN, Answer, Parts, Sign
 
 MONITOR = Sign("/greenhouse/rosgraph_monitor", "monitor", "http://a:1", 300.0)
 REASONER = Sign("/greenhouse/reasoner", "reasoner", "http://a:2", 100.0)
@@ -36,18 +36,6 @@ def test_who_is_gone_is_lost_at_once(parts):
     assert parts.lost() == {}
 
 
-def test_who_is_lost_is_not_asked_again(parts):
-    parts.note(MONITOR.node, Answer.GONE, 2.0)
-    assert parts.doubtful(2.0) == [REASONER]
-
-
-def test_who_hung_and_ends_is_not_there_again(parts):
-    parts.note(REASONER.node, Answer.GONE, 2.0)
-    assert REASONER.node in parts.to_tell()
-    parts.hear(Sign(REASONER.node, "reasoner", ends=True), 3.0)
-    assert parts.to_tell() == {}
-
-
 def test_an_answer_from_the_address_of_before_brings_nobody_back(parts):
     """A port may be somebody else's by then."""
     parts.note(MONITOR.node, Answer.GONE, 2.0)
@@ -63,10 +51,30 @@ def test_who_hangs_is_lost_after_a_while(parts):
 
 
 def test_who_was_asked_to_end_is_not_lost(parts):
-    parts.hear(Sign(MONITOR.node, ends=True), 1.0)
+    """Whoever ends in order takes its leave of the master."""
+    parts.note(MONITOR.node, Answer.ENDED, 2.0)
     assert MONITOR.node not in parts.known
     parts.note(MONITOR.node, Answer.GONE, 2.0)  # it had been asked meanwhile
     assert parts.lost() == {}
+
+
+def test_last_sign_says_that_a_part_ends(parts):
+    parts.hear(Sign(MONITOR.node, "monitor", "http://a:1", 300.0, ends=True), 1.0)
+    assert MONITOR.node not in parts.known
+
+
+def test_who_was_started_again_has_some_time_until_it_gives_signs(parts):
+    parts.note(MONITOR.node, Answer.STARTS, STARTS_WITHIN - 0.1)
+    assert parts.lost() == {}
+    parts.note(MONITOR.node, Answer.STARTS, STARTS_WITHIN)
+    assert parts.lost() == {MONITOR.node: "it was started again, but gives no sign of life"}
+
+
+def test_who_hung_and_is_ended_then_is_not_there_again(parts):
+    parts.note(REASONER.node, Answer.SILENT, HANGS_AFTER)
+    assert REASONER.node in parts.to_tell()
+    parts.note(REASONER.node, Answer.ENDED, 9.0)
+    assert parts.to_tell() == {}
 
 
 def test_the_one_that_has_run_for_longest_tells(parts):

@@ -16,7 +16,7 @@ import time
 import actionlib
 import rospy
 from actionlib.msg import TestAction, TestGoal, TestResult
-from node_kit.ros.action_server import EndsQuietly
+from node_kit.ros.action_server import Sturdy
 from std_msgs.msg import Empty
 
 parser = argparse.ArgumentParser()
@@ -42,7 +42,7 @@ rospy.init_node("wait_server", disable_signals=options.stubborn)
 sys.stdout.write("it writes to its log\n")
 
 
-class Server(EndsQuietly, actionlib.ActionServer):
+class Server(Sturdy, actionlib.ActionServer):
     """A server as any, but what a node prints when it ends stands in the launcher's output, which tests read."""
 
 

@@ -7,6 +7,7 @@ import socket
 import tempfile
 from pathlib import Path
 
+import rospy
 import rostest
 from geometry_msgs.msg import Twist
 from helpers.cases import case
@@ -19,6 +20,8 @@ from integration.rosgraph_manipulator.manipulator_harness import (
     is_alive,
     pid_of,
 )
+from metacontrol_msgs.msg import NodeDescription
+from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, StandBy
 
 FOLDER = tempfile.mkdtemp()
 
@@ -76,6 +79,20 @@ class FaultsTest(PairTest):
     def test_unknown_name_is_refused(self):
         self.assertEqual(self.request("no_such_configuration"), -1)
         self.assertIn("no_such_configuration", self.text)
+
+    def test_nobody_else_has_the_launcher_start_programs(self):
+        mark = Path(FOLDER) / "mark"
+        own = {"namespace": "/", "package": "rosgraph_manipulator", "executable": "status"}
+        node = NodeDescription(name="/stranger", launch_prefix=f"touch {mark}", **own)
+        change = rospy.ServiceProxy("rosgraph_launcher/change", ChangeNodes)
+        answer = change(ChangeNodesRequest("f_stranger", "any", [node], [], ["/stranger"], "0" * 64))
+        self.assertFalse(answer.ok)
+        self.assertIn("has another signature than this host's", answer.message)
+        stand_by = rospy.ServiceProxy("rosgraph_launcher/stand_by", StandBy)
+        with self.assertRaisesRegex(rospy.ServiceException, "is not signed"):
+            stand_by([node], "")
+        self.assertFalse(mark.exists())
+        self.wait_for_state("slow")
 
     def test_port_in_use_is_rolled_back(self):
         self.assertEqual(self.request("port"), 0)

@@ -102,6 +102,17 @@ class SurvivalTest(PairTest):
         self.assertEqual(self.request("fast"), 1)
         self.wait_for_goal(goal_id, server)
 
+    def test_goal_that_a_server_has_taken_is_known_to_a_manipulator_that_comes_back(self):
+        goal_id, _ = self.send_goal()
+        self.wait_until_kept(goal_id)
+        server = self.server
+        self.manipulator.end(signal.SIGKILL)
+        rospy.delete_param("wait/resume_goal")  # as the server does when it takes the goal
+        self.restart_manipulator()
+        self.wait_until_it_serves()
+        self.assertEqual(self.request("fast"), 1)
+        self.wait_for_goal(goal_id, server)
+
     def test_goal_that_ends_while_there_is_no_manipulator_is_not_resurrected(self):
         goal_id, _ = self.send_goal()
         self.manipulator.end(signal.SIGKILL)

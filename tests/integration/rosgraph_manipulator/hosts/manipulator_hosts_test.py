@@ -44,7 +44,7 @@ class HostsTest(PairTest):
     @classmethod
     def setUpClass(cls):
         # A node stays dead long enough for the manipulator to see it.
-        rospy.set_param(FAR_LAUNCHER, {"restart_delay": 1.0, "restart_period": 100.0})
+        rospy.set_param(FAR_LAUNCHER, {"restart_delay": 3.0, "restart_period": 200.0})
         super().setUpClass()
         cls.far = Respawned()
         cls.addClassCleanup(cls.far.end)

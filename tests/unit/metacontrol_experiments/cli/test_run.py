@@ -1,5 +1,8 @@
 """The mission that `metacontrol run` makes of its options."""
 
+import os
+from unittest import mock
+
 import pytest
 from click.testing import CliRunner
 from helpers.office import write_office
@@ -7,6 +10,7 @@ from metacontrol_experiments.cli import build
 from metacontrol_experiments.cli import run as cli
 from metacontrol_experiments.cli.main import metacontrol
 from metacontrol_experiments.lockstep.system import private_parameters
+from metacontrol_experiments.ros import runner
 from ros_model.io.files import resolve
 from rosgraph_manipulator.io.launch_files import read_launch_file
 
@@ -141,3 +145,29 @@ def test_manager_is_what_the_launch_file_starts(monkeypatch, manager, file, node
     assert f" {file} " in " ".join(command) and settings.decider == node
     assert ("manager:=rules" in command) == (manager == "rules")
     assert ("as_published:=true" in command) == (manager == "as_published")
+
+
+@pytest.mark.parametrize("options", [["--gui"], ["--mission", "manipulation", "--gui"]])
+def test_window_without_a_display_is_refused_before_anything_starts(monkeypatch, tmp_path, options):
+    monkeypatch.setenv("DISPLAY", ":250")
+    kept = tmp_path / "summary.json"
+    kept.write_text("{}")
+    result = CliRunner().invoke(metacontrol, ["run", "--quiet", "--output", str(tmp_path), *options])
+    assert result.exit_code == 2
+    assert "--gui: a window needs" in result.output
+    assert kept.exists(), "results of an earlier run"
+
+
+@pytest.mark.parametrize("options", [[], ["--mission", "manipulation"]])
+def test_namespace_of_another_robot_is_not_the_missions(monkeypatch, tmp_path, options):
+    seen = []
+
+    def stop(*_):
+        seen.append((os.environ.get("ROS_NAMESPACE"), os.environ["ROS_HOSTNAME"]))
+        raise cli.RunError("enough")
+
+    monkeypatch.setattr(runner, "_run", stop)
+    with mock.patch.dict(os.environ, {"ROS_NAMESPACE": "rover"}):
+        result = CliRunner().invoke(metacontrol, ["run", "--quiet", "--output", str(tmp_path), *options])
+    assert "enough" in result.output
+    assert seen == [(None, "localhost")]

@@ -6,6 +6,7 @@ import pytest
 from metacontrol_experiments.campaign.matrix import Run
 from metacontrol_experiments.campaign.progress import Status
 from metacontrol_experiments.io.campaign_driver import drive
+from metacontrol_experiments.mission.settings import LOG_NAME
 
 MANIFEST = """<package format="2"><name>odd_managers</name><version>0.1.0</version><description>Odd.</description>
 <maintainer email="a@example.com">A</maintainer><license>Apache-2.0</license><export>
@@ -59,9 +60,9 @@ def test_process_that_dies_is_tried_once_more_and_the_next_run_is_well():
     assert [attempt.status for attempt in result.attempts] == [Status.CRASHED, Status.CRASHED]
     assert result.attempts[0].problem == "its process ended with status -6" and result.summary is None
     assert "in aborting" in result.attempts[1].log
-    result, log = drive(asked("none"), 100.0, keep_log=True)
+    result, files = drive(asked("none"), 100.0, keep_log=True)
     assert (result.status, result.summary["outcome"], len(result.attempts)) == (Status.DONE, "timeout", 1)
-    assert log.startswith("3.00 MISSION_START") and result.provenance["versions"].startswith("python 3")
+    assert files[LOG_NAME].startswith(b"3.00 MISSION_START") and result.provenance["versions"].startswith("python 3")
 
 
 def test_error_is_told_with_its_traceback():

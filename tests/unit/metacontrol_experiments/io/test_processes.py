@@ -1,6 +1,7 @@
 """The processes of a run."""
 
 import signal
+import subprocess
 import sys
 
 import psutil
@@ -49,3 +50,16 @@ def _stop_interrupts_and_waits(tmp_path):
     assert wait_until(lambda: "up" in (tmp_path / "log").read_text(), DEADLINE_S)
     assert tree.stop(process, DEADLINE_S)
     assert "bye" in (tmp_path / "log").read_text()
+
+
+def test_processes_end_in_order_when_the_run_is_killed(tmp_path):
+    log = tmp_path / "log"
+    code = "import time\ntry:\n print('up', flush=True); time.sleep(1000)\nexcept KeyboardInterrupt:\n print('bye')"
+    run = (
+        "import pathlib, sys, time; from metacontrol_experiments.io.processes import ProcessTree; "
+        f"ProcessTree({{}}).start([sys.executable, '-c', {code!r}], pathlib.Path({str(log)!r})); time.sleep(1000)"
+    )
+    with subprocess.Popen([sys.executable, "-c", run]) as process:
+        assert wait_until(lambda: log.exists() and "up" in log.read_text(), DEADLINE_S)
+        process.kill()
+    assert wait_until(lambda: "bye" in log.read_text(), DEADLINE_S)

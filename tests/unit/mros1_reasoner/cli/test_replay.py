@@ -11,7 +11,7 @@ from mros1_reasoner.cli.replay import replay
 from mros1_reasoner.forward.engine import RuleEngine
 from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.io.reasoner_bag import read_decisions, read_recording
-from mros1_reasoner.loop.entries import ActiveFact, ComponentFact, LevelFact, Lock, Unlock
+from mros1_reasoner.loop.entries import ActiveFact, ComponentFact, LevelFact, Lock, SetNfr, Unlock
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.replay.comparison import first_messages
 from mros1_reasoner.replay.recording import RecordingError
@@ -146,6 +146,29 @@ def test_other_limit_tells_what_it_would_have_done(life, bag):
     assert result.exit_code == 0
     assert "qa:safety" in result.output
     assert "the replay decides otherwise" in result.output
+
+
+def test_other_limit_holds_against_what_an_operator_set_then_and_says_so(life, bag):
+    set_then = (START + 3.0, SetNfr("", "safety", 0.9))
+    path = bag(life([set_then, *levels("safety", 0.55, 12.0, 18.0)]))
+    result = run(replay, path, "--nfr", "safety=0.5")
+    assert result.exit_code == 0
+    assert "qa:safety" in result.output
+    assert "set_nfr safety 0.9: the limit is 0.5 now" in result.output
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--set", "cool_dwn=1"], "did you mean cool_down?"),
+        (["--set", "banana=1"], "nothing reads it"),
+        (["--nfr", "saftey=1"], "no quality 'saftey': did you mean safety?"),
+    ],
+)
+def test_name_that_means_nothing_is_refused(life, bag, words, said):
+    result = run(replay, bag(life()), *words)
+    assert result.exit_code == 2
+    assert said in result.output
 
 
 def test_after_the_parting_requests_are_taken_for_carried_out(life, bag):

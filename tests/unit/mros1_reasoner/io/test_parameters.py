@@ -6,7 +6,7 @@ import pytest
 from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.knowledge.model import Direction
 from node_kit.parameters import ParameterError
-from reasoner_helpers import application
+from reasoner_helpers import DECIMAL, application
 
 
 @pytest.fixture
@@ -127,3 +127,13 @@ def test_what_can_not_be_used_is_named(model, values, message):
 
     with pytest.raises(ParameterError, match=message):
         use()
+
+
+@pytest.mark.parametrize("given_limit", [-2, [-0.5, 0.5]])
+def test_limit_out_of_its_range_is_named(tmp_path, given_limit):
+    bounds = f'<t:qa_min rdf:datatype="{DECIMAL}">0</t:qa_min><t:qa_max rdf:datatype="{DECIMAL}">1</t:qa_max>'
+    path = tmp_path / "bounded.owl"
+    path.write_text(application(extra=f'<t:QualityAttributeType rdf:about="#safety">{bounds}</t:QualityAttributeType>'))
+    parameters = given(path, nfr_safety=given_limit)
+    with pytest.raises(ParameterError, match=r"~nfr_safety is .* a level within its range, 0 to 1"):
+        parameters.objectives(parameters.knowledge_base())

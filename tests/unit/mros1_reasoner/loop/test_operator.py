@@ -186,3 +186,11 @@ def test_saved_knowledge_base_has_the_statuses_and_loads_again(make, knowledge_b
     assert "IN_ERROR_COMPONENT" in (tmp_path / "saved.owl").read_text()
     with pytest.raises(KnowledgeBaseError, match=r"nowhere/saved\.owl: No such file"):
         save_knowledge_base(tmp_path / "nowhere" / "saved.owl", knowledge_base)
+
+
+@pytest.mark.parametrize("limit", [-2.0, 1.5])
+def test_limit_out_of_its_range_is_refused(make, knowledge_base, limit):
+    core = make()
+    knowledge_base.qualities["safety"] = replace(knowledge_base.qualities["safety"], low=0.0, high=1.0)
+    with pytest.raises(MapeError, match=f"limit of safety is {limit:g}, not within its range, 0 to 1: left as it is"):
+        core.operator.set_nfr("o_move", "safety", limit)

@@ -98,7 +98,7 @@ def test_nobody_at_the_address():
     with socket.socket() as free:
         free.bind((QUIET_HOST, 0))
         uri = f"http://{QUIET_HOST}:{free.getsockname()[1]}"
-        with Client(uri, "/me") as client, pytest.raises(GoneError, match=f"^ROS master {uri} is gone"):
+        with Client(uri, "/me") as client, pytest.raises(GoneError, match=f"^no ROS master answers at {uri}"):
             client.call("size")
 
 

@@ -3,6 +3,7 @@
 import errno
 import io
 import itertools
+import os
 import subprocess
 from pathlib import Path
 
@@ -133,7 +134,7 @@ def test_file_that_can_not_be_written_is_told_by_its_own_name(run, base, monkeyp
         raise PermissionError(errno.EACCES, "Permission denied")
 
     path = base(ARM)
-    monkeypatch.setattr(Path, "write_text", refuse)
+    monkeypatch.setattr(os, "replace", refuse)
     status, _, err = run("init", path)
     written = path.parent / "metacontrol.yaml"
     assert (status, err) == (2, f"rosmodel: {written}: can't be written (Permission denied): check its folder\n")

@@ -394,6 +394,19 @@ def launched(tmp_path, monkeypatch):
     return read
 
 
+def test_program_of_a_launch_file_is_run_only_if_that_is_asked_for(launched, tmp_path):
+    mark, out = tmp_path / "mark", tmp_path / "out"
+    command = f"touch {mark}"
+    launched(f"""<param name="text" command="{command}"/><param name="kept" value="1"/>""")
+    assert run("extract", tmp_path / "system.launch", "-o", out) == 0
+    assert not mark.exists()
+    written = (out / "system.rossystem").read_text()
+    assert f"Left out: the parameter /text, which a program gives that was not run: {command}" in written
+    assert run("extract", tmp_path / "system.launch", "-o", out, "--run-programs") == 0
+    assert mark.exists()
+    assert "Left out" not in (out / "system.rossystem").read_text()
+
+
 def test_launch_file_gives_components_wiring_and_parameters(launched, tmp_path, capsys):
     launched(
         """<arg name="side"/><param name="gain" value="2"/>

@@ -4,8 +4,9 @@ import pytest
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io import launcher as module
 from rosgraph_launcher.io import node_processes
-from rosgraph_launcher.io.launcher import Launcher, LauncherError
+from rosgraph_launcher.io.launcher import Launcher
 from rosgraph_launcher.launching.options import LauncherOptions
+from rosgraph_launcher.launching.supervision import LauncherError
 
 PREFIX = "/bin/sh -c 'exec sleep 1000'"
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rosgraph_launcher.description import NodeDescription
-from rosgraph_launcher.launching.contested import HOLD
+from rosgraph_launcher.launching.contested import ANSWER_TIMEOUT, HOLD
 from rosgraph_launcher.launching.managed_nodes import ManagedNodes
 from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE
 from rosgraph_launcher.launching.restarts import RestartPolicy, Verdict
@@ -414,3 +414,17 @@ def test_required_manager_fails_its_configuration(camera):
     wanted = {**nodelet("/m", "manager", required=True), **nodelet("/l1", "load a/B m")}
     change(camera, "other", wanted, list(wanted))
     assert camera.ended("/m", -9, 10.0).verdict is Verdict.GIVE_UP
+
+
+def test_node_that_does_not_answer_under_its_contested_name_hangs(nodes):
+    nodes.ended("/a", 0, 5.0, conflict="its name is taken by process 7 (x): end that process")
+    nodes.started("/a", 5.5)
+    nodes.seen("/a", False, 6.0)
+    assert nodes.hanging(5.5 + ANSWER_TIMEOUT) == []
+    assert nodes.hanging(5.6 + ANSWER_TIMEOUT) == ["/a"]
+    nodes.seen("/a", True, 36.0)
+    assert nodes.hanging(100.0) == []
+
+
+def test_node_whose_name_nobody_has_taken_does_not_hang(nodes):
+    assert nodes.hanging(1000.0) == []

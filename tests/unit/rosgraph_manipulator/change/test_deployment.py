@@ -57,8 +57,8 @@ class Recorder:
         return self.staying
 
 
-def run(executor, plans, last_good=OLD):
-    return deploy(executor, NEW, plans, last_good, Stopwatch(itertools.count().__next__))
+def run(executor, plans, last_good=OLD, runs=True):
+    return deploy(executor, NEW, plans, last_good, Stopwatch(itertools.count().__next__), runs=runs)
 
 
 def test_cheapest_plan_that_works_is_the_only_one_carried_out():
@@ -131,6 +131,14 @@ def test_request_taken_back_before_anything_was_touched_leaves_what_runs():
     outcome = run(executor, [RESTART])
     assert (outcome.result, outcome.running, outcome.cancelled) == (Result.FAILED, OLD, True)
     assert executor.calls == ["begin new by restart"]
+
+
+@pytest.mark.parametrize("last_good, result", [(OLD, Result.FAILED), (None, Result.GENERAL_ERROR)])
+def test_request_taken_back_where_nothing_whole_runs_is_not_told_to_leave_it(last_good, result):
+    executor = Recorder(begin=CancelledError("taken back"))
+    outcome = run(executor, [RESTART], last_good=last_good, runs=False)
+    assert (outcome.result, outcome.running, outcome.cancelled) == (result, last_good, True)
+    assert executor.calls[-1] == ("restore old" if last_good else "release f")
 
 
 @pytest.mark.parametrize("where", ["change_processes", "ready", "settled"])

@@ -202,3 +202,13 @@ def test_server_that_an_earlier_step_replaced_is_waited_for(progress):
     progress.start(("/new",))
     progress.leave({"/old"}, set(), servers={"/new"})
     assert progress.awaited(False).server
+
+
+def test_function_gives_up_shared_and_dead_nodes_that_it_has_no_more():
+    progress = ChangeProgress()
+    spray = LauncherReport("spray", "by_leaf", nodes=("/mast", "/sprayer"))
+    follow = LauncherReport("follow", "by_rows", nodes=("/mast", "/finder", "/lost", "/steering"), dead=("/lost",))
+    progress.take([spray, follow])
+    assert progress.given_up("follow", ["/steering"]) == ("/mast", "/lost")
+    assert progress.given_up("follow", ["/steering", "/mast", "/lost"]) == ()
+    assert progress.given_up("unheard", []) == ()

@@ -116,8 +116,8 @@ def test_configuration_without_its_package_refuses_no_plan_of_the_others(run, la
     [
         (plan, ("a", "b"), "a: no ROS master knows the configurations: start the manipulator or give --config\n"),
         (plan, ("/no/such.launch", ""), "/no/such.launch"),
-        (request, ("a",), f"no ROS master at http://{QUIET_HOST}:"),
-        (status, (), f"no ROS master at http://{QUIET_HOST}:"),
+        (request, ("a",), f"no ROS master answers at http://{QUIET_HOST}:"),
+        (status, (), f"no ROS master answers at http://{QUIET_HOST}:"),
     ],
 )
 def test_refusal_is_one_line_and_status_2(run, command, words, told):

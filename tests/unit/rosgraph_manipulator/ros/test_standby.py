@@ -3,8 +3,8 @@
 import pytest
 from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions, Repair
+from rosgraph_manipulator.io import launch_files
 from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError
-from rosgraph_manipulator.ros import running_system
 from rosgraph_manipulator.ros.standby import Standby
 
 
@@ -32,7 +32,7 @@ def standby(monkeypatch, launchers):
         node = NodeDescription(name, "/", "p", "x", parameters={"speed": path})
         return LaunchFile(SystemDescription({name: node}))
 
-    monkeypatch.setattr(running_system, "read_launch_file", read)
+    monkeypatch.setattr(launch_files, "read_launch_file", read)
     configurations = {name: Configuration(name, f"f_{name}", name) for name in ("slow", "broken", "fast")}
     repairs = {"eye": Repair("eye", driver=Configuration("repair_of_eye", "repair_of_eye", "eye"))}
     return Standby(ManipulatorOptions(configurations, repairs=repairs), launchers)

@@ -84,3 +84,10 @@ def test_look_on_request_does_not_wait_until_one_is_due(stand):
     stand.answer(GRAPH)
     assert stand.poller.count == 2
     stand.poller.request()
+
+
+def test_error_that_nobody_foresaw_costs_one_look(stand, caplog):
+    stand.master.answers.put(RuntimeError("unforeseen"))
+    stand.answer(GRAPH)
+    assert stand.poller.latest.snapshot == GRAPH
+    assert "the graph could not be looked at" in caplog.text

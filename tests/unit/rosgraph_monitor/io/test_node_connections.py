@@ -195,3 +195,25 @@ def test_node_that_is_not_watched_any_more_is_forgotten(watcher):
         )
         watcher.watch({})
         wait_for(lambda: watcher.lives() == {}, known(watcher))
+
+
+def test_error_that_nobody_foresaw_costs_no_other_node(caplog):
+    told = threading.Semaphore(0)
+
+    def change():
+        told.release()
+        if not failed:
+            failed.append(True)
+            raise RuntimeError("unforeseen")
+
+    failed = []
+    watcher = NodeConnections(change, TIMING)
+    with node() as (one, _), node() as (other, _):
+        watcher.start()
+        try:
+            keys = {"/one": one, "/other": other}
+            watcher.watch(keys)
+            wait_for(lambda: set(watcher.pids()) == set(keys.items()), "both are known to live")
+        finally:
+            watcher.close()
+    assert failed and "is asked anew" in caplog.text

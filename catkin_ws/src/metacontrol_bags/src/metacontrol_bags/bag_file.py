@@ -199,6 +199,7 @@ class BagFile:
             header = read_header(self._file)
             skip(self._file, read_uint32(self._file))
             index = UINT64.unpack(header[b"index_pos"])[0]
+            chunks = UINT32.unpack(header[b"chunk_count"])[0]
         except DAMAGE:
             raise BagError(f"{path}: its first bytes are damaged: copy it again") from None
         if header.get(b"encryptor"):
@@ -206,11 +207,11 @@ class BagFile:
         begin = self._file.tell()
         if not index:
             self.problems.append("it was not closed, so its end may be missing: `rosbag reindex` gives it an index")
-        elif index >= self.size and UINT32.unpack(header[b"chunk_count"])[0]:
+        elif index >= self.size and chunks:
             self.problems.append(f"it is cut off: at least {index - self.size} bytes are missing: copy it again")
         else:
             try:
-                self._read_index(index, UINT32.unpack(header[b"chunk_count"])[0])
+                self._read_index(index, chunks)
                 self.is_closed = True
             except DAMAGE:
                 self.connections, self._contents = {}, {}

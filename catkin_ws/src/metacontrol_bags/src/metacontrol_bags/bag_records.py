@@ -13,7 +13,7 @@ import lz4.frame
 _HEADER_LIMIT, _DATA_LIMIT = 1 << 20, 1 << 30
 """Bytes: what claims to be longer is no header, no message."""
 
-_BLOCK = 1 << 16
+_BLOCK, _LARGE_BLOCK = 1 << 16, 1 << 20
 UINT32, UINT64, _TIME = struct.Struct("<L"), struct.Struct("<Q"), struct.Struct("<LL")
 
 
@@ -95,10 +95,14 @@ def read_uint32(stream: BinaryIO) -> int:
 
 
 def _exactly(stream: BinaryIO, size: int) -> bytes:
-    data = stream.read(size)
-    if len(data) != size:
-        raise DamageError
-    return data
+    """Read so many bytes. A stream takes memory for all that it is asked for, whether it is there or not."""
+    parts, left = [], size
+    while left:
+        parts.append(stream.read(min(left, _LARGE_BLOCK)))
+        if not parts[-1]:
+            raise DamageError
+        left -= len(parts[-1])
+    return parts[0] if len(parts) == 1 else b"".join(parts)
 
 
 def time_of(data: bytes) -> int:

@@ -20,6 +20,7 @@ from metacontrol_bags.decision import (
     Decision,
     milliseconds,
 )
+from metacontrol_bags.printable import all_printable
 
 _STYLES = {EXECUTED: "green", FAILED: "red", PROPOSED: "yellow", ADVISED: "yellow"}
 
@@ -31,6 +32,7 @@ def render(decision: Decision, since: float = 0.0) -> Group:
         decision: the decision.
         since: moment from which its time is counted, s of ROS time.
     """
+    decision = all_printable(decision)
     return Group(
         _heading(decision, since),
         *_causes(decision.reasons, decision.causes),

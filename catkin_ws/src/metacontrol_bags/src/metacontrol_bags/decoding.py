@@ -21,7 +21,10 @@ _ERRORS = (SerdeError, ValueError, AttributeError, AssertionError, LookupError, 
 
 
 def decode(
-    bag: BagFile, wanted: Callable[[Connection], bool], take: Callable[[Connection, int, Any], None]
+    bag: BagFile,
+    wanted: Callable[[Connection], bool],
+    take: Callable[[Connection, int, Any], None],
+    is_due: Callable[[Connection, int], bool] = lambda _connection, _stamp: True,
 ) -> tuple[str, ...]:
     """Pass on the wanted messages of a bag, in the order of the file, and return which ones are lost, in words.
 
@@ -30,10 +33,13 @@ def decode(
         wanted: tells which connections are.
         take: gets the connection, the time of recording in ns and the message. If it raises LookupError, ValueError or
             the like, the message is lost: it is of another type than its topic usually has.
+        is_due: tells by connection and time of recording which of the wanted ones are worth the time to decode them.
     """
     decoders: dict[tuple[str, str], Callable[[bytes], Any] | str] = {}
     lost: Counter[str] = Counter()
     for connection, stamp, data in bag.messages(wanted):
+        if not is_due(connection, stamp):
+            continue
         kind = connection.type, connection.definition
         if kind not in decoders:
             decoders[kind] = _decoder(*kind)

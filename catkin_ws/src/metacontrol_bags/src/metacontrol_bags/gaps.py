@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from metacontrol_bags.words import MissionEvent
 
 if TYPE_CHECKING:
@@ -27,6 +29,8 @@ _TELLS_OF_ANY_ROBOT = {
 }
 _NAMED = 4
 """Topics of a bag of something else that a line names."""
+_HOLE_S = 0.5
+"""s between two poses from which on something is missing: the ground truth has 20 or more a second."""
 
 
 def is_mission(record: MissionRecord) -> bool:
@@ -41,6 +45,33 @@ def is_d2(record: MissionRecord) -> bool:
     if began is not None:
         return began.values.get("mission", "D2") == "D2"
     return any(record.true_quality.values()) or not (record.decisions or record.configurations)
+
+
+def holes(record: MissionRecord) -> list[tuple[float, float]]:
+    """Return the spans of the mission without a pose of the ground truth: their begin and end in s of ROS time.
+
+    None where nothing of the ground truth was recorded at all.
+    """
+    start, end = record.start_stamp, record.end_stamp
+    stamps = record.poses[:, 0]
+    if not stamps.size or end <= start:
+        return []
+    edges = np.concatenate(([start], stamps[(stamps > start) & (stamps < end)], [end]))
+    wide = np.flatnonzero(np.diff(edges) > _HOLE_S)
+    return [(float(edges[i]), float(edges[i + 1])) for i in wide]
+
+
+def holes_in_words(record: MissionRecord) -> tuple[str, ...]:
+    """Return a line for the holes of a record; empty if it has none."""
+    start = record.start_stamp
+    spans = [f"{since - start:.1f} to {until - start:.1f} s" for since, until in holes(record)]
+    if not spans:
+        return ()
+    more = f" and {len(spans) - _NAMED} more" if len(spans) > _NAMED else ""
+    return (
+        f"it has holes: nothing of the robot's way was recorded from {', '.join(spans[:_NAMED])}{more} of the mission, "
+        "so way, shares and means are not of all of it",
+    )
 
 
 def gaps(found: Salvaged) -> tuple[str, ...]:
@@ -58,7 +89,7 @@ def gaps(found: Salvaged) -> tuple[str, ...]:
         told.append("the start of the mission is not in it: the first message is taken for it")
     elif found.record.event(MissionEvent.MISSION_END) is None:
         told.append("the end of the mission is not in it: the last message is taken for it")
-    return tuple(told)
+    return (*told, *holes_in_words(found.record))
 
 
 def nothing_of_a_mission(found: Salvaged) -> str:

@@ -17,6 +17,8 @@ Definitions
 - `control` is about the initial configuration until the first change: the rate that its controller was set to, and the
   share of its periods in which no velocity command came. A command that is late within its period does not count as
   missed. A controller that lags a whole period behind its schedule, at once or little by little, has missed one.
+- `unrecorded` are the spans [from, to] in s since MISSION_START, longer than 0.5 s, in which the bag has no pose of the
+  ground truth: way, shares and means are not of all of the mission then.
 - `success` is the paper's: goal reached, mean safety risk < 0.4, risk below its threshold for more than 95 % of the
   time, energy below its threshold for more than 90 % of the time; and not longer than 250 s.
 """
@@ -28,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from metacontrol_bags.decision import DECIDED, EXECUTED, FAILED
+from metacontrol_bags.gaps import holes
 from metacontrol_bags.goal_status import GoalStatus
 from metacontrol_bags.record import MissionRecord, Samples
 from metacontrol_bags.series import held, mean, periods_missed, share_above, start_of_run
@@ -121,6 +124,7 @@ def summarise(record: MissionRecord) -> dict[str, Any]:
         "outcome": closing.get("outcome", "unknown"),
         "reason": closing.get("reason", "the bag holds no end of the mission"),
         "start_stamp_s": _rounded(start),
+        "unrecorded": [[_rounded(since - start), _rounded(until - start)] for since, until in holes(record)],
         "thresholds": limits,
         "observed_qa": {name: _observed(record, name, limit, start, end) for name, limit in limits.items()},
     }

@@ -116,7 +116,7 @@ def _event(report: Event) -> tuple[Entry, ...]:
     if report.kind == MissionEvent.PERTURBATION:
         share = f" after {float(values['share']):.0%} of the way" if "share" in values else ""
         pid = f", pid {values['pid']}: {values.get('how', 'kill')}" if "pid" in values else ""
-        return (Entry(report.stamp, "!", f"{report.name} struck{share}{pid}", True),)
+        return (Entry(report.stamp, "!", f"injected: {report.name}{share}{pid}", True),)
     if report.kind == MissionEvent.MISSION_START:
         route = f", route {values['route']}" if "route" in values else ""
         return (Entry(report.stamp, "-", f"goal sent{route}"),)

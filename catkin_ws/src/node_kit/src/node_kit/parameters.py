@@ -7,13 +7,16 @@ remedy.
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from node_kit.one_line import OneLineError
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
 PRIVATE = "~"
 """Stands for the node's name in names of parameters."""
@@ -22,7 +25,7 @@ _REMEDY = "correct the launch or YAML file that sets it"
 _TRUE, _FALSE = (True, 1, "true", "True"), (False, 0, "false", "False")
 
 
-class ParameterError(ValueError):
+class ParameterError(OneLineError, ValueError):
     """A parameter can't be used; one line with its full name, its value and the remedy."""
 
 
@@ -205,6 +208,12 @@ def mapping(value: object, name: str, content: str = "") -> Mapping[str, Any]:
     return value
 
 
+def unknown(name: str, known: Collection[str]) -> str:
+    """Return what to say of a name that is not known: the one that it may stand for, else all."""
+    meant = difflib.get_close_matches(name, known, n=1)
+    return f"did you mean {meant[0]}?" if meant else f"known are {', '.join(sorted(known))}"
+
+
 class ParameterTree:
     """One level of a tree of parameters. Defaults are checked like given values, but may be infinite."""
 
@@ -230,6 +239,19 @@ class ParameterTree:
     def child(self, name: str) -> ParameterTree:
         """Return the level below; empty where there is none."""
         return ParameterTree(self.values.get(name, {}), self.full_name(name))
+
+    def strangers(self, known: Collection[str], beginnings: tuple[str, ...] = ()) -> list[str]:
+        """Return what to say of each parameter of this level that nobody reads, as where its name is misspelt.
+
+        Args:
+            known: names of those that are read.
+            beginnings: of names of which any number may be given.
+        """
+        return [
+            f"parameter {self.full_name(name)} is left out, because nothing reads it: {unknown(name, known)}"
+            for name in sorted(self.values)
+            if name not in known and not name.startswith(beginnings)
+        ]
 
     def has(self, name: str) -> bool:
         """Return whether a parameter is given."""

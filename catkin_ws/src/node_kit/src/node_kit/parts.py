@@ -15,6 +15,8 @@ SILENCE = 1.2
 """s without a sign after which a part is asked."""
 HANGS_AFTER = 4.0
 """s without a sign or an answer after which a part hangs; one at whose address nobody listens is lost at once."""
+STARTS_WITHIN = 15.0
+"""s without a sign after which a part that was started again has not come back."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,12 @@ class Answer(Enum):
 
     LIVES = "it answers"
     GONE = "its process has ended"
+    ENDED = "it was asked to end"
+    STARTS = "it was started again, but gives no sign of life"
     SILENT = "it does not answer"
+
+
+_PATIENCE = {Answer.GONE: 0.0, Answer.SILENT: HANGS_AFTER, Answer.STARTS: STARTS_WITHIN}
 
 
 @dataclass(frozen=True)
@@ -83,27 +90,26 @@ class Parts:
         if sign.node == self._own:
             return
         if sign.ends:
-            self._known.pop(sign.node, None)
-            self._told.discard(sign.node)  # it has not come back
+            self.note(sign.node, Answer.ENDED, now)
         else:
             self._known[sign.node] = Standing(sign, now)
 
     def doubtful(self, now: float) -> list[Sign]:
-        """Return the last signs of those to ask whether they are there, because they have given none for too long.
-
-        One that is lost is not asked: the next sign tells that it is back.
-        """
-        return [known.sign for known in self._known.values() if not known.lost and now - known.heard > SILENCE]
+        """Return the last signs of those to ask whether they are there, because they have given none for too long."""
+        return [known.sign for known in self._known.values() if now - known.heard > SILENCE]
 
     def note(self, node: str, answer: Answer, now: float) -> None:
         """Take in what came of asking a part."""
         standing = self._known.get(node)
         if standing is None:
             return
-        if answer is Answer.LIVES:
+        if answer is Answer.ENDED:  # neither lost nor back
+            del self._known[node]
+            self._told.discard(node)
+        elif answer is Answer.LIVES:
             if not standing.lost:
                 self._known[node] = replace(standing, heard=now)
-        elif answer is Answer.GONE or now - standing.heard >= HANGS_AFTER:
+        elif now - standing.heard >= _PATIENCE[answer]:
             self._known[node] = replace(standing, lost=answer.value)
 
     def lost(self) -> dict[str, str]:

@@ -10,11 +10,13 @@ from __future__ import annotations
 import base64
 import binascii
 
+from node_kit.one_line import OneLineError
+
 MAX_LENGTH = 100_000
 """Longest accepted text; a goal takes about 300 characters."""
 
 
-class TakeoverError(ValueError):
+class TakeoverError(OneLineError, ValueError):
     """The parameter does not hold a goal; the message says why."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING, Any
 
 import yaml
@@ -60,7 +61,9 @@ def _parse(text: str, places: dict[Keys, Place], is_unique: bool) -> Any:
         node = loader.get_single_node()
         if node is None:
             return None
-        _walk(node, (), places, _Count(), is_unique)
+        _check_size(node)
+        if is_unique:
+            _walk(node, (), places)
         return loader.construct_document(node)
     except YamlError:
         raise
@@ -76,7 +79,7 @@ def _parse(text: str, places: dict[Keys, Place], is_unique: bool) -> Any:
 
 
 class _Loader(yaml.SafeLoader):
-    """A loader that gives up where brackets are nested too deep."""
+    """A loader that gives up where brackets are nested too deep, or a number is larger than any that is used."""
 
     def fetch_flow_collection_start(self, token: Any) -> None:
         """Take an opening bracket or brace."""
@@ -85,28 +88,60 @@ class _Loader(yaml.SafeLoader):
         super().fetch_flow_collection_start(token)
 
 
-class _Count:
-    """Counts values."""
+def _construct_int(loader: _Loader, node: yaml.ScalarNode) -> int:
+    value: int = loader.construct_yaml_int(node)
+    if abs(value) > sys.float_info.max:
+        raise YamlError("a number is too large: correct it", _place(node))
+    return value
 
-    def __init__(self) -> None:
-        self.values = 0
+
+_Loader.add_constructor("tag:yaml.org,2002:int", _construct_int)
 
 
-def _walk(node: yaml.Node, keys: Keys, places: dict[Keys, Place], count: _Count, is_unique: bool) -> None:
+def _check_size(root: yaml.Node) -> None:
+    """Check that a document has no more values than may be, however often its aliases repeat them.
+
+    Raises:
+        YamlError: it has more.
+        RecursionError: it has circles.
+    """
+    counts: dict[int, int] = {}  # values of a node and of all in it, by the node's id; 0 while they are counted
+
+    def count(node: yaml.Node) -> int:
+        known = counts.get(id(node))
+        if known == 0:
+            raise RecursionError  # an alias stands within what it repeats
+        if known:
+            return known
+        counts[id(node)] = 0
+        total = 1
+        for item in node.value if isinstance(node, yaml.CollectionNode) else ():
+            total += count(item) if isinstance(item, yaml.Node) else count(item[0]) - 1 + count(item[1])
+            if total > MAX_VALUES:
+                raise YamlError(f"holds more than {MAX_VALUES} values: correct its aliases", _place(node))
+        counts[id(node)] = total
+        return total
+
+    count(root)
+
+
+def _walk(node: yaml.Node, keys: Keys, places: dict[Keys, Place]) -> None:
+    """Note where each value stands.
+
+    Raises:
+        YamlError: a key stands twice.
+    """
     places.setdefault(keys, _place(node))
-    count.values += 1
-    if count.values > MAX_VALUES:
-        raise YamlError(f"holds more than {MAX_VALUES} values: correct its aliases", _place(node))
     if isinstance(node, yaml.SequenceNode):
         for number, item in enumerate(node.value):
-            _walk(item, (*keys, number), places, count, is_unique)
+            _walk(item, (*keys, number), places)
     elif isinstance(node, yaml.MappingNode):
         for key, item in node.value:
             inner = (*keys, str(key.value))
-            if is_unique and inner in places and key.tag != _MERGE:
+            if inner in places and key.tag != _MERGE:
                 raise YamlError(f"the key {key.value!r} stands twice: take one out", _place(key))
             places[inner] = _place(key)
-            _walk(item, inner, places, count, is_unique)
+            _walk(item, inner, places)
 
 
 def _place(node: yaml.Node) -> Place:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
+
+from node_kit.one_line import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -28,7 +31,7 @@ class ModelError(Exception):
     def __init__(
         self, message: str, position: Position | None = None, others: Iterable[ModelError] = (), rule: str = ""
     ) -> None:
-        super().__init__(printable(message if position is None else f"{position}: {message}"))
+        super().__init__(one_line(message if position is None else f"{position}: {message}"))
         self.message = message
         self.position = position
         self.others = tuple(others)
@@ -42,9 +45,7 @@ class ModelError(Exception):
 
 def printable(text: str) -> str:
     """Return a text on one line, safe for a terminal: quoted text may have line breaks or control characters."""
-    if text.isprintable():
-        return text
-    return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in text)
+    return one_line(text, sys.maxsize)
 
 
 def short(text: str) -> str:

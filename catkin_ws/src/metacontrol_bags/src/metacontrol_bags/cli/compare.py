@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from metacontrol_bags.cli.metrics import told
-from metacontrol_bags.cli.output import BAGS, JSON, NAMESPACE, of_each, printable, show_json, show_table
+from metacontrol_bags.cli.output import BAGS, JSON, NAMESPACE, of_each, show_json, show_table
+from metacontrol_bags.printable import printable
 from metacontrol_bags.side_by_side import adaptation_table, markdown, short_names, table
 
 

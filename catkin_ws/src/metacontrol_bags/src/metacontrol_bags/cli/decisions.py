@@ -14,12 +14,12 @@ from metacontrol_bags.cli.output import (
     NAMESPACE,
     console,
     of_each,
-    printable,
     robot_of,
     show_json,
     tell_problems,
 )
 from metacontrol_bags.decision_tables import render
+from metacontrol_bags.printable import printable
 
 _TOPIC, _EVENTS = "/mros1_reasoner/decision", "/mission/event"
 

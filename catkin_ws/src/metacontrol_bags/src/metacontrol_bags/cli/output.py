@@ -18,6 +18,7 @@ from rich.text import Text
 from metacontrol_bags.bag import BagError, Salvaged, robots, salvage
 from metacontrol_bags.gaps import gaps, is_mission, nothing_of_a_mission
 from metacontrol_bags.metrics import MetricsError
+from metacontrol_bags.printable import printable
 
 BAGS = click.argument("bags", metavar="BAG...", nargs=-1, required=True, type=click.Path(path_type=Path))
 JSON = click.option("--json", "as_json", is_flag=True, help="Print a JSON list with an object for each bag.")
@@ -117,11 +118,6 @@ def show_table(rows: Sequence[Sequence[str]], title: str = "") -> None:
 def console() -> Console:
     """Return the console; for a file or a pipe, it is as wide as a table needs."""
     return Console(highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
-
-
-def printable(text: str) -> str:
-    """Return a text without characters that control a terminal: a bag may come from anybody."""
-    return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in text)
 
 
 def _plain(value: Any) -> Any:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from metacontrol_bags.metrics import summarise
 from metacontrol_bags.series import held, quantile_of, share_above
+from node_kit.one_line import OneLineError
 
 from metacontrol_experiments.campaign.definition import over_runs
 
@@ -38,7 +39,7 @@ Only energy has a usual level: it belongs to the variant, while the risk belongs
 _ROUTES = 1000  # seeds that are kept apart for the routes of one seed
 
 
-class CalibrationError(RuntimeError):
+class CalibrationError(OneLineError, RuntimeError):
     """Runs cannot be read or are not enough; the message names file and remedy."""
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from metacontrol_bags.metrics import TIMEOUT_S
+from node_kit.one_line import OneLineError
 from ros_model.project.schema_check import violations
 
 from metacontrol_experiments.contingency.contingency import Contingency, Kind
@@ -96,7 +97,7 @@ _SCHEMA = {
 }
 
 
-class CampaignError(ValueError):
+class CampaignError(OneLineError, ValueError):
     """A campaign makes no sense, or its folder is not its own; the message names file, place and remedy."""
 
 
@@ -159,7 +160,7 @@ class Campaign:
     Attributes:
         runs: repeat by repeat, cells in a random order that is always the same: any first part is a sample of all.
         deadline: wall s for a run.
-        logs: whether each run leaves its log.
+        logs: whether each run leaves its log, and on ROS its bag.
         ground: of all runs.
     """
 

@@ -141,6 +141,8 @@ def from_row(content: Mapping[str, Any], where: str) -> Result:
     try:
         run = run_of(content)
         before = int(content["attempts"]) - 1
+        if not 0 <= before < MOST_ATTEMPTS:
+            raise ValueError(f"{before + 1} attempts")
         last = Attempt(Status(content["status"]), content["wall_s"], content["problem"])
         attempts = (*(Attempt(Status.CRASHED, 0.0) for _ in range(before)), last)
         summary = json.loads(content["summary"]) if content["summary"] else None

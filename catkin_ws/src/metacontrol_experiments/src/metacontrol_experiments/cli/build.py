@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,8 +64,6 @@ def build(quiet: bool, output: Path, no_metacontrol: bool, **options: Any) -> No
     """
     with refusing(BagError, RunError):
         settings = PyramidSettings(output, metacontrol=not no_metacontrol, commit=current_commit(), **options)
-        for name in (SUMMARY_NAME, FIGURE_NAME):  # those of an earlier run
-            (output / name).unlink(missing_ok=True)
         with Display(quiet) as display:
             display.say(f"scenario {settings.scenario}: {TITLES[settings.scenario]}")
             run_mission(settings, display, _maker(settings))
@@ -77,6 +76,7 @@ def build(quiet: bool, output: Path, no_metacontrol: bool, **options: Any) -> No
         display.show(reconfigurations_table(summary["reconfigurations"]))
     for name in (BAG_NAME, SUMMARY_NAME, FIGURE_NAME):
         display.say(str(output / name))
+    display.say(f"as a page: metacontrol view {shlex.quote(str(output / BAG_NAME))}")
     raise click.exceptions.Exit(0 if summary["success"] else _FAILED)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ from metacontrol_experiments.io.input_files import PackageError, read_components
 from metacontrol_experiments.io.processes import RunError, alone_in, signals_as_interrupts
 from metacontrol_experiments.managers.manager import PACKAGE
 from metacontrol_experiments.mission.routes import RouteError
-from metacontrol_experiments.mission.settings import ENGINES
+from metacontrol_experiments.mission.settings import BAG_NAME, ENGINES
 from metacontrol_experiments.pyramid.campaign import asks_for_pyramids
 
 if TYPE_CHECKING:
@@ -166,8 +167,8 @@ def _drive(
 
     with _progress() as bar:
         task = bar.add_task("starting", total=len(missing), began=time.monotonic())
-        for result, log in drive_all(asked, missing, jobs=jobs, scheduler=scheduler):
-            write_result(folder, result, log)
+        for result, files in drive_all(asked, missing, jobs=jobs, scheduler=scheduler):
+            write_result(folder, result, files)
             results[result.run.name] = result
             ended = result.summary["outcome"] if result.summary else result.status.value
             bar.update(task, advance=1, description=f"{result.run.name}: {ended}")
@@ -193,6 +194,8 @@ def _progress() -> Progress:
 
 
 def _tell(asked: Campaign, results: dict[str, Result], driven: int, table: Path | None, folder: Path) -> None:
+    if any((folder / RUNS).glob(f"**/{BAG_NAME}")):
+        tell(f"the missions with a bag, as pages: metacontrol view {shlex.quote(str(folder / RUNS))}")
     bad = [result for result in results.values() if result.status is not Status.DONE]
     tell(f"{driven} missions driven, {len(results)} of {len(asked.runs)} in {table}")
     for result in bad[:10]:

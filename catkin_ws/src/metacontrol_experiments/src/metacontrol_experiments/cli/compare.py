@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 import click
+from node_kit.io.output_files import write_file
 
 from metacontrol_experiments.io.display import refusing
 
@@ -28,6 +29,6 @@ def compare(results: tuple[Path, ...], output: Path | None) -> None:
         if output:
             asked = shlex.join(["metacontrol", "compare", *map(str, results), "--output", str(output)])
             output.parent.mkdir(parents=True, exist_ok=True)
-            output.write_text(f"# Lockstep beside ROS\n\nMade by `{asked}`.\n\n{text}", encoding="utf-8")
+            write_file(output, f"# Lockstep beside ROS\n\nMade by `{asked}`.\n\n{text}")
             return
     click.echo(text, nl=False)

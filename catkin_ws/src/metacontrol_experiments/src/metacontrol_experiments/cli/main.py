@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 from metacontrol_bags.cli.main import bag
+from metacontrol_dashboard.cli.view import view
 
 from metacontrol_experiments.cli.calibrate import calibrate
 from metacontrol_experiments.cli.campaign import campaign
@@ -22,7 +23,7 @@ def metacontrol() -> None:
     """Missions of a robot that adapts, and what their bags tell."""
 
 
-for _command in (run, summary, figure, calibrate, variants, compare, delays, campaign, report, yardstick, bag):
+for _command in (run, summary, figure, calibrate, variants, compare, delays, campaign, report, yardstick, bag, view):
     metacontrol.add_command(_command)
 
 

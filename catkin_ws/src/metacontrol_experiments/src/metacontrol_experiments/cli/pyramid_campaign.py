@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
+import shlex
 import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from node_kit.io.output_files import write_file
 
 from metacontrol_experiments.campaign.matrix import CampaignError
 from metacontrol_experiments.campaign.progress import Status
@@ -49,20 +53,23 @@ def drive_pyramids(content: Any, file: Path, folder: Path) -> bool:
     finally:
         driven = _read(folder, runs)
         if driven:
-            (folder / REPORT).write_text(report(driven), encoding="utf-8")
+            write_file(folder / REPORT, report(driven))
             _write(folder / TABLE, rows(driven))
             _write(folder / LEVELS, levels(driven))
     tell(f"{len(driven)} of {len(runs)} missions are in {folder / REPORT}")
+    if any((folder / RUNS).glob(f"*/{BAG_NAME}")):
+        tell(f"the bags that were kept, as a page: metacontrol view {shlex.quote(str(folder / RUNS))}")
     return len(driven) == len(runs)
 
 
 def _write(path: Path, table: Sequence[Mapping[str, Any]]) -> None:
     """Write a table with rows; write none without."""
     if table:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(table[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(table)
+        text = io.StringIO()
+        writer = csv.DictWriter(text, list(table[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(table)
+        write_file(path, text.getvalue())
 
 
 def _summary(folder: Path, run: PyramidRun) -> Path:

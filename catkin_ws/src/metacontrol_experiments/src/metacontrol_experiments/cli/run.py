@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from metacontrol_bags.decision import DECIDED
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S, MetricsError, summarise
 from metacontrol_bags.timeline import Timeline
 from mros1_reasoner.loop.settings import setting_names
+from node_kit.io.output_files import write_file
 
 from metacontrol_experiments.cli.figure import draw_figure
 from metacontrol_experiments.cli.missions import ByMission
@@ -45,6 +47,7 @@ from metacontrol_experiments.mission.settings import (
     FIGURE_NAME,
     LOCKSTEP,
     LOG_NAME,
+    RESULTS,
     ROS,
     SUMMARY_NAME,
     Settings,
@@ -153,8 +156,6 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
     engine = options["engine"]
     with refusing(*_BAD_INPUT):
         settings = _settings(output, options)
-        for name in (SUMMARY_NAME, FIGURE_NAME):  # those of an earlier run
-            (output / name).unlink(missing_ok=True)
         with Display(quiet) as display:
             if engine == LOCKSTEP:
                 if options["gui"] or options["rviz"]:
@@ -169,6 +170,8 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
     display.summary(summary)
     for name in (LOG_NAME if engine == LOCKSTEP else BAG_NAME, SUMMARY_NAME, FIGURE_NAME):
         display.say(str(output / name))
+    if engine != LOCKSTEP:
+        display.say(f"as a page: metacontrol view {shlex.quote(str(output / BAG_NAME))}")
     raise click.exceptions.Exit(0 if state.outcome is Outcome.REACHED else _FAILED)
 
 
@@ -272,7 +275,9 @@ def _run_lockstep(settings: Settings, display: Display) -> tuple[State, MissionR
     except (LockstepError, MissionError) as error:
         raise RunError(str(error)) from error
     settings.output.mkdir(parents=True, exist_ok=True)
-    (settings.output / LOG_NAME).write_text(outcome.log, encoding="utf-8")
+    for name in RESULTS:  # of an earlier run
+        (settings.output / name).unlink(missing_ok=True)
+    write_file(settings.output / LOG_NAME, outcome.log)
     told = Timeline(settings.thresholds)
     display.start(outcome.state.started_s)
     record = outcome.record

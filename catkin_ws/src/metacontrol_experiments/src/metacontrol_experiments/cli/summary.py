@@ -9,6 +9,7 @@ from typing import Any
 import click
 from metacontrol_bags.bag import BagError, read_record
 from metacontrol_bags.metrics import MetricsError, summarise
+from node_kit.io.output_files import write_file
 
 from metacontrol_experiments.io.display import refusing
 from metacontrol_experiments.pyramid.record import is_of_pyramid, read_pyramid
@@ -30,4 +31,4 @@ def summary(bag: Path, output: Path | None) -> None:
 
 def write_summary(summary: dict[str, Any], path: Path) -> None:
     """Write a summary as JSON."""
-    path.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    write_file(path, json.dumps(summary, indent=2) + "\n")

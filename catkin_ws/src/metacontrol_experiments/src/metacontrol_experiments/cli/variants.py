@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from node_kit.io.output_files import write_file
 
 from metacontrol_experiments.campaign.calibration import CalibrationError
 from metacontrol_experiments.cli.calibrate import runs_option
@@ -26,6 +27,6 @@ def variants(runs: Path, output: Path | None) -> None:
         text = markdown(done)
         if output:
             text = f"# Variants\n\nMade by `metacontrol variants --output {output}`.\n\n{text}"
-            output.write_text(text, encoding="utf-8")
+            write_file(output, text)
             return
     click.echo(text, nl=False)

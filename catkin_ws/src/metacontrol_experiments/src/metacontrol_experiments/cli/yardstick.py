@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 import rospkg
+from node_kit.io.output_files import write_file
 from pybullet_simulator.robot.motion_sensors import JOLT, JOLT_SPACING, VIBRATION
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
@@ -18,7 +19,7 @@ from metacontrol_experiments.io.display import CONSOLE, refusing, tell
 from metacontrol_experiments.io.ground_files import read_ground, routes_file
 from metacontrol_experiments.io.input_files import PackageError, route_names, simulation_package
 from metacontrol_experiments.io.report_files import read_published
-from metacontrol_experiments.io.yardstick_runs import drive, read_trace, trace_file
+from metacontrol_experiments.io.yardstick_runs import TraceError, drive, read_trace, trace_file
 from metacontrol_experiments.managers.manager import NONE
 from metacontrol_experiments.mission.settings import DEFAULT_THRESHOLDS
 
@@ -52,7 +53,7 @@ def yardstick(seeds: int, jobs: int, fitting: bool, runs: Path, output: Path | N
     Drives baseline missions in lockstep: all variants on all routes, and the nine starts with clutter. Missions whose
     traces are there are not driven again. No mission has a meta-controller.
     """
-    with refusing(PackageError, OSError):
+    with refusing(PackageError, TraceError, OSError):
         package = simulation_package()
         variants = sorted(path.stem for path in (package / "models" / "variants").glob("*.rossystem"))
         routes = route_names(routes_file(read_ground(None, None)))
@@ -93,7 +94,7 @@ def yardstick(seeds: int, jobs: int, fitting: bool, runs: Path, output: Path | N
     text = "\n".join(lines) + "\n"
     tell(text)
     if output is not None:
-        output.write_text(text, encoding="utf-8")
+        write_file(output, text)
 
 
 def _published() -> tuple[Any, Any, dict[str, float]]:

@@ -6,6 +6,8 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
+from node_kit.one_line import OneLineError
+
 from metacontrol_experiments.contingency.contingency import AT_START, PLACE_RADIUS, Contingency, Kind, Moment
 
 if TYPE_CHECKING:
@@ -18,11 +20,11 @@ MAX_CLUTTER = 100
 _SPECIFICATION = re.compile(r"(?P<kind>[a-z]+):(?P<what>[^@]+)(@(?P<when>[a-z]+):(?P<value>[^@]+))?")
 
 
-class ContingencyError(ValueError):
+class ContingencyError(OneLineError, ValueError):
     """A contingency that makes no sense; the message names where it stands and what is expected."""
 
 
-class ComponentError(ValueError):
+class ComponentError(OneLineError, ValueError):
     """A component is unknown; the message names the known ones."""
 
 

@@ -32,15 +32,17 @@ CONNECT_S = 10.0
 
 START_S = 120.0
 """Wall s until worker processes on this machine must have answered: it may be busy."""
+SILENCE_S = 600.0
+"""Wall s without a word between the processes on this machine until one counts as lost; others may take the CPU."""
 
 
 def drive_all(
     campaign: Campaign, runs: Sequence[Run], *, jobs: int, scheduler: str | None
-) -> Iterator[tuple[Result, str | None]]:
-    """Drive runs of a campaign, and yield what became of each, with its log, as soon as it is over.
+) -> Iterator[tuple[Result, dict[str, bytes]]]:
+    """Drive runs of a campaign, and yield what became of each, with its files, as soon as it is over.
 
     Args:
-        campaign: says how long a run may take, and whether it leaves its log.
+        campaign: says how long a run may take, and whether it leaves log and bag.
         runs: those that are to be driven.
         jobs: worker processes on this machine.
         scheduler: address of a scheduler in their place.
@@ -67,7 +69,7 @@ def drive_all(
             try:
                 yield future.result()
             except KilledWorker as error:
-                yield _lost(run, f"its workers died: {error}"), None
+                yield _lost(run, f"its workers died: {error}"), {}
             except FutureCancelledError as error:
                 raise CampaignError(f"the scheduler is lost ({error}): give the same command again to go on") from error
             future.release()
@@ -94,6 +96,7 @@ def _client(jobs: int, scheduler: str | None) -> Iterator[Client]:
         "distributed.worker.multiprocessing-method": "spawn",  # PyBullet and threads do not survive a fork
         "distributed.worker.profile.enabled": False,  # nobody looks at it
         "distributed.comm.timeouts.connect": f"{START_S}s",
+        "distributed.comm.timeouts.tcp": f"{SILENCE_S}s",
     }
     with dask.config.set(settings), _interrupts_ignored():
         try:

@@ -24,7 +24,7 @@ from metacontrol_experiments.io.code_version import current_commit
 from metacontrol_experiments.io.ground_files import read_ground
 from metacontrol_experiments.mission.ground import FACTORY, Ground
 from metacontrol_experiments.mission.routes import RouteError
-from metacontrol_experiments.mission.settings import ROS
+from metacontrol_experiments.mission.settings import BAG_NAME, LOG_NAME, ROS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -37,17 +37,17 @@ _PACKAGES = ("distributed", "jpype1", "numpy", "opencv-python-headless", "owlrea
 _own = threading.local()
 
 
-def drive(run: Run, deadline: float, *, keep_log: bool, ground: Ground = FACTORY) -> tuple[Result, str | None]:
+def drive(run: Run, deadline: float, *, keep_log: bool, ground: Ground = FACTORY) -> tuple[Result, dict[str, bytes]]:
     """Drive a run, once more where it crashes or hangs.
 
     Args:
         run: what is asked for.
         deadline: wall s for an attempt.
-        keep_log: return the mission's log, too.
+        keep_log: return the mission's log, too, and on ROS its bag.
         ground: of the run; its files must be on this machine, too.
 
     Returns:
-        What became of it, and its log.
+        What became of it, and the content of its files by their names.
     """
     problem = _ground_problem(run, ground)
     attempts = [Attempt(Status.CRASHED, 0.0, problem)] * MOST_ATTEMPTS if problem else []
@@ -61,8 +61,12 @@ def drive(run: Run, deadline: float, *, keep_log: bool, ground: Ground = FACTORY
             if attempt.status is not Status.DONE:
                 child.close()
         attempts.append(attempt)
-    log = answer.get("log") if keep_log else None
-    return Result(run, tuple(attempts), answer.get("summary"), provenance()), log
+    files = {}
+    if keep_log and "log" in answer:
+        files[LOG_NAME] = answer["log"].encode()
+    if keep_log and "bag" in answer:
+        files[BAG_NAME] = answer["bag"]
+    return Result(run, tuple(attempts), answer.get("summary"), provenance()), files
 
 
 def provenance() -> dict[str, str]:

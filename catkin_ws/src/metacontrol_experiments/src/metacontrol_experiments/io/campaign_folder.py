@@ -5,14 +5,14 @@ A run is over when its `result.json` is there: it is written last, under another
 
 from __future__ import annotations
 
-import os
+import io
 from typing import TYPE_CHECKING
 
 from node_kit.io.input_files import InputFileError, read_text
+from node_kit.io.output_files import write_file
 
 from metacontrol_experiments.campaign.matrix import CampaignError
 from metacontrol_experiments.campaign.progress import Result, Status, from_json, from_row, row, to_json
-from metacontrol_experiments.mission.settings import LOG_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -54,7 +54,8 @@ def read_table(path: Path) -> pyarrow.Table:
     try:
         return parquet.read_table(path)
     except (pyarrow.ArrowException, OSError, ValueError) as error:
-        raise CampaignError(f"{path}: is no Parquet table ({error}); name the {TABLE} of a campaign") from error
+        problem = " ".join(str(error).split())
+        raise CampaignError(f"{path}: is no Parquet table ({problem}); name the {TABLE} of a campaign") from error
 
 
 def results_of(path: Path) -> dict[str, Result]:
@@ -68,16 +69,16 @@ def results_of(path: Path) -> dict[str, Result]:
     return {result.run.name: result for result in results if result.status is Status.DONE}
 
 
-def write_result(folder: Path, result: Result, log: str | None = None) -> None:
-    """Write what became of a run, with the logs of attempts that failed, and the mission's own log if given."""
+def write_result(folder: Path, result: Result, files: Mapping[str, bytes] | None = None) -> None:
+    """Write what became of a run, with the logs of attempts that failed, and the mission's own files by their names."""
     home = folder / RUNS / result.run.name
     home.mkdir(parents=True, exist_ok=True)
     for number, attempt in enumerate(result.attempts, start=1):
         if attempt.log:
-            _replace(home / f"attempt-{number}.log", attempt.log.encode())
-    if log is not None:
-        _replace(home / LOG_NAME, log.encode())
-    _replace(home / RESULT, to_json(result).encode())
+            write_file(home / f"attempt-{number}.log", attempt.log)
+    for name, content in (files or {}).items():
+        write_file(home / name, content)
+    write_file(home / RESULT, to_json(result))
 
 
 def write_table(folder: Path, runs: Iterable[Run], results: Mapping[str, Result], about: Mapping[str, str]) -> Path:
@@ -95,17 +96,7 @@ def write_table(folder: Path, runs: Iterable[Run], results: Mapping[str, Result]
     path = folder / TABLE
     rows = [row(results[run.name]) for run in runs if run.name in results]
     table = pyarrow.Table.from_pylist(rows).replace_schema_metadata(dict(about))
-    beside = path.with_name(path.name + ".part")
-    parquet.write_table(table, beside, compression="zstd")
-    beside.replace(path)
+    content = io.BytesIO()
+    parquet.write_table(table, content, compression="zstd")
+    write_file(path, content.getvalue())
     return path
-
-
-def _replace(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole, or not at all."""
-    beside = path.with_name(f"{path.name}.part")
-    with beside.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(path)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from metacontrol_experiments.campaign.progress import LONGEST_LOG, Attempt, Status
-from metacontrol_experiments.mission.settings import ROS, SUMMARY_NAME
+from metacontrol_experiments.mission.settings import BAG_NAME, ROS, SUMMARY_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +27,7 @@ _CONSOLE = Path("log", "console.log")
 
 
 def drive_on_ros(run: Run, deadline: float, ground: Ground) -> tuple[Attempt, dict[str, Any]]:
-    """Drive a run; return how that went, and its summary with the log of the console.
+    """Drive a run; return how that went, and its summary with the log of the console and the bag.
 
     Args:
         run: what is asked for.
@@ -39,7 +39,7 @@ def drive_on_ros(run: Run, deadline: float, ground: Ground) -> tuple[Attempt, di
         attempt, summary = drive_command(_command(run, ground, output), output, deadline)
         if attempt.status is not Status.DONE:
             return attempt, {}
-        return attempt, {"summary": summary, "log": _end_of(output / _CONSOLE)}
+        return attempt, {"summary": summary, "log": _end_of(output / _CONSOLE), "bag": (output / BAG_NAME).read_bytes()}
 
 
 def drive_command(command: Sequence[str], output: Path, deadline: float) -> tuple[Attempt, dict[str, Any]]:

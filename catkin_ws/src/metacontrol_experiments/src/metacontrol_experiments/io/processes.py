@@ -28,19 +28,22 @@ MARK = "METACONTROL_RUN"
 """Name of the environment variable that marks a run's processes."""
 
 _POLL_S = 0.05
-_WITH_SIGINT = ("env", "--default-signal=INT")
-"""A background job of a shell script has SIGINT ignored, which its children would inherit; they are ended by it."""
+_ENDED_BY_SIGINT = ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
+"""They are ended by SIGINT, which also comes when this process is killed. A background job of a shell script has SIGINT
+ignored, and its children would inherit that."""
 
 
 class RunError(RuntimeError):
     """The mission could not be started; the message names the log."""
 
 
-def free_port() -> int:
-    """Return a TCP port that nobody listens on now."""
-    with socket.socket() as probe:
-        probe.bind(("", 0))
-        return int(probe.getsockname()[1])
+@contextmanager
+def reserved_port() -> Iterator[int]:
+    """Yield a TCP port that the system gives to nobody else in the body; a master can listen on it."""
+    with socket.socket() as holder:
+        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        holder.bind(("", 0))
+        yield int(holder.getsockname()[1])
 
 
 def is_free(port: int) -> bool:
@@ -82,7 +85,7 @@ class ProcessTree:
             raise FileNotFoundError(errno.ENOENT, "no such command", command[0])
         with log.open("wb") as output:
             process = subprocess.Popen(
-                [*_WITH_SIGINT, *command],
+                [*_ENDED_BY_SIGINT, *command],
                 env={**os.environ, **self.environment},
                 stdin=subprocess.DEVNULL,
                 stdout=output,

@@ -10,6 +10,7 @@ import numpy as np
 import rospkg
 from metacontrol_bags.record import OccupancyMap
 from node_kit.io.input_files import InputFileError, is_file, read_text, read_yaml
+from node_kit.io.output_files import write_file
 from node_kit.yaml_text import YamlError, parse_yaml
 from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.world.grid import OCCUPIED
@@ -113,7 +114,7 @@ def write_report(report: Report, folder: Path) -> list[Path]:
             written.append(path)
         content[f"{FOLDER}/{picture.name}.png"] = path.read_bytes()
     for name, text in (("report.md", report.markdown), ("report.html", page(report.markdown, TITLE, content))):
-        (folder / name).write_text(text, encoding="utf-8")
+        write_file(folder / name, text)
         written.append(folder / name)
     return written
 

@@ -9,7 +9,7 @@ from metacontrol_experiments.campaign.matrix import DEADLINE_S
 from metacontrol_experiments.campaign.progress import Status
 from metacontrol_experiments.io.campaign_driver import drive
 from metacontrol_experiments.io.report_files import read_log
-from metacontrol_experiments.mission.settings import LOCKSTEP
+from metacontrol_experiments.mission.settings import LOCKSTEP, LOG_NAME
 from metacontrol_experiments.report.pair import read_series, typical_pair
 from metacontrol_experiments.report.report import Single
 from metacontrol_experiments.report.text import code, plain
@@ -48,8 +48,8 @@ def find_pair(missions: Sequence[Mission], table: Path, tell: Callable[[str], No
     tell("driving a pair of missions anew, for the figure of their levels over time")
     found, remarks = [], []
     for mission in both:
-        result, log = drive(replace(mission.run, engine=LOCKSTEP), DEADLINE_S, keep_log=True)
-        driven = read_series(log or "")
+        result, files = drive(replace(mission.run, engine=LOCKSTEP), DEADLINE_S, keep_log=True)
+        driven = read_series(files.get(LOG_NAME, b"").decode())
         if result.status is not Status.DONE or driven is None or result.summary is None:
             return Single(told=f"{plain(mission.run.name)} could not be driven: {result.attempts[-1].problem}")
         if any(result.summary.get(name) != mission.summary.get(name) for name in _COMPARED):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import rospkg
 from node_kit.io.input_files import InputFileError, read_text
+from node_kit.io.output_files import write_file
 
 from metacontrol_experiments.campaign.calibration import QUALITIES, CalibrationError, Run, measure
 from metacontrol_experiments.lockstep.delays import KINDS, DelayError, Delays
@@ -46,12 +47,8 @@ def read_delays(path: Path | None = None) -> Delays:
 
 def write_delays(path: Path, found: Iterable[tuple[str, float]]) -> None:
     """Write a file of delays, in the order of kind and time."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["delay", "seconds"])
-        writer.writerows(
-            (kind, f"{value:.4f}") for kind, value in sorted(found, key=lambda d: (KINDS.index(d[0]), d[1]))
-        )
+    in_order = sorted(found, key=lambda d: (KINDS.index(d[0]), d[1]))
+    _write(path, ["delay", "seconds"], ((kind, f"{value:.4f}") for kind, value in in_order))
 
 
 def read_runs(path: Path) -> list[Run]:
@@ -80,8 +77,8 @@ def append_runs(path: Path, runs: Iterable[Run]) -> Iterator[Run]:
     """Append each run to a file at once, and yield it, so that an interrupted calibration can continue."""
     path.parent.mkdir(parents=True, exist_ok=True)
     text = path.read_text(encoding="utf-8") if path.exists() else ""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(text[: text.rfind("\n") + 1])
+    write_file(path, text[: text.rfind("\n") + 1])
+    with path.open("a", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         if not file.tell():
             writer.writerow(_COLUMNS)
@@ -96,14 +93,13 @@ def write_levels(path: Path, runs: Sequence[Run]) -> None:
     """Write the expected levels of all variants, with their spread, as `rosmodel generate all` reads them."""
     seeds = sorted({run.seed for run in runs})
     spreads = [f"{name}_spread" for name in QUALITIES]
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["name", *QUALITIES, "source", *spreads, "missions", "seeds"])
-        for variant, levels in measure(runs).items():
-            own = [run for run in runs if run.variant == variant]
-            values = [f"{levels[name].value:.3f}" for name in QUALITIES]
-            deviations = [f"{levels[name].spread:.3f}" for name in QUALITIES]
-            writer.writerow([variant, *values, "measured", *deviations, len(own), f"{seeds[0]}-{seeds[-1]}"])
+    rows = []
+    for variant, levels in measure(runs).items():
+        own = [run for run in runs if run.variant == variant]
+        values = [f"{levels[name].value:.3f}" for name in QUALITIES]
+        deviations = [f"{levels[name].spread:.3f}" for name in QUALITIES]
+        rows.append([variant, *values, "measured", *deviations, len(own), f"{seeds[0]}-{seeds[-1]}"])
+    _write(path, ["name", *QUALITIES, "source", *spreads, "missions", "seeds"], rows)
 
 
 def write_bag_levels(
@@ -155,10 +151,11 @@ def write_bag_intervals(path: Path, measured: Mapping[str, Mapping[str, Measured
 
 
 def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    write_file(path, text.getvalue())
 
 
 def _run(row: dict[str, str]) -> Run:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+import zipfile
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from node_kit.one_line import OneLineError
 
 from metacontrol_experiments.campaign.yardstick import SAMPLES, Trace
 from metacontrol_experiments.contingency.parsing import parse_contingency
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
 
     from pybullet_simulator.physics.simulation import Simulation
 
+_LARGEST = 100_000_000
+"""Bytes of a trace; a mission of an hour has a thousandth of that."""
+
 Job = tuple[str, str, int, int]
 """Variant, route, seed, clutter."""
 
@@ -33,10 +38,31 @@ def trace_file(folder: Path, job: Job) -> Path:
     return folder / f"{variant}-{route}-{seed}-{clutter}.npz"
 
 
+class TraceError(OneLineError, ValueError):
+    """A trace can't be used; the message names its file, and the remedy."""
+
+
 def read_trace(path: Path) -> Trace:
-    """Return a trace that was kept."""
-    with np.load(path, allow_pickle=False) as content:
-        return Trace(**{name: content[name] if content[name].ndim else content[name].item() for name in content.files})
+    """Return a trace that was kept.
+
+    Raises:
+        TraceError: the file is none.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > _LARGEST:
+                raise TraceError(f"{path}: holds more than {_LARGEST} bytes: delete it to drive the mission again")
+        with np.load(path, allow_pickle=False) as content:
+            values = {name: content[name] for name in content.files}
+        return Trace(**{name: value if value.ndim else value.item() for name, value in values.items()})
+    except TraceError:
+        raise
+    # numpy and the archive raise whatever their parts do
+    except Exception as error:
+        problem = f"{type(error).__name__}: {' '.join(str(error).split())}"
+        raise TraceError(
+            f"{path}: is no trace of a mission ({problem}): delete it to drive the mission again"
+        ) from error
 
 
 def drive(jobs: Sequence[Job], folder: Path, processes: int) -> Iterator[Path]:

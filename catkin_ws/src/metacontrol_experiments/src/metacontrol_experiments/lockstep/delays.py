@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from node_kit.one_line import OneLineError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -17,7 +18,7 @@ KINDS = ("detect", "decide", "restart", "parameters")
 that starts navigation anew, or that changes its parameters while it runs."""
 
 
-class DelayError(ValueError):
+class DelayError(OneLineError, ValueError):
     """Delays cannot be read or made; the message names file and remedy."""
 
 

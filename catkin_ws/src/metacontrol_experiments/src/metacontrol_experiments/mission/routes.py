@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from node_kit.one_line import OneLineError
 from robot_formulas.geometry import Pose
 
 
-class RouteError(ValueError):
+class RouteError(OneLineError, ValueError):
     """A route that does not exist or is not well-formed."""
 
 

@@ -23,6 +23,7 @@ MANAGER_NODE = "mission_manager"
 """Name of the node that runs a manager on ROS."""
 BAG_NAME, SUMMARY_NAME, FIGURE_NAME, LOG_NAME = "mission.bag", "summary.json", "mission.png", "mission.log"
 """Files that a mission leaves in its folder: a bag on ROS, a log in lockstep."""
+RESULTS = BAG_NAME, SUMMARY_NAME, FIGURE_NAME, LOG_NAME
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,11 @@ class Settings:
             contingencies=with_seed(self.contingencies, self.seed),
             timeout_s=self.timeout_s,
         )
+
+    @property
+    def windows(self) -> list[str]:
+        """Options that open a window."""
+        return ["--gui"] * self.gui + ["--rviz"] * self.rviz
 
     @property
     def launch_file(self) -> str:

@@ -50,6 +50,11 @@ class PyramidSettings:
         return replace(drawn, configurations=self.configurations) if self.configurations else drawn
 
     @property
+    def windows(self) -> list[str]:
+        """Options that open a window."""
+        return ["--gui"] * self.gui
+
+    @property
     def decider(self) -> str:
         """Name of the node that decides on ROS; empty for the baseline."""
         return "reasoner" if self.metacontrol else ""

@@ -8,6 +8,8 @@ from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from node_kit.one_line import OneLineError
+
 from metacontrol_experiments.campaign.matrix import Run
 from metacontrol_experiments.campaign.progress import PROVENANCE, Status, run_of
 from metacontrol_experiments.contingency.contingency import Kind
@@ -24,7 +26,7 @@ QUALITIES = ("safety", "energy")
 _FIGURES = ("success", "goal_reached", "duration_s", "above_safety", "above_energy", "outcome")
 
 
-class ReportError(ValueError):
+class ReportError(OneLineError, ValueError):
     """There is nothing to report on; the message names file and remedy."""
 
 

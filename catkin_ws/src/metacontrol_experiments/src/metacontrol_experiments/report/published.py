@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
+from node_kit.one_line import OneLineError
 from ros_model.project.schema_check import violations
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ _SCHEMA = {
 }
 
 
-class PublishedError(ValueError):
+class PublishedError(OneLineError, ValueError):
     """The file of published figures makes no sense; the message names the place."""
 
 

@@ -24,8 +24,9 @@ from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.entries import ActiveFact, ComponentFact
 from mros1_reasoner.loop.readable_state import MapeError
+from mros1_reasoner.loop.requesting import Wanted
 from mros1_reasoner.ros.decisions import DecisionTopic
-from mros1_reasoner.ros.requests import Requests, Wanted
+from mros1_reasoner.ros.requests import Requests
 from node_kit.io.inbox import Inbox
 from node_kit.io.xml_rpc import CallError, Client
 from node_kit.parameters import ParameterError, ParameterTree

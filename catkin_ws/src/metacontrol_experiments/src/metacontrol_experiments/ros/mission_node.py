@@ -136,7 +136,7 @@ class MissionNode(ABC, Generic[State]):
             self._startup.wait_for_decider(self._decider)
 
     def wait_recorded(self, recorder: str, topics: Collection[str]) -> None:
-        """Wait until the node `recorder` has subscribed to these topics.
+        """Wait until the node `recorder` receives all that comes on these topics.
 
         Raises:
             StartError: it has not, in time.

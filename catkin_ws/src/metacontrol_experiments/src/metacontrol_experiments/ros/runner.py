@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import re
 import signal
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
+from node_kit.io.x_display import DisplayError, held_display
 from roslib.packages import find_node
 from rospkg import ResourceNotFound
 
@@ -16,11 +16,12 @@ from metacontrol_experiments.io.processes import (
     ProcessTree,
     RunError,
     alone_in,
-    free_port,
     is_free,
+    reserved_port,
     signals_as_interrupts,
 )
-from metacontrol_experiments.mission.settings import BAG_NAME
+from metacontrol_experiments.mission.console import cause_in
+from metacontrol_experiments.mission.settings import BAG_NAME, RESULTS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
@@ -34,10 +35,6 @@ RECORDER = "/mission_recorder"
 _RECORDER_GRACE_S = 15.0
 _LAUNCH_GRACE_S = 12.0
 """Wall seconds after which a process that was asked to end is made to."""
-
-_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
-_POINTER = ("The traceback for the exception", "log file:")
-_COMPLAINT = re.compile(r"error|exception|fatal|has died|unused args|invalid|no such", re.IGNORECASE)
 
 
 class Settings(Protocol):
@@ -55,6 +52,10 @@ class Settings(Protocol):
     def topics(self) -> Collection[str]:
         """What is recorded."""
 
+    @property
+    def windows(self) -> Collection[str]:
+        """Options that open a window."""
+
     def launch_command(self, port: int) -> list[str]:
         """Return the roslaunch command of the whole system, with a master on this port."""
 
@@ -67,12 +68,14 @@ Make = Callable[["ProcessTree", "Display", Callable[[], None]], Node]
 def run_mission(settings: Settings, display: Display, make: Make[Node]) -> Node:
     """Run a mission and record it to OUTPUT/mission.bag; return its node, which knows how it ended.
 
+    Results that are in the folder go once the mission begins: a system that does not start takes nothing away.
     Whatever happens, no process of the run is left behind.
 
     Raises:
         RunError: the system did not come up, or the mission cannot be run as asked for.
         KeyboardInterrupt: it was interrupted; the bag is complete up to then.
     """
+    _check_windows(settings.windows)
     log = settings.output / "log"
     bag = settings.output / BAG_NAME
     for folder in (settings.output, log):
@@ -82,20 +85,24 @@ def run_mission(settings: Settings, display: Display, make: Make[Node]) -> Node:
 
 
 def _run_alone(settings: Settings, display: Display, make: Make[Node], log: Path, bag: Path) -> Node:
-    for old in (bag, bag.with_name(bag.name + ".active")):
-        old.unlink(missing_ok=True)
+    bag.with_name(bag.name + ".active").unlink(missing_ok=True)
     if settings.port is not None and not is_free(settings.port):
         raise RunError(
             f"--port: port {settings.port} is in use or not allowed: choose another, or leave the option out"
         )
-    port = settings.port or free_port()
+    with nullcontext(settings.port) if settings.port else reserved_port() as port:
+        return _run_on(port, settings, display, make, log, bag)
+
+
+def _run_on(port: int, settings: Settings, display: Display, make: Make[Node], log: Path, bag: Path) -> Node:
     environment = {
         "ROS_MASTER_URI": f"http://localhost:{port}",
         "ROS_HOSTNAME": "localhost",
         "ROS_HOME": str(log.resolve()),
         "ROS_LOG_DIR": str(log.resolve()),
     }
-    os.environ.pop("ROS_IP", None)
+    for name in ("ROS_IP", "ROS_NAMESPACE"):  # of the robot that the user works with otherwise
+        os.environ.pop(name, None)
     os.environ.update(environment)
     tree = ProcessTree(environment)
     with signals_as_interrupts(), _closing(tree):
@@ -112,7 +119,8 @@ def _run(settings: Settings, display: Display, make: Make[Node], tree: ProcessTr
 
     def check() -> None:
         if launch.poll() is not None:
-            raise StartError(f"roslaunch has ended: {_last_complaint(console)}")
+            said = console.read_text(encoding="utf-8", errors="replace")
+            raise StartError(f"roslaunch has ended: {cause_in(said)}")
 
     node = None
     try:
@@ -120,6 +128,8 @@ def _run(settings: Settings, display: Display, make: Make[Node], tree: ProcessTr
         node.start_up()
         recorder = tree.start(_record_command(bag, settings.topics), settings.output / "log" / "recorder.log")
         node.wait_recorded(RECORDER, settings.topics)
+        for name in RESULTS:  # of an earlier run
+            (settings.output / name).unlink(missing_ok=True)
         node.drive()
     except (StartError, MissionError) as error:
         raise RunError(f"{error}; see {console}") from error
@@ -134,26 +144,40 @@ def _run(settings: Settings, display: Display, make: Make[Node], tree: ProcessTr
     return node
 
 
+def _check_windows(options: Collection[str]) -> None:
+    """Check that the windows can open that options ask for.
+
+    Raises:
+        RunError: there is no display, or no RViz.
+    """
+    if "--rviz" in options and not _find("rviz", "rviz"):
+        raise RunError("--rviz: RViz is not installed: ./mros setup --gui, or leave the option out")
+    if options:
+        try:
+            with held_display():
+                pass
+        except DisplayError as error:
+            raise RunError(f"{', '.join(options)}: {error}") from error
+
+
+def _find(package: str, kind: str) -> str:
+    """Return the path of a node's program; empty where it is not installed."""
+    try:
+        return next(iter(find_node(package, kind)), "")
+    except ResourceNotFound:
+        return ""
+
+
 def _record_command(bag: Path, topics: Collection[str]) -> list[str]:
     """Return the command of the recorder itself: its Python front end would not pass signals on.
 
     Raises:
         RunError: rosbag is not installed.
     """
-    try:
-        found = find_node("rosbag", "record")
-    except ResourceNotFound:
-        found = []
+    found = _find("rosbag", "record")
     if not found:
         raise RunError("rosbag's recorder is not installed; on Debian it is in the package rosbag")
-    return [found[0], "-O", str(bag), "--min-space", "64M", *topics, f"__name:={RECORDER.lstrip('/')}"]
-
-
-def _last_complaint(console: Path) -> str:
-    """Return the last line of a log that tells of an error, else the last line."""
-    text = _COLOUR.sub("", console.read_text(encoding="utf-8", errors="replace"))
-    lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith(_POINTER)]
-    return ([line for line in lines if _COMPLAINT.search(line)] or lines or ["it said nothing"])[-1]
+    return [found, "-O", str(bag), "--min-space", "64M", *topics, f"__name:={RECORDER.lstrip('/')}"]
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import rosgraph
 import rospy
-from node_kit.io.xml_rpc import CallError, Client
+from node_kit.io.xml_rpc import CallError, Client, DeniedError, GoneError
 
 from metacontrol_experiments.io.processes import wait_until
 
@@ -68,13 +68,22 @@ class Startup:
         self.wait(lambda: self._offers_decisions(name), f"the node {name} with its topic {DECISION_TOPIC}")
 
     def wait_for_recorder(self, recorder: str, topics: Collection[str], *publishers: rospy.Publisher) -> None:
-        """Wait until the node `recorder` subscribes to these topics, and is connected to these of this node.
+        """Wait until the node `recorder` subscribes to these topics, and whoever publishes them is connected to it.
+
+        Args:
+            recorder: its name.
+            topics: what it records.
+            publishers: of this node; there may be more than the master knows of yet.
 
         Raises:
             StartError: it did not come up in time.
         """
-        names = {publisher.resolved_name for publisher in publishers}
-        self.wait(lambda: self._recorded(recorder, topics, names), f"the recorder {recorder}")
+        own = {publisher.resolved_name for publisher in publishers}
+        self.wait(lambda: self._subscribed(recorder, topics), f"the recorder {recorder}")
+        self.wait(
+            lambda: self._connected(recorder, topics, own),
+            f"connections from all who publish what is recorded to the recorder {recorder}",
+        )
 
     def _simulated_time(self) -> bool:
         return bool(self._master.call("getParam", "/use_sim_time"))
@@ -83,14 +92,25 @@ class Startup:
         publishers, _, _ = self._master.call("getSystemState")
         return any(topic == rospy.resolve_name(DECISION_TOPIC) and node in nodes for topic, nodes in publishers)
 
-    def _recorded(self, recorder: str, topics: Collection[str], own: set[str]) -> bool:
+    def _subscribed(self, recorder: str, topics: Collection[str]) -> bool:
         _, subscribers, _ = self._master.call("getSystemState")
-        taken = {topic for topic, nodes in subscribers if recorder in nodes}
-        return taken.issuperset(topics) and own <= _topics_to(recorder)
+        return {topic for topic, nodes in subscribers if recorder in nodes}.issuperset(topics)
 
+    def _connected(self, recorder: str, topics: Collection[str], own: set[str]) -> bool:
+        publishers, _, _ = self._master.call("getSystemState")
+        offered = {rospy.get_name(): own}
+        for topic, nodes in publishers:
+            if topic in topics:
+                for node in nodes:
+                    offered.setdefault(node, set()).add(topic)
+        offered.pop(recorder, None)
+        return all(wanted <= self._topics_to(recorder, node, wanted) for node, wanted in offered.items())
 
-def _topics_to(node: str) -> set[str]:
-    """Return the topics of this node over which it is connected to a subscriber."""
-    with Client(rospy.get_node_uri(), rospy.get_name(), _CALL_S, peer="node") as api:
-        links = api.call("getBusInfo")
-    return {topic for _, subscriber, direction, _, topic, *_ in links if subscriber == node and direction == "o"}
+    def _topics_to(self, subscriber: str, node: str, wanted: set[str]) -> set[str]:
+        """Return the topics over which a node is connected to a subscriber; `wanted` of one that has ended."""
+        try:
+            with Client(self._master.call("lookupNode", node), rospy.get_name(), _CALL_S, peer="node") as api:
+                links = api.call("getBusInfo")
+        except (DeniedError, GoneError):
+            return wanted
+        return {topic for _, peer, direction, _, topic, *_ in links if peer == subscriber and direction == "o"}

@@ -43,7 +43,7 @@ def read_pixels(image: Image) -> NDArray[np.uint8]:
             f"images are {image.encoding or 'without encoding'}: their driver has to send {', '.join(_CHANNELS)}"
         )
     row = image.width * channels
-    if not image.width or image.step < row or len(image.data) < image.height * image.step:
+    if not (image.width and image.height) or image.step < row or len(image.data) < image.height * image.step:
         raise RobotError(f"an image of {image.width} x {image.height} has {len(image.data)} bytes: see its driver")
     rows = np.frombuffer(image.data, np.uint8, image.height * image.step).reshape(image.height, image.step)[:, :row]
     if channels == 1:

@@ -201,9 +201,12 @@ class GivenCell:
         base = self._odometry.at(message.header.stamp)
         if base is None:
             return
-        covariance = message.pose.covariance
+        cell, variances = pose_of(message.pose.pose), (message.pose.covariance[0], message.pose.covariance[35])
+        if not all(map(math.isfinite, (cell.x, cell.y, cell.yaw, *variances))) or min(variances) < 0.0:
+            rospy.logwarn_throttle(10.0, "cell_pose ignored: it is not finite, or a variance is below 0")
+            return
         with self._news:
-            self._known = Localisation(pose_of(message.pose.pose), base, covariance[0] ** 0.5, covariance[35] ** 0.5)
+            self._known = Localisation(cell, base, math.sqrt(variances[0]), math.sqrt(variances[1]))
             self._stamp = message.header.stamp.to_sec()
             self._news.notify_all()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import TYPE_CHECKING, Any
@@ -199,11 +200,11 @@ class RosRobot:
     def _on_joints(self, message: JointState) -> None:
         known = dict(zip(message.name, message.position, strict=False))
         for arm in self._arms:
-            names = joint_names(arm)
-            if all(name in known for name in names):
+            names, fingers = joint_names(arm), [f"{arm}_panda_finger_joint{i}" for i in range(1, FINGERS + 1)]
+            if all(math.isfinite(known.get(name, math.nan)) for name in (*names, *fingers)):
                 with self._news:
                     self._joints[arm] = tuple(known[name] for name in names)
-                    self._widths[arm] = sum(known[f"{arm}_panda_finger_joint{i}"] for i in range(1, FINGERS + 1))
+                    self._widths[arm] = sum(known[finger] for finger in fingers)
                     self._news.notify_all()
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:

@@ -9,10 +9,11 @@ import rospy
 from actionlib_msgs.msg import GoalStatusArray
 from geometry_msgs.msg import PoseStamped
 from node_kit.io.input_files import InputFileError, read_yaml
+from node_kit.one_line import OneLineError
 from node_kit.ros.lifetime import Lifetime
 
 
-class GoalFileError(Exception):
+class GoalFileError(OneLineError):
     """The goal file cannot be used; the message names the file, the place and the remedy."""
 
 

@@ -96,7 +96,8 @@ def cloud_observation(message: Any, source: ObservationSource) -> Observation:
     row_step = message.row_step or message.point_step * message.width
     if row_step < message.point_step * message.width or len(message.data) < row_step * message.height:
         raise SensorError(f"the cloud announces {count} points, its data hold {len(message.data)} bytes")
-    points = _points(message, [offsets[name] for name in "xyz"], row_step)
+    # A point of no cloud may have any size: numpy's limit is 31 bits.
+    points = _points(message, [offsets[name] for name in "xyz"], row_step) if count else np.empty((0, 3), np.float32)
     finite = np.isfinite(points)
     if not finite.all():
         points = points[finite.all(axis=1)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rospy
@@ -18,15 +18,21 @@ TF_CACHE = 10.0
 """Transforms kept, s: tf2's own default."""
 
 
+_SECONDS = (1 << 32) - 1
+"""s: tf2 ends the process where a stamp has more."""
+
+
 class TfTransformer:
     """The navigator's access to /tf."""
 
     def __init__(self) -> None:
         self.buffer = tf2_ros.Buffer(cache_time=rospy.Duration.from_sec(TF_CACHE), debug=False)
-        self._listener = tf2_ros.TransformListener(self.buffer)
+        self._listener = _Listener(self.buffer)
 
     def lookup(self, target: str, source: str, stamp: float | None) -> NDArray[np.float64] | None:
         """Return the 4 x 4 transform at a time (s), the newest for None, or None."""
+        if stamp is not None and not 0.0 <= stamp < _SECONDS:
+            return None
         when = rospy.Time() if stamp is None else rospy.Time.from_sec(stamp)
         try:
             transform = self.buffer.lookup_transform_core(target, source, when).transform
@@ -46,3 +52,24 @@ class TfTransformer:
     def clear(self) -> None:
         """Forget everything, after the clock was set back."""
         self.buffer.clear()
+
+
+class _Listener(tf2_ros.TransformListener):
+    """A listener that leaves out transforms whose stamp tf2 can't hold."""
+
+    def callback(self, data: Any) -> None:
+        """Take transforms."""
+        super().callback(_with_sound_stamps(data))
+
+    def static_callback(self, data: Any) -> None:
+        """Take transforms that never change."""
+        super().static_callback(_with_sound_stamps(data))
+
+
+def _with_sound_stamps(data: Any) -> Any:
+    if all(transform.header.stamp.secs < _SECONDS for transform in data.transforms):
+        return data
+    rospy.logwarn_throttle(10.0, "tf: a transform is ignored: its stamp fits no message")
+    kept = type(data)([transform for transform in data.transforms if transform.header.stamp.secs < _SECONDS])
+    kept._connection_header = data._connection_header
+    return kept

@@ -18,7 +18,7 @@ from move_base_msgs.msg import (
     RecoveryStatus,
 )
 from node_kit.io.inbox import Inbox
-from node_kit.ros.action_server import EndsQuietly
+from node_kit.ros.action_server import Sturdy
 from node_kit.ros.resumed_goal import start_with
 from robot_formulas.geometry import Pose
 
@@ -42,8 +42,8 @@ FEEDBACK_PERIOD = 0.2
 """s; the action's status has the same rate."""
 
 
-class _Server(EndsQuietly, actionlib.ActionServer):
-    """An action server that may end at any time."""
+class _Server(Sturdy, actionlib.ActionServer):
+    """An action server that may end at any time, and whose clock may be set back."""
 
 
 class GoalServer:

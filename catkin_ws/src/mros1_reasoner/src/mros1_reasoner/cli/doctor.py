@@ -40,7 +40,7 @@ def doctor(models: str, master: str | None, namespace: str | None, listen: float
 
     FOLDER is that of a package with models/, or that of metacontrol.yaml. Each line says what is wrong, where, and the
     remedy. Lines that begin with `note:` are no hindrance. Nothing is changed. Launch files that the robot's nodes were
-    started by are read as roslaunch reads them, so programs that they name in `command=` are run.
+    started by are read.
 
     Exit status: 0 nothing is wrong, 1 something is, 2 the project or the master can't be looked at.
     """

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import sys
-import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 from metacontrol_bags.decision import Decision
 from metacontrol_bags.decision_tables import render
-from metacontrol_msgs.msg import FunctionGrounding
 from node_kit.parameters import ParameterError
 from node_kit.yaml_text import YamlError, parse_yaml
 from rich.console import Console
@@ -23,14 +20,11 @@ from mros1_reasoner.cli.output import ERRORS, NAMESPACE, console, refuse
 from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.io.reasoner_bag import read_recording
 from mros1_reasoner.io.reasoners import make_reasoner
-from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
+from mros1_reasoner.io.replaying import replay_run
 from mros1_reasoner.knowledge.reasoner import Reasoner
-from mros1_reasoner.loop.diagnostics import DiagnosticsReader
-from mros1_reasoner.loop.entries import ActiveFact
-from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.replay.comparison import Pair, pairs
-from mros1_reasoner.replay.recording import Recording, RecordingError, Run
-from mros1_reasoner.replay.rerun import Replayed, rerun, usual_duration, without_journal
+from mros1_reasoner.replay.recording import Recording, Run
+from mros1_reasoner.replay.rerun import Replayed
 
 _DIFFERS = 1  # exit status
 _OUTCOME = {"state", "objective", "from_configuration", "to_configuration", "degraded"}
@@ -63,13 +57,16 @@ def replay(
     out = console()
     reasoner: Reasoner | None = None
     try:
-        changes = {f"nfr_{name}": value for name, value in _assignments(nfrs)} | dict(_assignments(settings))
+        limits = dict(_assignments(nfrs))
+        changes = {f"nfr_{name}": value for name, value in limits.items()} | dict(_assignments(settings))
+        for line in Parameters(dict(_assignments(settings))).strangers:
+            raise ParameterError(f"--set: {line}")
         recording = read_recording(bag, namespace)
         files = [resolve(model) for model in models]
         first = recording.runs[0].parameters if recording.runs else {}
         reasoner = make_reasoner(Parameters({**first, **changes}).reasoner)
         found = [
-            _replay_run(recording, run, changes, files, initial, duration, reasoner)
+            replay_run(recording, run, reasoner, changes, files, initial, duration, limits=limits)
             for run in recording.runs or [Run("replay")]
         ]
     except ERRORS as error:
@@ -87,62 +84,6 @@ def replay(
     _print(out, recording, replayed, beside, is_changed, verbose)
     if not is_changed and recording.runs and not all(pair.is_equal for pair in beside):
         sys.exit(_DIFFERS)
-
-
-def _replay_run(
-    recording: Recording,
-    run: Run,
-    changes: Mapping[str, Any],
-    models: Sequence[Path],
-    initial: str | None,
-    duration: float | None,
-    reasoner: Reasoner,
-) -> Replayed:
-    parameters = Parameters({**run.parameters, **changes})
-    knowledge_base = _knowledge_base(parameters, run, models)
-    reasoner.load(knowledge_base.ontology)
-    objectives, settings = parameters.objectives(knowledge_base), parameters.settings(knowledge_base)
-    if not run.entries:  # nothing tells when the first configuration came
-        settings = replace(settings, start_grace=0.0)
-    core = Mape(knowledge_base, reasoner, objectives, settings, name=run.name)
-    entries = run.entries or without_journal(
-        recording,
-        DiagnosticsReader(
-            {*knowledge_base.qualities, *knowledge_base.environment}, knowledge_base.components, parameters.nodes
-        ),
-        _initial(knowledge_base, recording, initial),
-    )
-    if not entries:
-        raise RecordingError("the bag holds neither a reasoner's journal nor diagnostics: nothing to replay")
-    usual = usual_duration(recording.decisions) if duration is None else duration
-    return rerun(core, entries, usual, follow=bool(run.entries))
-
-
-def _knowledge_base(parameters: Parameters, run: Run, models: Sequence[Path]) -> KnowledgeBase:
-    """Return the knowledge base of the given models, else of the text in the bag, else of the parameters' files."""
-    if models or not run.files:
-        return parameters.knowledge_base(list(models) or None)
-    with tempfile.TemporaryDirectory() as folder:
-        paths: list[Path] = []
-        for name, content in run.files.items():
-            file_name = f"{Path(name).stem or 'model'}.owl"  # together, so that they find each other by name
-            path = Path(folder) / str(sum(other.name == file_name for other in paths)) / file_name
-            path.parent.mkdir(exist_ok=True)
-            path.write_text(content, encoding="utf-8")
-            paths.append(path)
-        return parameters.knowledge_base(paths, [])
-
-
-def _initial(
-    knowledge_base: KnowledgeBase, recording: Recording, configuration: str | None
-) -> list[tuple[float, ActiveFact]]:
-    if configuration is None:
-        return []
-    if configuration not in knowledge_base.designs:
-        known = ", ".join(knowledge_base.designs)
-        raise ParameterError(f"--initial: no FunctionDesign is called {configuration!r}: known: {known}")
-    function = knowledge_base.designs[configuration].function
-    return [(recording.start, ActiveFact(function, configuration, FunctionGrounding.STABLE))]
 
 
 def _assignments(texts: Sequence[str]) -> list[tuple[str, Any]]:

@@ -17,13 +17,32 @@ from mros1_reasoner.io.reasoners import NAMES, PELLET
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Direction, Objective
 from mros1_reasoner.loop.estimate import MOST
-from mros1_reasoner.loop.settings import Settings
+from mros1_reasoner.loop.settings import Settings, setting_names
 from mros1_reasoner.planning.utility import UtilityError, make_utility
 
 _log = logging.getLogger(__name__)
 
 DEFAULT_ACTION = "rosgraph_manipulator_action_server"
 _NFR = "nfr_"
+PARAMETERS = (
+    *setting_names(),
+    "asked",
+    "components",
+    "default_nfrs",
+    "default_objectives",
+    "desired_configuration",
+    "execution_deadline",
+    "model_file",
+    "qa_direction",
+    "reasoning_rate",
+    "reconfigure_srv_name",
+    "save_folder",
+    "spares",
+    "task_actions",
+    "tomasys_file",
+    "use_reconfigure_srv",
+)
+"""Names of all parameters, but for the limits."""
 _NAMED_OTHERWISE = ("desired", "start_grace", "utility")  # settings whose parameter needs more than its default's type
 
 
@@ -35,6 +54,11 @@ class Parameters:
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def strangers(self) -> list[str]:
+        """What to say of each parameter that nobody reads."""
+        return self._tree.strangers(PARAMETERS, (_NFR,))
 
     @property
     def _tree(self) -> ParameterTree:
@@ -143,6 +167,11 @@ class Parameters:
                 for function in knowledge_base.functions
                 if function not in required
             )
+        limits = self.limits(knowledge_base)
+        return tuple(replace(o, limits={**o.limits, **limits}) for o in objectives)
+
+    def limits(self, knowledge_base: KnowledgeBase) -> dict[str, float]:
+        """Return the limits of `~nfr_<quality>`, for all objectives."""
         limits: dict[str, float] = {}
         nfrs = ParameterTree(dict(_leaves({k: v for k, v in self.values.items() if k.startswith(_NFR)})))
         for name in sorted(nfrs.values):
@@ -152,7 +181,7 @@ class Parameters:
                 _log.warning("parameter ~%s: Unsupported QA TYPE received: %s: left out", name, quality)
                 continue
             limits |= found
-        return tuple(replace(o, limits={**o.limits, **limits}) for o in objectives)
+        return limits
 
     def settings(self, knowledge_base: KnowledgeBase) -> Settings:
         """Return the loop's settings: each has a parameter of its name, `desired` is `~desired_configuration`."""
@@ -188,13 +217,25 @@ def _limits(tree: ParameterTree, name: str, quality: str, knowledge_base: Knowle
     """Return the limits that a parameter gives: a number, or the two of a band, the least first; none if unknown."""
     if not isinstance(tree.value(name), list):
         limit = tree.number(name, 0.0)
-        return {quality: limit} if knowledge_base.admit(quality) else {}
+        return _possible(tree, name, {quality: limit} if knowledge_base.admit(quality) else {}, knowledge_base)
     match tree.numbers(name):
         case [least, most] if least < most:
             kind = knowledge_base.qualities.get(quality)
             limits = kind.band(quality, least, most) if kind else {}
-            return {limit: level for limit, level in limits.items() if knowledge_base.admit(limit)}
+            admitted = {limit: level for limit, level in limits.items() if knowledge_base.admit(limit)}
+            return _possible(tree, name, admitted, knowledge_base)
     raise tree.error(name, "one number, or two, the least one first", tree.value(name))
+
+
+def _possible(
+    tree: ParameterTree, name: str, limits: dict[str, float], knowledge_base: KnowledgeBase
+) -> dict[str, float]:
+    """Return limits, each of which is a level that its quality may have."""
+    for quality, limit in limits.items():
+        kind = knowledge_base.qualities[quality]
+        if not kind.holds(limit):
+            raise tree.error(name, f"a level within its range, {kind.range}", tree.value(name))
+    return limits
 
 
 def _leaves(tree: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

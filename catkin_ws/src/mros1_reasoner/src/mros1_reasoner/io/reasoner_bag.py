@@ -18,7 +18,7 @@ from metacontrol_bags.decision import Decision
 from metacontrol_bags.decoding import decode
 from node_kit.yaml_text import YamlError, parse_yaml
 
-from mros1_reasoner.loop.entries import ActiveFact
+from mros1_reasoner.loop.entries import ActiveFact, Entry
 from mros1_reasoner.loop.entry_text import read_entry
 from mros1_reasoner.replay.recording import Recording, RecordingError, Run, Statuses
 
@@ -83,6 +83,38 @@ def read_recording(path: Path, namespace: str | None = None) -> Recording:
     return recording
 
 
+class JournalReader:
+    """Reads the journal of a running reasoner, message by message, and keeps nothing of what it has passed on."""
+
+    def __init__(self) -> None:
+        """Know nothing yet."""
+        self._recording = Recording()
+
+    def take(self, message: Any) -> tuple[Run, list[Entry]]:
+        """Take a metacontrol_msgs/ReasonerJournal.
+
+        Returns:
+            The run, without parameters as long as its beginning has not come, and the entries that are new since then.
+
+        Raises:
+            RecordingError: a part is missing, or this one makes no sense. Later ones can't be read either.
+        """
+        part = _message_part(message)
+        run = next((run for run in self._recording.runs if run.name == part.name), None)
+        if run is not None and not part.parameters:
+            if part.first + len(part.entries) <= run.first:
+                return run, []  # the beginning had it already
+        elif run is None:
+            self._recording.runs.clear()  # another reasoner
+        _add(Path("the journal"), self._recording, part)
+        run = self._recording.runs[0]
+        if not run.parameters:
+            return run, []
+        fresh, run.entries = run.entries, []
+        run.first += len(fresh)
+        return run, fresh
+
+
 @dataclass(frozen=True)
 class _Part:
     """What a message of the journal adds: entries from the number `first` on, as `read_entry` takes them."""
@@ -95,6 +127,10 @@ class _Part:
 
 
 def _part(_connection: Connection, _now: float, message: Any) -> _Part:
+    return _message_part(message)
+
+
+def _message_part(message: Any) -> _Part:
     return _Part(
         str(message.name),
         int(message.first),

@@ -101,6 +101,12 @@ class Quality:
         above = self.low is None or level >= self.low
         return math.isfinite(level) and above and (self.high is None or level <= self.high)
 
+    @property
+    def range(self) -> str:
+        """Which levels are possible, in words."""
+        low, high = ("any" if end is None else f"{end:g}" for end in (self.low, self.high))
+        return f"{low} to {high}"
+
 
 @dataclass(frozen=True)
 class Need:

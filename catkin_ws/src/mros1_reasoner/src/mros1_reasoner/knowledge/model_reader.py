@@ -8,6 +8,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from node_kit.one_line import OneLineError
+
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.bindings import BindingError, Bindings, order, read_bindings, rebound
 from mros1_reasoner.knowledge.live_rules import without_idle
@@ -44,7 +46,7 @@ _OF_REPAIRS = (v.REPAIR, *PROPERTIES)
 _LEVELS = (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION, v.HAS_VALUE, v.IS_QA_TYPE)
 
 
-class KnowledgeBaseError(Exception):
+class KnowledgeBaseError(OneLineError):
     """The models can't be used; one line that says which file or individual, why, and what to do."""
 
 
@@ -371,13 +373,12 @@ class _Reader:
             quality = self._end(value, quality, kind)
             if not kind.holds(numbers[0]):
                 _log.warning(
-                    "QAvalue %s of %s is left out: %g is not within the range of %s, %s to %s",
+                    "QAvalue %s of %s is left out: %g is not within the range of %s, %s",
                     local_name(value),
                     local_name(owner),
                     numbers[0],
                     quality,
-                    "any" if kind.low is None else f"{kind.low:g}",
-                    "any" if kind.high is None else f"{kind.high:g}",
+                    kind.range,
                 )
                 continue
             if quality in levels:

@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 
 import owlready2
+from node_kit.one_line import OneLineError
 
 from mros1_reasoner.knowledge.reasoner import Assertion
 from mros1_reasoner.knowledge.vocabulary import RDF_TYPE
@@ -20,7 +21,7 @@ _ESCAPE = re.compile(r"\\(u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|.)", re.DOTALL)
 _ESCAPED = {"n": "\n", "r": "\r", "t": "\t", "b": "\b", "f": "\f"}
 
 
-class TripleError(Exception):
+class TripleError(OneLineError):
     """A text holds no readable triples."""
 
 

@@ -142,7 +142,7 @@ class Operator:
         """Return limits by name; of two limits of one quality, the first one is the least level of a band.
 
         Raises:
-            MapeError: a quality is unknown or has more limits, a limit is not finite, or a band is not in order.
+            MapeError: a quality is unknown or has more limits, a limit is no level, or a band is not in order.
         """
         found: dict[str, list[float]] = {}
         for quality, limit in given:
@@ -166,7 +166,7 @@ class Operator:
         """Give an objective another limit of a quality.
 
         Raises:
-            MapeError: there is no such objective or quality, or the limit is not finite.
+            MapeError: there is no such objective or quality, or the limit is no level of it.
         """
         self._state.named(objective)
         self._check_limit(quality, limit)
@@ -206,6 +206,9 @@ class Operator:
             raise MapeError(f"Unsupported QA TYPE received: {quality}")
         if not math.isfinite(limit):
             raise MapeError(f"limit of {quality} is {limit}, not a finite number: left as it is")
+        kind = self._state.kb.qualities[quality]
+        if not kind.holds(limit):
+            raise MapeError(f"limit of {quality} is {limit:g}, not within its range, {kind.range}: left as it is")
 
 
 def _check_name(name: str) -> None:

@@ -20,7 +20,7 @@ from mros1_reasoner.knowledge.reasoner import Reasoner
 from mros1_reasoner.loop.commands import Operator
 from mros1_reasoner.loop.deliberation import Deliberation, Timing
 from mros1_reasoner.loop.fulfilment import Fulfilment, fulfilment
-from mros1_reasoner.loop.readable_state import MapeError
+from mros1_reasoner.loop.readable_state import MapeError, View
 from mros1_reasoner.loop.repairs import UnderWay
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.loop.state import State
@@ -97,6 +97,11 @@ class Mape:
     def analysis(self) -> Analysis:
         """The last analysis."""
         return self._state.analysis
+
+    @property
+    def view(self) -> View:
+        """All that the loop knows, for reading only."""
+        return self._state
 
     @property
     def proposal(self) -> Decision | None:

@@ -154,7 +154,8 @@ def plan(
         return Plan(None, False, tuple(c.lost(c.refused_because) for c in ranked), _nothing(designs, situation))
     others = sorted((c for c in candidates if c is not best), key=lambda c: (bool(c.refused_because), *by_use(c)))
     degraded = not best.keeps_limits
-    lost = (c.lost(_loss(c, best, degraded, keeps_as_well=c in kept, is_desired=best is wanted)) for c in others)
+    useful = fit[0].utility - situation.indifference if fit else math.inf
+    lost = (c.lost(_loss(c, best, degraded, kept, useful, is_desired=best is wanted)) for c in others)
     return Plan(best.design.name, degraded, (best.chosen(), *lost), reason, is_retry=not fit and not degraded)
 
 
@@ -326,8 +327,25 @@ def _corrected(correction: Correction) -> str:
     return "" if correction == _AS_EXPECTED else f" ({correction} what was expected)"
 
 
-def _loss(candidate: _Judged, best: _Judged, degraded: bool, *, keeps_as_well: bool, is_desired: bool) -> str:
-    """Return why a candidate was rejected."""
+def _loss(
+    candidate: _Judged,
+    best: _Judged,
+    degraded: bool,
+    kept: Collection[_Judged],
+    useful: float,
+    *,
+    is_desired: bool,
+) -> str:
+    """Return why a candidate was rejected.
+
+    Args:
+        candidate: it.
+        best: the choice.
+        degraded: whether the choice violates limits.
+        kept: those that keep the limits as well as the choice; empty: nobody has compared that.
+        useful: utility from which on a design counts as being as useful as any.
+        is_desired: whether the choice is the desired configuration.
+    """
     if candidate.refused_because:
         worse = f"; violates limits by {candidate.violation:.2g}, the choice by {best.violation:.2g}"
         tells = degraded and math.isfinite(candidate.violation) and candidate.violation > 0.0
@@ -336,10 +354,11 @@ def _loss(candidate: _Judged, best: _Judged, degraded: bool, *, keeps_as_well: b
         return f"{best.design.name} is the desired configuration"
     if best.relieves and not candidate.relieves:
         return "it would keep the violated limit barely"
+    keeps_worse = bool(kept) and candidate not in kept
+    if keeps_worse and candidate.utility >= useful:
+        return "as useful as the choice, but nearer to a limit"
     if candidate.utility < best.utility:
         return f"utility {candidate.utility:.4g} is less than {best.utility:.4g}"
-    if candidate.utility > best.utility and not keeps_as_well:
-        return "as useful as the choice, but nearer to a limit"
     return "as useful as the choice, but a bigger change"
 
 

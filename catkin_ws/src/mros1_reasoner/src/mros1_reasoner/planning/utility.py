@@ -12,6 +12,7 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from node_kit.one_line import OneLineError
 from node_kit.plugins import PluginError, find
 
 from mros1_reasoner.knowledge.model import Design, Direction, Quality
@@ -45,7 +46,7 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
 _Levels = Mapping[str, float]
 
 
-class UtilityError(Exception):
+class UtilityError(OneLineError):
     """A utility function can't be made as requested; one line that says why."""
 
 

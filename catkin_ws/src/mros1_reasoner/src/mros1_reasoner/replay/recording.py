@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from metacontrol_bags.decision import Decision
+from node_kit.one_line import OneLineError
 
 from mros1_reasoner.loop.entries import ActiveFact, Entry
 
 
-class RecordingError(Exception):
+class RecordingError(OneLineError):
     """A bag can't be used; one line that names it and says what to do."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rospy
@@ -36,10 +36,11 @@ class JournalTopic:
         self._contents = [path.read_text(encoding="utf-8", errors="replace") for path in files]
         self._journal = Journal()
         self._lock = threading.Lock()
+        self._sending = threading.Lock()  # rospy does not lock what it sends to a new subscriber: both would be garbled
         self._fresh: list[Entry] = []
         self._first = 0
         listener = rospy.SubscribeListener()
-        listener.peer_subscribe = lambda _topic, _publish, publish_to_peer: publish_to_peer(self._beginning())
+        listener.peer_subscribe = self._greet
         self._publisher = rospy.Publisher(
             "mros1_reasoner/journal", ReasonerJournal, subscriber_listener=listener, queue_size=1000
         )
@@ -56,7 +57,12 @@ class JournalTopic:
         """Publish the entries since the last flush."""
         fresh, self._fresh = self._fresh, []
         if fresh and self._publisher.get_num_connections():
-            self._publisher.publish(self._message(self._first, fresh))
+            with self._sending:
+                self._publisher.publish(self._message(self._first, fresh))
+
+    def _greet(self, _topic: str, _publish: object, publish_to_peer: Callable[[ReasonerJournal], None]) -> None:
+        with self._sending:
+            publish_to_peer(self._beginning())
 
     def _beginning(self) -> ReasonerJournal:
         with self._lock:

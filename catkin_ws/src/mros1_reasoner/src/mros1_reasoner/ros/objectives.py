@@ -11,6 +11,7 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from metacontrol_msgs import msg as messages
 from metacontrol_msgs.msg import ObjectiveWords as Words
+from node_kit.ros.action_server import Sturdy
 
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.loop.fulfilment import Fulfilment
@@ -21,6 +22,10 @@ NAME = "mros1_reasoner/objective"
 _IMPROVE = {Words.AS_SET: None, Words.IMPROVE: True, Words.KEEP: False}
 _GOODBYE = 0.3  # s, wall, for the publisher's own thread to send the last results
 _BY_CLIENTS = (Words.CANCELLED, Words.REPLACED)  # as in SimpleActionServer, these preempt a goal
+
+
+class _Server(Sturdy, actionlib.ActionServer):
+    """actionlib's, which outlives a clock that is set back."""
 
 
 class ObjectiveAction:
@@ -38,7 +43,7 @@ class ObjectiveAction:
         """
         self._goals, self._tell = goals, tell
         self._handles: dict[str, Any] = {}
-        self._server = actionlib.ActionServer(
+        self._server = _Server(
             NAME,
             messages.ObjectiveAction,
             lambda handle: queue(lambda: self._take(handle)),

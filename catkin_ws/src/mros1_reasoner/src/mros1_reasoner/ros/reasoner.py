@@ -30,12 +30,13 @@ from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.goals import Goals
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
+from mros1_reasoner.loop.requesting import Wanted
 from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic
 from mros1_reasoner.ros.log import Log
 from mros1_reasoner.ros.objectives import ObjectiveAction
 from mros1_reasoner.ros.repairs import RepairRequests
-from mros1_reasoner.ros.requests import Requests, Wanted
+from mros1_reasoner.ros.requests import Requests
 from mros1_reasoner.ros.services import Services
 
 _TIMER_PERIOD = 0.02  # s, wall, the shortest between two looks at ROS time while the core waits for a moment

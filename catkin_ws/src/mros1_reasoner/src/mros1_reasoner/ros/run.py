@@ -37,6 +37,8 @@ def run(early: Popen[bytes] | None) -> None:
         life.start()
         log_core()
         parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
+        for line in parameters.strangers:
+            rospy.logwarn("%s", line)
         reasoner = make_reasoner(parameters.reasoner, early)  # its process gets ready while this one reads models
         knowledge_base = parameters.knowledge_base()
         objectives = parameters.objectives(knowledge_base)

@@ -8,6 +8,7 @@ import stat
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from node_kit.one_line import one_line
 from node_kit.yaml_text import YamlError, parse_yaml
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ class InputFileError(ValueError):
 
     def __init__(self, path: str | Path, problem: str, place: Place | None = None) -> None:
         where = str(path) if place is None else f"{path}:{place[0]}:{place[1]}"
-        super().__init__(_printable(f"{where}: {problem}"))
+        super().__init__(one_line(f"{where}: {problem}"))
         self.problem = problem
         self.place = place
 
@@ -105,10 +106,3 @@ def real_path(path: str | Path) -> Path:
         return Path(os.path.realpath(path))
     except ValueError:
         return Path(path)
-
-
-def _printable(text: str) -> str:
-    """Return a text on one line, safe for a terminal."""
-    if text.isprintable():
-        return text
-    return "".join(mark if mark.isprintable() else mark.encode("unicode_escape").decode() for mark in text)

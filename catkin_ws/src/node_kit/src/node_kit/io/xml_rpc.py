@@ -69,7 +69,8 @@ class Client:
             CallError: it is no http address.
         """
         self.uri = uri
-        self._caller, self._timeout, self._peer = caller, timeout, f"{peer} {uri}"
+        self._caller, self._timeout, self._kind = caller, timeout, peer
+        self._peer = f"{peer} {uri}"
         self._transport = _Transport(kept_answers)
         try:
             self._proxy = xmlrpc.client.ServerProxy(uri, transport=self._transport)
@@ -137,7 +138,7 @@ class Client:
                 return call(*parameters)
         except ConnectionRefusedError as error:
             self.close()
-            raise GoneError(f"{self._peer} is gone ({error.strerror})", str(error)) from error
+            raise GoneError(f"no {self._kind} answers at {self.uri} ({error.strerror})", str(error)) from error
         except (OSError, http.client.HTTPException) as error:
             self.close()
             reason = str(error) or type(error).__name__

@@ -1,4 +1,4 @@
-"""Servers of actions: clients look for them in wall time, and they end without a traceback.
+"""Servers of actions: clients look for them in wall time; they outlive a clock that is set back, and end quietly.
 
 `wait_for_server` of actionlib waits in ROS time. Under simulated time, ROS time is 0 until the first /clock, and jumps
 when that comes: a wait that began before ends at once, however long it was meant to be. While no clock runs, the wait
@@ -48,12 +48,22 @@ def wait_for_server(client: Any, patience_s: float) -> bool:
     return True
 
 
-class EndsQuietly:
-    """Goes before actionlib's ActionServer in a list of bases: such a server may end at any time.
+class Sturdy:
+    """Goes before actionlib's ActionServer in a list of bases: neither a jump of the clock nor its end disturbs it.
 
-    Its timer publishes the status now and then. Where that happens just when the node closes its topics, actionlib lets
-    a traceback be printed. rospy closes them before `is_shutdown` says so, but after the end was asked for.
+    Its timer publishes the status now and then. A timer of rospy ends for good where simulated time goes back, be it by
+    one wrong message on /clock: clients would see their goals LOST. Where the timer fires just when the node closes its
+    topics, actionlib lets a traceback be printed. rospy closes them before `is_shutdown` says so, but after the end was
+    asked for.
     """
+
+    def initialize(self) -> None:
+        """Begin, with a timer that goes on where time goes back."""
+        super().initialize()  # type: ignore[misc]
+        timer = getattr(self, "status_timer", None)  # there is none where the frequency is set to 0
+        if timer is not None:
+            timer.shutdown()
+            self.status_timer = rospy.Timer(timer._period, self.publish_status_async, reset=True)  # type: ignore[attr-defined]
 
     def publish_status(self) -> None:
         """Publish the status of all goals, unless the node is ending."""

@@ -18,6 +18,7 @@ import rosgraph
 import rospy
 
 from node_kit.io.master_watch import MasterWatch
+from node_kit.io.printable_logs import print_safely
 from node_kit.io.xml_rpc import CallError
 from node_kit.master import View
 from node_kit.ros.connections import connect_to_all
@@ -88,6 +89,7 @@ class Lifetime:
         Args:
             anonymous: whether the node's name gets an addition that makes it unique.
         """
+        print_safely()
         try:
             self.watch.start(rosgraph.get_master_uri())
             if not self.watch.confirm():

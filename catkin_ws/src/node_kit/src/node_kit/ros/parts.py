@@ -7,11 +7,12 @@ import math
 import threading
 import time
 
+import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from node_kit.io.inbox import Inbox
-from node_kit.io.xml_rpc import CallError, Client, GoneError
+from node_kit.io.xml_rpc import CallError, Client, DeniedError, GoneError
 from node_kit.parts import PERIOD, Answer, Parts, Sign
 
 TOPIC = "metacontrol_parts"
@@ -62,7 +63,7 @@ class _Watch:
         self._inbox.put(lambda: self._parts.hear(sign, time.monotonic()))
 
     def _run(self) -> None:
-        given = told = 0.0
+        given = asked = told = 0.0
         before: dict[str, str] = {}
         while not rospy.is_shutdown():
             self._inbox.do_next(wait_s=_LOOK)
@@ -71,8 +72,10 @@ class _Watch:
             if now - given >= PERIOD:
                 given = now
                 self._give()
-            for sign in self._parts.doubtful(now):
-                self._parts.note(sign.node, _ask(sign), time.monotonic())
+            if now - asked >= _LOOK:
+                asked = now
+                for sign in self._parts.doubtful(now):
+                    self._parts.note(sign.node, _ask(sign), time.monotonic())
             news = self._parts.to_tell()
             is_new = any(before.get(node) != why for node, why in news.items())
             if news and (is_new or now - told >= _REPEAT):
@@ -113,12 +116,26 @@ class _Watch:
 
 
 def _ask(sign: Sign) -> Answer:
-    """Ask a node for its process."""
+    """Ask a node for its process; of one that is gone, ask the master.
+
+    One that was asked to end, and whose last sign was lost, has taken its leave there, or has a successor.
+    """
     try:
         with Client(sign.uri, rospy.get_name(), _DEADLINE, "node") as client:
             client.call("getPid")
     except GoneError:
-        return Answer.GONE
+        return _ask_master(sign)
     except CallError:
         return Answer.SILENT
     return Answer.LIVES
+
+
+def _ask_master(sign: Sign) -> Answer:
+    """Ask the master about a node whose process has ended."""
+    try:
+        with Client(rosgraph.get_master_uri(), rospy.get_name(), _DEADLINE) as master:
+            return Answer.GONE if master.call("lookupNode", sign.node) == sign.uri else Answer.STARTS
+    except DeniedError:
+        return Answer.ENDED
+    except CallError:
+        return Answer.GONE

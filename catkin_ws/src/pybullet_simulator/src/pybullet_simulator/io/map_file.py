@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 from node_kit.io.input_files import InputFileError, read_bytes
+from node_kit.one_line import OneLineError
 
 from pybullet_simulator.world.grid import FREE, OCCUPIED, UNKNOWN, Grid
 
@@ -24,7 +25,7 @@ MAX_IMAGE_SIZE = 8 * MAX_CELLS
 """Bytes of the largest image: four channels of 16 bits a cell."""
 
 
-class MapError(ValueError):
+class MapError(OneLineError, ValueError):
     """A map that cannot be used; the message names the file, the key and the remedy."""
 
 

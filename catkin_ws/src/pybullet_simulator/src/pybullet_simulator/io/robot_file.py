@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import rospkg
 from node_kit.io.input_files import InputFileError, read_text
+from node_kit.one_line import OneLineError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,7 +22,7 @@ _SLIDE_MASS = "1"
 _LOOKS_MASS = "0.001"  # kg; to a link without inertia PyBullet gives 1 kg
 
 
-class RobotFileError(ValueError):
+class RobotFileError(OneLineError, ValueError):
     """A URDF that cannot be used; the message names the file."""
 
 

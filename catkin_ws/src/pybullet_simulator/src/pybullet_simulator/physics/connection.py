@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
-
 import pybullet
+from node_kit.io.x_display import DisplayError, held_display
 
 
 class PhysicsError(RuntimeError):
@@ -18,8 +17,13 @@ def connect(gui: bool) -> int:
         PhysicsError: the window cannot open, or PyBullet has too many clients.
     """
     if gui:
-        _check_display()
-    client = int(pybullet.connect(pybullet.GUI if gui else pybullet.DIRECT))
+        try:
+            with held_display():  # PyBullet itself would end the process
+                client = int(pybullet.connect(pybullet.GUI))
+        except DisplayError as error:
+            raise PhysicsError(f"{error} (gui:=false)") from error
+    else:
+        client = int(pybullet.connect(pybullet.DIRECT))
     if client < 0:
         raise PhysicsError("PyBullet does not start; run without its window (gui:=false)")
     return client
@@ -44,16 +48,3 @@ def disconnect(client: int) -> None:
     """Free a client's world; it cannot be used any more."""
     if pybullet.isConnected(client):
         pybullet.disconnect(client)
-
-
-def _check_display() -> None:
-    """Raise PhysicsError where no X display answers; PyBullet itself would end the process."""
-    try:
-        x11 = ctypes.CDLL("libX11.so.6")
-    except OSError as error:
-        raise PhysicsError("PyBullet's window needs libX11: ./mros setup --gui, or gui:=false") from error
-    x11.XOpenDisplay.restype = ctypes.c_void_p
-    display = x11.XOpenDisplay(None)
-    if not display:
-        raise PhysicsError("PyBullet's window needs a display, and none answers: set DISPLAY, or use gui:=false")
-    x11.XCloseDisplay(ctypes.c_void_p(display))

@@ -15,6 +15,7 @@ from control_msgs.msg import (
 )
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from node_kit.parameters import ParameterError, ParameterTree
+from node_kit.ros.action_server import Sturdy
 from node_kit.ros.lifetime import Lifetime
 from sensor_msgs.msg import JointState
 from simulator_msgs.msg import ArmCommand, ArmState
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 FORCE_LIMIT = 25.0
 """N: above what a block brings about that is put 5 mm too low (18 N), below what an obstacle does at once (200 N)."""
+_SECONDS = 1 << 32
+"""Nanoseconds of more than a second may make more seconds of a stamp than it has room for."""
 _REPORT = 0.5
 """s of ROS time between two reports on /diagnostics; a change is reported at once."""
 _CODES = {
@@ -44,6 +47,10 @@ _WORDS = {
     Outcome.BEHIND: "a joint has fallen behind its path",
     Outcome.NOT_REACHED: "a joint is not at its goal in time",
 }
+
+
+class _Server(Sturdy, actionlib.ActionServer):
+    """actionlib's, which outlives a clock that is set back."""
 
 
 class ArmNode:
@@ -77,10 +84,10 @@ class ArmNode:
         self._last_outcome: Outcome | None = None
         self._release = rospy.Service("~release", Trigger, self._on_release)
         self._retreat = rospy.Service("~retreat", Trigger, self._on_retreat)
-        self._motions = actionlib.ActionServer(
+        self._motions = _Server(
             "~follow_joint_trajectory", FollowJointTrajectoryAction, self._on_motion, self._on_cancel, auto_start=False
         )
-        self._grips = actionlib.ActionServer(
+        self._grips = _Server(
             "~gripper_command", GripperCommandAction, self._on_grip, self._on_cancel, auto_start=False
         )
         self._input = rospy.Subscriber(f"{raw}/state", ArmState, self._on_state, queue_size=1, tcp_nodelay=True)
@@ -90,6 +97,9 @@ class ArmNode:
     # Callbacks
 
     def _on_state(self, state: ArmState) -> None:
+        if state.stamp.secs >= _SECONDS:
+            rospy.logwarn_throttle(10.0, f"a state of the {self._arm} arm is ignored: its stamp fits no message")
+            return
         try:
             self._take(state)
         except rospy.ROSException:  # the node's topics are closed while it ends
@@ -109,7 +119,7 @@ class ArmNode:
                 result = GripperCommandResult(gripped.width, self._gripper.force, gripped.stalled, gripped.reached)
                 self._grip.set_succeeded(result)
                 self._grip = None
-            self._report(now)
+            self._report(state.stamp)
         self._joints.publish(joint_state(self._arm, state, state.stamp))
 
     def _on_motion(self, goal: ServerGoalHandle) -> None:
@@ -160,7 +170,7 @@ class ArmNode:
             problem = self._controller.release(self._state.contact_force if self._state else 0.0)
             if not problem:
                 rospy.loginfo("released")
-                self._report(rospy.get_time())
+                self._report(rospy.Time.now())
         return TriggerResponse(not problem, problem or "released")
 
     def _on_retreat(self, _request: TriggerRequest) -> TriggerResponse:
@@ -199,9 +209,9 @@ class ArmNode:
         else:
             goal.set_aborted(result, words)
 
-    def _report(self, now: float) -> None:
+    def _report(self, stamp: rospy.Time) -> None:
         """Say on /diagnostics how the arm is."""
-        stopped = self._controller.is_stopped
+        now, stopped = stamp.to_sec(), self._controller.is_stopped
         if stopped == self._was_stopped and 0.0 <= now - self._reported < _REPORT:
             return
         self._was_stopped, self._reported = stopped, now
@@ -211,7 +221,7 @@ class ArmNode:
             status.message = "safety stop: the arm met resistance; take away what it met, then call ~release"
             status.values = [KeyValue("force", f"{self._controller.resistance:.0f}")]
         message = DiagnosticArray(status=[status])
-        message.header.stamp = rospy.Time.from_sec(now)
+        message.header.stamp = stamp
         self._diagnostics.publish(message)
 
 

@@ -40,6 +40,7 @@ from pybullet_simulator.world.world import Box, WorldError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+ORIGIN = Pose(0.0, 0.0, 0.0)
 _SERVICE_S = 10.0
 """Wall seconds that a service call waits for the loop."""
 
@@ -47,11 +48,12 @@ _SERVICE_S = 10.0
 class SimulatorNode:
     """Owns the simulation; callbacks only leave their input for the loop, which runs in the main thread."""
 
-    def __init__(self, default_world: Path | None = None) -> None:
+    def __init__(self, default_world: Path | None = None, default_pose: Pose = ORIGIN) -> None:
         """Read the parameters, build the world and connect.
 
         Args:
             default_world: world file where parameter `~world` is empty or not set.
+            default_pose: where parameters `~initial_pose_x` and so on are not set, map frame.
 
         Raises:
             ParameterError: a parameter cannot be used.
@@ -62,7 +64,7 @@ class SimulatorNode:
         factor = parameters.number("real_time_factor", 1.0, low=0.0, high=1000.0)
         world = read_world(_world_path(parameters, default_world))
         laser_steps, camera_steps = (_steps(parameters, name) for name in ("laser_rate", "camera_rate"))
-        self._simulation = Simulation(world, _settings(parameters))
+        self._simulation = Simulation(world, _settings(parameters, default_pose))
         self._pacer = Pacer(STEP / factor if factor > 0.0 else 0.0)
         self._inbox = Inbox()
         self._output = Output(self._simulation, world, laser_steps, camera_steps)
@@ -149,7 +151,7 @@ class SimulatorNode:
             return None, f"the simulation did not answer within {_SERVICE_S:g} s"
 
 
-def _settings(parameters: ParameterTree) -> Settings:
+def _settings(parameters: ParameterTree, pose: Pose) -> Settings:
     """Return the simulation's settings from the node's parameters.
 
     Raises:
@@ -163,7 +165,11 @@ def _settings(parameters: ParameterTree) -> Settings:
         localisation=parameters.number("localisation_noise", REAL.localisation, low=0.0, high=10.0),
     )
     return Settings(
-        Pose(*(parameters.number(f"initial_pose_{key}", 0.0) for key in "xya")),
+        Pose(
+            parameters.number("initial_pose_x", pose.x),
+            parameters.number("initial_pose_y", pose.y),
+            parameters.number("initial_pose_a", pose.yaw),
+        ),
         parameters.whole("seed", 0, low=0),
         errors,
         parameters.number("battery_charge", 1.0, low=0.0, high=1.0),
@@ -183,17 +189,18 @@ def _world_path(parameters: ParameterTree, default: Path | None) -> Path:
     return parameters.path("world")
 
 
-def main(default_world: Path | None = None) -> None:
+def main(default_world: Path | None = None, default_pose: Pose = ORIGIN) -> None:
     """Run the node; exit status 2 when a parameter or the world cannot be used.
 
     Args:
         default_world: world file where parameter `~world` is empty or not set.
+        default_pose: where parameters `~initial_pose_x` and so on are not set, map frame.
     """
     # The loop computes without a pause at real-time factor 0: threads that talk to other nodes get their turn sooner.
     sys.setswitchinterval(0.001)
     with Lifetime("simulator", ParameterError, WorldError, SimulationError) as life:
         life.start()
-        node = SimulatorNode(default_world)
+        node = SimulatorNode(default_world, default_pose)
         try:
             node.run()
         finally:

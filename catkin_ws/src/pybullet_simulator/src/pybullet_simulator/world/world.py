@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from node_kit.one_line import OneLineError
 
 from pybullet_simulator.world.grid import FREE, OCCUPIED, UNKNOWN, Grid, cover
 from pybullet_simulator.world.walking import MAX_SPEED, RADIUS
@@ -34,7 +35,7 @@ _TRIANGLES = np.array(
 """Corners of a unit box that stands on the floor, and its top and sides; nobody looks at it from below."""
 
 
-class WorldError(ValueError):
+class WorldError(OneLineError, ValueError):
     """A world file that cannot be read, or an entry in it that makes no sense."""
 
 

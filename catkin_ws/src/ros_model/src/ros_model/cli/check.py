@@ -65,8 +65,7 @@ def check(files: tuple[str, ...], folders: tuple[str, ...], form: str) -> int:
 
     References are followed to the .ros models that are checked, stand beside the files, belong to their project, or are
     found with --path. Message types of installed ROS packages are known. A variant is checked with its project's base.
-    Of a launch file, the machines and the executables are checked, with the defaults of its arguments. Programs that it
-    names in `command=` are run, as roslaunch does.
+    Of a launch file, the machines and the executables are checked, with the defaults of its arguments.
     Of a project, the text also tells which components each design requires and by which way, what fills roles, and how
     components are repaired.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from node_kit.io.output_files import write_file
 
 from ros_model.errors import ModelError
 from ros_model.io.files import read_text
@@ -46,7 +47,7 @@ def _format(path: Path, only_check: bool) -> bool:
         return False
     if not only_check:
         try:
-            path.write_text(formatted, encoding="utf-8")
+            write_file(path, formatted)
         except OSError as error:
             raise ModelError(f"{path}: {error.strerror or error}: check its permissions") from error
     click.echo(f"{'would change' if only_check else 'changed'} {path}")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rospkg
-from node_kit.io import input_files
+from node_kit.io import input_files, output_files
 from node_kit.io.input_files import InputFileError, real_path
 
 from ros_model.errors import ModelError
@@ -76,7 +76,7 @@ def write_file(path: Path, text: str, root: Path) -> Path:
         raise ModelError(f"{path}: leaves the folder {root}: nothing is written there")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        output_files.write_file(path, text)
     except OSError as error:
         raise ModelError(f"{path}: can't be written ({error.strerror or error}): check its folder") from error
     return path

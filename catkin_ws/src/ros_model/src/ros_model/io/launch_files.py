@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import rospkg
@@ -11,12 +12,12 @@ from ros_model.errors import ModelError
 from ros_model.io.files import read_text
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
 
 def read_launch_file(path: Path) -> LaunchFile:
-    """Return what a launch file starts; its arguments have their defaults. Programs in its `command=` are run.
+    """Return what a launch file starts; its arguments have their defaults. It runs nothing.
 
     Raises:
         ModelError: it can't be read, or roslaunch refuses it; says what roslaunch says.
@@ -33,12 +34,25 @@ def read_launch_file(path: Path) -> LaunchFile:
     return LaunchFile(str(path), tuple(nodes), machines)
 
 
-def load(path: Path, arguments: Sequence[str] = ()) -> Any:
+@dataclass(frozen=True)
+class NotRun:
+    """Stands for the value of a parameter that a program would give.
+
+    Attributes:
+        command: the words of `command=`.
+    """
+
+    command: str
+
+
+def load(path: Path, arguments: Sequence[str] = (), *, runs_programs: bool = False) -> Any:
     """Return the configuration that roslaunch makes of a launch file, without what a roscore has.
 
     Args:
         path: the launch file.
         arguments: `name:=value`, as for roslaunch.
+        runs_programs: run those that the file names in `command=`, as roslaunch does; else their parameters have a
+            NotRun as their value.
 
     Raises:
         ModelError: roslaunch refuses the file; says what it says.
@@ -50,6 +64,8 @@ def load(path: Path, arguments: Sequence[str] = ()) -> Any:
     try:
         config = roslaunch.config.ROSLaunchConfig()  # without what a roscore has: that runs two programs
         loader = roslaunch.xmlloader.XmlLoader()
+        if not runs_programs:
+            loader.param_value = _without_programs(loader.param_value)
         loader.ignore_unset_args = False
         loader.load(str(path), config, argv=list(arguments), verbose=False)
     except (roslaunch.core.RLException, roslaunch.xmlloader.XmlParseException, rospkg.ResourceNotFound) as error:
@@ -59,3 +75,13 @@ def load(path: Path, arguments: Sequence[str] = ()) -> Any:
     if config.config_errors:
         raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(config.config_errors[0]).split())}")
     return config
+
+
+def _without_programs(param_value: Callable[..., Any]) -> Callable[..., Any]:
+    """Return roslaunch's reader of a parameter's value, which runs no program."""
+
+    def value_of(verbose: bool, name: str, kind: str, *ways: str | None) -> Any:
+        *_, command = ways  # value, textfile, binfile, command: one of them is given
+        return param_value(verbose, name, kind, *ways) if command is None else NotRun(command)
+
+    return value_of

@@ -146,7 +146,27 @@ def _keeps_bounds(value: Any, schema: Mapping[str, Any]) -> bool:
 
 def _fault(value: object, schema: Mapping[str, Any], keys: Keys) -> Violation:
     found = "is empty" if value is None else f"is {_shortened(value)}"
-    return Violation(keys, f"{found}, must be {schema['title']}")
+    return Violation(keys, f"{found}, must be {_wanted(schema)}")
+
+
+def _wanted(schema: Mapping[str, Any]) -> str:
+    """Return in words what a schema asks for."""
+    if "title" in schema:
+        return str(schema["title"])
+    if "anyOf" in schema:
+        return " or ".join(map(_wanted, schema["anyOf"]))
+    return _KINDS.get(schema.get("type", ""), "another value")
+
+
+_KINDS = {
+    "array": "a list",
+    "boolean": "true or false",
+    "integer": "a whole number",
+    "number": "a number",
+    "object": "a mapping",
+    "string": "a text",
+}
+"""What a schema without a title asks for."""
 
 
 def _shortened(value: object) -> str:

@@ -21,13 +21,16 @@ _LAUNCH_FILES = (".launch", ".xml", ".test")
 @click.argument("path", metavar="PATH")
 @click.argument("arguments", nargs=-1, metavar="[PATH | ARG:=VALUE]...")
 @click.option("-o", "--output", default=".", metavar="FOLDER", help="Where the files go; made if it is missing.")
-def extract(path: str, arguments: tuple[str, ...], output: str) -> int:
+@click.option(
+    "--run-programs", is_flag=True, help="Run programs that a launch file names in `command=`, as roslaunch does."
+)
+def extract(path: str, arguments: tuple[str, ...], output: str, run_programs: bool) -> int:
     """Write models of what is in PATH: a ROS package, a folder of packages, or a launch file.
 
     A package gives PACKAGE.ros: its executables (rospy and roscpp), their interfaces and parameters, its messages.
     Several folders are read one after the other.
     A launch file (.launch, .xml, .test), read by roslaunch with the arguments ARG:=VALUE, gives NAME.rossystem and
-    NAME.ros.
+    NAME.ros. Nothing of what is read is run, unless --run-programs says so.
     What the source does not tell is marked so, with its place, in names and in comments at the top of the files.
 
     Exit status: 0 all was read, 1 some source file or folder could not be read, 2 a package or launch file could not.
@@ -38,7 +41,7 @@ def extract(path: str, arguments: tuple[str, ...], output: str) -> int:
             raise ModelError(
                 f"{path}: no launch file ({known}): give one, or the folder of a ROS package, or of several"
             )
-        return _launch_file(Path(path), arguments, output)
+        return _launch_file(Path(path), arguments, output, run_programs)
     for argument in arguments:
         if ":=" in argument:
             raise ModelError(f"{argument}: arguments are for a launch file, and {path} is a folder")
@@ -47,11 +50,11 @@ def extract(path: str, arguments: tuple[str, ...], output: str) -> int:
     return _all_packages((path, *arguments), output)
 
 
-def _launch_file(path: Path, arguments: tuple[str, ...], output: str) -> int:
+def _launch_file(path: Path, arguments: tuple[str, ...], output: str, runs_programs: bool) -> int:
     from ros_model_extraction.io.launch_files import read_launch_file  # imported when asked for
     from ros_model_extraction.io.output import write_models
 
-    models = read_launch_file(path, arguments)
+    models = read_launch_file(path, arguments, runs_programs=runs_programs)
     for written in write_models(models, output, models.system.name):
         click.echo(f"wrote {written}")
     nodes = len(models.system.components)

@@ -12,6 +12,7 @@ from typing import Any
 import rospkg
 from node_kit.yaml_text import YamlError, parse_yaml
 from ros_model.errors import ModelError
+from ros_model.io.launch_files import NotRun
 from ros_model.io.launch_files import load as load_by_roslaunch
 from ros_model.language.graph_names import resolve
 from ros_model.language.metamodel import PortKind, Reference, topic_suffixes
@@ -62,21 +63,27 @@ class LaunchedNode:
         return resolve(self.words[2], self.name) if is_loaded else self.name
 
 
-def read_launch_file(path: Path, arguments: Sequence[str] = ()) -> Models:
-    """Return the models of what a launch file starts. Programs that it names in `command=` are run, as roslaunch does.
+def read_launch_file(path: Path, arguments: Sequence[str] = (), *, runs_programs: bool = False) -> Models:
+    """Return the models of what a launch file starts.
 
     Args:
         path: the launch file.
         arguments: `name:=value`, as for roslaunch.
+        runs_programs: run those that the file names in `command=`; else the parameters that they give are left out.
 
     Raises:
         ModelError: roslaunch refuses the file; says what it says.
     """
-    nodes, parameters = load(path, arguments)
+    nodes, parameters = load(path, arguments, runs_programs)
+    not_run = {name: value.command for name, value in parameters.items() if isinstance(value, NotRun)}
+    parameters = {name: value for name, value in parameters.items() if name not in not_run}
     tree = _tree(parameters)
     sources = _Sources()
     instances = {}
-    lines = []
+    lines = [
+        f"Left out: the parameter {name}, which a program gives that was not run: {command}"
+        for name, command in sorted(not_run.items())
+    ]
     for node in nodes:
         for name, value in node.private.items():
             _put(tree, f"{node.name}/{name}", value)
@@ -126,7 +133,7 @@ def _with_nodelet(instances: Mapping[str, Instance], name: str, manager: str, en
         yield f"{manager} has the interfaces of the nodelet {name}, as in the running graph."
 
 
-def load(path: Path, arguments: Sequence[str]) -> tuple[list[LaunchedNode], dict[str, Any]]:
+def load(path: Path, arguments: Sequence[str], runs_programs: bool) -> tuple[list[LaunchedNode], dict[str, Any]]:
     """Return the nodes of a launch file, and the parameters that it sets, by full name, as roslaunch reads it.
 
     Raises:
@@ -136,7 +143,7 @@ def load(path: Path, arguments: Sequence[str]) -> tuple[list[LaunchedNode], dict
     for argument in arguments:
         if ":=" not in argument:
             raise ModelError(f"argument {argument!r} is not NAME:=VALUE")
-    config = load_by_roslaunch(path, arguments)
+    config = load_by_roslaunch(path, arguments, runs_programs=runs_programs)
     nodes = [_launched(node) for node in config.nodes]
     return nodes, {name: parameter.value for name, parameter in config.params.items()}
 

@@ -19,7 +19,7 @@ _MAX_WORDS = 10_000
 _MAX_LENGTH = 100_000
 _MAX_DEPTH = 3
 """Variables within variables' names, `${${PROJECT_NAME}_SOURCES}`; values are expanded when they are set."""
-_MAX_COMMANDS = 100_000
+_MAX_COMMANDS = 10_000
 _MAX_CALLS = 32
 _BLOCKS = ("foreach", "function", "macro", "if", "while")
 _TESTING = ("CATKIN_ENABLE_TESTING", "BUILD_TESTING")

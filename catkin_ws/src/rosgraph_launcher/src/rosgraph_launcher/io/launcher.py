@@ -1,40 +1,25 @@
-"""Owns the nodes of the functions that run: changes them, and starts again those that die.
+"""The launcher of this host: `launching.supervision` with real processes, the master and the clock.
 
-The decisions are in `launching`. For one thread only: the main thread of the node rosgraph_launcher.
+For one thread only, the main thread of the node rosgraph_launcher, where nothing else is said.
 """
 
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable
 
-from node_kit.io.xml_rpc import CallError
-
-from rosgraph_launcher.description import NodeDescription
-from rosgraph_launcher.io.command_lines import CommandLineError
 from rosgraph_launcher.io.master import advertised
 from rosgraph_launcher.io.node_commands import NodeCommands
 from rosgraph_launcher.io.node_processes import NodeProcesses
 from rosgraph_launcher.io.ownership import look_up
-from rosgraph_launcher.io.processes import Command, Process, StartError
 from rosgraph_launcher.io.scripts import script_is_at_work
-from rosgraph_launcher.launching.managed_nodes import ManagedNodes
-from rosgraph_launcher.launching.nodelets import unloading
 from rosgraph_launcher.launching.options import LauncherOptions
 from rosgraph_launcher.launching.report import LauncherReport
-from rosgraph_launcher.launching.restarts import Ending, Verdict
-
-UNLOAD_TIMEOUT = 2.0  # s, for a nodelet's manager to answer; it takes about 0.1
-STANDBY_PERIOD = 1.0  # s, from one warm process to the next one, so that their imports take no more than one core
+from rosgraph_launcher.launching.supervision import Supervisor
 
 
-class LauncherError(Exception):
-    """A change can't be made; the message says why, in one line."""
-
-
-class Launcher:
-    """The nodes of all functions, and the warm processes that wait for the next ones."""
+class Launcher(Supervisor):
+    """The nodes of all functions on this host."""
 
     def __init__(
         self,
@@ -49,31 +34,17 @@ class Launcher:
             changed: is called with the reports of all functions, whenever one differs.
             log: takes a line for the operator.
         """
-        self._options = options
-        self._changed = changed
-        self._log = log
-        self._nodes = ManagedNodes(options.policy)
-        self._commands = NodeCommands(options.mark, options.run_id, log)
-        self._processes = NodeProcesses(options, log)
-        self._next_standby = 0.0
-        self._report()
-
-    @property
-    def changes(self) -> int:
-        """Number of the changes that were asked for."""
-        return self._nodes.changes
+        commands = NodeCommands(options.mark, options.run_id, log)
+        self._real = NodeProcesses(options, log)
+        super().__init__(options, changed, log, commands, self._real, _Names(options.mark), time.monotonic)
 
     def pidfds(self) -> dict[int, str]:
         """Return the file descriptors that become readable when a node ends, with the node's name."""
-        return self._processes.pidfds()
-
-    def next_restart(self) -> float | None:
-        """Return the time (time.monotonic()) of the next restart; None where no node waits for one."""
-        return self._nodes.next_restart()
+        return self._real.pidfds()
 
     def is_up(self, name: str) -> bool:
         """Tell, in any thread, whether a node of the launcher is up."""
-        node = self._nodes.find(name)
+        node = self.find(name)
         mark = self._options.mark
         return node is not None and (look_up(name).is_up(mark) or script_is_at_work(node, mark))
 
@@ -81,186 +52,21 @@ class Launcher:
         """Return, in any thread, who has taken the name of a node; empty where nobody has."""
         return look_up(name).conflict(self._options.mark)
 
-    # -- changes --------------------------------------------------------------------------------------------------
 
-    def change(
-        self,
-        function: str,
-        configuration: str,
-        nodes: Mapping[str, NodeDescription],
-        stop: Collection[str],
-        start: Sequence[str],
-    ) -> dict[str, float]:
-        """Change the nodes of a function: end those in `stop`, start those in `start`, keep all others.
+class _Names:
+    """What answers under the names of nodes, by the master and the processes of this host."""
 
-        The executables are found before anything is touched. The new processes do their imports while the old nodes
-        end. A node that another function needs does not end, unless it is in `start` too.
+    def __init__(self, mark: str) -> None:
+        self._mark = mark
 
-        Args:
-            function: its name.
-            configuration: the name of its configuration; empty: end all nodes that no other function needs.
-            nodes: all nodes of the configuration, by full name.
-            stop: the nodes to end.
-            start: the nodes to start; those that run already are restarted.
+    def successor(self, name: str) -> str:
+        """Return who has taken the name of a node whose own process has ended; empty where nobody has."""
+        return look_up(name).successor(self._mark)
 
-        Returns:
-            The durations of the phases, s.
+    def is_own(self, name: str, conflict: str) -> bool:
+        """Tell whether the launcher's own node answers under a name again that somebody else had taken."""
+        return look_up(name).is_own(self._mark, conflict)
 
-        Raises:
-            LauncherError: the change failed. Nodes may have been stopped; none of those in `start` runs.
-        """
-        began = time.monotonic()
-        self._nodes.ask_for_change(function)
-        if not configuration:
-            self._release(function)
-            return {"stop": time.monotonic() - began}
-        commands = self._look_up(nodes, start)
-        idle = [name for name in start if not self._nodes.runs(name)]
-        taken = {name: look_up(name).successor(self._options.mark) for name in idle}
-        leaving = self._nodes.begin_change(function, stop, start)
-        self._report()
-        self._processes.ask_to_end(leaving)
-        prepared: dict[str, Process] = {}
-        try:
-            for name, command in commands.items():
-                process = self._processes.prepare(command)
-                if process:
-                    prepared[name] = process
-            prepared_at = time.monotonic()
-            self._end(leaving, forget=[name for name in leaving if name not in start])
-            stopped_at = time.monotonic()
-            self._nodes.adopt(function, configuration, nodes, stop, start, stopped_at, taken)
-            self._report()
-            for name, command in commands.items():
-                self._nodes.started(name, self._processes.begin(name, command, prepared.pop(name, None)))
-        except (CallError, StartError, OSError) as error:
-            self._end(start)
-            self._nodes.end_change(function, time.monotonic(), failed_to_start=start)
-            self._report()
-            raise LauncherError(_one_line(error)) from error
-        finally:
-            for process in prepared.values():
-                process.close()
-        ended_at = time.monotonic()
-        self._nodes.end_change(function, ended_at)
-        self._report()
-        return {"prepare": prepared_at - began, "stop": stopped_at - prepared_at, "start": ended_at - stopped_at}
-
-    def close(self, gently: bool = True) -> None:
-        """Stop everything, because the launcher ends.
-
-        Args:
-            gently: ask the nodes first. Without a master they can't be asked; then begin with SIGINT.
-        """
-        names = self._nodes.names
-        if gently:
-            self._processes.ask_to_end(names)
-        self._processes.end(names, forget=names if gently else (), patience=gently)
-        self._processes.end_standby()
-        self._processes.close()
-
-    def _release(self, function: str) -> None:
-        leaving = self._nodes.begin_release(function)
-        self._report()
-        self._processes.ask_to_end(leaving)
-        self._end(leaving, forget=leaving)
-        self._nodes.end_release(function, time.monotonic())
-        self._processes.stand_by(self._nodes.needed, may_start=False)
-        self._report()
-
-    # -- supervision ----------------------------------------------------------------------------------------------
-
-    def look_after(self) -> None:
-        """Deal with the nodes that have ended, and start again those that are due."""
-        now = time.monotonic()
-        self._inspect(now)
-        stopped: set[str] = set()
-        for name, status in self._processes.take_ended().items():
-            if name not in stopped:
-                conflict = look_up(name).successor(self._options.mark)
-                stopped.update(self._follow(self._nodes.ended(name, status, now, conflict)))
-        for name in self._nodes.to_restart(now):
-            if name not in stopped:
-                stopped.update(self._restart(name))
-        for name, conflict in self._nodes.contested.items():
-            self._nodes.seen(name, look_up(name).is_own(self._options.mark, conflict), now)
-        if self._nodes.recovered():
-            self._report()
-
-    def stand_by(self) -> None:
-        """Keep a warm process for each Python node that runs or is expected, where that is wanted.
-
-        None is started right after a change.
-        """
-        now = time.monotonic()
-        if self._options.standby:
-            may_start = now >= self._next_standby and self._nodes.may_stand_by(now)
-            if self._processes.stand_by(self._nodes.needed, may_start):
-                self._next_standby = now + STANDBY_PERIOD
-
-    def expect(self, nodes: Iterable[NodeDescription]) -> None:
-        """Note which nodes may be started next beside those that run; one without an executable here is left out."""
-        commands = []
-        for node in nodes:
-            with contextlib.suppress(CommandLineError):  # whoever deploys it will be told
-                commands.append(self._commands.command(node))
-        self._processes.expect(commands)
-
-    def _inspect(self, now: float) -> None:
-        for name in self._nodes.to_inspect(now):
-            try:
-                self._nodes.inspected(name, advertised([name]))
-            except CallError:
-                return
-
-    def _follow(self, ending: Ending) -> tuple[str, ...]:
-        """Do what follows from the end of a node, except for the restart, which is not due yet.
-
-        Returns:
-            The nodes that were stopped.
-        """
-        self._log(ending.text)
-        if ending.verdict is Verdict.GIVE_UP:
-            self._processes.ask_to_end(ending.stopped)
-            self._end(ending.stopped, forget=ending.stopped)
-            self._processes.stand_by(self._nodes.needed, may_start=False)
-        elif ending.stopped:
-            self._end(ending.stopped, patience=False)
-        self._report()
-        return ending.stopped
-
-    def _restart(self, name: str) -> tuple[str, ...]:
-        try:
-            node = self._nodes.description(name)
-            command = self._commands.command(node)
-            unload = unloading(node) if self._nodes.has_died(name) else None
-            if unload:
-                self._processes.run(self._commands.command(unload), UNLOAD_TIMEOUT)
-            self._nodes.started(name, self._processes.begin_again(name, command))
-        except (CommandLineError, StartError, OSError) as error:
-            return self._follow(self._nodes.failed_to_restart(name, _one_line(error), time.monotonic()))
-        self._report()
-        return ()
-
-    # -- steps ----------------------------------------------------------------------------------------------------
-
-    def _look_up(self, nodes: Mapping[str, NodeDescription], start: Sequence[str]) -> dict[str, Command]:
-        reason = self._nodes.refusal(nodes, start)
-        if reason:
-            raise LauncherError(f"the configuration {reason}")
-        try:
-            return {name: self._commands.command(nodes[name]) for name in start}
-        except CommandLineError as error:
-            raise LauncherError(str(error)) from error
-
-    def _end(self, names: Collection[str], forget: Collection[str] = (), patience: bool = True) -> None:
-        self._processes.end(names, forget, patience)
-        for name in names:
-            self._nodes.stopped(name)
-
-    def _report(self) -> None:
-        self._changed(self._nodes.reports())
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
+    def advertised(self, name: str) -> set[str]:
+        """Return the topics and services of a node."""
+        return advertised([name])

@@ -13,6 +13,9 @@ HOLD = 3.0
 end, and a Python node then takes 0.3 to 1.5 s to register. With a `respawn_delay` it may come later, so this is doubled
 each time that a name is taken once more within MEMORY."""
 
+ANSWER_TIMEOUT = 30.0
+"""s after its start in which a node must answer under a contested name: twice what the manipulator gives a node."""
+
 MEMORY = 60.0  # s, twice the period in which deaths are counted
 
 
@@ -66,6 +69,11 @@ class ContestedNames:
             self._contests[name] = replace(contest, held_since=now)
         elif now - contest.held_since >= contest.hold:
             self._contests[name] = replace(contest, is_over=True)
+
+    def is_held(self, name: str) -> bool:
+        """Tell whether the launcher's own node answered under a name when it was last looked at, or has it for good."""
+        contest = self._contests.get(name)
+        return contest is None or contest.is_over or contest.held_since is not None
 
     def begin(self, name: str, conflict: str, now: float) -> None:
         """Note who had a name when a node was started under it; empty: nobody had."""

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from rosgraph_launcher.description import NodeDescription
-from rosgraph_launcher.launching.contested import ContestedNames
+from rosgraph_launcher.launching.contested import ANSWER_TIMEOUT, ContestedNames
 from rosgraph_launcher.launching.nodelets import loaders
 from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 from rosgraph_launcher.launching.restarts import DeathCounter, Ending, Meaning, RestartPolicy, Verdict, meaning_of_end
@@ -331,6 +331,14 @@ class ManagedNodes:
     def seen(self, name: str, is_own: bool, now: float) -> None:
         """Note whether the launcher's own process answers under a contested name."""
         self._contested.seen(name, is_own, now)
+
+    def hanging(self, now: float) -> list[str]:
+        """Return the nodes that have run for long and do not answer under their contested names."""
+        return [
+            name
+            for name in self.contested
+            if not self._contested.is_held(name) and now - (self._nodes[name].started or now) > ANSWER_TIMEOUT
+        ]
 
     def recovered(self) -> bool:
         """Make each function STABLE whose nodes all run again under their own names; return whether there is one."""

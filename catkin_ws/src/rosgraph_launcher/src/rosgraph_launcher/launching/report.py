@@ -10,6 +10,8 @@ STABLE: str = LauncherState.STABLE
 CHANGING: str = LauncherState.CHANGING
 RECOVERING: str = LauncherState.RECOVERING
 FAILED: str = LauncherState.FAILED
+STATES = (STABLE, CHANGING, RECOVERING, FAILED)
+"""From the best to the worst."""
 
 ENDING = "the launcher is shutting down"
 """What a launcher answers once it has begun to end. All its nodes end with it, so a successor may be asked the same."""

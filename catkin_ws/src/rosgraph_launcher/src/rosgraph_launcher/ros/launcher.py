@@ -30,14 +30,16 @@ from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.ros.lifetime import LONGEST_END, Lifetime
 from node_kit.ros.parts import watch_parts
 
-from rosgraph_launcher.io.launcher import Launcher, LauncherError
+from rosgraph_launcher.io.launcher import Launcher
 from rosgraph_launcher.io.ownership import launcher_mark
 from rosgraph_launcher.io.processes import StartError, check_host
+from rosgraph_launcher.io.secret import SecretError, check_signature, read_secret
 from rosgraph_launcher.io.this_host import addresses
 from rosgraph_launcher.io.usage import read_sample
 from rosgraph_launcher.launching.options import LauncherOptions
 from rosgraph_launcher.launching.report import ENDING, LauncherReport
 from rosgraph_launcher.launching.restarts import RestartPolicy
+from rosgraph_launcher.launching.supervision import LauncherError
 from rosgraph_launcher.ros.node_messages import from_message, report_message, usage_messages
 
 TOPIC = "rosgraph_launcher/functions"
@@ -126,17 +128,19 @@ class LauncherNode:
 
     def _on_stand_by(self, request: StandByRequest) -> StandByResponse:
         try:
+            check_signature(request, rospy.get_name())
             nodes = [from_message(node) for node in request.nodes]
             self._inbox.call(lambda: self._launcher.expect(nodes))
-        except (ClosedError, ValueError) as error:
+        except (ClosedError, SecretError, ValueError) as error:
             raise rospy.ServiceException(str(error)) from error
         return StandByResponse()
 
     def _change(self, request: ChangeNodesRequest) -> ChangeNodesResponse:
         try:
+            check_signature(request, rospy.get_name())
             nodes = {node.name: from_message(node) for node in request.nodes}
             phases = self._launcher.change(request.function, request.configuration, nodes, request.stop, request.start)
-        except (LauncherError, ValueError) as error:
+        except (LauncherError, SecretError, ValueError) as error:
             return ChangeNodesResponse(ok=False, message=str(error), change=self._launcher.changes)
         return ChangeNodesResponse(
             ok=True, change=self._launcher.changes, phases=[Phase(*phase) for phase in phases.items()]
@@ -148,6 +152,20 @@ class LauncherNode:
         self._functions.publish(message)
 
 
+PARAMETERS = (
+    "addresses",
+    "host",
+    "restart_delay",
+    "restart_intensity",
+    "restart_period",
+    "shutdown_timeout",
+    "sigint_timeout",
+    "standby",
+    "standby_others",
+)
+"""Names of all parameters; `~addresses` is set by the node itself."""
+
+
 def read_options() -> LauncherOptions:
     """Read the node's parameters.
 
@@ -155,6 +173,8 @@ def read_options() -> LauncherOptions:
         ParameterError: one can't be used.
     """
     parameters = ParameterTree(rospy.get_param("~", {}), rospy.get_name())
+    for line in parameters.strangers(PARAMETERS):
+        rospy.logwarn("%s", line)
     default, policy = LauncherOptions(mark=""), RestartPolicy()
     return LauncherOptions(
         mark=launcher_mark(rospy.get_name()),
@@ -173,8 +193,9 @@ def read_options() -> LauncherOptions:
 
 def main() -> None:
     """Run the node; exit status 2 when it can't start."""
-    with Lifetime("rosgraph_launcher", ParameterError, StartError) as life:
+    with Lifetime("rosgraph_launcher", ParameterError, SecretError, StartError) as life:
         check_host()
+        read_secret()
         life.start()
         options = read_options()
         rospy.set_param("~addresses", addresses(str(rospy.get_param("~host", ""))))

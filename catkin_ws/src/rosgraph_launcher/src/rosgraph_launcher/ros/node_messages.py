@@ -10,7 +10,7 @@ from metacontrol_msgs.msg import LaunchedFunction, ProcessUsage
 from metacontrol_msgs.msg import NodeDescription as Message
 
 from rosgraph_launcher.description import NodeDescription
-from rosgraph_launcher.launching.report import LauncherReport
+from rosgraph_launcher.launching.report import STATES, LauncherReport
 from rosgraph_launcher.usage import Sample, Use
 
 _OPTIONAL = ("cwd", "launch_prefix")  # None in the description is empty in the message
@@ -56,7 +56,13 @@ def report_message(report: LauncherReport) -> LaunchedFunction:
 
 
 def report_from(message: LaunchedFunction) -> LauncherReport:
-    """Return the report that a message holds."""
+    """Return the report that a message holds.
+
+    Raises:
+        ValueError: the function has a state that is none.
+    """
+    if message.state not in STATES:
+        raise ValueError(f"function {message.function!r} has the state {message.state!r}, which is none")
     content = {field.name: getattr(message, field.name) for field in fields(LauncherReport)}
     return LauncherReport(**{**content, "nodes": tuple(message.nodes), "dead": tuple(message.dead)})
 

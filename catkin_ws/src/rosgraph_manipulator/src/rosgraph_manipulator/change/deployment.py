@@ -110,6 +110,7 @@ def deploy(
     last_good: Configuration | None,
     watch: Stopwatch,
     remark: str = "",
+    runs: bool = True,
 ) -> Outcome:
     """Carry out plans until one succeeds; where none does, restore the last good configuration.
 
@@ -122,18 +123,19 @@ def deploy(
         last_good: the configuration to restore; None: there is none.
         watch: measures the phases.
         remark: what the plans do besides, in words.
+        runs: whether a complete configuration runs now.
     """
     reasons: list[str] = []
-    touched = False
+    whole = runs
     for plan in plans:
         try:
             executor.begin(wanted, plan)
-            touched = True
+            whole = False
             _carry_out(executor, plan, watch)
         except CancelledError as error:
             reason = f"{wanted.name}: {error}"
-            if not touched or error.superseded:
-                return Outcome(Result.FAILED, None if touched else last_good, reason, cancelled=True)
+            if whole or error.superseded:
+                return Outcome(Result.FAILED, last_good if whole else None, reason, cancelled=True)
             return _go_back(executor, wanted.function, last_good, reason, watch, cancelled=True)
         except DeploymentError as error:
             reasons.append(f"{plan.tactic}: {error}")

@@ -93,6 +93,19 @@ class ChangeProgress:
             if node not in report.dead
         )
 
+    def given_up(self, function: str, wanted: Collection[str]) -> tuple[str, ...]:
+        """Return the nodes that a function has no more and that no plan stops: others share them, or they are dead.
+
+        The launcher must know: else they would run on for it when the others need them no longer, or start again.
+
+        Args:
+            function: its name.
+            wanted: the nodes that it is to have.
+        """
+        report = self.report(function) or LauncherReport(function)
+        kept = {*self.shared(function), *report.dead}
+        return tuple(node for node in report.nodes if node in kept and node not in wanted)
+
     def take(self, reports: Iterable[LauncherReport]) -> bool:
         """Take in the reports of all functions; return whether the robot must be stopped now.
 

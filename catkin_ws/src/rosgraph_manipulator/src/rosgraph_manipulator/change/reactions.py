@@ -40,6 +40,7 @@ class DeployedConfigurations:
         self._previous: Configuration | None = None  # what the running one has replaced
         self._waiting: Configuration | None = None
         self._recovering = False
+        self._torn = False
         self._deployed_at = float("-inf")
         self._failure = ""
 
@@ -68,6 +69,11 @@ class DeployedConfigurations:
         """The configuration that the running one has replaced; None: there was none."""
         return self._previous
 
+    @property
+    def is_torn(self) -> bool:
+        """Whether the last change was given up half-way for another request, and nothing was restored."""
+        return self._torn
+
     def resume(self, running: Configuration | None, last_good: Configuration | None, failure: str = "") -> None:
         """Begin with what an earlier manipulator has left."""
         self._running, self._last_good, self._failure = running, running or last_good, failure
@@ -85,6 +91,7 @@ class DeployedConfigurations:
     def finished(self, outcome: Outcome, now: float) -> None:
         """Note how a change ended."""
         self._running, self._waiting, self._recovering = outcome.running, None, False
+        self._torn = outcome.running is None and outcome.result is not Result.GENERAL_ERROR
         self._failure = outcome.message if outcome.result is Result.GENERAL_ERROR else ""
         if outcome.running:
             replaces = outcome.result is Result.OK and self._last_good != outcome.running
@@ -133,7 +140,7 @@ class DeployedConfigurations:
     def released(self) -> None:
         """Note that the function is needed no longer: nothing is restored."""
         self._running = self._last_good = self._previous = self._waiting = None
-        self._recovering = False
+        self._recovering = self._torn = False
 
     def begin_recovery(self) -> None:
         """Note that the launcher starts dead nodes again."""

@@ -6,6 +6,7 @@ import sys
 
 import click
 from metacontrol_msgs.msg import ActiveConfiguration
+from node_kit.one_line import printable
 from node_kit.plugins import PluginError
 from ros_model.errors import ModelError
 
@@ -25,7 +26,7 @@ def run(command: click.Command) -> None:
     try:
         command.main(arguments, prog_name=command.name)
     except ERRORS as error:
-        click.echo(" ".join(str(error).split()), err=True)
+        click.echo(printable(" ".join(str(error).split())), err=True)
         sys.exit(2)
 
 
@@ -34,6 +35,6 @@ def print_last_change(active: ActiveConfiguration | None) -> None:
     if active is None:
         return
     if active.message:
-        click.echo(f"  {active.message}")
+        click.echo(printable(f"  {active.message}"))
     for phase in active.phases:
-        click.echo(f"  {phase.name:<9} {phase.duration:.3f} s")
+        click.echo(printable(f"  {phase.name:<9} {phase.duration:.3f} s"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 import click
+from node_kit.one_line import printable
 
 from rosgraph_manipulator.cli.invocation import HELP, run
 from rosgraph_manipulator.ros import client
@@ -19,7 +20,7 @@ def release(function: str) -> None:
     """
     client.join_or_refuse("release")
     answer = client.release(function)
-    click.echo(answer.text)
+    click.echo(printable(answer.text))
     if not answer.done:
         sys.exit(2)
 

@@ -6,6 +6,7 @@ import sys
 
 import click
 from metacontrol_msgs.msg import ReconfigurationResult
+from node_kit.one_line import printable
 
 from rosgraph_manipulator.cli.invocation import HELP, print_last_change, run
 from rosgraph_manipulator.ros import client
@@ -21,7 +22,7 @@ def request(name: str, restart: tuple[str, ...]) -> None:
     """
     client.join_or_refuse("request")
     answer = client.request(name, restart)
-    click.echo(answer.text)
+    click.echo(printable(answer.text))
     if not answer.done:
         sys.exit(1 if answer.result == ReconfigurationResult.FAILED else 2)
     print_last_change(client.active_configuration())

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import click
 from metacontrol_msgs.msg import ActiveConfiguration, LaunchedFunction
+from node_kit.one_line import printable
 
 from rosgraph_manipulator.cli.invocation import HELP, print_last_change, run
 from rosgraph_manipulator.ros import client
@@ -21,14 +22,14 @@ def status() -> None:
         raise client.ClientError("neither manipulator nor launcher answers: start manipulator.launch")
     if active is not None:
         for line in function_lines(active, client.failures()):
-            click.echo(line)
+            click.echo(printable(line))
         print_last_change(active)
     for name, launcher in launchers.items():
         of = "" if len(launchers) == 1 else f" of {name}"
         lines = process_lines(launcher.functions)
-        click.echo("\n".join([f"processes{of}:{'' if lines else ' none'}", *lines]))
+        click.echo(printable("\n".join([f"processes{of}:{'' if lines else ' none'}", *lines])))
     for line in failure_lines(monitor.failed()):
-        click.echo(line)
+        click.echo(printable(line))
 
 
 def function_lines(active: ActiveConfiguration, failures: Mapping[str, str]) -> list[str]:

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from node_kit.one_line import OneLineError
+
 DEFAULT_FUNCTION = "f_navigate"  # the published configuration files name no function: they are for navigation
 ARGUMENT = re.compile(r"[A-Za-z_]\w*:=.*", re.DOTALL)
 KEYS = (
@@ -36,7 +38,7 @@ FindLaunchFile = Callable[[str, bool], str]
 package. Raises ConfigurationError."""
 
 
-class ConfigurationError(Exception):
+class ConfigurationError(OneLineError):
     """The configuration cannot be used; the message names the key and the remedy."""
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
-
-_WORST_LAST = (STABLE, CHANGING, RECOVERING, FAILED)
+from rosgraph_launcher.launching.report import CHANGING, FAILED, STABLE, STATES, LauncherReport
 
 
 def merged(
@@ -32,7 +30,7 @@ def merged(
     lost = {name: line for name, line in (lost or {}).items() if name in parts}
     own = {name: reports.get(name, LauncherReport(function)) for name in sorted(parts)}
     told = [LauncherReport(function, state=FAILED, message=line) for line in lost.values()] + list(own.values())
-    state = max((report.state for report in told), key=_WORST_LAST.index, default=STABLE)
+    state = max((report.state for report in told), key=STATES.index, default=STABLE)
     names = {report.configuration for report in own.values()}
     dead = {node: None for name, report in own.items() for node in (report.nodes if name in lost else report.dead)}
     messages = [report.message for report in told if report.state == state and report.message]

@@ -18,14 +18,18 @@ import roslaunch.loader
 import roslaunch.substitution_args
 import roslaunch.xmlloader
 from node_kit.io.input_files import InputFileError, read_bytes
+from node_kit.one_line import OneLineError
 from ros_model.errors import ModelError
 from ros_model.generators.launch import launch_file
 from ros_model.io.models import read_system
 from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_launcher.io.command_lines import EXPLAINED, reason
 
+from rosgraph_manipulator.change.deployment import DeploymentError
+from rosgraph_manipulator.configuration.configurations import Configuration
 
-class LaunchFileError(Exception):
+
+class LaunchFileError(OneLineError):
     """A launch file cannot be used; the message names it and says why, in one line."""
 
 
@@ -56,6 +60,20 @@ def read_launch_file(path: str | Path, args: Sequence[str] = ()) -> LaunchFile:
         config = roslaunch.config.ROSLaunchConfig()
         _Loader().load(str(path), config, argv=list(args), verbose=False)
         return _checked(path, config)
+
+
+def read_configuration(configuration: Configuration) -> LaunchFile:
+    """Read the launch file of a configuration.
+
+    Raises:
+        DeploymentError: it can't be read.
+    """
+    if configuration.problem:
+        raise DeploymentError(configuration.problem)
+    try:
+        return read_launch_file(configuration.launch_file, configuration.args)
+    except LaunchFileError as error:
+        raise DeploymentError(str(error)) from error
 
 
 def read_model(path: Path) -> LaunchFile:

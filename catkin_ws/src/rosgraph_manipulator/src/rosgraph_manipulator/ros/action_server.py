@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import actionlib
-from node_kit.ros.action_server import EndsQuietly
+from node_kit.ros.action_server import Sturdy
 
 
-class ActionServer(EndsQuietly, actionlib.ActionServer):
-    """actionlib's, without a traceback when the node ends."""
+class ActionServer(Sturdy, actionlib.ActionServer):
+    """actionlib's, which outlives a clock that is set back, and ends without a traceback."""

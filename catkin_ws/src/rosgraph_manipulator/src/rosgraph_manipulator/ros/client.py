@@ -86,7 +86,7 @@ def join_or_refuse(name: str) -> None:
         ClientError: there is no master, or it does not answer.
     """
     if not join(name):
-        raise ClientError(f"no ROS master at {rosgraph.get_master_uri()}: start roscore or set ROS_MASTER_URI")
+        raise ClientError(f"no ROS master answers at {rosgraph.get_master_uri()}: start roscore or set ROS_MASTER_URI")
 
 
 def manipulator_parameters() -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """Keeps the pending goal of an action while its server is replaced; the decisions are in `goal_keeper`.
 
 As long as the goal is pending, it is stored in the parameter `ACTION/resume_goal`. A server that knows the parameter
-continues the goal before it publishes its first status. A manipulator that is started again finds the goal there, too.
+continues the goal before it publishes its first status, and deletes the parameter. `~kept_goals` has the same goal for
+a manipulator that is started again: the former one may have died just after a server took the goal.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class PendingGoal:
             ConfigurationError: the type is not installed.
         """
         self._action = action
-        self._parameter = f"{action}/resume_goal"
+        self._parameters = (f"{action}/resume_goal", f"~kept_goals/{action.strip('/').replace('/', '__')}")
         self._goal_type = action_type + "Goal"
         self._keeper = GoalKeeper()
         self._clients = GoalClients(action)
@@ -160,25 +161,26 @@ class PendingGoal:
         return locked
 
     def _store(self, again: bool = False) -> None:
-        """Update the parameter."""
+        """Update the parameters."""
         goal_id = self._keeper.pending_id
         if goal_id == self._stored and not (again and goal_id is not None):
             return
         with contextlib.suppress(rospy.ROSException, OSError):  # without a master there is nothing to keep it for
             if goal_id is None:
-                with contextlib.suppress(KeyError):
-                    rospy.delete_param(self._parameter)
+                self._delete()
             else:
                 buffer = io.BytesIO()
                 self._keeper.pending.serialize(buffer)
                 data = base64.b64encode(buffer.getvalue()).decode("ascii")
                 client = self._keeper.client
                 waits = {"client": [client.node, client.address]} if client else {}
-                rospy.set_param(self._parameter, {"type": self._goal_type, "data": data, **waits})
+                for parameter in self._parameters:
+                    rospy.set_param(parameter, {"type": self._goal_type, "data": data, **waits})
             self._stored = goal_id
 
     def _recall(self, goal_class: Any, adopt: bool) -> None:
-        left = rospy.get_param(self._parameter, None)
+        found = (rospy.get_param(parameter, None) for parameter in self._parameters)
+        left = next((value for value in found if value is not None), None)
         if left is None:
             return
         try:
@@ -190,11 +192,16 @@ class PendingGoal:
                 rospy.logwarn("%s: goal %s is not kept: %s", self._action, goal.goal_id.id, why_gone)
                 raise ValueError(why_gone)
         except (KeyError, TypeError, ValueError, binascii.Error, genpy.DeserializationError):
-            rospy.delete_param(self._parameter)
+            self._delete()
             return
         self._keeper.adopt(goal, client)
         self._stored = goal.goal_id.id
         rospy.loginfo("took over the pending goal %s of %s", goal.goal_id.id, self._action)
+
+    def _delete(self) -> None:
+        for parameter in self._parameters:
+            with contextlib.suppress(KeyError):
+                rospy.delete_param(parameter)
 
 
 def _message_class(name: str) -> Any:

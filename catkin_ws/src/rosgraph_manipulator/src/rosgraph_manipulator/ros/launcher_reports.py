@@ -29,6 +29,7 @@ from rosgraph_manipulator.io.master import get_parameters, publishers
 TOPIC = "rosgraph_launcher/functions"
 REPEAT_PERIOD = 0.01  # s, wall
 WATCH_PERIOD = 0.5  # s, wall, between two questions whether a host is there
+WARN_PERIOD = 10.0  # s, wall, between two equal warnings
 ASKING = "ask a launcher"  # name of the threads that do
 
 
@@ -154,6 +155,11 @@ class LauncherReports:
 
     def _take(self, message: LaunchedFunctions) -> None:
         name = message._connection_header["callerid"]
+        try:
+            reports = {function.function: report_from(function) for function in message.functions}
+        except ValueError as error:
+            rospy.logwarn_throttle(WARN_PERIOD, f"a report of {name} is left out: {error}: is its version another one?")
+            return
         with self._lock:
             unknown = name not in self._known
         place = _place_of(name) if unknown else None
@@ -161,7 +167,7 @@ class LauncherReports:
             if place:
                 self._known[name] = _Known(place, _is_here(place))
             known = self._known[name]
-            known.reports = {function.function: report_from(function) for function in message.functions}
+            known.reports = reports
             self._heard(known)
         self.on_reports()
 

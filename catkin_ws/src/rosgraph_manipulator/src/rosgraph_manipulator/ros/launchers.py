@@ -12,10 +12,18 @@ from typing import Any
 
 import rosgraph
 import rospy
-from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, ChangeNodesResponse, CheckNodes, StandBy
+from metacontrol_msgs.srv import (
+    ChangeNodes,
+    ChangeNodesRequest,
+    ChangeNodesResponse,
+    CheckNodes,
+    StandBy,
+    StandByRequest,
+)
 from node_kit.io.background import in_background
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.hosts import no_launcher
+from rosgraph_launcher.io.secret import SecretError, sign
 from rosgraph_launcher.launching.report import ENDING, FAILED
 from rosgraph_launcher.ros.node_messages import to_message
 from rospy.exceptions import TransportException, TransportInitError
@@ -118,9 +126,11 @@ class Launchers(LauncherReports):
 
     def _tell_expected(self, name: str, nodes: Sequence[NodeDescription]) -> None:
         service = rospy.ServiceProxy(f"{name}/stand_by", StandBy)
-        with contextlib.suppress(*_FAILURES):
+        with contextlib.suppress(*_FAILURES, SecretError):
             service.wait_for_service(self._timeout)
-            service([to_message(node) for node in nodes])
+            request = StandByRequest([to_message(node) for node in nodes], "")
+            sign(request, name)
+            service(request)
 
     def clear(self, function: str) -> list[str]:
         """Stop what runs for a function where it should not; return the hosts on which something did."""
@@ -181,6 +191,10 @@ class Launchers(LauncherReports):
                 stop=list(part.stop),
                 start=list(part.start),
             )
+            try:
+                sign(request, part.launcher)
+            except SecretError as error:
+                raise DeploymentError(str(error)) from error
             asked[part.launcher] = in_background(partial(self._ask, part.launcher, request, found), ASKING)
         answers, failures = {}, []
         for name, future in asked.items():

@@ -23,6 +23,7 @@ from rosservice import ROSServiceException, get_service_type
 from std_srvs.srv import Empty, Trigger
 
 from rosgraph_manipulator.change.deployment import DeploymentError
+from rosgraph_manipulator.change.execution import LOOK_PERIOD, DriverStart, Execution
 from rosgraph_manipulator.change.repairs import (
     TRIGGER,
     RepairedDrivers,
@@ -34,7 +35,6 @@ from rosgraph_manipulator.change.repairs import (
 )
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions, Repair
 from rosgraph_manipulator.ros.action_server import ActionServer
-from rosgraph_manipulator.ros.executor import LOOK_PERIOD, DriverStart, RosExecutor
 
 ACTION = "rosgraph_manipulator/repair"
 
@@ -55,7 +55,7 @@ class _Run:
 class RepairServer:
     """Offers the action, and keeps repaired drivers running."""
 
-    def __init__(self, options: ManipulatorOptions, inbox: Inbox, executor: RosExecutor, timeout: float) -> None:
+    def __init__(self, options: ManipulatorOptions, inbox: Inbox, executor: Execution, timeout: float) -> None:
         """Begin without offering anything; `start` offers the action.
 
         Args:

@@ -8,8 +8,8 @@ from rosgraph_launcher.description import NodeDescription
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.configuration.configurations import ManipulatorOptions
+from rosgraph_manipulator.io.launch_files import read_configuration
 from rosgraph_manipulator.ros.launchers import Launchers
-from rosgraph_manipulator.ros.running_system import read_configuration
 
 
 class Standby:

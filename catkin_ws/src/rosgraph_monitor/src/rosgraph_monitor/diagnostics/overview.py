@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from metacontrol_msgs.msg import DiagnosticWords as Words
 from metacontrol_msgs.msg import FunctionGrounding
+from node_kit.one_line import one_line
 from node_kit.parts import Parts
 from rich.console import Group
 from rich.table import Table
@@ -27,19 +28,29 @@ _THRESHOLD = "nfr_"
 
 
 @dataclass
-class _Row:
+class Row:
+    """What is known of something.
+
+    Attributes:
+        at: when it was told last, wall s.
+        level: of the status.
+        text: in words.
+        values: of the status, by their keys.
+    """
+
     at: float
     level: int
     text: str
+    values: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass
 class Overview:
     """The present state, by name."""
 
-    components: dict[str, _Row] = field(default_factory=dict)
-    qualities: dict[str, _Row] = field(default_factory=dict)
-    findings: dict[tuple[str, str, str], _Row] = field(default_factory=dict)
+    components: dict[str, Row] = field(default_factory=dict)
+    qualities: dict[str, Row] = field(default_factory=dict)
+    findings: dict[tuple[str, str, str], Row] = field(default_factory=dict)
     usage: dict[tuple[str, str], str] = field(default_factory=dict)
     functions: dict[str, tuple[str, str]] = field(default_factory=dict)
     """The configuration of each, and its state."""
@@ -57,15 +68,20 @@ class Overview:
             first = status.values[0] if status.values else None
             if status.message == Words.COMPONENT_STATUS and first:
                 why = next((value.value for value in status.values[1:] if value.key == Words.REASON), "")
-                self.components[first.key] = _Row(now, level, f"{first.value}: {why}" if why else first.value)
+                self.components[first.key] = Row(now, level, f"{first.value}: {why}" if why else first.value)
             elif status.message in (Words.QA_STATUS, Words.QA_STALE) and first:
-                self.qualities[first.key] = _Row(now, level, first.value)
+                self.qualities[first.key] = Row(now, level, first.value)
             elif status.message in (Words.CPU_USAGE, Words.MEMORY_USAGE) and first:
                 self.usage[status.name, status.message] = first.value
             elif level != s.Level.OK:
-                values = ", ".join(f"{value.key}: {value.value}" for value in status.values)
+                values = {value.key: value.value for value in status.values}
+                text = ", ".join(f"{value.key}: {value.value}" for value in status.values)
                 key = (status.name, status.message, first.value if first else "")
-                self.findings[key] = _Row(now, level, values)
+                self.findings[key] = Row(now, level, text, values)
+
+    def forget(self, now: float) -> None:
+        """Forget the findings that are not repeated any more at wall time `now` in s."""
+        self.findings = {key: row for key, row in self.findings.items() if now - row.at <= _FORGET}
 
     def render(self, nodes: Iterable[str], parameters: Mapping[str, Any], now: float) -> Group:
         """Return the tables.
@@ -75,7 +91,7 @@ class Overview:
             parameters: the master's tree of parameters, in which `nfr_QUALITY` are thresholds.
             now: wall time in s.
         """
-        self.findings = {key: row for key, row in self.findings.items() if now - row.at <= _FORGET}
+        self.forget(now)
         tables = (self._nodes(nodes, now), self._qualities(thresholds(parameters), now), self._findings())
         return Group(self._meta_controller(now), *([self._functions()] if self.functions else []), *tables)
 
@@ -84,9 +100,11 @@ class Overview:
         for node, standing in self.parts.known.items():
             silent = now - standing.heard
             level, text = (s.Level.OK, "runs") if silent < _SILENT else (s.Level.ERROR, f"silent for {silent:.0f} s")
-            table.add_row(Text(standing.sign.part), Text(node), Text(text, _STYLE[level]))
+            table.add_row(_shown(standing.sign.part), _shown(node), _shown(text, _STYLE[level]))
         if not self._is_watched(now):
-            table.add_row(Text("monitor"), "", Text("not heard: nobody watches what is below", _STYLE[s.Level.ERROR]))
+            table.add_row(
+                _shown("monitor"), "", _shown("not heard: nobody watches what is below", _STYLE[s.Level.ERROR])
+            )
         return table
 
     def _is_watched(self, now: float) -> bool:
@@ -96,7 +114,7 @@ class Overview:
         table = Table("function", "configuration", "state", title="Functions", title_justify="left")
         for name, (configuration, state) in sorted(self.functions.items()):
             style = _STYLE[s.Level.OK if state == FunctionGrounding.STABLE else s.Level.WARN]
-            table.add_row(Text(name), Text(configuration), Text(state, style))
+            table.add_row(_shown(name), _shown(configuration), _shown(state, style))
         return table
 
     def _nodes(self, nodes: Iterable[str], now: float) -> Table:
@@ -110,8 +128,8 @@ class Overview:
             if name in gone:
                 level, text = s.Level.ERROR, self._reason(name)
             table.add_row(
-                Text(name),
-                Text(text, _STYLE.get(s.Level(level), "")),
+                _shown(name),
+                _shown(text, _STYLE.get(s.Level(level), "")),
                 self.usage.get((name, Words.CPU_USAGE), ""),
                 self.usage.get((name, Words.MEMORY_USAGE), ""),
             )
@@ -124,13 +142,15 @@ class Overview:
         table = Table("quality", "level", "required", "age s", title="Quality attributes", title_justify="left")
         for name, row in sorted(self.qualities.items()):
             limit = f"{limits[name]:g}" if name in limits else ""
-            table.add_row(Text(name), Text(row.text, _STYLE.get(s.Level(row.level), "")), limit, f"{now - row.at:.1f}")
+            table.add_row(
+                _shown(name), _shown(row.text, _STYLE.get(s.Level(row.level), "")), limit, f"{now - row.at:.1f}"
+            )
         return table
 
     def _findings(self) -> Table:
         table = Table("what", "finding", "values", title="Findings", title_justify="left")
         for (name, message, _), row in sorted(self.findings.items()):
-            table.add_row(Text(name), Text(message, _STYLE.get(s.Level(row.level), "")), Text(row.text))
+            table.add_row(_shown(name), _shown(message, _STYLE.get(s.Level(row.level), "")), _shown(row.text))
         return table
 
 
@@ -161,3 +181,8 @@ def _level(status: Any) -> int:
     level = status.level
     number = level[0] if isinstance(level, bytes) and level else int(level or 0)
     return number if number in set(s.Level) else int(s.Level.ERROR)
+
+
+def _shown(text: str, style: str = "") -> Text:
+    """Return a cell with what others have said."""
+    return Text(one_line(text), style)

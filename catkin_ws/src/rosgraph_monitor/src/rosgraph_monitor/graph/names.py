@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 IGNORED_NODES = (
     *("rosout", "rosgraph_*", "reasoner", "mission", "mission_*", "rviz*", "rosbag*", "record", "rostopic*"),
     *("action_relay", "rosservice*", "rqt*", "diagnostic_aggregator", "diagnostic_names", "roslaunch*", "rostest*"),
+    "metacontrol_dashboard",
 )
 """Nodes that never count as additional: the meta-controller's own, missions and tools."""
 COMMON_TOPICS = ABSOLUTE_TOPICS

@@ -96,6 +96,57 @@ def compare_ports(
         yield from _connection(snapshot, connection, live, wanted, namespace)
 
 
+@dataclass(frozen=True)
+class Link:
+    """A connection of the model as it should be in the graph.
+
+    Attributes:
+        kind: what it carries.
+        name: resolved name of the topic, service or action: the one that the graph has, else that of the connection.
+        sources: resolved names of the nodes that publish or serve.
+        targets: resolved names of the nodes that subscribe or ask.
+    """
+
+    kind: ConnectionKind
+    name: str
+    sources: tuple[str, ...]
+    targets: tuple[str, ...]
+
+
+def desired_links(snapshot: GraphSnapshot, system: RosSystem, namespace: str = "/") -> list[Link]:
+    """Return the connections of a model, with the names that their ends have in the graph or would have."""
+    called: dict[tuple[str, str], set[str]] = {}
+    for connection in system.connections:
+        for end in (*connection.sources, *connection.targets):
+            called.setdefault((end.component, end.port), set()).add(connection.name)
+    nodes = {component.name: resolved(component.graph_name, namespace) for component in system.components}
+    wanted = {c.name: _wanted(called, c, nodes[c.name]) for c in system.components}
+    present = snapshot.topics.keys() | snapshot.services.keys() | snapshot.actions.keys()
+    links = []
+    for connection in system.connections:
+        sources = [end for end in connection.sources if end.component in nodes]
+        targets = [end for end in connection.targets if end.component in nodes]
+        names: set[str] = set()
+        for end in (*sources, *targets):
+            names |= {n for (_, port), (_, found) in wanted[end.component].items() if port == end.port for n in found}
+        ends = [tuple(dict.fromkeys(nodes[end.component] for end in side)) for side in (sources, targets)]
+        known = sorted(names & present)  # a port may have several names: that which most of the ends have
+        name = max(
+            known, key=lambda name: _fitting(snapshot, name, *ends), default=resolved(connection.name, namespace)
+        )
+        links.append(Link(connection.kind, name, *ends))
+    return links
+
+
+def _fitting(snapshot: GraphSnapshot, name: str, sources: Collection[str], targets: Collection[str]) -> int:
+    """Return how many of the nodes are ends of the topic or action of a name."""
+    if name in snapshot.actions:
+        action = snapshot.actions[name]
+        return len(set(sources) & set(action.servers)) + len(set(targets) & set(action.clients))
+    topic = snapshot.topics.get(name)
+    return len(set(sources) & set(topic.publishers)) + len(set(targets) & set(topic.subscribers)) if topic else 0
+
+
 _Wanted = dict[tuple[PortKind, str], tuple["Port", frozenset[str]]]
 """Of one component: by kind and name of the port, the port and the resolved names that it may have in the graph."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
     from rosgraph_monitor.health.liveness import Life
     from rosgraph_monitor.io.node_connections import NodeConnections
+
+_log = logging.getLogger(__name__)
 
 _SHORTEST = 0.1
 """Wall s between polls at least: many nodes may come or go at once."""
@@ -88,7 +91,10 @@ class GraphPoller:
         while not self._closing:
             self._requested.clear()
             begin = time.monotonic()
-            self._poll(begin)
+            try:
+                self._poll(begin)
+            except Exception:  # it costs this poll, and not those to come
+                _log.exception("the graph could not be looked at")
             if begin >= due:
                 due = max(due + self._period, begin)
             if not self._requested.wait(max(due - time.monotonic(), 0.0)):

@@ -11,6 +11,7 @@ import socket
 import threading
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
@@ -122,18 +123,28 @@ class NodeConnections:
                 sweep_at = now + _SWEEP
                 for target in list(self._targets.values()):
                     if now >= target.due_at:
-                        self._step(target)
+                        self._guarded(target, self._step)
             for key, events in self._selector.select(max(sweep_at - time.monotonic(), 0.0)):
                 if key.data is None:
                     self._drain()
                     sweep_at = 0.0
                 else:
-                    self._handle(key.data, events)
+                    self._guarded(key.data, partial(self._handle, events=events))
         for target in self._targets.values():
             self._drop(target)
         self._selector.close()
         self._waker.close()
         self._wakened.close()
+
+    def _guarded(self, target: _Target, do: Callable[[_Target], None]) -> None:
+        """Do something about a node; an error that nobody foresaw costs its connection, and no other node's."""
+        try:
+            do(target)
+        except Exception:
+            _log.exception("%s is asked anew", target.key[0])
+            self._drop(target)
+            target.state = liveness.on_no_socket(target.state, time.monotonic(), self._timing)
+            target.due_at = liveness.due_at(target.state, self._timing)
 
     def _retarget(self, wanted: frozenset[Key]) -> None:
         if wanted == self._targets.keys():

@@ -223,6 +223,17 @@ def cloud_points(cloud: PointCloud2) -> tuple[NDArray[np.float64], NDArray[np.fl
         if field.name in ("x", "y", "z") and field.datatype in _DATA_TYPES:
             formats[field.name] = (("<", ">")[bool(cloud.is_bigendian)] + _DATA_TYPES[field.datatype], field.offset)
     count = cloud.width * cloud.height
+    if count * cloud.point_step > len(cloud.data):
+        raise StaleInputError(
+            f"point cloud is malformed: {count} points are announced, {len(cloud.data)} bytes are there"
+        )
+    # numpy would reckon with offsets of more than 31 bits wrongly, and read outside of the data.
+    if any(offset + np.dtype(kind).itemsize > cloud.point_step for kind, offset in formats.values()):
+        raise StaleInputError(
+            f"point cloud is malformed: a coordinate is outside of a point of {cloud.point_step} bytes"
+        )
+    if not count:
+        return np.empty(0), np.empty(0), np.empty(0)
     try:
         dtype = np.dtype(
             {

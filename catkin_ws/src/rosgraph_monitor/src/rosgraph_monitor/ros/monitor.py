@@ -18,16 +18,14 @@ from node_kit.parameters import ParameterError
 from node_kit.ros.lifetime import Lifetime
 from node_kit.ros.parts import watch_parts
 from ros_model.errors import ModelError
-from ros_model.file_names import safe_file_name
-from ros_model.io.files import resolve
 from ros_model.io.master import MasterClient
-from ros_model.io.models import read_system
 
 from rosgraph_monitor.evaluation import GraphEvaluator
-from rosgraph_monitor.graph.desired import DesiredModel, Grounding
+from rosgraph_monitor.graph.desired import Grounding
 from rosgraph_monitor.health.liveness import Life
 from rosgraph_monitor.health.topics import merged, model_topics
 from rosgraph_monitor.io.graph_poller import GraphPoller, PolledGraph
+from rosgraph_monitor.io.models import desired_model
 from rosgraph_monitor.io.node_connections import NodeConnections
 from rosgraph_monitor.ros import parameters as parameters_node
 from rosgraph_monitor.ros.diagnostics import DiagnosticsTopic
@@ -37,10 +35,9 @@ from rosgraph_monitor.ros.topics import BatteryListener, TopicListener
 from rosgraph_monitor.ros.usage import UsageWatch
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
 
     from ros_model.graph.snapshot import GraphSnapshot
-    from ros_model.language.metamodel import RosSystem
 
     from rosgraph_monitor.diagnostics.status import Status
 
@@ -87,7 +84,6 @@ class MonitorNode:
         self._connections.start()
         self._poller.start()
         self._namespace = rospy.get_namespace()
-        self._variants = parameters_node.text("variants")
         components = parameters_node.components()
         self._topic_specs = merged(components.topics, parameters_node.topics())
         patience = parameters_node.patience()
@@ -95,9 +91,7 @@ class MonitorNode:
             components.of_node, scope=parameters_node.scope(self._topic_specs), patience=patience
         )
         base = parameters_node.text("desired_rossystem")
-        self._model = DesiredModel(
-            read_system(resolve(base)) if base else None, self._read_variant, self._read_variants
-        )
+        self._model = desired_model(base, parameters_node.text("variants"), rospy.logwarn)
         self._observers_due = 0.0
         self._running_observers = 0
         self._evaluation = 0.0
@@ -235,19 +229,6 @@ class MonitorNode:
         system = self._model.current.system
         self._topics.follow(merged(model_topics(system) if system else {}, self._topic_specs))
 
-    def _read_variants(self) -> Iterator[RosSystem]:
-        """Read all variants; one that can't be read is a problem only when it is deployed."""
-        for path in sorted(resolve(self._variants).glob("*.rossystem")) if self._variants else ():
-            try:
-                yield read_system(path)
-            except ModelError as error:
-                rospy.logwarn("left out, so nodes that only this variant has count as the base's: %s", error)
-
-    def _read_variant(self, name: str) -> RosSystem:
-        if not self._variants:
-            raise ModelError(f"configuration {name!r}: set ~variants to the folder of the variants' models")
-        return read_system(resolve(self._variants) / f"{safe_file_name(name, 'configuration')}.rossystem")
-
 
 def main() -> None:
     """Run the command with the arguments that are not roslaunch's."""
@@ -268,6 +249,8 @@ def command(load: tuple[str, ...], more: tuple[str, ...]) -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))  # a connection to each node
     with Lifetime(NAME, ParameterError, ModelError) as life:
         life.start()
+        for line in parameters_node.strangers():
+            rospy.logwarn("%s", line)
         life.watch.patience = parameters_node.number("master_patience", PATIENCE)
         node = MonitorNode((*load, *more))
         watch_parts("monitor")

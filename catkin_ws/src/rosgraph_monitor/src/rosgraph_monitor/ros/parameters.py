@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import rospy
@@ -18,9 +20,39 @@ from rosgraph_monitor.health.liveness import Timing
 from rosgraph_monitor.health.topics import TopicSpec, parse_topics
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from ros_model.language.packages import PackageSet
+
+PARAMETERS = (
+    "components",
+    "desired_rossystem",
+    "ignore",
+    "ignore_ports",
+    "master_patience",
+    "metacontrol_nodes",
+    "observers",
+    "port_patience",
+    "probe_deadline",
+    "probe_period",
+    "rate",
+    "recovery_time",
+    "restart_patience",
+    "ros_models",
+    "startup_grace",
+    "topics",
+    "variants",
+)
+"""Names of all parameters, but for those of observers: each observer has a group of its own, of its name."""
+
+
+def strangers() -> list[str]:
+    """Return what to say of each parameter that nobody reads; a group may be one of an observer that comes later."""
+    own = _own()
+    groups = [
+        name
+        for name, value in own.values.items()
+        if isinstance(value, Mapping) and not difflib.get_close_matches(name, PARAMETERS)
+    ]
+    return own.strangers((*PARAMETERS, *groups))
 
 
 def number(name: str, default: float) -> float:

@@ -16,6 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from metacontrol_bags import ownership
 from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.io.xml_rpc import CallError
+from node_kit.ros.command import leaving_by_signals
 from node_kit.ros.connections import connect_to_all
 from node_kit.ros.lifetime import BAD_START, LONGEST_END, Lifetime
 from node_kit.ros.parts import TOPIC as SIGNS
@@ -54,7 +55,8 @@ def command(once: float | None) -> None:
         sys.exit(BAD_START)
     rospy.on_shutdown(lambda: life.cut_off(LONGEST_END))
     connect_to_all()
-    rospy.init_node("rosgraph_watch", anonymous=True, disable_signals=True)
+    with leaving_by_signals():
+        rospy.init_node("rosgraph_watch", anonymous=True, disable_signals=True)
     overview, lock = Overview(), threading.Lock()
     topic, robot = rospy.resolve_name(ownership.TOPIC), rospy.get_namespace()
 

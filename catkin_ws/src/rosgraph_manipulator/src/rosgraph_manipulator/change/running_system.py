@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import rospy
 from node_kit.io.xml_rpc import CallError
 from rosgraph_launcher.description import NodeDescription, SystemDescription
-from rosgraph_launcher.io.command_lines import CommandLineError, command_line
-from rosgraph_launcher.io.master import NodeApi
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.parameters import put_back
 from rosgraph_manipulator.change.progress import ChangeProgress
+from rosgraph_manipulator.change.surroundings import Adjusting, Surroundings
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
 from rosgraph_manipulator.configuration.difference import read_by_nodes, same_value
 from rosgraph_manipulator.configuration.sharing import disagreement, seen_by
-from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError, read_launch_file
-from rosgraph_manipulator.io.master import get_parameters
-from rosgraph_manipulator.ros.reconfigure_client import ReconfigureClient
 
-ASK_THREADS = 8  # nodes are asked side by side whether they hang
+if TYPE_CHECKING:
+    from rosgraph_manipulator.io.launch_files import LaunchFile
 
 
 @dataclass(frozen=True)
@@ -53,7 +48,12 @@ class RunningSystem:
     """The running configurations of all functions, and those that can be deployed."""
 
     def __init__(
-        self, options: ManipulatorOptions, progress: ChangeProgress, is_here: Callable[[NodeDescription], bool]
+        self,
+        options: ManipulatorOptions,
+        progress: ChangeProgress,
+        is_here: Callable[[NodeDescription], bool],
+        around: Surroundings,
+        adjusting: Adjusting,
     ) -> None:
         """Look at what the launchers' reports in `progress` say.
 
@@ -61,9 +61,12 @@ class RunningSystem:
             options: the configurations.
             progress: has the reports.
             is_here: tells whether a node is started on this host, so that its executable must be here.
+            around: the master, the nodes and the launch files.
+            adjusting: the dynamic_reconfigure servers of nodes.
         """
         self._is_here = is_here
-        self.nodes = ReconfigureClient()
+        self._around = around
+        self.nodes = adjusting
         self._options = options
         self._progress = progress
         self._described: tuple[Configuration, LaunchFile] | None = None  # the last one read
@@ -87,7 +90,7 @@ class RunningSystem:
         lost = set(restart)
         is_repair = self._progress.running(function) == wanted.name
         if is_repair:
-            lost |= self._silent(self._progress.launched_for(function))
+            lost |= self._around.silent(self._progress.launched_for(function))
         drifted = self._drifted(function)
         running = seen_by(self._with_live_values(function, drifted), system, others)
         nodes = {name: node for name, node in running.nodes.items() if name not in lost}
@@ -100,15 +103,12 @@ class RunningSystem:
         Raises:
             DeploymentError: it can't be read, or names an executable that does not exist.
         """
-        launch = read_configuration(configuration)
+        launch = self._around.launch_file(configuration)
         for remark in launch.remarks:
-            rospy.logwarn_once("%s: %s", configuration.launch_file, remark)
-        try:
-            for node in launch.system.nodes.values():
-                if self._is_here(node):
-                    command_line(node)
-        except CommandLineError as error:
-            raise DeploymentError(f"{configuration.launch_file}: {error}") from error
+            self._around.log.warn(f"{configuration.launch_file}: {remark}", once=True)
+        for node in launch.system.nodes.values():
+            if self._is_here(node) and (reason := self._around.why_not_started(node)):
+                raise DeploymentError(f"{configuration.launch_file}: {reason}")
         self._described = (configuration, launch)
         return launch.system
 
@@ -141,7 +141,7 @@ class RunningSystem:
             DeploymentError: it can't be read.
         """
         if self._described is None or self._described[0] != configuration:
-            self._described = configuration, read_configuration(configuration)
+            self._described = configuration, self._around.launch_file(configuration)
         return self._described[1]
 
     def deployed(self, configuration: Configuration, launch: LaunchFile) -> None:
@@ -181,9 +181,9 @@ class RunningSystem:
             return SystemDescription()
         if function not in self._deployed or self._deployed[function][0] != configuration:
             try:  # an earlier manipulator has deployed it
-                self._deployed[function] = configuration, read_configuration(configuration)
+                self._deployed[function] = configuration, self._around.launch_file(configuration)
             except DeploymentError as error:
-                rospy.logwarn("%s", error)
+                self._around.log.warn(str(error))
                 return self._progress.running_system(function, None)
         return self._progress.running_system(function, self._deployed[function][1].system)
 
@@ -191,9 +191,9 @@ class RunningSystem:
         """Return the values that the parameters of what runs have now, where they differ; None: not set."""
         wanted = read_by_nodes(self._described_as_deployed(function))
         try:
-            live = get_parameters(wanted)
+            live = self._around.parameters(wanted)
         except CallError as error:
-            rospy.logwarn("parameters are not compared with what the nodes have: %s", error)
+            self._around.log.warn(f"parameters are not compared with what the nodes have: {error}")
             return {}
         differ = (n for n, value in wanted.items() if n not in live or not same_value(live[n], value))
         return {name: live.get(name) for name in differ}
@@ -212,25 +212,3 @@ class RunningSystem:
         if not values:
             return system
         return self._progress.running_system(function, self._deployed[function][1].system, values)
-
-    def _silent(self, nodes: Collection[str]) -> set[str]:
-        """Return the nodes that do not answer, though their processes run."""
-        if not nodes:
-            return set()
-        with ThreadPoolExecutor(ASK_THREADS, thread_name_prefix="ask whether it hangs") as pool:
-            answers = dict(zip(nodes, pool.map(NodeApi.is_answering, nodes), strict=True))
-        return {node for node, answers_now in answers.items() if not answers_now}
-
-
-def read_configuration(configuration: Configuration) -> LaunchFile:
-    """Read the launch file of a configuration.
-
-    Raises:
-        DeploymentError: it can't be read.
-    """
-    if configuration.problem:
-        raise DeploymentError(configuration.problem)
-    try:
-        return read_launch_file(configuration.launch_file, configuration.args)
-    except LaunchFileError as error:
-        raise DeploymentError(str(error)) from error

@@ -5,12 +5,22 @@ from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_launcher.launching.report import STABLE, LauncherReport
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.progress import ChangeProgress
+from rosgraph_manipulator.change.running_system import RunningSystem
+from rosgraph_manipulator.change.tactics import NoRunningNodes
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions, Repair
 from rosgraph_manipulator.io.launch_files import LaunchFile
-from rosgraph_manipulator.ros import running_system
-from rosgraph_manipulator.ros.running_system import RunningSystem
 
 LEVEL = "/qa_performance"
+
+
+class Around:
+    """Launch files by name, in place of those on the disk."""
+
+    def __init__(self, files=()):
+        self.files = dict(files)
+
+    def launch_file(self, configuration):
+        return LaunchFile(self.files[configuration.launch_file])
 
 
 @pytest.fixture
@@ -19,7 +29,8 @@ def running():
     configurations = {name: Configuration(name, f"f_{name}", f"{name}.launch") for name in ("arm", "drive")}
     progress = ChangeProgress()
     progress.take(LauncherReport(f"f_{name}", name, state=STABLE, nodes=(f"/{name}",)) for name in configurations)
-    running = RunningSystem(ManipulatorOptions(configurations), progress, lambda _node: True)
+    options = ManipulatorOptions(configurations)
+    running = RunningSystem(options, progress, lambda _node: True, Around(), NoRunningNodes())
     for level, (name, configuration) in enumerate(configurations.items()):
         node = NodeDescription(f"/{name}", "/", "p", "x", parameters={"rate": 1})
         running.deployed(configuration, LaunchFile(SystemDescription({node.name: node}, {LEVEL: level, "/robot": "r"})))
@@ -31,22 +42,16 @@ def test_node_that_starts_again_gets_its_parameters_back_but_no_expected_level(r
     assert running.parameters_of("f_arm", ["/drive"]) == {}
 
 
-@pytest.fixture
-def read(monkeypatch):
-    """Launch files by name, in place of those on the disk: nodes of any package, on another host."""
-    files = {}
-    monkeypatch.setattr(running_system, "read_launch_file", lambda path, _args: LaunchFile(files[path]))
-    return files
-
-
-def test_drivers_yield_to_functions_and_to_one_another(read):
+def test_drivers_yield_to_functions_and_to_one_another():
     look = Configuration("look", "f_look", "look")
     driver, twin = (Configuration(f"repair_of_{name}", f"repair_of_{name}", name) for name in ("eye", "twin"))
     progress = ChangeProgress()
     progress.take(LauncherReport(one.function, one.name, nodes=(f"/{one.name}",)) for one in (look, driver))
     repairs = {"eye": Repair("eye", driver=driver), "twin": Repair("twin", driver=twin)}
     options = ManipulatorOptions({"look": look}, repairs=repairs)
-    system = RunningSystem(options, progress, lambda _node: False)
+    around = Around()
+    read = around.files
+    system = RunningSystem(options, progress, lambda _node: False, around, NoRunningNodes())
     read["look"] = SystemDescription({"/look": NodeDescription("/look", "/", "p", "x")}, {"/gain": 1})
     read["eye"] = SystemDescription({"/eye": NodeDescription("/eye", "/", "p", "x")}, {"/gain": 2})
     assert system.describe_beside_others(look) == read["look"]

@@ -1,43 +1,36 @@
-"""Carries out the steps of a change on the running system: the launcher, the nodes, the pending goals and the robot."""
+"""Carries out the steps of a change on the running system: the launcher, the nodes, the pending goals and the robot.
+
+It waits through its surroundings only, so that the same code runs on ROS and on a simulated clock.
+"""
 
 from __future__ import annotations
 
 import contextlib
-import subprocess
-import threading
-import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import rospy
-from geometry_msgs.msg import Twist
 from node_kit.io.xml_rpc import CallError
 from rosgraph_launcher.description import NodeDescription
-from rosgraph_launcher.io.master import NodeApi, advertised
 from rosgraph_launcher.launching.contested import HOLD
-from rosgraph_launcher.launching.report import CHANGING, LauncherReport
+from rosgraph_launcher.launching.report import CHANGING, STABLE, LauncherReport
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.parameters import OverwrittenParameters
 from rosgraph_manipulator.change.progress import ChangeProgress
+from rosgraph_manipulator.change.running_system import RunningSystem
+from rosgraph_manipulator.change.surroundings import Adjusting, KeptGoal, Launchers, MakeNames, Names, Surroundings
 from rosgraph_manipulator.change.tactics import Plan
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
 from rosgraph_manipulator.configuration.difference import same_value
-from rosgraph_manipulator.io.foreign_nodes import end_node
-from rosgraph_manipulator.io.launch_files import LaunchFile
-from rosgraph_manipulator.io.master import get_parameters, publishers, set_parameters
-from rosgraph_manipulator.ros.goal import PendingGoal
-from rosgraph_manipulator.ros.launchers import Launchers
-from rosgraph_manipulator.ros.node_names import NodeNames
-from rosgraph_manipulator.ros.running_system import RunningSystem
-from rosgraph_manipulator.ros.waiting import POLL_PERIOD, wait_until
 
+if TYPE_CHECKING:
+    from rosgraph_manipulator.io.launch_files import LaunchFile
+
+POLL_PERIOD = 0.01  # s, wall
 LOOK_PERIOD = 0.03  # s, wall, where a look calls the master and nodes: new nodes need the processor, and the master
 STATE_TIMEOUT = 2.0  # s, wall, for the launcher's state to follow its answer
 DELIVERY_TIMEOUT = 5.0  # s, wall, for the new server to have the pending goal
-COMMAND_TIMEOUT = 5.0  # s, wall, for a `rosparam` call of a launch file
-ASK_THREADS = 8  # nodes are asked side by side whether they hang
 
 
 @dataclass(frozen=True)
@@ -52,21 +45,24 @@ class DriverStart:
 
     nodes: tuple[str, ...]
     number: int
-    names: NodeNames
+    names: Names
 
 
-class RosExecutor:
-    """The `ChangeExecutor` of a running ROS system. One thread calls it; the launcher's topic has another one."""
+class Execution:
+    """The `ChangeExecutor` of a running system. One thread calls it; the launcher's reports may come in another one."""
 
     def __init__(
         self,
         options: ManipulatorOptions,
-        goals: Mapping[str, PendingGoal],
+        goals: Mapping[str, KeptGoal],
         overwritten: OverwrittenParameters,
         ready_timeout: float,
         settle_time: float,
         launchers: Launchers,
         on_report: Callable[[], object],
+        around: Surroundings,
+        adjusting: Adjusting,
+        make_names: MakeNames,
     ) -> None:
         """Begin to follow the launchers.
 
@@ -77,23 +73,26 @@ class RosExecutor:
             ready_timeout: how long a configuration may take to be ready, s, wall.
             settle_time: how long started nodes must live after that, s, wall.
             launchers: those of all hosts.
-            on_report: is called after each report of a launcher, in a thread of its own.
+            on_report: is called after each report of a launcher, maybe in a thread of its own.
+            around: the clock, the master and the nodes.
+            adjusting: the dynamic_reconfigure servers of nodes.
+            make_names: makes what looks up who answers under the names of nodes.
         """
         self.check: Callable[[], None] = lambda: None  # raises CancelledError where the change must be given up
         self.launcher_phases: dict[str, float] = {}  # durations of the launcher's last change, s
         self._options = options
+        self._around = around
+        self._make_names = make_names
         self._goals = goals
         self._overwritten = overwritten
         self._ready_timeout, self._settle_time = ready_timeout, settle_time
         self._on_report = on_report
         self._progress = ChangeProgress()
         self._launchers = launchers
-        self.system = RunningSystem(options, self._progress, launchers.is_here)
-        self._names = NodeNames(launchers, self._description, self._progress.has_finished)
+        self.system = RunningSystem(options, self._progress, launchers.is_here, around, adjusting)
+        self._names = make_names(self._description, self._progress.has_finished)
         self._servers_died: dict[str, bool] = {}  # by function: whether the kept action's server died
-        self._news = threading.Condition()
         self._follows = False  # whether the reports of the launcher that made the last change arrive
-        self._cmd_vel = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         launchers.on_reports = self._follow
         if launchers.reports():
             self._follow()
@@ -115,7 +114,7 @@ class RosExecutor:
     def clear(self, function: str) -> None:
         """Stop what runs for a function on hosts where it should not, because they were lost when it changed."""
         for host in self._launchers.clear(function):
-            rospy.logwarn("%s: stopped what was left of it on host %s", function, host)
+            self._around.log.warn(f"{function}: stopped what was left of it on host {host}")
 
     def lost_hosts(self, function: str) -> list[str]:
         """Return the lost hosts that have a part of what should run for a function."""
@@ -133,8 +132,8 @@ class RosExecutor:
         self.check()
         self._follows = False
         self._names.begin()
-        rospy.loginfo("%s: %s", wanted.name, " ".join(str(plan).split()))
-        self._progress.begin(wanted.function, wanted, time.monotonic())
+        self._around.log.info(f"{wanted.name}: {' '.join(str(plan).split())}")
+        self._progress.begin(wanted.function, wanted, self._around.now())
 
     def set_parameters(self, server: str, values: Mapping[str, Any]) -> None:
         """Set values at a dynamic_reconfigure server."""
@@ -154,7 +153,8 @@ class RosExecutor:
             self._end_foreign_nodes(wanted.function)
             self._see_who_leaves(wanted.function, leaving)
         self._store_parameters(wanted.function, launch)
-        self._call(wanted.function, wanted.name, launch, stop, start)
+        given_up = self._progress.given_up(wanted.function, launch.system.nodes)
+        self._call(wanted.function, wanted.name, launch, tuple(dict.fromkeys((*stop, *given_up))), start)
         self.system.deployed(wanted, launch)
 
     def wait_until_ready(self) -> None:
@@ -166,13 +166,13 @@ class RosExecutor:
         for node in awaited.nodes:
             what = f"node {node} is not up"
             self._wait(lambda: self._names.is_up(node), what, lambda: self._names.conflict(node), LOOK_PERIOD)  # noqa: B023
-        topics = {rospy.resolve_name(topic) for topic in awaited.topics}
+        topics = {self._around.resolve(topic) for topic in awaited.topics}
         if topics:
             missing = set(topics)
 
             def all_are_published() -> bool:
                 missing.clear()
-                missing.update(topics - advertised(self._progress.launched_for(function)))
+                missing.update(topics - self._around.advertised(self._progress.launched_for(function)))
                 return not missing
 
             what = "not all of its topics are published"
@@ -180,15 +180,15 @@ class RosExecutor:
         if goal is not None and awaited.server:
             self._wait(lambda: goal.server_is_new, "its action server is not up")
             goal.server_started()
-            if not wait_until(goal.deliver, DELIVERY_TIMEOUT):
-                rospy.logwarn("the new server does not take the pending goal")
+            if not self._wait_until(goal.deliver, DELIVERY_TIMEOUT):
+                self._around.log.warn("the new server does not take the pending goal")
 
     def wait_until_settled(self) -> None:
         """Wait until the nodes that were started have lived for the settling time."""
-        end = time.monotonic() + self._settle_time
-        while time.monotonic() < end:
+        end = self._around.now() + self._settle_time
+        while self._around.now() < end:
             self._raise_if_broken()
-            time.sleep(POLL_PERIOD)
+            self._around.pause(POLL_PERIOD)
         self._see_names_held(self._progress.started)
 
     def restore(self, configuration: Configuration) -> None:
@@ -197,11 +197,13 @@ class RosExecutor:
         try:
             function = configuration.function
             self._names.begin()
-            self._progress.begin(function, configuration, time.monotonic())
+            begun = self._progress.started  # a new launcher may have started them, and its report be on the way
+            self._progress.begin(function, configuration, self._around.now())
             system = self.system.describe(configuration)
             # Where the launcher has died, nothing runs for the other functions either.
             shared = frozenset() if self._launchers.unconnected(function) else self._progress.shared(function)
-            stop = tuple(node for node in self._progress.launched_for(function) if node not in shared)
+            known = dict.fromkeys((*self._progress.launched_for(function), *begun))
+            stop = tuple(node for node in known if node not in shared)
             self.change_processes(stop, tuple(node for node in system.nodes if node not in shared))
             self.wait_until_ready()
             self._see_names_held(())
@@ -214,12 +216,15 @@ class RosExecutor:
         Returns:
             The nodes that stay, because other functions need them.
         """
-        self._progress.begin(function, None, time.monotonic())
+        self._progress.begin(function, None, self._around.now())
         staying = self._progress.shared(function).intersection(self._progress.launched_for(function))
         leaving = set(self._progress.launched_for(function)) - staying
         try:
             if leaving:
-                self._see_who_leaves(function, leaving)
+                try:
+                    self._see_who_leaves(function, leaving)
+                except DeploymentError as error:  # the nodes must end nevertheless
+                    self._around.log.warn(f"{function}: it is not known who drives the robot: {error}")
             self._call(function, "", None, tuple(leaving), ())
             self.system.released(function)
             self._store_parameters(function, None)
@@ -235,11 +240,11 @@ class RosExecutor:
     def stop_robot(self, function: str) -> None:
         """Command the base to stand still, unless nodes of another function drive it."""
         try:
-            drivers = publishers(self._cmd_vel.resolved_name)
+            drivers = self._around.drivers()
         except CallError:
             drivers = set()
         if not drivers & self._progress.shared(function):
-            self._cmd_vel.publish(Twist())
+            self._around.halt()
 
     # -- recovery -------------------------------------------------------------------------------------------------
 
@@ -256,20 +261,20 @@ class RosExecutor:
         function = report.function
         wanted = self.system.parameters_of(function, report.dead)
         try:
-            live = get_parameters(wanted)
+            live = self._around.parameters(wanted)
             lost = {name: v for name, v in wanted.items() if name not in live or not same_value(live[name], v)}
             if lost:
-                set_parameters(lost)
-                rospy.logwarn("%s: put back, because nodes start again: %s", function, ", ".join(sorted(lost)))
+                self._around.set_parameters(lost)
+                self._around.log.warn(f"{function}: put back, because nodes start again: {', '.join(sorted(lost))}")
         except CallError as error:
-            rospy.logwarn("parameters are not put back: %s", error)
+            self._around.log.warn(f"parameters are not put back: {error}")
         goal = self._goals.get(function)
         if goal is None:
             return
         try:
-            servers = publishers(goal.status_topic)
+            servers = self._around.publishers(goal.status_topic)
         except CallError as error:
-            rospy.logwarn("%s", error)
+            self._around.log.warn(str(error))
             servers = set()
         self._servers_died[function] = bool(servers & set(report.dead))
         if self._servers_died[function]:
@@ -286,9 +291,15 @@ class RosExecutor:
         if report is not None:
             configuration = self._options.configurations.get(report.configuration)
             new_server = self._servers_died.get(function, False)
-            self._progress.recover(function, configuration, time.monotonic(), new_server)
+            self._progress.recover(function, configuration, self._around.now(), new_server)
             self.wait_until_ready()
             self._servers_died.pop(function, None)
+
+    def hears_more(self, function: str) -> bool:
+        """Tell whether the launcher has more to tell of nodes that do not get ready, such as another death."""
+        report = self._progress.report(function)
+        is_at_rest = report is not None and report.state == STABLE and self._progress.failure() is None
+        return not is_at_rest or bool(self._launchers.unconnected(function))
 
     # -- repairs --------------------------------------------------------------------------------------------------
 
@@ -311,11 +322,9 @@ class RosExecutor:
                 f"functions that run have its nodes, {', '.join(system.nodes)}: request their configurations again, "
                 "which restarts nodes that hang"
             )
-        names = NodeNames(
-            self._launchers, system.nodes.get, lambda node: node not in self._progress.launched_for(function)
-        )
+        names = self._make_names(system.nodes.get, lambda node: node not in self._progress.launched_for(function))
         for node in set(start) - self._progress.at_work:
-            end_node(node)
+            self._around.end_node(node)
         names.see_takers(set(start) - self._progress.at_work)
         self._store_parameters(function, launch)
         stop = tuple(node for node in self._progress.launched_for(function) if node not in shared)
@@ -327,8 +336,7 @@ class RosExecutor:
             report = self._progress.report(function)
             return report is not None and report.change == number and report.state != CHANGING
 
-        with self._news:
-            self._news.wait_for(is_reported, STATE_TIMEOUT)
+        self._around.wait_for_news(is_reported, STATE_TIMEOUT)
         return DriverStart(start, number, names)
 
     # -- helpers --------------------------------------------------------------------------------------------------
@@ -343,16 +351,14 @@ class RosExecutor:
         others = [name for system in self.system.others(function).values() for name in system.all_parameters()]
         try:
             for command in launch.commands if launch else ():
-                subprocess.run(
-                    ["/usr/bin/env", *command], check=True, timeout=COMMAND_TIMEOUT, stdout=subprocess.DEVNULL
-                )
+                self._around.run(command)
             asked = self._overwritten.unknown(wanted)
-            self._overwritten.remember(asked, get_parameters(asked))
+            self._overwritten.remember(asked, self._around.parameters(asked))
             values, gone = self._overwritten.transition(wanted, others)
-            handover = {rospy.resolve_name("~overwritten"): self._overwritten.as_parameter()} if asked else {}
+            handover = {self._around.resolve("~overwritten"): self._overwritten.as_parameter()} if asked else {}
             clear = launch.clear if launch else ()
-            set_parameters({**handover, **values}, delete=[*clear, *gone])
-        except (CallError, OSError, subprocess.SubprocessError) as error:
+            self._around.set_parameters({**handover, **values}, delete=[*clear, *gone])
+        except (CallError, OSError) as error:
             raise DeploymentError(" ".join(str(error).split())) from error
 
     def _call(
@@ -371,12 +377,11 @@ class RosExecutor:
             stop,
             start,
             # The nodes have all their time, however long the launcher could not be found.
-            found=lambda: self._progress.restart_deadline(time.monotonic()),
+            found=lambda: self._progress.restart_deadline(self._around.now()),
         )
         self.launcher_phases = dict(made.phases)
         self._progress.answered(made.number)
-        with self._news:
-            self._follows = self._news.wait_for(lambda: self._progress.is_reported(made.number), STATE_TIMEOUT)
+        self._follows = self._around.wait_for_news(lambda: self._progress.is_reported(made.number), STATE_TIMEOUT)
 
     def _description(self, node: str) -> NodeDescription | None:
         wanted = self._progress.wanted
@@ -385,10 +390,10 @@ class RosExecutor:
     def _end_foreign_nodes(self, function: str) -> None:
         """End nodes of the same function that somebody else started."""
         for node in self._options.of(function).kill_nodes:
-            name = rospy.resolve_name(node)
+            name = self._around.resolve(node)
             ours = name in self._progress.at_work
-            if not ours and NodeApi.request_shutdown(name, "replaced by another configuration"):
-                gone = wait_until(lambda: not NodeApi.is_answering(name), self._ready_timeout)  # noqa: B023
+            if not ours and self._around.shut_down(name, "replaced by another configuration"):
+                gone = self._wait_until(lambda: not self._around.is_answering(name), self._ready_timeout)  # noqa: B023
                 if not gone:
                     raise DeploymentError(f"node {name} does not end")
 
@@ -396,19 +401,27 @@ class RosExecutor:
         """See whether the pending goal's server and the robot's last driver end or are started anew."""
         goal = self._goals.get(function)
         try:
-            drivers = publishers(self._cmd_vel.resolved_name) - {rospy.get_name()}
-            servers = publishers(goal.status_topic) if goal else None
+            drivers = self._around.drivers()
+            servers = self._around.publishers(goal.status_topic) if goal else None
         except CallError as error:
             raise DeploymentError(str(error)) from error
         if self._progress.leave(leaving, drivers, servers) and goal is not None:
             goal.server_stops(leaving)
 
     def _follow(self) -> None:
-        with self._news:
+        with self._around.news():
             if self._progress.take(self._launchers.reports().values()):
-                self._cmd_vel.publish(Twist())
-            self._news.notify_all()
+                self._around.halt()
         self._on_report()
+
+    def _wait_until(self, condition: Callable[[], bool], timeout: float) -> bool:
+        """Wait for a condition; return whether it became true within `timeout` (s, wall)."""
+        deadline = self._around.now() + timeout
+        while not condition():
+            if self._around.now() > deadline or self._around.is_ending:
+                return False
+            self._around.pause(POLL_PERIOD)
+        return True
 
     def _wait(
         self, condition: Callable[[], bool], what: str, why: Callable[[], str] = str, period: float = POLL_PERIOD
@@ -421,9 +434,9 @@ class RosExecutor:
                     return
             except CallError as error:
                 raise DeploymentError(str(error)) from error
-            if time.monotonic() > deadline:
+            if self._around.now() > deadline:
                 raise DeploymentError(f"{what} within {self._ready_timeout:g} s{why()}; see the nodes' logs")
-            time.sleep(period)
+            self._around.pause(period)
 
     def _see_names_held(self, nodes: Collection[str]) -> None:
         """See that nobody has taken the names of nodes, nor takes back those that somebody else had, for a while.
@@ -431,19 +444,19 @@ class RosExecutor:
         Raises:
             DeploymentError: somebody has.
         """
-        until = time.monotonic() + (HOLD if self._names.contested else 0.0)
+        until = self._around.now() + (HOLD if self._names.contested else 0.0)
         while True:
             self._raise_if_broken()
             for node in {*nodes, *self._names.contested}:
                 if conflict := self._names.conflict(node):
                     raise DeploymentError(f"node {node} has lost its name{conflict}")
-            if time.monotonic() >= until:
+            if self._around.now() >= until:
                 return
-            time.sleep(LOOK_PERIOD)
+            self._around.pause(LOOK_PERIOD)
 
     def _raise_if_broken(self) -> None:
         self.check()
-        if rospy.is_shutdown():
+        if self._around.is_ending:
             raise DeploymentError("the manipulator is shutting down")
         failure = self._progress.failure()
         gone = self._launchers.unconnected(self._progress.function) if failure is None and self._follows else ""

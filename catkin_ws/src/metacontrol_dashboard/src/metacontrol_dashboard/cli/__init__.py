@@ -1,0 +1,1 @@
+"""The commands `metacontrol view` and `metacontrol export`."""

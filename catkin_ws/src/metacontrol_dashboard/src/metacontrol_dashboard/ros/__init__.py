@@ -1,0 +1,1 @@
+"""The node: what it hears, and what an operator asks of the other nodes."""

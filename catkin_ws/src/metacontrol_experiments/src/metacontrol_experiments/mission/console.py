@@ -1,0 +1,26 @@
+"""Why a system has ended, from what roslaunch and its nodes have written to their console."""
+
+from __future__ import annotations
+
+import re
+
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_POINTER = ("The traceback for the exception", "log file:")
+_CAUSE = re.compile(r"ROS master \S+ is gone|REQUIRED process \[\S+\] has died!")
+_COMPLAINT = re.compile(r"error|exception|fatal|has died|unused args|invalid|no such", re.IGNORECASE)
+
+
+def cause_in(text: str) -> str:
+    """Return why a system has ended: one line.
+
+    It is the first line by which roslaunch or a node tells that all ends: what is written after it only follows from
+    it. Without one, it is the last line that tells of an error, else the last line.
+
+    Args:
+        text: what the console has.
+    """
+    text = _COLOUR.sub("", text)
+    if (cause := _CAUSE.search(text)) is not None:
+        return cause[0]
+    lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith(_POINTER)]
+    return ([line for line in lines if _COMPLAINT.search(line)] or lines or ["it said nothing"])[-1]

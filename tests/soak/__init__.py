@@ -1,0 +1,1 @@
+"""Real missions on ROS while everything fails: `./mros soak --faults N`."""

@@ -1,0 +1,3 @@
+"""Fixtures of the dashboard's tests."""
+
+from helpers.small_run import bag  # noqa: F401

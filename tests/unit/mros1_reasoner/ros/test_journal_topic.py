@@ -1,0 +1,50 @@
+"""Subscribers that come while the journal is published get whole messages: rospy has one buffer for both."""
+
+import threading
+
+import pytest
+import rospy
+from helpers.waiting import DEADLINE_S
+from mros1_reasoner.io.parameters import Parameters
+from mros1_reasoner.loop.entries import Entry, Pause
+from mros1_reasoner.ros.journal import JournalTopic
+
+
+class Buffer:
+    """A publisher with one buffer that two threads must not fill at once."""
+
+    def __init__(self, *_, subscriber_listener, **__):
+        self.listener, self.used, self.clashes, self.sent = subscriber_listener, threading.Lock(), 0, 0
+        self.begun = threading.Event()
+
+    def get_num_connections(self):
+        return 1
+
+    def publish(self, _message):
+        if not self.used.acquire(blocking=False):
+            self.clashes += 1
+            return
+        self.begun.set()
+        threading.Event().wait(0.05)
+        self.used.release()
+        self.sent += 1
+
+
+@pytest.fixture
+def publisher(monkeypatch):
+    made = []
+    monkeypatch.setattr(rospy, "Publisher", lambda *words, **options: made.append(Buffer(*words, **options)) or made[0])
+    monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(1))
+    return made
+
+
+def test_beginning_for_a_new_subscriber_and_the_next_entries_are_sent_one_after_the_other(publisher):
+    topic = JournalTopic("reasoner-1", Parameters({}), [])
+    [buffer] = publisher
+    topic.append(Entry(1.0, Pause()))
+    flushing = threading.Thread(target=topic.flush)
+    flushing.start()
+    assert buffer.begun.wait(DEADLINE_S)
+    buffer.listener.peer_subscribe("", buffer.publish, buffer.publish)
+    flushing.join()
+    assert (buffer.clashes, buffer.sent) == (0, 2)

@@ -1,0 +1,73 @@
+"""Histories that failed once, shrunk; each is a defect that was mended."""
+
+from rosgraph_manipulator.change.request_queue import Policy
+from simulated.faults import Fault, Kind
+from simulated.history import History, run
+
+
+def holds(told):
+    assert not run(told).broken
+
+
+def test_nothing_runs_on_when_the_master_is_silent_while_a_failed_change_is_cleared_away():
+    faults = (
+        Fault(7.596, Kind.REQUEST, "f3_v1_r2_b"),
+        Fault(8.352, Kind.MASTER_SILENT, "", 3.721),
+    )
+    holds(History(11, "d2", faults, Policy.REFUSE, starts_with_initial=True))
+
+
+def test_nothing_runs_on_when_the_master_is_silent_during_a_request():
+    faults = (
+        Fault(36.37, Kind.MASTER_SILENT, "", 2.648),
+        Fault(36.798, Kind.REQUEST, "sprinkle"),
+    )
+    holds(History(128, "greenhouse", faults, Policy.REPLACE, starts_with_initial=True))
+
+
+def test_node_that_hangs_after_its_restart_is_deployed_again():
+    faults = (
+        Fault(23.071, Kind.KILL_NODE, "/waterer"),
+        Fault(23.385, Kind.FREEZE_NODE, "/waterer"),
+    )
+    holds(History(18, "greenhouse", faults, Policy.WAIT))
+
+
+def test_shared_node_ends_with_the_last_function_that_needs_it():
+    faults = (
+        Fault(25.912, Kind.REQUEST, "by_wheel"),
+        Fault(34.033, Kind.REQUEST, "by_clock"),
+    )
+    holds(History(871, "orchard", faults, Policy.WAIT))
+
+
+def test_node_that_never_answers_under_a_name_that_was_taken_counts_as_dead():
+    faults = (
+        Fault(36.3, Kind.FOREIGN, "/fleet/r7/leaf_finder", 13.829),
+        Fault(36.654, Kind.NEVER_READY, "/fleet/r7/leaf_finder", 4.059),
+    )
+    holds(History(586, "orchard", faults, Policy.REPLACE, starts_with_initial=True))
+
+
+def test_change_that_was_given_up_for_a_request_that_is_taken_back_is_undone():
+    faults = (
+        Fault(38.802, Kind.KILL_PART, "reasoner"),
+        Fault(40.273, Kind.KILL_DRIVER, "/front_laser", 15.542),
+        Fault(41.439, Kind.FREEZE_PART, "manipulator", 8.705),
+        Fault(46.947, Kind.CANCELLED_REQUEST, "f1_v3_r2", 1.582),
+    )
+    holds(History(101016, "d2", faults, Policy.REPLACE, starts_with_initial=True))
+
+
+def test_what_a_new_launcher_has_started_ends_when_the_change_is_undone():
+    faults = (
+        Fault(38.326, Kind.REQUEST, "by_clock"),
+        Fault(40.784, Kind.KILL_PART, "launcher"),
+        Fault(40.998, Kind.REQUEST, "by_rows"),
+    )
+    holds(History(101665, "orchard", faults, Policy.REFUSE, starts_with_initial=True))
+
+
+def test_first_request_of_a_function_that_is_taken_back_at_once_leaves_nothing_under_way():
+    faults = (Fault(2.237, Kind.CANCELLED_REQUEST, "look_right", 0.006),)
+    holds(History(202349, "station", faults, Policy.REFUSE))
