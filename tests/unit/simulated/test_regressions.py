@@ -71,3 +71,12 @@ def test_what_a_new_launcher_has_started_ends_when_the_change_is_undone():
 def test_first_request_of_a_function_that_is_taken_back_at_once_leaves_nothing_under_way():
     faults = (Fault(2.237, Kind.CANCELLED_REQUEST, "look_right", 0.006),)
     holds(History(202349, "station", faults, Policy.REFUSE))
+
+
+def test_nothing_runs_on_when_what_a_change_would_go_back_to_can_not_be_read():
+    faults = (
+        Fault(3.222, Kind.DIES_LATER, "/waterer", 1.668),
+        Fault(11.713, Kind.KILL_DRIVER, "/pump_driver"),
+        Fault(44.271, Kind.FILE_GONE, "sprinkle", 18.658),
+    )
+    holds(History(400435, "greenhouse", faults, Policy.WAIT, starts_with_initial=True))

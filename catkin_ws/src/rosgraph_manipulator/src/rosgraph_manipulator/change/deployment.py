@@ -136,7 +136,7 @@ def deploy(
             reason = f"{wanted.name}: {error}"
             if whole or error.superseded:
                 return Outcome(Result.FAILED, last_good if whole else None, reason, cancelled=True)
-            return _go_back(executor, wanted.function, last_good, reason, watch, cancelled=True)
+            return go_back(executor, wanted.function, last_good, reason, watch, cancelled=True)
         except DeploymentError as error:
             reasons.append(f"{plan.tactic}: {error}")
         else:
@@ -146,7 +146,7 @@ def deploy(
     reason = f"{wanted.name}: {'; '.join(reasons) or 'no tactic has a plan'}"
     if last_good == wanted and not any(plan.touched for plan in plans):
         return Outcome(Result.FAILED, last_good, f"{reason}; it runs on as it did")
-    return _go_back(executor, wanted.function, last_good, reason, watch)
+    return go_back(executor, wanted.function, last_good, reason, watch)
 
 
 def release(
@@ -175,18 +175,7 @@ def release(
     return Outcome(Result.OK, None, f"{function} is released: {what}", "release")
 
 
-def _carry_out(executor: ChangeExecutor, plan: Plan, watch: Stopwatch) -> None:
-    for step in plan.steps:
-        with watch.phase("set" if isinstance(step, SetParameters) else "change"):
-            step.run(executor)
-    with watch.phase("ready"):
-        executor.wait_until_ready()
-    if plan.started:
-        with watch.phase("settle"):
-            executor.wait_until_settled()
-
-
-def _go_back(
+def go_back(
     executor: ChangeExecutor,
     function: str,
     last_good: Configuration | None,
@@ -194,6 +183,16 @@ def _go_back(
     watch: Stopwatch,
     cancelled: bool = False,
 ) -> Outcome:
+    """Restore the last good configuration; where there is none, or it does not come up, stop what is left.
+
+    Args:
+        executor: carries out steps on the running system.
+        function: its name.
+        last_good: the configuration to restore; None: there is none.
+        reason: why the change has failed, in words.
+        watch: measures the phases.
+        cancelled: whether the request was cancelled.
+    """
     try:
         if last_good is None:
             reason = f"{reason}; there is no earlier configuration to restore"
@@ -209,3 +208,14 @@ def _go_back(
         except DeploymentError as error:
             reason = f"{reason}; {error}"
     return Outcome(Result.GENERAL_ERROR, None, reason, cancelled=cancelled)
+
+
+def _carry_out(executor: ChangeExecutor, plan: Plan, watch: Stopwatch) -> None:
+    for step in plan.steps:
+        with watch.phase("set" if isinstance(step, SetParameters) else "change"):
+            step.run(executor)
+    with watch.phase("ready"):
+        executor.wait_until_ready()
+    if plan.started:
+        with watch.phase("settle"):
+            executor.wait_until_settled()

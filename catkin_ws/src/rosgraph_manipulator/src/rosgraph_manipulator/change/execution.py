@@ -101,6 +101,10 @@ class Execution:
         """Return the launcher's last report of a function; None: it has made none at all yet."""
         return self._progress.report(function)
 
+    def has_nodes(self, function: str) -> bool:
+        """Tell whether the launcher has nodes of a function, as far as it has reported."""
+        return bool(self._progress.launched_for(function))
+
     def adopt(self, configuration: Configuration) -> None:
         """Note that a configuration runs, or should, although the last change was not to it."""
         with contextlib.suppress(DeploymentError):  # what the launchers tell is all that is known of it

@@ -17,6 +17,7 @@ from rosgraph_manipulator.change.deployment import (
     Stopwatch,
     deploy,
     durations,
+    go_back,
     release,
 )
 from rosgraph_manipulator.change.execution import Execution
@@ -210,13 +211,27 @@ class Manipulation:
         try:
             with watch.phase("plan"):
                 plans = self._plans(found := self._executor.system.compare(wanted, restart))
-            last_good, runs = deployments.fallback(wanted), deployments.running is not None
-            outcome = deploy(self._executor, wanted, plans, last_good, watch, found.remark, runs)
         except self._failures as error:
             outcome = deployments.refused(wanted, " ".join(str(error).split()))
+            if outcome.running is None and (deployments.is_torn or self._executor.has_nodes(wanted.function)):
+                outcome = self._clear_away(wanted, outcome.message, watch)
+        else:
+            last_good, runs = deployments.fallback(wanted), deployments.running is not None
+            try:
+                outcome = deploy(self._executor, wanted, plans, last_good, watch, found.remark, runs)
+            except self._failures as error:
+                outcome = self._clear_away(wanted, f"{wanted.name}: {' '.join(str(error).split())}", watch)
         phases = durations(watch.phases, self._executor.launcher_phases, outcome.result is Result.OK)
         self._finish(wanted, outcome, {**phases, "total": self._around.now() - began})
         return outcome
+
+    def _clear_away(self, wanted: Configuration, reason: str, watch: Stopwatch) -> Outcome:
+        """Restore what ran before, or stop what is left, where a change fails and no whole configuration runs."""
+        try:
+            last_good = self._deployments[wanted.function].fallback(wanted)
+            return go_back(self._executor, wanted.function, last_good, reason, watch)
+        except self._failures as error:
+            return Outcome(Result.GENERAL_ERROR, None, f"{reason}; {' '.join(str(error).split())}")
 
     def _plans(self, found: Comparison) -> list[Plan]:
         # Several tactics ask the same.
