@@ -2,7 +2,7 @@
 
 Messages of one connection keep their order; those of two connections may overtake each other. A message is lost where a
 subscriber is not connected yet, or its queue is full while it hangs. A connection that is made anew brings the last
-message of a latched topic once more.
+message of a latched topic once more. Subscribers of latched topics leave out what comes late, as `node_kit` has it.
 """
 
 from __future__ import annotations
@@ -11,6 +11,8 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
+
+from node_kit.succession import Succession
 
 from simulated.kernel import Kernel, Process
 
@@ -31,6 +33,7 @@ class _Subscriber:
     take: Callable[[Any], object]
     queue: int
     connections: dict[int, _Connection] = field(default_factory=dict)
+    succession: Succession = field(default_factory=Succession)
 
 
 class Topic:
@@ -110,5 +113,6 @@ class Topic:
             self._kernel.after(0.05, lambda: self._deliver(connection, subscriber))
         elif connection.waiting:
             message = connection.waiting.popleft()
-            if subscriber.process.alive:
+            is_late = self._latched and subscriber.succession.is_late(connection.publisher.name, connection)
+            if subscriber.process.alive and not is_late:
                 subscriber.take(message)

@@ -80,3 +80,13 @@ def test_nothing_runs_on_when_what_a_change_would_go_back_to_can_not_be_read():
         Fault(44.271, Kind.FILE_GONE, "sprinkle", 18.658),
     )
     holds(History(400435, "greenhouse", faults, Policy.WAIT, starts_with_initial=True))
+
+
+def test_late_report_of_a_launcher_that_died_is_not_believed():
+    faults = (
+        Fault(2.865, Kind.FREEZE_NODE, "/move_base", 6.467),
+        Fault(50.808, Kind.SLOW, "functions", 3.775),
+        Fault(50.975, Kind.CANCELLED_REQUEST, "f1_v2_r3", 1.612),
+        Fault(53.242, Kind.KILL_PART, "launcher"),
+    )
+    holds(History(502265, "d2", faults, Policy.WAIT, starts_with_initial=True))

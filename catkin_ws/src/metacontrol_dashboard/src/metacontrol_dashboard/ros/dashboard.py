@@ -17,6 +17,7 @@ from metacontrol_msgs.msg import ActiveConfiguration, Decision, MissionEvent, Re
 from metacontrol_msgs.srv import LastDecisions
 from node_kit.io.xml_rpc import CallError
 from node_kit.parameters import ParameterError, ParameterTree
+from node_kit.ros.connections import latest
 from node_kit.ros.lifetime import Lifetime
 from node_kit.ros.parts import TOPIC as SIGNS
 from node_kit.ros.parts import sign_of
@@ -90,7 +91,7 @@ class DashboardNode:
         rospy.Subscriber(ownership.TOPIC, DiagnosticArray, self._on_diagnostics, queue_size=100)
         rospy.Subscriber(SIGNS, DiagnosticStatus, self._on_sign, queue_size=50)
         active = "rosgraph_manipulator/active_configuration"
-        rospy.Subscriber(active, ActiveConfiguration, self._on_configuration, queue_size=20)
+        rospy.Subscriber(active, ActiveConfiguration, latest(self._on_configuration), queue_size=20)
         rospy.Subscriber("mros1_reasoner/decision", Decision, self._on_decision, queue_size=100)
         rospy.Subscriber("mission/event", MissionEvent, self._on_event, queue_size=100)
         rospy.Subscriber("mros1_reasoner/journal", ReasonerJournal, self._on_journal, queue_size=1000)

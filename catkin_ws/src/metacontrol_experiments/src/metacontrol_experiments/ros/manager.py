@@ -31,6 +31,7 @@ from node_kit.io.inbox import Inbox
 from node_kit.io.xml_rpc import CallError, Client
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.plugins import PluginError
+from node_kit.ros.connections import latest
 from node_kit.ros.lifetime import Lifetime
 from ros_model.errors import ModelError
 
@@ -139,7 +140,7 @@ class ManagerNode:
             rospy.Subscriber(ownership.TOPIC, DiagnosticArray, self._on_diagnostics, queue_size=100)
             active = "rosgraph_manipulator/active_configuration"
             rospy.Subscriber(
-                active, ActiveConfiguration, lambda message: self._inbox.put(lambda: self._take_active(message))
+                active, ActiveConfiguration, latest(lambda message: self._inbox.put(lambda: self._take_active(message)))
             )
         threading.Thread(target=self._look_for_drivers, args=(nodes,), name="drivers", daemon=True).start()
 

@@ -15,6 +15,7 @@ from metacontrol_bags import ownership
 from metacontrol_bags.decision import DECIDED, Decision
 from metacontrol_msgs import msg as messages
 from node_kit.io.inbox import Inbox
+from node_kit.ros.connections import latest
 from std_msgs.msg import Bool
 
 from mros1_reasoner.io.parameters import Parameters
@@ -115,7 +116,7 @@ class ReasonerNode:
 
     def _listen(self, task_actions: dict[str, str]) -> None:
         active = "rosgraph_manipulator/active_configuration"
-        rospy.Subscriber(active, messages.ActiveConfiguration, self._on_active)
+        rospy.Subscriber(active, messages.ActiveConfiguration, latest(self._on_active))
         self._namespace = rospy.get_namespace()
         self._diagnostics = rospy.resolve_name(ownership.TOPIC)  # it may be remapped
         rospy.Subscriber(ownership.TOPIC, DiagnosticArray, self._on_diagnostics, queue_size=100)

@@ -1,4 +1,4 @@
-"""Has rospy connect each topic to all of its publishers, once to each.
+"""Has rospy connect each topic to all of its publishers, once to each; and leaves out what former ones bring late.
 
 With rospy alone, a node that listens to a topic of several publishers may never hear one of them, without a word:
 
@@ -13,10 +13,16 @@ from __future__ import annotations
 
 import threading
 from collections import defaultdict
-from typing import Any
+from functools import wraps
+from typing import TYPE_CHECKING, Any, Callable
 
 from rospy.impl.masterslave import ROSHandler
 from rospy.impl.registration import RegManager
+
+from node_kit.succession import Succession
+
+if TYPE_CHECKING:
+    import genpy
 
 _connect_topic, _publisher_update = ROSHandler._connect_topic, RegManager.publisher_update
 
@@ -24,6 +30,24 @@ _connect_topic, _publisher_update = ROSHandler._connect_topic, RegManager.publis
 def connect_to_all() -> None:
     """Change rospy in this process, before `rospy.init_node` or after it; without effect a second time."""
     ROSHandler._connect_topic, RegManager.publisher_update = _connect_once, _update_with_earlier
+
+
+def latest(callback: Callable[[Any], object]) -> Callable[[Any], None]:
+    """Return a callback of a subscriber that leaves out what a publisher's former process or connection brings late.
+
+    For topics whose messages tell a state, such as latched ones. Each connection of rospy has a thread of its own;
+    here one calls after the other.
+    """
+    succession, lock = Succession(), threading.RLock()
+
+    @wraps(callback)
+    def take(message: genpy.Message) -> None:
+        header = message._connection_header  # one object for each connection
+        with lock:
+            if not succession.is_late(header.get("callerid", ""), header):
+                callback(message)
+
+    return take
 
 
 class _Locks:

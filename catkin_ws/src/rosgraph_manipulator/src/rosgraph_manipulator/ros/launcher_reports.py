@@ -15,6 +15,7 @@ import rospy
 from metacontrol_msgs.msg import LaunchedFunctions
 from node_kit.io.background import in_background
 from node_kit.io.xml_rpc import CallError
+from node_kit.ros.connections import latest
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.hosts import HostLauncher, launcher_at
 from rosgraph_launcher.io.master import NodeApi
@@ -73,7 +74,7 @@ class LauncherReports:
         self._lock = threading.RLock()
         self._known: dict[str, _Known] = {}
         self._parts: dict[str, frozenset[str]] = {}  # by function: the launchers that should have a part of it
-        self._subscriber = rospy.Subscriber(TOPIC, LaunchedFunctions, self._take, queue_size=20)
+        self._subscriber = rospy.Subscriber(TOPIC, LaunchedFunctions, latest(self._take), queue_size=20)
         threading.Thread(target=self._watch, name="hosts", daemon=True).start()
 
     # -- what they tell -------------------------------------------------------------------------------------------

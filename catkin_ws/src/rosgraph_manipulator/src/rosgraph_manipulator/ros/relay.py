@@ -10,6 +10,7 @@ import roslib.message
 import rospy
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
 from node_kit.ros.action_server import is_connected
+from node_kit.ros.connections import latest
 from node_kit.ros.lifetime import Lifetime
 
 from rosgraph_manipulator.configuration.configurations import ConfigurationError, action_type
@@ -41,7 +42,9 @@ class Relay:
         self._changing = False
         self._client = actionlib.ActionClient(server, kind)
         self._server = ActionServer(action, kind, self._on_goal, self._on_cancel, auto_start=False)
-        rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)
+        rospy.Subscriber(
+            "rosgraph_manipulator/active_configuration", ActiveConfiguration, latest(self._on_configuration)
+        )
         self._waits = GoalClients(action, server)
         self._waiting: dict[str, Client | None] = {}  # who waits for each goal
         self._subscriber = rospy.Subscriber(f"{action}/goal", type(kind().action_goal), self._on_goal_message)

@@ -15,6 +15,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.master import PATIENCE
 from node_kit.parameters import ParameterError
+from node_kit.ros.connections import latest
 from node_kit.ros.lifetime import Lifetime
 from node_kit.ros.parts import watch_parts
 from ros_model.errors import ModelError
@@ -116,7 +117,7 @@ class MonitorNode:
             self._publish,
         )
         self._subscriber = rospy.Subscriber(
-            "rosgraph_manipulator/active_configuration", ActiveConfiguration, self._follow, queue_size=5
+            "rosgraph_manipulator/active_configuration", ActiveConfiguration, latest(self._follow), queue_size=5
         )
 
     def run(self) -> None:

@@ -9,6 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from metacontrol_bags import ownership
 from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.parameters import ParameterError, ParameterTree
+from node_kit.ros.connections import latest
 from node_kit.ros.lifetime import Lifetime
 from visualization_msgs.msg import Marker
 
@@ -39,7 +40,9 @@ class RvizTextNode:
         self._marker = rospy.Publisher("rviz/text", Marker, queue_size=1, latch=True)
         self._inputs = (
             rospy.Subscriber(ownership.TOPIC, DiagnosticArray, self._on_diagnostics),
-            rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration),
+            rospy.Subscriber(
+                "rosgraph_manipulator/active_configuration", ActiveConfiguration, latest(self._on_configuration)
+            ),
         )
         self._timer = rospy.Timer(rospy.Duration.from_sec(_PERIOD_S), lambda _event: self._publish(), reset=True)
 

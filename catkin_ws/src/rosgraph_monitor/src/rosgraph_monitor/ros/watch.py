@@ -17,7 +17,7 @@ from metacontrol_bags import ownership
 from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.io.xml_rpc import CallError
 from node_kit.ros.command import leaving_by_signals
-from node_kit.ros.connections import connect_to_all
+from node_kit.ros.connections import connect_to_all, latest
 from node_kit.ros.lifetime import BAD_START, LONGEST_END, Lifetime
 from node_kit.ros.parts import TOPIC as SIGNS
 from node_kit.ros.parts import sign_of
@@ -75,7 +75,7 @@ def command(once: float | None) -> None:
 
     rospy.Subscriber(ownership.TOPIC, DiagnosticArray, take, queue_size=100)
     rospy.Subscriber(SIGNS, DiagnosticStatus, take_sign, queue_size=50)
-    rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, take_configuration)
+    rospy.Subscriber("rosgraph_manipulator/active_configuration", ActiveConfiguration, latest(take_configuration))
 
     def tables(graph: GraphSnapshot) -> Group:
         with lock:
