@@ -104,6 +104,7 @@ def run(told: History) -> Outcome:
     outcome.steps = world.kernel.steps
     trace.update(f"{outcome.steps} {world.kernel.now!r} {world.kernel.random.random()} {outcome.broken}".encode())
     outcome.digest = trace.hexdigest()
+    world.close()
     return outcome
 
 

@@ -96,6 +96,12 @@ class World:
         self._unlock("")
         self._disturb()
 
+    def close(self) -> None:
+        """End all tasks: those that wait would be kept for ever, and all else with them."""
+        for part in (self.launcher, self.manipulator, self.monitor, self.reasoner):
+            if part is not None:
+                part.process.kill()
+
     # -- parts ----------------------------------------------------------------------------------------------------
 
     def _start(self, name: str) -> None:

@@ -90,3 +90,11 @@ def test_late_report_of_a_launcher_that_died_is_not_believed():
         Fault(53.242, Kind.KILL_PART, "launcher"),
     )
     holds(History(502265, "d2", faults, Policy.WAIT, starts_with_initial=True))
+
+
+def test_dead_node_of_a_failed_function_is_not_started_again_when_the_other_function_gives_it_up():
+    faults = (
+        Fault(9.715, Kind.DIES_AT_START, "/fleet/r7/mast", 4.0),
+        Fault(24.403, Kind.KILL_NODE, "/fleet/r7/mast"),
+    )
+    holds(History(507068, "orchard", faults, Policy.WAIT, starts_with_initial=True))

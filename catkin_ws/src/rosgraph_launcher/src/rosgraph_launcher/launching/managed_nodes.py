@@ -186,7 +186,7 @@ class ManagedNodes:
             self._nodes[node] = replace(self._nodes[node], description=nodes[node])
         names = tuple([node for node in nodes if node in start or node in kept] + left)
         self._set(name, configuration=configuration, message="", nodes=names)
-        self._drop_unowned()
+        self._drop_unneeded()
 
     def end_change(self, name: str, now: float, failed_to_start: Iterable[str] = ()) -> None:
         """Note that a change is over; nodes that it could not start belong to no configuration any more."""
@@ -197,7 +197,7 @@ class ManagedNodes:
                 self._set(other, state=RECOVERING, message=f"node {node} could not be restarted for {name}")
         own = tuple(node for node in self._functions[name].nodes if node not in failed)
         self._set(name, nodes=own, state=STABLE, changed_at=now)
-        self._drop_unowned()
+        self._drop_unneeded()
 
     def begin_release(self, name: str) -> list[str]:
         """Begin to release a function, and return the nodes that must end: those that no other function shares."""
@@ -208,7 +208,7 @@ class ManagedNodes:
         """Note that a function has no nodes any more."""
         self._functions[name].deaths.reset()
         self._set(name, configuration="", nodes=(), state=STABLE, message="", changed_at=now)
-        self._drop_unowned()
+        self._drop_unneeded()
 
     def started(self, name: str, now: float) -> None:
         """Note that the process of a node has begun."""
@@ -381,6 +381,8 @@ class ManagedNodes:
         same = before and (before.description.executable, before.description.args)
         return True if before and before.serves and same == (description.executable, description.args) else None
 
-    def _drop_unowned(self) -> None:
-        self._nodes = {name: node for name, node in self._nodes.items() if self._owners(name)}
+    def _drop_unneeded(self) -> None:
+        """Forget nodes that no function has any more, and restarts of those that only failed functions have."""
+        owned = {name: node for name, node in self._nodes.items() if self._owners(name)}
+        self._nodes = {n: node if self._needing(n) else replace(node, restart_at=None) for n, node in owned.items()}
         self._contested.keep(self._nodes)
