@@ -212,5 +212,14 @@ def test_who_tells_the_robot_where_it_is_is_obeyed():
     assert "/tf" in excuse_of(plan(fault), observed)
 
 
+def test_nodes_of_all_variants_need_what_the_base_sets():
+    observed = calm()
+    fault = Fault(Kind.PARAMETERS, 10.0, (), "huge")
+    observed.strikes = [Strike(10.0, 0, False, "/move_base/max_vel_x: 0.3 to x")]
+    assert excuse_of(plan(fault), observed) == ""
+    observed.strikes = [Strike(10.0, 0, False, "/move_base/oscillation_distance: 0.4 to x, which no variant sets")]
+    assert "oscillation" in excuse_of(plan(fault), observed)
+
+
 def test_every_invariant_is_broken_by_some_test():
     assert len(CHECKS) == 8  # one more needs a test here

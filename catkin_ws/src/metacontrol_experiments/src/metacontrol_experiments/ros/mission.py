@@ -131,7 +131,7 @@ class NavigationMission(MissionNode[State]):
         try:
             self._inject_now(self._plan.contingencies[index])
         except InjectionError as error:
-            self._state = mission.abort(self.state, rospy.get_time(), f"a contingency could not strike: {error}")
+            self._state = mission.abort(self.state, self._now(), f"a contingency could not strike: {error}")
 
     def _inject_now(self, contingency: Contingency) -> None:
         injected = self._injector.inject(contingency, self._way())
@@ -161,7 +161,7 @@ class NavigationMission(MissionNode[State]):
     def _on_configuration(self, message: ActiveConfiguration) -> None:
         super()._on_configuration(message)
         if self._state is not None:
-            self._take(mission.on_configuration(self._state, rospy.get_time(), self._readiness.stable))
+            self._take(mission.on_configuration(self._state, self._now(), self._readiness.stable))
 
     def _on_request(self, contingency: Contingency) -> None:
         """Answer a call of the service.
@@ -181,17 +181,17 @@ class NavigationMission(MissionNode[State]):
             return
         self._position = (position.x, position.y)
         if self._state is not None:
-            self._take(mission.on_pose(self._plan, self.state, rospy.get_time(), *self._position))
+            self._take(mission.on_pose(self._plan, self.state, self._now(), *self._position))
             if not self.state.over:
-                self._display.progress(self.state.share, rospy.get_time(), f"{self.state.distance_m:4.1f} m")
+                self._display.progress(self.state.share, self._now(), f"{self.state.distance_m:4.1f} m")
 
     def _on_status(self, message: GoalStatusArray) -> None:
         self._readiness.has_server = True
         if self._state is not None:
-            self._take(mission.on_goal_status(self.state, rospy.get_time(), self._goal.status_in(message)))
+            self._take(mission.on_goal_status(self.state, self._now(), self._goal.status_in(message)))
 
     def _on_result(self, message: MoveBaseActionResult) -> None:
-        report = messages.result(message, rospy.get_time())
+        report = messages.result(message, self._now())
         if self._state is not None and report.id == self._goal.id:
             status = GoalStatus.of(message.status.status)
             self._take(mission.on_goal_result(self.state, report.stamp, status, report.text))

@@ -20,6 +20,7 @@ from node_kit.io.inbox import Inbox
 from node_kit.ros.connections import connect_to_all
 
 from metacontrol_experiments.io.processes import wait_until
+from metacontrol_experiments.mission.clock import SteadyClock
 from metacontrol_experiments.mission.readiness import Readiness
 from metacontrol_experiments.ros.startup import DECISION_TOPIC, StartError, Startup
 
@@ -63,6 +64,7 @@ class MissionNode(ABC, Generic[State]):
         self._timeline = Timeline(thresholds)
         self._inbox = Inbox()
         self._readiness = Readiness()
+        self._clock = SteadyClock()
         self._began_wall = time.monotonic()
         self._startup = Startup(self._attend)
         self._startup.wait_for_master()
@@ -154,7 +156,7 @@ class MissionNode(ABC, Generic[State]):
         try:
             self._loop()
         except KeyboardInterrupt:
-            self._give_up(rospy.get_time(), "interrupted", interrupted=True)
+            self._give_up(self._now(), "interrupted", interrupted=True)
             self._goal.cancel()
             self._end()
             raise
@@ -183,16 +185,20 @@ class MissionNode(ABC, Generic[State]):
             if now != clock:
                 clock, moved = now, time.monotonic()
             elif time.monotonic() - moved > STANDSTILL_S:
-                self._give_up(now, "the simulated clock stands still", interrupted=False)
-            self._advance(now)
+                self._give_up(self._now(), "the simulated clock stands still", interrupted=False)
+            self._advance(self._now())
             try:
                 self._check()
             except StartError as error:
-                self._give_up(now, str(error), interrupted=False)
+                self._give_up(self._now(), str(error), interrupted=False)
+
+    def _now(self) -> float:
+        """Return the ROS time, s, but for a jump that does not last."""
+        return self._clock.believe(rospy.get_time(), time.monotonic())
 
     def _end(self) -> None:
         ended, name, values = self._ending()
-        stamp = rospy.Time.from_sec(ended if ended is not None else rospy.get_time())
+        stamp = rospy.Time.from_sec(ended if ended is not None else self._now())
         values |= {"wall_duration_s": f"{time.monotonic() - self._began_wall:.3f}"}
         self._publish_event(stamp, MissionEvent.MISSION_END, name, values)
         wait_until(lambda: rospy.get_time() > stamp.to_sec() + TAIL_S, 2.0)

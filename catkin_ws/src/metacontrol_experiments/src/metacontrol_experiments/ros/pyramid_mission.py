@@ -135,7 +135,7 @@ class PyramidMission(MissionNode[State]):
         try:
             injected = self._happen(strike)
         except (InjectionError, rospy.ROSException, rospy.ServiceException) as error:
-            self._give_up(rospy.get_time(), f"{strike} could not happen: {error}", interrupted=False)
+            self._give_up(self._now(), f"{strike} could not happen: {error}", interrupted=False)
             return
         if injected is None:
             return
@@ -182,7 +182,7 @@ class PyramidMission(MissionNode[State]):
             self._state = course.on_known(self._state)
 
     def _on_result(self, message: BuildPyramidActionResult) -> None:
-        report = messages.result(message, rospy.get_time())
+        report = messages.result(message, self._now())
         if self._state is not None and report.id == self._goal.id:
             text = report.text or message.result.message
             self._state = course.on_result(self._state, report.stamp, GoalStatus.of(message.status.status), text)
@@ -203,7 +203,7 @@ class PyramidMission(MissionNode[State]):
         count = int((distances <= IN_PLACE).sum())
         self._state = course.on_placed(self._state, count)
         left = course.BLOCKS - count
-        self._display.progress(count / course.BLOCKS, rospy.get_time(), f"{left} block{'' if left == 1 else 's'}")
+        self._display.progress(count / course.BLOCKS, self._now(), f"{left} block{'' if left == 1 else 's'}")
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         super()._on_diagnostics(message)
