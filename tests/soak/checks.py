@@ -221,12 +221,12 @@ def _lost_for_good(fault: Fault) -> tuple[str, ...]:
 
 
 def _variants(observed: Observed, pose: Pose) -> set[str]:
-    """Return the variants that were deployed at a pose or 2 s before."""
+    """Return the variants that were deployed at a pose or 2 s before; during a change, the former one may still run."""
     names = set()
     for told in observed.told:
         if told.t > pose.t:
             break
-        if told.ros < pose.ros - 2.0:
+        if told.ros < pose.ros - 2.0 and not any(state == RECONFIGURING for _, state in told.functions.values()):
             names.clear()
         names |= {one for one, _ in told.functions.values()}
     return names

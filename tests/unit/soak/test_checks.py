@@ -113,6 +113,16 @@ def test_stamps_of_the_past_and_the_future_are_no_current_data(stamp):
     assert names(observed) == {"the robot sees where it goes"}
 
 
+def test_former_variant_may_run_while_the_change_lasts():
+    observed = calm(told={"f_navigate": ("f2_v3_r2", "STABLE")}, speed=0.7)
+    observed.told.append(Told(30.0, 30.0, {"f_navigate": ("f2_v1_r2", "RECONFIGURING")}))
+    observed.told.append(Told(40.0, 40.0, {"f_navigate": ("f2_v1_r2", "STABLE")}))
+    observed.poses = [pose._replace(speed=0.7 if pose.t < 41.0 else 0.2) for pose in observed.poses]
+    assert names(observed) == set()
+    observed.poses = [pose._replace(speed=0.7 if pose.t < 45.0 else 0.2) for pose in observed.poses]
+    assert names(observed) == {"the robot keeps the speed of its variant"}
+
+
 def test_sensor_is_that_of_the_variant():
     observed = calm(told={"f_navigate": ("f1_v2_r1_b", "STABLE")})
     observed.scans = [scan._replace(topic="rear/scan" if scan.t < 20.0 else "front/scan") for scan in observed.scans]
