@@ -729,11 +729,13 @@ def _mission(_ros: Ros) -> Callable[[], object]:
     from metacontrol_bags import messages
     from metacontrol_bags.goal_status import GoalStatus as Status
     from metacontrol_bags.timeline import Timeline
+    from metacontrol_experiments.mission.clock import SteadyClock
     from metacontrol_experiments.mission.readiness import Readiness
     from metacontrol_experiments.ros.goal import MissionGoal
     from metacontrol_experiments.ros.mission import NavigationMission
 
     node = object.__new__(NavigationMission)
+    node._clock = SteadyClock()
     node._timeline, node._readiness, node._state, node._position = Timeline({"freshness": 0.2}), Readiness(), None, None
     node._goal = MissionGoal("move_base", MoveBaseActionGoal)
     node._display = SimpleNamespace(entry=lambda _: None)
@@ -769,10 +771,12 @@ def _contingencies(_ros: Ros) -> Callable[[], object]:
 
 
 def _pyramid(_ros: Ros) -> None:
+    from metacontrol_experiments.mission.clock import SteadyClock
     from metacontrol_experiments.pyramid import course
     from metacontrol_experiments.ros.pyramid_mission import PyramidMission
 
     node = object.__new__(PyramidMission)
+    node._clock = SteadyClock()
     node._state, node._placing, node._scenario = course.start(NOW), "left", None
     node._display = SimpleNamespace(progress=lambda *_: None)
     rospy.Subscriber("simulator/left_arm/state", ArmState, lambda m: node._on_arm("left", m))

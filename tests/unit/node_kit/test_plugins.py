@@ -181,6 +181,18 @@ def test_broken_command_does_not_hide_the_others(package):
     assert any(line.split()[:1] == ["check"] for line in lines)
 
 
+@pytest.mark.parametrize("attributes", ["format='4'", "format='x'", "format='2'"])
+def test_package_that_can_not_be_read_does_not_hide_the_others(package, tmp_path, attributes):
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken/package.xml").write_text(
+        f"<package {attributes}><name>broken</name><export><rosgraph_manipulator tactic='X'/></export></package>"
+    )
+    target = package("poetry", "tactic")
+    assert [(one.package, one.target) for one in find("rosgraph_manipulator", "tactic").values()] == [
+        ("poetry", target)
+    ]
+
+
 def test_nothing_is_imported_until_it_is_loaded(package):
     package("poetry", "tactic", "raise SystemExit\n")
     assert find("rosgraph_manipulator", "tactic")["Mine"].package == "poetry"

@@ -19,6 +19,11 @@ from typing import Any
 import rospkg
 from catkin_pkg.package import InvalidPackage
 
+UNREADABLE = (
+    *(rospkg.InvalidManifest, rospkg.ResourceNotFound, InvalidPackage),
+    *(AssertionError, ValueError, RecursionError, OSError),
+)
+"""What rospkg and catkin_pkg raise where a package.xml can't be read, such as one of an unknown format."""
 _TARGET = re.compile(r"(?P<module>[A-Za-z_]\w*(\.[A-Za-z_]\w*)*):(?P<attribute>[A-Za-z_]\w*)")
 _REMEDY = "correct it, or remove the export from package.xml"
 
@@ -125,7 +130,7 @@ def _exported(tag: str) -> Iterator[tuple[str, Mapping[str, str]]]:
             continue
         try:
             exports = packages.get_manifest(package).exports
-        except (rospkg.InvalidManifest, rospkg.ResourceNotFound, InvalidPackage):
+        except UNREADABLE:
             continue
         for export in exports:
             if export.tag == tag:

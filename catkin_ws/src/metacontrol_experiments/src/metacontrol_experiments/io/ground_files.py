@@ -37,10 +37,14 @@ def read_ground(world: Path | None, routes: Path | None) -> Ground:
     try:
         for path in named:
             digest.update(read_bytes(path))
-        if world is not None and (image := _image_of(world)) is not None:
-            digest.update(read_bytes(image, MAX_IMAGE_SIZE))
+        image = _image_of(world) if world is not None else None
     except InputFileError as error:
         raise RouteError(str(error)) from error
+    if image is not None:
+        try:
+            digest.update(read_bytes(image, MAX_IMAGE_SIZE))
+        except InputFileError as error:
+            raise RouteError(f"{world}: image: {error}") from error
     return Ground(world, routes, " ".join([*(path.name for path in named), digest.hexdigest()[:_DIGITS]]))
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import click
-from catkin_pkg.package import InvalidPackage, parse_package
+from catkin_pkg.package import parse_package
 from node_kit.io.input_files import real_path
+from node_kit.plugins import UNREADABLE
 
 from ros_model.cli.generate import ALL, run_generators
 from ros_model.errors import ModelError, printable
@@ -236,7 +237,7 @@ def _package_around(folder: Path) -> str:
         if os.path.isfile(around / "package.xml"):
             try:
                 return str(parse_package(str(around)).name)
-            except InvalidPackage:
+            except UNREADABLE:
                 break
     named = folder.parent if folder.name == "models" else folder
     return re.sub(r"[^A-Za-z0-9_-]+|^[^A-Za-z]+", "_", named.name).strip("_") or "my_robot"

@@ -7,7 +7,8 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from catkin_pkg.package import InvalidPackage, parse_package
+from catkin_pkg.package import parse_package
+from node_kit.plugins import UNREADABLE
 
 from ros_model.errors import ModelError
 from ros_model.generators import write_files
@@ -73,7 +74,7 @@ def _about(project: Project) -> Package | None:
         if (folder / "package.xml").is_file():
             try:
                 return parse_package(str(folder))
-            except InvalidPackage:
+            except UNREADABLE:
                 return None
     return None
 

@@ -110,6 +110,9 @@ def read_package(folder: Path) -> CatkinPackage:
         raise ModelError("it is not UTF-8: save it as UTF-8 text", Position(str(manifest), line, 1)) from error
     except InvalidPackage as error:
         raise ModelError(_first_line(error), Position(str(manifest), *_place(error))) from error
+    except AssertionError as error:
+        problem = "its format is none that catkin_pkg knows: correct the attribute `format`"
+        raise ModelError(problem, Position(str(manifest), 1, 1)) from error
     except (ValueError, RecursionError) as error:  # an encoding that is none, or one that the text does not have
         problem = f"it can't be read ({error}): save it as well-formed UTF-8 XML"
         raise ModelError(problem, Position(str(manifest), 1, 1)) from error

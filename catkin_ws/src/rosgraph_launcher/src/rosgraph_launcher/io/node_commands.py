@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 
 import rospkg
-from catkin_pkg.package import InvalidPackage
+from node_kit.plugins import UNREADABLE
 
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io.command_lines import command_line, process_environment
@@ -62,6 +62,6 @@ def safe_imports(package: str) -> tuple[str, ...]:
     """Return the modules that a package declares to be safe to import before its node begins, by their first names."""
     try:
         declared = rospkg.RosPack.get_instance().get_manifest(package).get_export(EXPORT, "safe_imports")
-    except (rospkg.InvalidManifest, rospkg.ResourceNotFound, InvalidPackage):
+    except UNREADABLE:
         return ()
     return tuple(name for name in " ".join(declared).split() if name.isidentifier())
