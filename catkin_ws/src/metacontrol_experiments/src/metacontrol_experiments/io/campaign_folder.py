@@ -52,10 +52,13 @@ def read_table(path: Path) -> pyarrow.Table:
     from pyarrow import parquet
 
     try:
-        return parquet.read_table(path)
+        table = parquet.read_table(path)
+        table.validate(full=True)
+        table.column_names  # noqa: B018, raises where one is no text
     except (pyarrow.ArrowException, OSError, ValueError) as error:
         problem = " ".join(str(error).split())
         raise CampaignError(f"{path}: is no Parquet table ({problem}); name the {TABLE} of a campaign") from error
+    return table
 
 
 def results_of(path: Path) -> dict[str, Result]:

@@ -110,7 +110,7 @@ def parse_components(value: Any) -> ComponentMap:
                 )
             )
         elif settings:
-            raise ValueError(f"components/{component}: {', '.join(settings)} need a topic")
+            raise ValueError(f"components/{component}: {', '.join(map(str, settings))} need a topic")
     return ComponentMap(of_node, topics, tuple(batteries), driver_statuses)
 
 
