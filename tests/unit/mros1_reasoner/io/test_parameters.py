@@ -27,6 +27,12 @@ def test_any_number_of_limits(model):
     assert objective.limits == {"safety": 0.5, "energy": 1.0, "performance": 0.1}
 
 
+def test_name_that_is_a_number_is_no_limit(model):
+    parameters = Parameters({"model_file": str(model), "nfr_safety": 0.5, 7: 0.1})  # as a journal may have it
+    (objective,) = parameters.objectives(parameters.knowledge_base())
+    assert objective.limits == {"safety": 0.5}
+
+
 def test_tasks_may_ask_for_all_objectives_of_a_model_without_any(model):
     parameters = given(model, default_objectives=False, nfr_safety=0.5)
     assert parameters.objectives(parameters.knowledge_base()) == ()

@@ -173,7 +173,7 @@ class Parameters:
     def limits(self, knowledge_base: KnowledgeBase) -> dict[str, float]:
         """Return the limits of `~nfr_<quality>`, for all objectives."""
         limits: dict[str, float] = {}
-        nfrs = ParameterTree(dict(_leaves({k: v for k, v in self.values.items() if k.startswith(_NFR)})))
+        nfrs = ParameterTree(dict(_leaves({k: v for k, v in self.values.items() if str(k).startswith(_NFR)})))
         for name in sorted(nfrs.values):
             quality = name.removeprefix(_NFR)
             found = _limits(nfrs, name, quality, knowledge_base)
