@@ -26,6 +26,8 @@ _INTEGERS = {
 }
 _HEADER = struct.Struct("<BI")
 _BY_BYTES = 0.25
+_TIMES = 20
+"""How much too large a message may be before it is not even made, by a guess that gives its lists equal shares."""
 
 
 def serialised(message: Any) -> bytes:
@@ -67,10 +69,13 @@ def changed(rng: Random, data: bytes, kind: Any, others: Sequence[bytes]) -> byt
         message.deserialize(data)
     except (genpy.DeserializationError, UnicodeDecodeError):
         return mutated(rng, [data], "binary")
+    size = len(data)
     for _ in range(rng.choice((1, 1, 1, 2, 3, 6))):
         holder, slot, type_name = rng.choice(list(_fields(message)))
-        before = getattr(holder, slot)
-        setattr(holder, slot, _bad(rng, type_name, before))
+        before, wrong = getattr(holder, slot), _bad(rng, type_name, getattr(holder, slot))
+        if isinstance(wrong, list) and len(wrong) * size > _TIMES * LARGEST * max(1, len(before)):
+            continue  # it takes minutes to make, and is too large in the end
+        setattr(holder, slot, wrong)
         try:
             result = serialised(message)
         except (genpy.SerializationError, struct.error, ValueError, TypeError, AttributeError, OverflowError):
@@ -78,6 +83,8 @@ def changed(rng: Random, data: bytes, kind: Any, others: Sequence[bytes]) -> byt
             continue
         if len(result) > LARGEST:
             setattr(holder, slot, before)
+        else:
+            size = len(result)
     return serialised(message)
 
 

@@ -40,6 +40,7 @@ def main() -> None:
                     verdict = tried(subject, data, Path(folder))
                 except (Exception, HangError) as error:  # outside of what takes the input
                     verdict = Verdict(BROKEN, f"a trial fails: {error!r}"[:300])
+                signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)  # the next input may take its time to make
                 told = (verdict.outcome, subject.name, f"{verdict.cpu:.4f}", str(verdict.memory), verdict.problem)
                 answers.write("\t".join(" ".join(text.split()) for text in told) + "\n")
 
