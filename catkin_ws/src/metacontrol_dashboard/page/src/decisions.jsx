@@ -1,6 +1,6 @@
 // Each decision with its causes, its ranked candidates, and why each of them lost.
 
-import { Sign } from "./panel.jsx";
+import { Sign, Table } from "./panel.jsx";
 import { DECISION_STATES, change, moment, number, seconds } from "./words.js";
 
 const KINDS = { PROPOSED: "warn", ADVISED: "muted", DECIDED: "changing", EXECUTED: "ok", FAILED: "bad" };
@@ -54,36 +54,19 @@ export function Decision({ decision, start, recorded, onSeek }) {
       </p>
       <h3>Candidates, the best first</h3>
       <p class="hint">Levels are those that were expected at that moment: what the model expects, corrected by what was measured.</p>
-      <div class="scroll" tabIndex={0} role="region" aria-label="Candidates">
-        <table>
-          <thead>
-            <tr>
-              <th scope="col">rank</th>
-              <th scope="col">design</th>
-              <th scope="col">utility</th>
-              {qualities.map((name) => (
-                <th scope="col" key={name}>
-                  {name}
-                </th>
-              ))}
-              <th scope="col">why it was not taken</th>
-            </tr>
-          </thead>
-          <tbody>
-            {ranked.map((candidate, i) => (
-              <tr key={candidate.name} class={candidate.chosen ? "chosen" : candidate.refused_because ? "refused" : ""}>
-                <td>{i + 1}</td>
-                <th scope="row">{candidate.name}</th>
-                <td>{number(candidate.utility)}</td>
-                {qualities.map((name) => (
-                  <td key={name}>{number(candidate.levels[name] ?? candidate.expected[name])}</td>
-                ))}
-                <td>{candidate.chosen ? "✔ taken" : candidate.lost_because || candidate.refused_because || "it is less useful"}</td>
-              </tr>
+      <Table label="Candidates" columns={["rank", "design", "utility", ...qualities, "why it was not taken"]}>
+        {ranked.map((candidate, i) => (
+          <tr key={candidate.name} class={candidate.chosen ? "chosen" : candidate.refused_because ? "refused" : ""}>
+            <td>{i + 1}</td>
+            <th scope="row">{candidate.name}</th>
+            <td>{number(candidate.utility)}</td>
+            {qualities.map((name) => (
+              <td key={name}>{number(candidate.levels[name] ?? candidate.expected[name])}</td>
             ))}
-          </tbody>
-        </table>
-      </div>
+            <td>{candidate.chosen ? "✔ taken" : candidate.lost_because || candidate.refused_because || "it is less useful"}</td>
+          </tr>
+        ))}
+      </Table>
     </div>
   );
 }

@@ -1,6 +1,6 @@
 // Functions, designs and groundings as the ontology has them, and the components.
 
-import { Sign } from "./panel.jsx";
+import { Sign, Table } from "./panel.jsx";
 import { moment, number, plural, short } from "./words.js";
 
 export function Functions({ state }) {
@@ -68,36 +68,20 @@ function Designs({ designs }) {
       <summary>
         {plural(designs.length, "design")}, {can.length} can be deployed
       </summary>
-      <div class="scroll" tabIndex={0} role="region" aria-label="Designs">
-        <table>
-          <thead>
-            <tr>
-              <th scope="col">design</th>
-              <th scope="col">can it be deployed?</th>
-              {qualities.map((name) => (
-                <th scope="col" key={name}>
-                  {name}, as modelled
-                </th>
-              ))}
-              <th scope="col">requires</th>
-            </tr>
-          </thead>
-          <tbody>
-            {sorted.map(([name, design]) => (
-              <tr key={name} class={design.runs ? "chosen" : design.blocked ? "refused" : ""}>
-                <th scope="row">{name}</th>
-                <td>
-                  {design.runs ? "✔ it runs" : design.blocked ? `✖ no: ${design.blocked_by.join(", ") || "a rule says so"}` : design.lacks.length ? `✖ no: ${design.lacks.join(", ")}` : design.failed ? `not now: ${design.failed}` : "yes"}
-                </td>
-                {qualities.map((quality) => (
-                  <td key={quality}>{number(design.expected[quality])}</td>
-                ))}
-                <td>{[...design.components, ...design.requires].join(", ")}</td>
-              </tr>
+      <Table label="Designs" columns={["design", "can it be deployed?", ...qualities.map((name) => `${name}, as modelled`), "requires"]}>
+        {sorted.map(([name, design]) => (
+          <tr key={name} class={design.runs ? "chosen" : design.blocked ? "refused" : ""}>
+            <th scope="row">{name}</th>
+            <td>
+              {design.runs ? "✔ it runs" : design.blocked ? `✖ no: ${design.blocked_by.join(", ") || "a rule says so"}` : design.lacks.length ? `✖ no: ${design.lacks.join(", ")}` : design.failed ? `not now: ${design.failed}` : "yes"}
+            </td>
+            {qualities.map((quality) => (
+              <td key={quality}>{number(design.expected[quality])}</td>
             ))}
-          </tbody>
-        </table>
-      </div>
+            <td>{[...design.components, ...design.requires].join(", ")}</td>
+          </tr>
+        ))}
+      </Table>
     </details>
   );
 }
@@ -110,54 +94,40 @@ export function Components({ state, start }) {
   const rank = (name) => (known[name]?.status === "FALSE" ? 0 : known[name]?.failures ? 1 : 2);
   names.sort((a, b) => rank(a) - rank(b) || a.localeCompare(b));
   return (
-    <div class="scroll" tabIndex={0} role="region" aria-label="Components">
-      <table>
-        <thead>
-          <tr>
-            <th scope="col">component</th>
-            <th scope="col">health</th>
-            <th scope="col">failures</th>
-            <th scope="col">history</th>
-            <th scope="col">repair</th>
-            <th scope="col">required by</th>
+    <Table label="Components" columns={["component", "health", "failures", "history", "repair", "required by"]}>
+      {names.map((name) => {
+        const component = known[name];
+        const about = model[name];
+        const status = component?.status ?? about?.status;
+        const [sign, kind, text] = { TRUE: ["●", "ok", "works"], RECOVERED: ["●", "ok", "works again"], FALSE: ["✖", "bad", "has failed"] }[status] ?? ["○", "muted", "not reported"];
+        return (
+          <tr key={name}>
+            <th scope="row">{name}</th>
+            <td>
+              <Sign sign={sign} kind={kind} text={text} />
+              {component?.reason && <div class="hint">{component.reason}</div>}
+            </td>
+            <td>{component?.failures ?? 0}</td>
+            <td>
+              {(component?.history ?? []).length > 1 && (
+                <details>
+                  <summary>{plural(component.history.length, "change")}</summary>
+                  <ul>
+                    {component.history.map(([at, what, reason]) => (
+                      <li key={at}>
+                        {moment(at, start)} {what} {reason}
+                      </li>
+                    ))}
+                  </ul>
+                </details>
+              )}
+            </td>
+            <td>{about?.repair ? `takes ${number(about.repair.duration)} s, succeeds in ${Math.round(about.repair.success * 100)} %` : "–"}</td>
+            <td>{!about ? "–" : about.required_by.length || !about.node_of_designs ? plural(about.required_by.length, "design") : "part of designs"}</td>
           </tr>
-        </thead>
-        <tbody>
-          {names.map((name) => {
-            const component = known[name];
-            const about = model[name];
-            const status = component?.status ?? about?.status;
-            const [sign, kind, text] = { TRUE: ["●", "ok", "works"], RECOVERED: ["●", "ok", "works again"], FALSE: ["✖", "bad", "has failed"] }[status] ?? ["○", "muted", "not reported"];
-            return (
-              <tr key={name}>
-                <th scope="row">{name}</th>
-                <td>
-                  <Sign sign={sign} kind={kind} text={text} />
-                  {component?.reason && <div class="hint">{component.reason}</div>}
-                </td>
-                <td>{component?.failures ?? 0}</td>
-                <td>
-                  {(component?.history ?? []).length > 1 && (
-                    <details>
-                      <summary>{plural(component.history.length, "change")}</summary>
-                      <ul>
-                        {component.history.map(([at, what, reason]) => (
-                          <li key={at}>
-                            {moment(at, start)} {what} {reason}
-                          </li>
-                        ))}
-                      </ul>
-                    </details>
-                  )}
-                </td>
-                <td>{about?.repair ? `takes ${number(about.repair.duration)} s, succeeds in ${Math.round(about.repair.success * 100)} %` : "–"}</td>
-                <td>{!about ? "–" : about.required_by.length || !about.node_of_designs ? plural(about.required_by.length, "design") : "part of designs"}</td>
-              </tr>
-            );
-          })}
-        </tbody>
-      </table>
-    </div>
+        );
+      })}
+    </Table>
   );
 }
 
@@ -166,27 +136,16 @@ export function Usage({ usage }) {
   if (!rows.length) return <p class="hint">Nobody has measured the nodes yet.</p>;
   const most = Math.max(100, ...rows.map(([, cost]) => cost.cpu ?? 0));
   return (
-    <div class="scroll" tabIndex={0} role="region" aria-label="What nodes cost">
-      <table>
-        <thead>
-          <tr>
-            <th scope="col">node</th>
-            <th scope="col">CPU, % of a core</th>
-            <th scope="col">memory, MB</th>
-          </tr>
-        </thead>
-        <tbody>
-          {rows.map(([name, cost]) => (
-            <tr key={name}>
-              <th scope="row">{short(name)}</th>
-              <td>
-                <meter min={0} max={most} value={cost.cpu ?? 0} aria-hidden="true" /> {number(cost.cpu)}
-              </td>
-              <td>{number(cost.memory)}</td>
-            </tr>
-          ))}
-        </tbody>
-      </table>
-    </div>
+    <Table label="What nodes cost" columns={["node", "CPU, % of a core", "memory, MB"]}>
+      {rows.map(([name, cost]) => (
+        <tr key={name}>
+          <th scope="row">{short(name)}</th>
+          <td>
+            <meter min={0} max={most} value={cost.cpu ?? 0} aria-hidden="true" /> {number(cost.cpu)}
+          </td>
+          <td>{number(cost.memory)}</td>
+        </tr>
+      ))}
+    </Table>
   );
 }

@@ -25,3 +25,23 @@ export function Sign({ sign, kind, text }) {
     </span>
   );
 }
+
+// A table that scrolls by itself, also by keys; its rows are the children.
+export function Table({ label, columns, children }) {
+  return (
+    <div class="scroll" tabIndex={0} role="region" aria-label={label}>
+      <table>
+        <thead>
+          <tr>
+            {columns.map((name, i) => (
+              <th scope="col" key={i}>
+                {name}
+              </th>
+            ))}
+          </tr>
+        </thead>
+        <tbody>{children}</tbody>
+      </table>
+    </div>
+  );
+}

@@ -1,6 +1,7 @@
 // Other limits for a recorded run: what was done beside what would have been done.
 
 import { Component } from "preact";
+import { Table } from "./panel.jsx";
 import { change, moment, number } from "./words.js";
 
 export class Replay extends Component {
@@ -39,46 +40,40 @@ export class Replay extends Component {
         </form>
         <p role="status">{told}</p>
         {pairs && (
-          <div class="scroll" tabIndex={0} role="region" aria-label="Decisions side by side">
-            <table>
-              <thead>
-                <tr>
-                  <th scope="col">when</th>
-                  <th scope="col">done</th>
-                  <th scope="col">with {Object.entries(limits).map(([quality, limit]) => `${quality} ${limit}`).join(", ") || "the same limits"}</th>
-                </tr>
-              </thead>
-              <tbody>
-                {pairs.map((pair, i) => (
-                  <tr key={i}>
-                    <td>
-                      <button type="button" class="link" onClick={() => onSeek(pair.t)}>
-                        {moment(pair.t, start)}
-                      </button>
+          <>
+            <Table
+              label="Decisions side by side"
+              columns={["when", "done", `with ${Object.entries(limits).map(([quality, limit]) => `${quality} ${limit}`).join(", ") || "the same limits"}`]}
+            >
+              {pairs.map((pair, i) => (
+                <tr key={i}>
+                  <td>
+                    <button type="button" class="link" onClick={() => onSeek(pair.t)}>
+                      {moment(pair.t, start)}
+                    </button>
+                  </td>
+                  {["recorded", "replayed"].map((side) => (
+                    <td key={side}>
+                      {pair[side] ? (
+                        <>
+                          <b>{change(pair[side])}</b>
+                          <div class="hint">{pair[side].causes[0]}</div>
+                        </>
+                      ) : (
+                        "–"
+                      )}
                     </td>
-                    {["recorded", "replayed"].map((side) => (
-                      <td key={side}>
-                        {pair[side] ? (
-                          <>
-                            <b>{change(pair[side])}</b>
-                            <div class="hint">{pair[side].causes[0]}</div>
-                          </>
-                        ) : (
-                          "–"
-                        )}
-                      </td>
-                    ))}
-                  </tr>
-                ))}
-                {!pairs.length && (
-                  <tr>
-                    <td colSpan={3}>No decision, neither recorded nor with these limits.</td>
-                  </tr>
-                )}
-              </tbody>
-            </table>
+                  ))}
+                </tr>
+              ))}
+              {!pairs.length && (
+                <tr>
+                  <td colSpan={3}>No decision, neither recorded nor with these limits.</td>
+                </tr>
+              )}
+            </Table>
             <p class="hint">From the first difference on, levels and components are taken as they were observed.</p>
-          </div>
+          </>
         )}
       </div>
     );
