@@ -30,6 +30,7 @@ def test_supposed_failures_and_limits():
         {"action": "set_limit", "quality": "noise"},
         {"action": "set_limit", "quality": "noise", "value": True},
         {"action": "set_limit", "quality": "noise", "value": float("nan")},
+        {"action": "set_limit", "quality": "noise", "value": 10**400},
         {"action": "suppose", "failed": "rudder"},
         {"action": "suppose", "failed": ["x"] * 1000},
         {"action": "suppose", "limits": {"noise": "much"}},
