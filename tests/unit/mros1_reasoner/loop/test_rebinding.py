@@ -35,6 +35,8 @@ def model(levels=LEVELS):
             text += assertion(value, v.IS_QA_TYPE, APP + quality)
             text += assertion(value, v.HAS_VALUE, level, v.XSD + "decimal")
     for design, sensor in SENSORS.items():
+        if design not in levels:
+            continue
         binding = f"{APP}touch_by_{sensor}"
         text += typed(APP + sensor, v.COMPONENT) + typed(binding, v.TOMASYS + "Binding")
         text += assertion(binding, v.BINDING_ROLE, APP + "touch")
@@ -63,9 +65,9 @@ def loop(request, tmp_path, pellet):
     return make
 
 
-def decided(core, now):
+def decided(core, now, heartbeat=False):
     """Return the decision of a step that has been carried out."""
-    found = [decision for decision in core.step(now) if decision.to_configuration]
+    found = [decision for decision in core.step(now, heartbeat=heartbeat) if decision.to_configuration]
     if not found:
         return None
     core.report(now + 0.1, found[0].id, ok=True)
@@ -134,6 +136,23 @@ def test_spare_that_is_more_useful_than_its_design_stays(loop):
         assert decided(core, now + 1.0) is None
         core.observe_component(now + 5.0, "right", "TRUE")
         assert decided(core, now + 6.0) is None
+
+
+def test_first_component_comes_back_and_the_way_back_to_the_design_before_stays_open(loop):
+    levels = {
+        "suck": {"performance": 0.9, "force": 26},
+        "grip": {"performance": 0.6, "force": 20},
+        "grip_left": {"performance": 0.6, "force": 16},
+    }
+    core, running, now, seen = loop("suck", levels=levels, history=3, violation_window=1.0), "suck", 1.0, []
+    # The cause of the violation gets less, so far that the first component may be used again, and then it is gone.
+    for factor in [1.5] * 20 + [1.2] * 40 + [1.0] * 80:
+        now += 0.5
+        core.observe_level(now, "force", levels[running]["force"] * factor)
+        if decision := decided(core, now, heartbeat=True):
+            running = decision.to_configuration
+            seen.append(running)
+    assert seen == ["grip_left", "grip", "suck"]
 
 
 def test_design_comes_before_its_rebindings_though_their_levels_are_nearer_to_the_running_one():

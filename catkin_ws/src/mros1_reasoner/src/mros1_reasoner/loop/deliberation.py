@@ -257,7 +257,7 @@ class Deliberation:
         )
         decision = self._decision(objective, causes, first, timing, words, self._wall() - began)
         if not self._state.settings.dry_run:
-            self._state.note_blame(timing.now, name, causes)
+            self._state.note_blame(timing.now, name, causes, is_better=not self._is_rebinding(name, outcome))
         return replace(
             decision,
             state=ADVISED if self._state.settings.dry_run else DECIDED,
@@ -498,6 +498,11 @@ class Deliberation:
         if found.choice is None or found.is_makeshift:
             return None
         return replace(found, reason=_rebinding(self._state.kb.designs[found.choice], running))
+
+    def _is_rebinding(self, name: str, outcome: Plan) -> bool:
+        """Return whether the running design stays but for its bindings."""
+        designs, running = self._state.kb.designs, self._state.running[name].design
+        return designs[running or ""].root == designs[outcome.choice or ""].root if running else False
 
     def _has_other_error(self, name: str) -> bool:
         """Return whether something is wrong with a running design beside its components."""

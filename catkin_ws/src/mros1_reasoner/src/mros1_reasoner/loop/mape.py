@@ -266,7 +266,8 @@ class Mape:
 
         Args:
             now: present time.
-            heartbeat: reason also when merely a level has changed.
+            heartbeat: reason also when merely a level has changed, or the cause of a violation is gone but the
+                last levels, by which other designs are judged, allowed no better design yet.
 
         Returns:
             Decisions to publish: those that are DECIDED are to be carried out and reported, at most one of them is no
@@ -286,7 +287,8 @@ class Mape:
         self._state.note_failed_nodes(now)
         facts = self._state.facts_at(now)
         seen = self._state.what_counts(facts, now)
-        if seen == self._state.seen and not (heartbeat and facts != self._state.facts):
+        looks_again = heartbeat and (facts != self._state.facts or bool(self._state.relieved(now)))
+        if seen == self._state.seen and not looks_again:
             return []
         began = self._wall()
         analysis = self._kb.analyse(facts, self._reasoner)

@@ -335,7 +335,7 @@ class View:
             frozenset(facts.levels),
             passed,
             self.violations(now),
-            frozenset(name for name in self.running if self.is_relieved(name, now)),
+            self.relieved(now),
             frozenset(name for name in self.running if self.rule_counts(name, now)),
             tuple(running.failed_nodes for running in self.running.values()),
             tuple((n, d.parameters, d.is_left) for r in self.running.values() for n, d in r.drifts.items()),
@@ -383,6 +383,10 @@ class View:
         """Return whether the causes for which designs of an objective were left have been gone for long enough."""
         gone = self.levels.gone_since(now, name)
         return gone is not None and now - gone >= self.calm(name)
+
+    def relieved(self, now: float) -> frozenset[str]:
+        """Return the objectives of which that holds."""
+        return frozenset(name for name in self.running if self.is_relieved(name, now))
 
     def is_relapse(self, name: str, now: float) -> bool:
         """Return whether a violation now comes soon after the return to a better design."""

@@ -474,8 +474,15 @@ class State(View):
         self.retries = {key: entry for key, entry in self.retries.items() if key in kept or key not in self.error_log}
         self.error_log = {key: entry for key, entry in self.error_log.items() if key in kept}
 
-    def note_blame(self, now: float, name: str, causes: Iterable[Cause]) -> None:
-        """Note for which qualities the design of an objective is left, or that it is left for a better one."""
+    def note_blame(self, now: float, name: str, causes: Iterable[Cause], *, is_better: bool) -> None:
+        """Note for which qualities the design of an objective is left, or that it is left because their cause is gone.
+
+        Args:
+            now: present time.
+            name: the objective.
+            causes: why its design is left.
+            is_better: whether what comes is a better design; else a better one is still looked for.
+        """
         running, causes = self.running.get(name), tuple(causes)
         if running is None:
             return
@@ -483,7 +490,8 @@ class State(View):
         for quality in violated:
             self.levels.blame(now, (name, quality))
         if any(is_relief(cause) for cause in causes) and not violated:
-            self.levels.acquit(name)
+            if is_better:
+                self.levels.acquit(name)
             self._run(name, returned_at=now)
         elif violated:
             relapses = running.relapses + 1 if self.is_relapse(name, now) else 0
