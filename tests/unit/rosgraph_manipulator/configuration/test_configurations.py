@@ -74,6 +74,12 @@ def test_older_form_that_is_no_list_of_packages_is_refused(names):
         parse_options({"configs": names}, lambda uri, _anywhere: uri)
 
 
+@pytest.mark.parametrize("args", [127, "profile:=slow", {"profile": "slow"}])
+def test_arguments_that_are_no_list_are_refused(args):
+    with pytest.raises(ConfigurationError, match="configurations/a: 'args' is .*: it must be a list of NAME:=VALUE"):
+        parse_options({"configurations": {"a": {"launch": "/a", "args": args}}}, lambda uri, _anywhere: uri)
+
+
 TWO = {"look": {"launch": "/l", "function": "f_look"}, "pick": {"launch": "/p", "function": "f_pick"}}
 GRASP = {"save_action": "grasp", "goal_msg_type": "arm_msgs/GraspAction"}
 

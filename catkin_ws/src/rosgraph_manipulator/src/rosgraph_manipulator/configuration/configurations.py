@@ -254,7 +254,10 @@ def _configuration(name: str, entry: object, find_launch_file: FindLaunchFile) -
         raise ConfigurationError(f"{where}: expected 'launch: FILE' or 'command: roslaunch PKG FILE', got {entry!r}")
     function = str(entry.get("function", DEFAULT_FUNCTION))
     if "launch" in entry:
-        uri, args = str(entry["launch"]), [str(arg) for arg in entry.get("args") or []]
+        uri, args = str(entry["launch"]), entry.get("args") or []
+        if not isinstance(args, list):
+            raise ConfigurationError(f"{where}: 'args' is {args!r}: it must be a list of NAME:=VALUE")
+        args = [str(arg) for arg in args]
     elif "command" in entry:
         uri, args = _parse_command(where, str(entry["command"]))
     else:
