@@ -34,9 +34,9 @@ from soak.records import Record, Struck
 from soak.recovery import recoveries
 from soak.striking import LeftOutError, Place, Striker, Undo
 
-TIMEOUT_S = 120
+TIMEOUT_S = 240
 """ROS s after which a mission has failed."""
-LIMIT_S = 300.0
+LIMIT_S = 540.0
 """Wall s after which a mission's command is ended, and that is told as broken: start, time-out and end, twice over."""
 START_S = 220.0
 """Wall s that it may take to send the goal; the command itself waits for 90 s for each part."""

@@ -16,7 +16,7 @@ PELLET = "pellet"
 ROUTES = ("r1", "r2", "r3", "r4", "r5", "r6")
 FIRST = ("f2_v2_r2", "f1_v2_r1", "f3_v2_r3", "f1_v1_r3")
 """Variants that are deployed at the start."""
-FAULTS_EACH = 5
+FAULTS_EACH = 7
 """Faults of a mission."""
 PHASES = ("begun", "stops", "starts")
 """Of a change: it has just begun; a node of it has just ended; a new one has just started."""
@@ -168,7 +168,7 @@ def mission(seed: int, number: int) -> Mission:
     for kind in kinds:
         fault = _fault(kind, round(at, 1), engine, draw)
         faults.append(fault)
-        at += fault.lasts * draw.choice((0.0, 0.5, 1.0)) + draw.uniform(3.0, 8.0)
+        at += fault.lasts * draw.choice((0.0, 0.5, 1.0)) + draw.uniform(2.0, 6.0)
     return Mission(number, draw.randrange(1, 2**31), draw.choice(ROUTES), draw.choice(FIRST), engine, tuple(faults))
 
 
