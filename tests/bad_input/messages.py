@@ -26,6 +26,8 @@ _INTEGERS = {
 }
 _HEADER = struct.Struct("<BI")
 _BY_BYTES = 0.25
+_MOST_ITEMS = 1_000_000
+"""Of a list that is made longer, so that the list of a list that was made longer before takes no gigabytes."""
 _TIMES = 20
 """How much too large a message may be before it is not even made, by a guess that gives its lists equal shares."""
 
@@ -140,7 +142,8 @@ def _bad_array(rng: Random, type_name: str, value: Any) -> Any:  # noqa: PLR0911
         case 2:
             return [*items, example]
         case 3:
-            return (items or [example]) * rng.choice((2, 50, 3000))
+            longer = (items or [example])[:_MOST_ITEMS]
+            return longer * min(rng.choice((2, 50, 3000)), max(2, _MOST_ITEMS // len(longer)))
         case 4:
             return items[::-1]
         case 5 if items:
