@@ -15,13 +15,12 @@ from pathlib import Path
 import click
 from helpers.soaking import FOLDER, Arguments, code, whole
 
+from soak.driving import OWN
 from soak.records import Record, RecordsError, faults, parsed, read, report, write
 
 RECORDS, REPORT = "missions.jsonl", "report.md"
 FAILURES = 3
 """Missions in a row without a record, after which the soak ends: the fault is its own."""
-_OWN = ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
-"""A mission ends when this process dies, also where a shell script runs it in the background."""
 _POLL_S = 0.2
 _GRACE_S = 90.0
 """Wall s for a mission that was interrupted: it ends its processes one after the other."""
@@ -139,7 +138,7 @@ class Soak:
 def drive_command(seed: int, number: int, folder: Path) -> list[str]:
     """Return the command that drives one mission and prints its record."""
     words = [sys.executable, "-m", "soak.driving", str(seed), str(number), str(folder)]
-    return [*_OWN, *own_network(), *words]
+    return [*OWN, *own_network(), *words]
 
 
 @cache

@@ -49,14 +49,15 @@ DISK_MB = 160
 PACKAGE = "metacontrol_sim"
 _SET_FLAGS, _UP = 0x8914, 0x41
 """Of Linux: SIOCSIFFLAGS, and IFF_UP with IFF_RUNNING."""
-_OWN = ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
+OWN = ("setpriv", "--pdeathsig", "INT", "env", "--default-signal=INT")
+"""Begins the command of a process that is to end with this one, also where a shell runs that in the background."""
 
 
 def main() -> None:
     """Drive the mission."""
     seed, number, folder = int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3]).resolve()
     plan = mission(seed, number)
-    _begin_network()
+    begin_network()
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     record = Drive(plan, folder).run()
@@ -97,7 +98,7 @@ class Drive:
         helpers |= {"ROS_LOG_DIR": str(self.folder / "helpers"), "ROS_HOME": str(self.folder / "helpers")}
         table = ProcessTable(str(output))
         command = subprocess.Popen(
-            [*_OWN, *self._command(port, output)],
+            [*OWN, *self._command(port, output)],
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=(self.folder / "said.log").open("wb"),
@@ -302,7 +303,7 @@ def judge(plan: Mission, observed: Observed, left_out: dict[int, str], wall_s: f
     )
 
 
-def _begin_network() -> None:
+def begin_network() -> None:
     """Begin with the loopback of a network of one's own, where this process has one; elsewhere it is there already."""
     with socket.socket() as probe, suppress(OSError):
         asked = struct.pack("16sH22x", b"lo", _UP)

@@ -167,6 +167,7 @@ def test_engine_that_is_given_takes_the_place_of_that_of_the_file():
         (changed("routes", ["r1", "r1"]), "parts.small.routes: 'r1' stands there more than once"),
         (changed("initial_configurations", ["f9"]), "initial_configurations: no variant 'f9'; there are f1_v1_r1"),
         (changed("managers", {"magic": 1}), "managers: no manager 'magic'; there are none, mros"),
+        (changed("managers", {"none": 2**63}), "missions; give fewer, at most 1,000,000"),
         (changed("managers", {"none": 0}), "managers.none: is 0; give a whole number, 1 or more"),
         (changed("clutter", [101]), "parts.small.clutter: clutter: is 101; give a whole number from 0 to 100"),
         (changed("power", [-1]), "parts.small.power: power: is -1; give a number 0 or more"),

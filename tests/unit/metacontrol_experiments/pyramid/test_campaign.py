@@ -37,6 +37,7 @@ def test_baseline_differs_in_one_word():
         ({"scenarios": [9]}, "scenarios"),
         ({"seeds": 0}, "seeds"),
         ({"seeds": 2.5}, "seeds"),
+        ({"seeds": 2**64}, "seeds: asks for .* missions; give fewer, at most 1,000,000"),
         ({"managers": ["rules"]}, "managers"),
         ({"managers": []}, "managers"),
         ({"engine": "ros"}, "engine"),

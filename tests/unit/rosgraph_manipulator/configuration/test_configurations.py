@@ -76,7 +76,7 @@ def test_older_form_that_is_no_list_of_packages_is_refused(names):
 
 @pytest.mark.parametrize("args", [127, "profile:=slow", {"profile": "slow"}])
 def test_arguments_that_are_no_list_are_refused(args):
-    with pytest.raises(ConfigurationError, match="configurations/a: 'args' is .*: it must be a list of NAME:=VALUE"):
+    with pytest.raises(ConfigurationError, match=r"configurations/a: 'args' is .*: it must be a list of NAME:=VALUE"):
         parse_options({"configurations": {"a": {"launch": "/a", "args": args}}}, lambda uri, _anywhere: uri)
 
 

@@ -25,6 +25,8 @@ DEADLINE_S = 600.0
 """Wall s for a run, by default: a mission in lockstep takes some seconds."""
 FIRST_SEED = 2**20
 """Seeds of campaigns are not below, those of calibration are: no variant is measured on what it is tried on."""
+MOST_MISSIONS = 1_000_000
+"""That a part of a campaign may ask for: years of work."""
 
 _SEEDS = 2**30
 _TEXTS = {"type": "array", "minItems": 1, "items": {"type": "string", "title": "text"}, "title": "a list of names"}
@@ -236,6 +238,16 @@ def parse_campaign(content: Any, known: Known, where: str, engine: str | None = 
     return Campaign(tuple(runs), deadline, logs, known.ground)
 
 
+def check_count(count: int, where: str) -> None:
+    """Check how many missions are asked for, before they are listed.
+
+    Raises:
+        CampaignError: they are more than any machine drives.
+    """
+    if count > MOST_MISSIONS:
+        raise CampaignError(f"{where}: asks for {count:,} missions; give fewer, at most {MOST_MISSIONS:,}")
+
+
 def contingencies_of(run: Run) -> tuple[Contingency, ...]:
     """Return what goes wrong in a run."""
     return tuple(parse_contingency(text) for text in run.contingencies)
@@ -269,6 +281,8 @@ def _runs(name: str, part: Mapping[str, Any], known: Known, where: str, common: 
     failures = part.get("failures", {"none": []})
     for failure, texts in failures.items():
         _check_contingencies(texts, known.components, f"{where}.failures.{failure}")
+    cells = len(part["routes"]) * len(part["initial_configurations"]) * len(clutter) * len(power) * len(failures)
+    check_count(cells * sum(repeats.values()), where)
     for repeat in range(1, max(repeats.values()) + 1):
         for cell in itertools.product(part["routes"], part["initial_configurations"], clutter, power, failures):
             contingencies = (*_disturbances(cell[2], cell[3], where), *failures[cell[4]])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ros_model.project.schema_check import violations
 
-from metacontrol_experiments.campaign.matrix import CampaignError
+from metacontrol_experiments.campaign.matrix import CampaignError, check_count
 from metacontrol_experiments.managers.manager import MROS, NONE
 from metacontrol_experiments.pyramid.scenarios import MANIPULATION, TITLES, UNDISTURBED
 from metacontrol_experiments.report.statistics import rate
@@ -118,12 +118,15 @@ def parse_pyramids(content: Any, where: str) -> tuple[PyramidRun, ...]:
     """
     for violation in violations(content, _SCHEMA):
         raise CampaignError(f"{where}: {violation}")
+    scenarios, managers = (tuple(dict.fromkeys(content[key])) for key in ("scenarios", "managers"))
+    given = tuple(dict.fromkeys(content.get("initial_configurations", [""])))
+    check_count(content["seeds"] * len(scenarios) * len(given) * len(managers), f"{where}: seeds")
     return tuple(
         PyramidRun(scenario, seed, manager, configurations)
         for seed in range(1, content["seeds"] + 1)
-        for scenario in dict.fromkeys(content["scenarios"])
-        for configurations in dict.fromkeys(content.get("initial_configurations", [""]))
-        for manager in dict.fromkeys(content["managers"])
+        for scenario in scenarios
+        for configurations in given
+        for manager in managers
     )
 
 

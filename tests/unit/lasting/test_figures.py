@@ -1,0 +1,71 @@
+"""Whether a system that has lived for hours is as it was at the start."""
+
+from random import Random
+
+import pytest
+from lasting.faults import TARGETS, fault
+from lasting.figures import End, Goal, Reading, Recovery, Run, broken, changes, line, read, report
+from soak.plan import PARTS, Kind
+
+
+def life(role, pid, memory, descriptors=lambda t: 20, threads=lambda t: 10, until=1000.0):
+    return [
+        Reading(float(t), pid, role, memory(t), descriptors(t), threads(t)) for t in range(0, 1001, 10) if t <= until
+    ]
+
+
+def run(*lives, **rest):
+    return Run(readings=[reading for one in lives for reading in one], **rest)
+
+
+def test_process_that_stays_as_it_was_is_flat():
+    grown_once = life("reasoner", 1, lambda t: 50.0 if t < 100 else 70.0)
+    assert broken(run(grown_once, end=End(1000.0, []))) == []
+    assert changes(run(grown_once))[0].memory == (70.0, 70.0)
+
+
+@pytest.mark.parametrize(
+    ("grows", "said"),
+    [
+        ({"memory": lambda t: 60.0 + t / 50.0}, "reasoner grows: 63 to 79 MB"),
+        ({"memory": lambda t: 60.0, "descriptors": lambda t: 20 + t // 50}, "20 to 3|23 to 39 descriptors"),
+        ({"memory": lambda t: 60.0, "threads": lambda t: 10 + t // 100}, "11 to 19 threads"),
+    ],
+)
+def test_growth_is_broken(grows, said):
+    (found,) = broken(run(life("reasoner", 1, **grows)))
+    assert any(words in found for words in said.split("|"))
+
+
+def test_only_processes_that_lived_all_the_time_are_compared():
+    young = [reading for reading in life("move_base", 2, lambda t: 200.0) if reading.t > 700.0]
+    assert changes(run(life("move_base", 1, lambda t: 80.0, until=600.0), young)) == []
+
+
+def test_fault_after_which_all_is_not_well_is_broken():
+    recoveries = [Recovery(5.0, "KILL", "move_base", 1.5), Recovery(60.0, "USURP", "move_base", None)]
+    assert broken(Run(recoveries=recoveries, end=End(90.0, ["left"]))) == [
+        "left",
+        "not well again after USURP (move_base)",
+    ]
+
+
+def test_report_has_what_was_written(tmp_path):
+    path = tmp_path / "run-0.jsonl"
+    lines = [line("reading", reading) for reading in life("reasoner", 1, lambda t: 60.0)]
+    lines += [line("goal", Goal(50.0, "succeeded", 40.0)), line("goal", Goal(90.0, "succeeded", 38.0))]
+    lines += [line("recovery", Recovery(10.0, "KILL", "", 2.0)), line("stretch", (1.5,)), line("end", End(1000.0, []))]
+    path.write_text("".join(lines) + '["reading", 10')
+    told = report([read(path)], "abc", 7)
+    assert "1 systems of seed 7 on code abc, 0.28 h, 1 faults\ngoals: succeeded 2\n" in told
+    assert "| reasoner | 60 | 60 | 20 | 20 | 10 | 10 |" in told
+    assert "| first quarter | 1 | 2.0 | 2.0 |" in told
+    assert told.endswith("- nothing broken\n")
+
+
+def test_faults_are_those_that_the_four_parts_outlive():
+    drawn = [fault(Random(number)) for number in range(500)]
+    assert {one.kind for one in drawn} == set(TARGETS)
+    deadly = {Kind.KILL, Kind.USURP, Kind.KILL_IN_CHANGE, Kind.KILL_STARTING}
+    assert not any(set(one.targets) & set(PARTS) for one in drawn if one.kind in deadly)
+    assert all(one.lasts > 0.0 for one in drawn if one.kind not in deadly)
