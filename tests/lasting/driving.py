@@ -230,9 +230,7 @@ class Drive:
             time.sleep(PERIOD_S)
         return None
 
-    def _end(
-        self, system: subprocess.Popen[bytes], table: ProcessTable, helpers: list[subprocess.Popen[str]]
-    ) -> None:
+    def _end(self, system: subprocess.Popen[bytes], table: ProcessTable, helpers: list[subprocess.Popen[str]]) -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         lived = self.lines.t
         for helper in helpers:
