@@ -16,8 +16,10 @@ SHARE = 0.1
 """Of a run: its start and its end. The start comes after the first of these shares, when all has been used once."""
 MORE_MEMORY, MORE_MB = 1.1, 5.0
 """A process may have so many times the memory of its start, and so many MB on top."""
-MORE_DESCRIPTORS, MORE_THREADS = 8, 4
-"""More than at the start that a process may have."""
+MORE_DESCRIPTORS, MORE_THREADS = 1.3, 1.3
+"""The same. Connections of nodes that were killed are closed later, so both go up and down."""
+MORE = 8
+"""Descriptors or threads on top."""
 
 
 class Reading(NamedTuple):
@@ -84,8 +86,8 @@ class Change(NamedTuple):
         """Whether it is as it was."""
         return (
             self.memory[1] <= MORE_MEMORY * self.memory[0] + MORE_MB
-            and self.descriptors[1] <= self.descriptors[0] + MORE_DESCRIPTORS
-            and self.threads[1] <= self.threads[0] + MORE_THREADS
+            and self.descriptors[1] <= MORE_DESCRIPTORS * self.descriptors[0] + MORE
+            and self.threads[1] <= MORE_THREADS * self.threads[0] + MORE
         )
 
 
