@@ -213,6 +213,7 @@ class MoveBaseTest(unittest.TestCase):
         self.assertEqual(self.finish()[0], GoalStatus.SUCCEEDED)
         self.assertEqual(states, {GoalStatus.ACTIVE})
         self.assertGreater(self.robot.x, 2.2)
+        self.assertFalse(rospy.has_param("move_base/resume_goal"), "it is meant for one start only")
 
     def test_malformed_goal_to_resume_is_ignored(self):
         self.stop()

@@ -12,7 +12,10 @@ from node_kit.takeover import TakeoverError, decode_parameter
 
 
 def take_resumed_goal(action: str, goal_class: Any) -> Any:
-    """Return the goal to take over, and delete the parameter `ACTION/resume_goal`: it is meant for this start only.
+    """Return the goal to take over, from the parameter `ACTION/resume_goal`.
+
+    `start_with` deletes the parameter, which is meant for one start only. Until then it stays: a server that is killed
+    while it starts has taken over nothing, and the next one does.
 
     Args:
         action: name of the action.
@@ -26,19 +29,18 @@ def take_resumed_goal(action: str, goal_class: Any) -> Any:
         value = rospy.get_param(name)
     except KeyError:
         return None
-    with contextlib.suppress(KeyError):
-        rospy.delete_param(name)
     try:
         goal = goal_class().deserialize(decode_parameter(value, goal_class._type))
     except (TakeoverError, genpy.DeserializationError) as error:
         rospy.logwarn("%s ignored: %s", name, error)
+        _delete(name)
         return None
     rospy.loginfo("Taking over goal %s", goal.goal_id.id)
     return goal
 
 
 def start_with(server: Any, goal: Any) -> None:
-    """Start a server as its `start` does, but its first status already holds a goal.
+    """Start a server as its `start` does, but its first status already holds a goal that it has taken over.
 
     Args:
         server: an ActionServer of actionlib that was made with `auto_start=False`; of a SimpleActionServer, its
@@ -49,5 +51,11 @@ def start_with(server: Any, goal: Any) -> None:
         server.initialize()
         server.started = True
         if goal is not None:
+            _delete(rospy.resolve_name(f"{server.ns}/resume_goal"))  # before it can do harm again
             server.internal_goal_callback(goal)
         server.publish_status()
+
+
+def _delete(name: str) -> None:
+    with contextlib.suppress(KeyError):
+        rospy.delete_param(name)

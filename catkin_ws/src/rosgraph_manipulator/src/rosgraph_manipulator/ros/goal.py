@@ -1,8 +1,9 @@
 """Keeps the pending goal of an action while its server is replaced; the decisions are in `goal_keeper`.
 
 As long as the goal is pending, it is stored in the parameter `ACTION/resume_goal`. A server that knows the parameter
-continues the goal before it publishes its first status, and deletes the parameter. `~kept_goals` has the same goal for
-a manipulator that is started again: the former one may have died just after a server took the goal.
+deletes it and continues the goal before it publishes its first status; then the goal is stored again, since that server
+may die, too. `~kept_goals` has the same goal for a manipulator that is started again: the former one may have died
+just after a server took the goal.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class PendingGoal:
             rospy.Subscriber(f"{action}/goal", goal_class, self._on_goal, queue_size=QUEUE),
             rospy.Subscriber(f"{action}/result", result_class, self._locked(self._keeper.on_result), queue_size=QUEUE),
             rospy.Subscriber(f"{action}/cancel", GoalID, self._locked(self._keeper.on_cancel), queue_size=QUEUE),
-            rospy.Subscriber(f"{action}/status", GoalStatusArray, self._locked(self._on_status), queue_size=QUEUE),
+            rospy.Subscriber(f"{action}/status", GoalStatusArray, self._on_status, queue_size=QUEUE),
         ]
 
     @property
@@ -149,8 +150,11 @@ class PendingGoal:
 
     def _on_status(self, status: GoalStatusArray) -> None:
         # Each connection has a header of its own, so another one is another process.
-        self._server = status._connection_header
-        self._keeper.on_status(status)
+        with self._lock:
+            is_new = self._server is not status._connection_header
+            self._server = status._connection_header
+            self._keeper.on_status(status)
+            self._store(again=is_new)  # it has taken the goal from there; if it dies at once, the next one needs it
 
     def _locked(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
         def locked(message: Any) -> None:
