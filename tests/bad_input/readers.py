@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from unittest.mock import patch
 
 import cv2
 import numpy as np
@@ -474,17 +475,20 @@ _OWL_XML = """<?xml version="1.0"?>
 
 
 def _knowledge_base(path: Path) -> object:
-    _keep_own_ontologies()
-    return read_knowledge_base([path])
+    own, log = _own_ontologies(), logging.getLogger("mros1_reasoner")
+    before = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        with patch.object(ontology_files, "read_triples", lambda file: own.get(file) or read_triples(file)):
+            return read_knowledge_base([path])
+    finally:
+        log.setLevel(before)
 
 
 @cache
-def _keep_own_ontologies() -> None:
-    """Parse the package's own ontologies once: they are the same each time."""
-    own = {file: read_triples(file) for file in ontology_files.own_ontologies()}
-    real = ontology_files.read_triples
-    ontology_files.read_triples = lambda path: own[path] if path in own else real(path)
-    logging.getLogger("mros1_reasoner").setLevel(logging.ERROR)
+def _own_ontologies() -> dict[Path, Any]:
+    """Return the triples of the package's own ontologies, parsed once: they are the same each time."""
+    return {file: read_triples(file) for file in ontology_files.own_ontologies()}
 
 
 # -- the table ---------------------------------------------------------------------------------------------------------

@@ -228,7 +228,7 @@ def test_transform_whose_stamp_tf2_cannot_hold_is_left_out_and_the_others_are_ke
 
     with unconnected() as ros:
         frames = TfTransformer()
-        late = [rospy.Time(2**32, 5), rospy.Time(2**32 - 1, 999_999_999)]
+        late = [rospy.Time(2**32, 5), rospy.Time(2**32 - 1, 999_999_999), rospy.Time(2**31 - 1, 999_999_999)]
         message = TFMessage([*(transform("late", stamp) for stamp in late), transform("base", rospy.Time(1))])
         message._connection_header = {"callerid": "/other"}
         for subscriber in ros.listening("/tf"):
@@ -236,6 +236,7 @@ def test_transform_whose_stamp_tf2_cannot_hold_is_left_out_and_the_others_are_ke
         assert frames.lookup("map", "base", None) is not None
         assert frames.lookup("map", "late", None) is None
         assert frames.lookup("map", "base", 2.0**32 + 3.0) is None
+        assert frames.lookup("map", "base", 2.0**31) is None
         assert "stamp" in ros.said[0]
 
 

@@ -1,11 +1,13 @@
 """A quick share of the soak, and all inputs that once broke something."""
 
+import logging
 from pathlib import Path
 
 import pytest
 from bad_input.soak import trials
 from bad_input.subjects import CORPUS, slug, subjects
 from bad_input.trial import ACCEPTED, BROKEN, tried
+from mros1_reasoner.io import ontology_files
 
 KEPT = sorted(path for path in CORPUS.glob("*/*"))
 COUNT = 2000
@@ -33,3 +35,11 @@ def test_some_seed_of_each_is_taken(subject, tmp_path: Path):
     assert BROKEN not in {verdict.outcome for verdict in verdicts}
     warns = subject.name == "the reasoner"  # of a quality that is stale
     assert warns or ACCEPTED in {verdict.outcome for verdict in verdicts}
+
+
+def test_trial_leaves_what_others_read_as_it_was(tmp_path: Path):
+    log, read = logging.getLogger("mros1_reasoner"), ontology_files.read_triples
+    level = log.level
+    (subject,) = (subject for subject in subjects() if subject.name == "an ontology")
+    tried(subject, subject.seeds[0], tmp_path)
+    assert (log.level, ontology_files.read_triples) == (level, read)

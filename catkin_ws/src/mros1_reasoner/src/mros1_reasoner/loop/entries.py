@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 # R1: facts
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LevelFact:
     """A quality attribute has a level.
 
@@ -27,7 +27,7 @@ class LevelFact:
     text: str = field(default="", compare=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class StaleFact:
     """A quality attribute can't be observed at present; the journal lacks the reason."""
 
@@ -35,7 +35,7 @@ class StaleFact:
     reason: str = field(default="", compare=False)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ComponentFact:
     """A component has a status; the diagnostic has a stamp, s, and may tell why the component has failed."""
 
@@ -45,7 +45,7 @@ class ComponentFact:
     reason: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class DriftFact:
     """Parameters of a node do not have the values of what is deployed.
 
@@ -62,7 +62,7 @@ class DriftFact:
     stamp: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class BindingFact:
     """A binding of a grounding is in error, or no longer is."""
 
@@ -70,7 +70,7 @@ class BindingFact:
     in_error: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class TaskFact:
     """The task of an objective has failed, or no longer has.
 
@@ -87,7 +87,7 @@ class TaskFact:
     message: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ActiveFact:
     """A configuration runs for a function, in a state of metacontrol_msgs/FunctionGrounding; empty: nothing does."""
 
@@ -101,45 +101,45 @@ Fact = LevelFact | StaleFact | ComponentFact | DriftFact | BindingFact | TaskFac
 # What an operator asks for
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Pause:
     """Decide nothing."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Resume:
     """Decide again."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Lock:
     """Keep the configuration of an objective; of all objectives if none is named."""
 
     objective: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Unlock:
     """Release a lock; all locks if no objective is named."""
 
     objective: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Approve:
     """Carry out the proposed decision of this id."""
 
     decision: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Reject:
     """Do not carry out the proposed decision of this id."""
 
     decision: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class AddObjective:
     """Ask for a function, with limits of quality attributes."""
 
@@ -148,7 +148,7 @@ class AddObjective:
     limits: Mapping[str, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Pursue:
     """Ask for a function with these limits, and no others, by an objective that may exist already.
 
@@ -165,14 +165,14 @@ class Pursue:
     always_improve: bool | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class RemoveObjective:
     """Ask for an objective's function no longer."""
 
     name: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class SetNfr:
     """Give an objective another limit; all objectives if none is named."""
 
@@ -186,14 +186,14 @@ Command = Pause | Resume | Lock | Unlock | Approve | Reject | AddObjective | Pur
 # What the loop does
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Step:
     """Reason and decide; on a heartbeat, also if only a level has changed."""
 
     heartbeat: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Result:
     """A decision was carried out, or was not.
 
@@ -210,7 +210,7 @@ class Result:
     blame: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Decided:
     """The decision to which the entry before has led: its id, objective and configuration."""
 
@@ -219,7 +219,7 @@ class Decided:
     configuration: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Released:
     """A function that nothing needed any longer was released."""
 
@@ -229,7 +229,7 @@ class Released:
 Content = Fact | Command | Step | Result | Decided | Released
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Entry:
     """An input or an action of the loop, with its ROS time in s."""
 
