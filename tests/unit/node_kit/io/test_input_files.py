@@ -74,9 +74,10 @@ def test_text_loses_its_byte_order_mark(tmp_path: Path):
     assert (read_text(path), read_yaml(path)) == ("a: 1\n", {"a": 1})
 
 
-def test_place_of_a_byte_that_is_no_text_is_told(tmp_path: Path):
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+def test_place_of_a_byte_that_is_no_text_is_told(tmp_path: Path, mark: bytes):
     path = tmp_path / "a.yaml"
-    path.write_bytes(b"a: 1\nb: \xff")
+    path.write_bytes(mark + b"a: 1\nb: \xff")
     with pytest.raises(InputFileError, match=f"^{path}:2:4: byte 0xff is not UTF-8: save the file as UTF-8 text$"):
         read_text(path)
 

@@ -66,11 +66,11 @@ def read_text(path: str | Path, largest: int = MAX_SIZE) -> str:
     Raises:
         InputFileError: as `read_bytes`, or it is not UTF-8; then with the place of the first bad byte.
     """
-    data = read_bytes(path, largest)
+    data = read_bytes(path, largest).removeprefix(codecs.BOM_UTF8)
     try:
-        return data.decode("utf-8-sig")
+        return data.decode("utf-8")
     except UnicodeDecodeError as error:
-        good = data[: error.start].decode("utf-8-sig")
+        good = data[: error.start].decode("utf-8")
         place = (good.count("\n") + 1, len(good) - (good.rfind("\n") + 1) + 1)
         found = "it looks like UTF-16: " if data.startswith(_UTF_16) else ""
         byte = data[error.start]
