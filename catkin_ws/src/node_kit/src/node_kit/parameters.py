@@ -249,7 +249,7 @@ class ParameterTree:
         """
         return [
             f"parameter {self.full_name(name)} is left out, because nothing reads it: {unknown(name, known)}"
-            for name in sorted(self.values)
+            for name in sorted(map(str, self.values))  # of a YAML file, they may be numbers
             if name not in known and not name.startswith(beginnings)
         ]
 

@@ -48,9 +48,9 @@ def strangers() -> list[str]:
     """Return what to say of each parameter that nobody reads; a group may be one of an observer that comes later."""
     own = _own()
     groups = [
-        name
+        str(name)
         for name, value in own.values.items()
-        if isinstance(value, Mapping) and not difflib.get_close_matches(name, PARAMETERS)
+        if isinstance(value, Mapping) and not difflib.get_close_matches(str(name), PARAMETERS)
     ]
     return own.strangers((*PARAMETERS, *groups))
 
