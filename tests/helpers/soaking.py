@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -44,6 +45,17 @@ def whole(what: str, least: int) -> Callable[[str], int]:
 
     read.__name__ = what
     return read
+
+
+def hours(text: str) -> float:
+    """Return the number of hours of an argument."""
+    found = float(text)
+    if not (math.isfinite(found) and found > 0.0):
+        raise ValueError
+    return found
+
+
+hours.__name__ = "number of hours"
 
 
 def code(*places: str) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import click
-from helpers.soaking import FOLDER, Arguments, code, whole
+from helpers.soaking import FOLDER, Arguments, code, hours, whole
 from soak.command import own_network
 from soak.driving import OWN
 
@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status: 1 where something was broken, 130 where it was interrupted."""
     parser = Arguments(__doc__)
     parser.add_argument("--lasting", action="store_true", required=True)
-    parser.add_argument("--hours", type=float, required=True, help="in all, with those that ran before on this code")
+    parser.add_argument("--hours", type=hours, required=True, help="in all, with those that ran before on this code")
     parser.add_argument("--seed", type=whole("seed", 0), default=0, help="of all faults and goals (default: 0)")
     parser.add_argument("--output", type=Path, help="folder (default: results/soak/lasting-CODE-SEED)")
     options = parser.parse_args(arguments)

@@ -19,6 +19,7 @@ from typing import TextIO
 import psutil
 import rospkg
 from helpers.ports import free_port
+from soak import beside
 from soak.driving import OWN, begin_network
 from soak.observed import Told, read
 from soak.plan import Fault
@@ -120,11 +121,6 @@ class Drive:
             self._end(system, table, [*striker.helpers, observer, goals])
 
     def _place(self, port: int, helpers: dict[str, str], observer: subprocess.Popen[str]) -> Place:
-        def request(configuration: str) -> None:
-            if observer.stdin is not None:
-                observer.stdin.write(configuration + "\n")
-                observer.stdin.flush()
-
         package = Path(rospkg.RosPack().get_path(PACKAGE))
         return Place(
             self.folder,
@@ -133,7 +129,7 @@ class Drive:
             self.folder / "control",
             f"http://localhost:{port}",
             helpers,
-            request,
+            beside.teller(observer),
             lambda: self._told,
         )
 
@@ -141,15 +137,7 @@ class Drive:
         self, words: list[str], environment: dict[str, str], take: Callable[[str], None]
     ) -> subprocess.Popen[str]:
         """Start a helper, and have what it writes taken in a thread."""
-        process = subprocess.Popen(
-            [sys.executable, "-m", *words],
-            env=environment,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=(self.folder / f"{words[0]}.log").open("wb"),
-            text=True,
-            start_new_session=True,
-        )
+        process = beside.start(words, environment, self.folder / f"{words[0]}.log")
 
         def listen() -> None:
             for text in process.stdout or ():

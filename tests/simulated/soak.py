@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import click
-from helpers.soaking import FOLDER, Arguments, FiguresError, code, whole
+from helpers.soaking import FOLDER, Arguments, FiguresError, code, hours, whole
 
 from simulated.history import history, run
 from simulated.shrinking import as_test, shrink
@@ -22,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status: 1 where something was broken, 130 where it was interrupted."""
     parser = Arguments(__doc__)
     parser.add_argument("--simulated", action="store_true", required=True, help="on a simulated clock and network")
-    parser.add_argument("--hours", type=_hours, required=True, help="in all, with what was done before on this code")
+    parser.add_argument("--hours", type=hours, required=True, help="in all, with what was done before on this code")
     parser.add_argument("--seed", type=whole("seed", 0), default=0, help="of the first history (default: 0)")
     parser.add_argument("--output", type=Path, default=FOLDER, help="folder (default: results/soak)")
     options = parser.parse_args(arguments)
@@ -83,15 +82,6 @@ def _progress(tally: Tally, seconds: float) -> None:
     )
     click.echo(f"\r{line}", nl=False, err=True)
 
-
-def _hours(text: str) -> float:
-    hours = float(text)
-    if not (math.isfinite(hours) and hours > 0.0):
-        raise ValueError
-    return hours
-
-
-_hours.__name__ = "number of hours"
 
 if __name__ == "__main__":
     sys.exit(main())

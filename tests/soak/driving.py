@@ -26,6 +26,7 @@ import psutil
 import rospkg
 from helpers.ports import free_port
 
+from soak import beside
 from soak.checks import broken, excuse_of
 from soak.observed import End, Observed, Strike, Told, line, read
 from soak.plan import Kind, Mission, mission
@@ -105,15 +106,7 @@ class Drive:
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
-        observer = subprocess.Popen(
-            [sys.executable, "-m", "soak.observer"],
-            env=helpers,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=(self.folder / "observer.log").open("wb"),
-            text=True,
-            start_new_session=True,
-        )
+        observer = beside.start(["soak.observer"], helpers, self.folder / "observer.log")
         threading.Thread(target=self._listen, args=(observer,), daemon=True).start()
         striker = Striker(self._place(output, port, helpers, observer), ProcessTable(str(output)))
         try:
@@ -157,11 +150,6 @@ class Drive:
         return words + (["--parameters", "{reasoner: rules}"] if plan.engine == "rules" else [])
 
     def _place(self, output: Path, port: int, helpers: dict[str, str], observer: subprocess.Popen[str]) -> Place:
-        def request(configuration: str) -> None:
-            if observer.stdin is not None:
-                observer.stdin.write(configuration + "\n")
-                observer.stdin.flush()
-
         return Place(
             output,
             self.folder / "copy" / PACKAGE,
@@ -169,7 +157,7 @@ class Drive:
             self.folder / "control",
             f"http://localhost:{port}",
             helpers,
-            request,
+            beside.teller(observer),
             lambda: self._told,
         )
 

@@ -2,7 +2,8 @@
 
 The program that restarts the server of ACTION sets the parameter `ACTION/resume_goal` to `{type:
 "move_base_msgs/MoveBaseActionGoal", data: BASE64}`, the serialised action goal. The new server then knows the goal
-before its first status message; the client sees no gap.
+before its first status message; the client sees no gap. It deletes the parameter just before that, not when it reads
+it: where it is killed while it starts, the next one takes the goal over.
 """
 
 from __future__ import annotations

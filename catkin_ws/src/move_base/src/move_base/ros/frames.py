@@ -18,7 +18,8 @@ TF_CACHE = 10.0
 """Transforms kept, s: tf2's own default."""
 
 _SECONDS = (1 << 31) - 60
-"""s: tf2 ends the process, by an exception or by a violation of memory, where a stamp has 2^31 or more (in 2038)."""
+"""s: tf2 ends the process, by an exception or by a violation of memory, where a stamp has 2^31 or more (in 2038).
+A minute less, because nanoseconds may add seconds."""
 
 
 class TfTransformer:

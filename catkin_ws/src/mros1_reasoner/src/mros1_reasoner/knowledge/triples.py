@@ -20,18 +20,15 @@ _LINE = re.compile(r"(\S+)\s+(\S+)\s+(.*?)\s*\.\s*$")
 _LITERAL = re.compile(r'"((?:[^"\\]|\\.)*)"(?:\^\^<([^>]*)>|@\S+)?$', re.DOTALL)
 _ESCAPE = re.compile(r"\\(u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|.)", re.DOTALL)
 _ESCAPED = {"n": "\n", "r": "\r", "t": "\t", "b": "\b", "f": "\f"}
-
-
-_DOTS = re.compile(r"(?:\.{1,2}/)*")
-_original_join = owlready2.rdfxml_2_ntriples.urljoin
+_DOTS = re.compile(r"^(?:\.{1,2}/)*")
+_owlready_join = owlready2.rdfxml_2_ntriples.urljoin
 
 
 def _join(base: str, name: str) -> str:
-    """Join a relative IRI as owlready2 does, which never ends where a name begins with a dot and no path: `.name`."""
-    dots = _DOTS.match(name)
-    steps = dots.group() if dots else ""
-    rest = name[len(steps) :]
-    return f"{_original_join(base, steps)}{rest}" if rest.startswith(".") else _original_join(base, name)
+    """Join a relative IRI as owlready2 does, also one with a name that begins with a dot: its own loop never ends."""
+    rest = _DOTS.sub("", name)
+    steps = name[: len(name) - len(rest)]
+    return f"{_owlready_join(base, steps)}{rest}" if rest.startswith(".") else _owlready_join(base, name)
 
 
 owlready2.rdfxml_2_ntriples.urljoin = _join

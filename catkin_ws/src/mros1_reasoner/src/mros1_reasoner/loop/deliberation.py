@@ -502,7 +502,9 @@ class Deliberation:
     def _is_rebinding(self, name: str, outcome: Plan) -> bool:
         """Return whether the running design stays but for its bindings."""
         designs, running = self._state.kb.designs, self._state.running[name].design
-        return designs[running or ""].root == designs[outcome.choice or ""].root if running else False
+        if running is None or outcome.choice is None:
+            return False
+        return designs[running].root == designs[outcome.choice].root
 
     def _has_other_error(self, name: str) -> bool:
         """Return whether something is wrong with a running design beside its components."""
