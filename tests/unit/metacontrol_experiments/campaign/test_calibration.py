@@ -79,7 +79,15 @@ def test_runs_are_written_as_they_come(tmp_path):
     assert tables.read_runs(path) == [a_run()]
 
 
-@pytest.mark.parametrize(("text", "said"), [("a,b\n1,2\n", "its columns are not"), (None, "line 2 is no run")])
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("a,b\n1,2\n", "its columns are not"),
+        (None, "line 2 is no run"),
+        ("a" * 200_000 + "\n", "field larger than field limit"),
+    ],
+    ids=["columns", "row", "cell"],
+)
 def test_file_that_holds_no_runs_is_refused(tmp_path, text, said):
     path = tmp_path / "runs.csv"
     names = [field.name for field in dataclasses.fields(Run)]

@@ -65,9 +65,9 @@ def read_runs(path: Path) -> list[Run]:
         raise CalibrationError(str(error)) from error
     whole = text[: text.rfind("\n") + 1]
     rows = csv.DictReader(whole.splitlines())
-    if whole and tuple(rows.fieldnames or ()) != _COLUMNS:
-        raise CalibrationError(f"{path}: its columns are not {', '.join(_COLUMNS)}; name another file of runs")
     try:
+        if whole and tuple(rows.fieldnames or ()) != _COLUMNS:
+            raise CalibrationError(f"{path}: its columns are not {', '.join(_COLUMNS)}; name another file of runs")
         return [_run(row) for row in rows]
     except (TypeError, ValueError, KeyError, csv.Error) as error:
         raise CalibrationError(f"{path}: line {rows.line_num} is no run ({error}); take it out") from error
