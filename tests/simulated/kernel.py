@@ -59,6 +59,7 @@ class Process:
         name: of its node.
         alive: whether it runs.
         frozen: whether it is stopped (SIGSTOP): its tasks go on when it continues.
+        started: when it has begun, s.
     """
 
     def __init__(self, kernel: Kernel, name: str, failed: Callable[[str, BaseException], object]) -> None:
@@ -71,6 +72,7 @@ class Process:
         """
         self.kernel, self.name, self._failed = kernel, name, failed
         self.alive, self.frozen = True, False
+        self.started = kernel.now
         self._tasks: list[greenlet] = []
         self._late: list[Callable[[], object]] = []
 

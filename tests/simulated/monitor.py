@@ -30,14 +30,17 @@ NAME = "rosgraph_monitor"
 class MonitorPart:
     """One process of the monitor."""
 
-    def __init__(self, process: Process, host: Host, system: System, topics: Mapping[str, Topic]) -> None:
-        """Begin."""
+    def __init__(
+        self, process: Process, host: Host, system: System, topics: Mapping[str, Topic], head_start: float
+    ) -> None:
+        """Begin; `head_start`: for how long others had run, s."""
         self.process, self._host, self._system, self._topics = process, host, system, topics
         self._inbox = Inbox(process)
         self._model = DesiredModel(system.base, self._read, system.variants.values)
         self._monitor = GraphEvaluator(system.components, scope=Scope(namespace=system.namespace))
         self._lives: dict[tuple[str, str], Liveness] = {}
         self._known: dict[str, NodeProcess] = {}
+        self._head_start = head_start
         self._snapshot: GraphSnapshot | None = None
         topics["diagnostics"].advertise(process)
         topics["active"].subscribe(process, self._follow, queue=5)
@@ -49,7 +52,8 @@ class MonitorPart:
         while True:
             if self._poll() and self._snapshot is not None:
                 lives = {key: state.life for key, state in self._lives.items()}
-                statuses = self._monitor.evaluate(self._snapshot, lives, self._model.current, self._host.kernel.now)
+                now, desired = self._host.kernel.now, self._model.current
+                statuses = self._monitor.evaluate(self._snapshot, lives, desired, now, head_start=self._head_start)
                 self._topics["diagnostics"].publish(self.process, _messages(statuses))
             self.process.pause(0.02)
             self._inbox.wait(PERIOD)

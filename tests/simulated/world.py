@@ -144,7 +144,9 @@ class World:
 
     def make_monitor(self, process: Process) -> MonitorPart:
         """Start the monitor's process."""
-        return MonitorPart(process, self.host, self.system, self._topics)
+        others = (self.launcher, self.manipulator, self.reasoner)
+        head_start = max([0.0, *(process.started - part.process.started for part in others if part is not None)])
+        return MonitorPart(process, self.host, self.system, self._topics, head_start)
 
     def make_reasoner(self, process: Process) -> ReasonerPart:
         """Start the reasoner's process."""

@@ -1,5 +1,7 @@
 """Parts that watch over each other: who is lost, and who tells it."""
 
+import math
+
 import pytest
 from node_kit.parts import HANGS_AFTER, SILENCE, STARTS_WITHIN, Answer, Parts, Sign
 
@@ -91,6 +93,19 @@ def test_of_two_that_were_started_at_once_the_first_by_name_tells():
     parts.hear(MONITOR, 0.0)
     parts.note(MONITOR.node, Answer.GONE, 2.0)
     assert parts.to_tell() == {}
+
+
+def test_head_start_is_that_of_the_oldest_other_part(parts):
+    assert parts.head_start() == 100.0
+    parts.note(REASONER.node, Answer.GONE, 2.0)
+    assert parts.head_start() == 0.0, "the monitor was started later, and the reasoner is no more"
+
+
+@pytest.mark.parametrize("started", [math.inf, math.nan])
+def test_sign_without_a_time_gives_no_head_start(started):
+    parts = Parts(OWN, 200.0)
+    parts.hear(Sign(REASONER.node, "reasoner", "http://a:2", started), 0.0)
+    assert parts.head_start() == 0.0
 
 
 def test_one_that_was_started_after_the_loss_keeps_nobody_from_telling_it(parts):

@@ -61,6 +61,16 @@ def test_start_up_raises_no_alarm_within_the_grace():
     assert ("laser_resender", "Component status", "FALSE") in late
 
 
+@pytest.mark.parametrize(("head_start", "grace"), [(0.0, 5.0), (1.0, 4.0), (600.0, 3.0)])
+def test_monitor_that_takes_anothers_place_waits_less_for_nodes_that_were_up_before(head_start, grace):
+    dead = ALIVE | lives(front_laser=Life.DEAD)
+    watched = monitor()
+    early = [watched.evaluate(BOTH, dead, DESIRED, now, head_start=head_start) for now in (10.0, 10.0 + grace - 0.1)]
+    assert all(("ROS Graph", "running OK", "") in said(statuses) for statuses in early)
+    late = said(watched.evaluate(BOTH, dead, DESIRED, 10.0 + grace, head_start=head_start))
+    assert ("laser_resender", "Component status", "FALSE") in late
+
+
 def test_node_of_a_variant_may_be_restarted_before_its_death_is_told():
     watched = monitor()
     desired = Desired(SYSTEM, variant_nodes=frozenset({"move_base"}))

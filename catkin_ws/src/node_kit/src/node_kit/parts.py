@@ -6,6 +6,7 @@ parts that are left, the one that has run for longest tells: it has heard of all
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -115,6 +116,14 @@ class Parts:
     def lost(self) -> dict[str, str]:
         """Return which nodes are lost, and why."""
         return {node: standing.lost for node, standing in self.known.items() if standing.lost}
+
+    def head_start(self) -> float:
+        """Return for how long the oldest of the others had run when one's own part was started, s; 0 if none had.
+
+        Who finds others that have run for long takes somebody's place in a system that has started long ago.
+        """
+        started = (known.sign.started for known in self._known.values() if not known.lost)
+        return max([0.0, *(self._started - other for other in started if math.isfinite(other))])
 
     def to_tell(self) -> dict[str, str]:
         """Return what one's own part is to tell: the nodes that are lost, and why; empty for those that are back.

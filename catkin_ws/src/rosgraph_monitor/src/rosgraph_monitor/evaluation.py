@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 _CONDITION = {Life.ALIVE: NodeCondition.ALIVE, Life.UNKNOWN: NodeCondition.UNKNOWN}
 _ENDED = "ended", "ended: it has unregistered from the master"
+_SHORTEST_GRACE = 3.0
+"""Wall s in which a node that the monitor has never seen may come up in a system that started long ago."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,8 @@ class Patience:
     """How long the monitor waits, in wall s, before it reports something that may still change.
 
     Attributes:
-        startup: in which an expected node may come up for the first time, complete its interfaces and set its
-            parameters, and in which the monitor itself may learn what is deployed.
+        startup: in which an expected node may come up after the start of the system, complete its interfaces and set
+            its parameters, and in which the monitor itself may learn what is deployed.
         restart: in which the manipulator may announce that it restarts a variant's node, before that node's death is
             reported. Deaths of the base's nodes are reported at once.
         ports: for which a difference in interfaces must last: nodes connect one after the other.
@@ -91,6 +93,7 @@ class GraphEvaluator:
         others: Mapping[str, NodeCondition] | None = None,
         reasons: Mapping[str, str] | None = None,
         is_fresh: bool = True,
+        head_start: float = 0.0,
     ) -> list[Status]:
         """Judge the graph.
 
@@ -104,6 +107,8 @@ class GraphEvaluator:
             reasons: why such a component has failed, by its name.
             is_fresh: whether the snapshot is newer than what is known of the nodes. Else a node that seems dead may
                 have unregistered since, so that the next evaluation says that it has ended.
+            head_start: for how long the system had run when this monitor was started, wall s. One that takes another's
+                place does not wait for nodes to come up that were up long ago.
 
         Returns:
             The statuses of components, then the findings, or "running OK" where there are none.
@@ -119,6 +124,7 @@ class GraphEvaluator:
             now,
             excused=desired.excused,
             patience=dict.fromkeys(desired.variant_nodes, self._patience.restart),
+            grace=max(self._patience.startup - head_start, min(self._patience.startup, _SHORTEST_GRACE)),
         )
         failed = [name for name, status in components if status is ComponentStatus.FALSE]
         found = {name: self._why(name, conditions, life, topics, reasons or {}, is_fresh) for name in failed}

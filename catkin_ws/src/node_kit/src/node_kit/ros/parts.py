@@ -26,13 +26,13 @@ _GOODBYE = 0.05  # s, wall, in which the last sign goes out
 _REPEAT = 1.0  # s, wall: what is lost is told so often
 
 
-def watch_parts(part: str) -> None:
+def watch_parts(part: str) -> PartsWatch:
     """Give signs of life from now on, and tell which other parts are lost. The node must have begun.
 
     Args:
         part: what this node is in the system.
     """
-    _Watch(part)
+    return PartsWatch(part)
 
 
 def sign_of(status: DiagnosticStatus) -> Sign:
@@ -46,8 +46,16 @@ def sign_of(status: DiagnosticStatus) -> Sign:
     return Sign(status.name, values.get("part", ""), values.get("uri", ""), started, ends)
 
 
-class _Watch:
+class PartsWatch:
+    """Watches over the other parts in a thread of its own.
+
+    Attributes:
+        head_start: for how long others had run when this node was started, wall s, as far as they have been heard.
+    """
+
     def __init__(self, part: str) -> None:
+        """Begin (see `watch_parts`)."""
+        self.head_start = 0.0
         self._part = part
         self._started = time.time()
         self._parts = Parts(rospy.get_name(), self._started)
@@ -76,6 +84,7 @@ class _Watch:
                 asked = now
                 for sign in self._parts.doubtful(now):
                     self._parts.note(sign.node, _ask(sign), time.monotonic())
+            self.head_start = self._parts.head_start()
             news = self._parts.to_tell()
             is_new = any(before.get(node) != why for node, why in news.items())
             if news and (is_new or now - told >= _REPEAT):

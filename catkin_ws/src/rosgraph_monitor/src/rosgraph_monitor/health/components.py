@@ -162,6 +162,7 @@ class ComponentTracker:
         now: float,
         excused: Collection[str] = (),
         patience: Mapping[str, float] | None = None,
+        grace: float | None = None,
     ) -> list[tuple[str, ComponentStatus]]:
         """Take in what is known of the expected nodes.
 
@@ -170,6 +171,7 @@ class ComponentTracker:
             now: wall seconds.
             excused: nodes that are not judged now.
             patience: wall seconds by node for which its absence is no failure yet; 0 for those not given.
+            grace: that of this moment, where it is not the usual one.
 
         Returns:
             Status of each component that is judged now.
@@ -183,7 +185,8 @@ class ComponentTracker:
                 # The wait for a first sign of life begins when the excuse ends.
                 seen[name] = _Seen(now, before.ever_alive, before.failed, is_replaced=before.failed)
                 continue
-            seen[name], status = self._judge(before, condition, now, (patience or {}).get(name, 0.0))
+            wait = (patience or {}).get(name, 0.0) if before.ever_alive else self._grace if grace is None else grace
+            seen[name], status = self._judge(before, condition, now, wait)
             if status:
                 statuses.append((self._component_of.get(name, name), status))
             elif condition is NodeCondition.GONE:
@@ -193,7 +196,7 @@ class ComponentTracker:
         return statuses
 
     def _judge(
-        self, before: _Seen, condition: NodeCondition, now: float, patience: float
+        self, before: _Seen, condition: NodeCondition, now: float, wait: float
     ) -> tuple[_Seen, ComponentStatus | None]:
         if condition is NodeCondition.ALIVE:
             back = now if before.failed else before.recovered_at
@@ -207,7 +210,7 @@ class ComponentTracker:
         if condition is NodeCondition.FAILED:
             return _Seen(now, ever_alive=True, failed=True), ComponentStatus.FALSE
         since = now if before.absent_since is None else before.absent_since
-        if now - since >= (patience if before.ever_alive else self._grace):
+        if now - since >= wait:
             return _Seen(since, before.ever_alive, failed=True), ComponentStatus.FALSE
         return replace(before, absent_since=since), None
 

@@ -38,6 +38,7 @@ from rosgraph_monitor.ros.usage import UsageWatch
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from node_kit.ros.parts import PartsWatch
     from ros_model.graph.snapshot import GraphSnapshot
 
     from rosgraph_monitor.diagnostics.status import Status
@@ -120,13 +121,17 @@ class MonitorNode:
             "rosgraph_manipulator/active_configuration", ActiveConfiguration, latest(self._follow), queue_size=5
         )
 
-    def run(self) -> None:
-        """Evaluate after every poll, and whenever a node or topic fails or returns, until the node ends."""
+    def run(self, parts: PartsWatch) -> None:
+        """Evaluate after every poll, and whenever a node or topic fails or returns, until the node ends.
+
+        Args:
+            parts: watches over the other parts of the meta-controller.
+        """
         while not self._ending:
             polled = self._poller.latest
             if polled:
                 begin = time.monotonic()
-                self._publish(self._evaluate(polled))
+                self._publish(self._evaluate(polled, parts.head_start))
                 self._evaluation = time.monotonic() - begin
                 # It rests as long again, up to a limit: hundreds of nodes may come or go together.
                 time.sleep(min(max(_COALESCE, self._evaluation), _LONGEST_REST))
@@ -164,7 +169,7 @@ class MonitorNode:
         desired = self._model.current
         return self._monitor.excused_topics(polled.snapshot, desired, self._topics.topics) if polled else frozenset()
 
-    def _evaluate(self, polled: PolledGraph) -> list[Status]:
+    def _evaluate(self, polled: PolledGraph, head_start: float) -> list[Status]:
         is_fresh = self._polled.is_set()
         lives = polled.lives if is_fresh else self._connections.lives()
         own = polled.snapshot.nodes.get(rospy.get_name())
@@ -182,6 +187,7 @@ class MonitorNode:
             others={**self._batteries.conditions, **self._drivers.conditions},
             reasons={**self._batteries.reasons, **self._drivers.reasons},
             is_fresh=is_fresh,
+            head_start=head_start,
         )
         if now >= self._observers_due:
             self._observers_due = now + _OBSERVERS_PERIOD
@@ -254,8 +260,7 @@ def command(load: tuple[str, ...], more: tuple[str, ...]) -> None:
             rospy.logwarn("%s", line)
         life.watch.patience = parameters_node.number("master_patience", PATIENCE)
         node = MonitorNode((*load, *more))
-        watch_parts("monitor")
-        node.run()
+        node.run(watch_parts("monitor"))
 
 
 def _message(status: Status) -> DiagnosticStatus:
