@@ -98,6 +98,7 @@ class SurvivalTest(PairTest):
         wait_for(lambda: "took over the running configuration" in self.manipulator.said(), "it takes over")
         self.assertTrue(self.client.wait_for_server(rospy.Duration(DEADLINE_S)))
         self.assertEqual(pid_of("/wait_server"), before)
+        self.assertNotIn("nothing reads it", self.manipulator.said(), "it knows what the former one has left")
         self.wait_until_it_serves()
         self.assertEqual(self.request("fast"), 1)
         self.wait_for_goal(goal_id, server)

@@ -45,6 +45,7 @@ PARAMETERS = (
     "host_timeout",
     "initial_configuration",
     "journal",
+    "kept_goals",
     "launcher_timeout",
     "overwritten",
     "probation",
