@@ -109,10 +109,18 @@ def _target(system: System, kind: Kind, chance: random.Random) -> str:
         **dict.fromkeys((Kind.REQUEST, Kind.CANCELLED_REQUEST, Kind.FILE_GONE), sorted(system.variants)),
         **dict.fromkeys((Kind.MASTER_SILENT, Kind.CLOCK_STANDS, Kind.CLOCK_JUMPS, Kind.WALL_JUMPS, Kind.PAUSE), ("",)),
         Kind.KILL_DRIVER: base,
-        Kind.LOCK: sorted(objective.name for objective in system.objectives),
+        Kind.LOCK: ["", *_objectives(system)],
         Kind.DRIFT: sorted(names),
     }
     return chance.choice(among.get(kind, own))
+
+
+def _objectives(system: System) -> list[str]:
+    """Return the names of the objectives that there are, and of those that designs may require."""
+    required = {function for design in system.knowledge.designs.values() for function in design.requires}
+    pursued = {objective.function: objective.name for objective in system.objectives}
+    names = {function: f"o_{function.removeprefix('f_')}" for function in required} | pursued
+    return sorted(set(names.values()))
 
 
 def _value(kind: Kind, chance: random.Random) -> float:

@@ -141,11 +141,11 @@ class Host:
             return self.clock_stands_at
         return self.kernel.now + self.ros_offset
 
-    def heed_operator(self, command: entries.Command) -> None:
-        """Note what an operator's command that was carried out holds, or sets free."""
+    def heed_operator(self, command: entries.Command, objectives: Iterable[str]) -> None:
+        """Note what an operator's command that was carried out holds, or sets free, of all objectives if of none."""
         match command:
             case entries.Lock(objective):
-                self.held.add(objective)
+                self.held |= {objective} if objective else set(objectives)
             case entries.Unlock(objective):
                 self.held = {name for name in self.held if objective not in ("", name)}
             case entries.Pause():

@@ -11,7 +11,7 @@ from ros_model.errors import ModelError
 from ros_model.graph.snapshot import GraphSnapshot, build_snapshot
 from ros_model.language.metamodel import PortKind, RosSystem
 from rosgraph_monitor.diagnostics.status import Status
-from rosgraph_monitor.evaluation import GraphEvaluator
+from rosgraph_monitor.evaluation import GraphEvaluator, Patience
 from rosgraph_monitor.graph.comparison import Scope
 from rosgraph_monitor.graph.desired import DesiredModel, Grounding
 from rosgraph_monitor.health import liveness
@@ -40,7 +40,7 @@ class MonitorPart:
         self._monitor = GraphEvaluator(system.components, scope=Scope(namespace=system.namespace))
         self._lives: dict[tuple[str, str], Liveness] = {}
         self._known: dict[str, NodeProcess] = {}
-        self._head_start = head_start
+        self._grace = Patience().grace(head_start)
         self._snapshot: GraphSnapshot | None = None
         topics["diagnostics"].advertise(process)
         topics["active"].subscribe(process, self._follow, queue=5)
@@ -53,7 +53,7 @@ class MonitorPart:
             if self._poll() and self._snapshot is not None:
                 lives = {key: state.life for key, state in self._lives.items()}
                 now, desired = self._host.kernel.now, self._model.current
-                statuses = self._monitor.evaluate(self._snapshot, lives, desired, now, head_start=self._head_start)
+                statuses = self._monitor.evaluate(self._snapshot, lives, desired, now, grace=self._grace)
                 self._topics["diagnostics"].publish(self.process, _messages(statuses))
             self.process.pause(0.02)
             self._inbox.wait(PERIOD)

@@ -17,6 +17,7 @@ from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.entries import ActiveFact, Entry, Released, Result, Step
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
+from mros1_reasoner.loop.remembered import remembered, to_remember
 from mros1_reasoner.loop.requesting import Answer, Requesting, Wanted
 from mros1_reasoner.loop.settings import Settings
 from rosgraph_manipulator.change.deployment import Outcome
@@ -29,6 +30,7 @@ from simulated.systems import System
 
 PERIOD = 1.0  # s, of heartbeats
 DEADLINE = 60.0  # s, for a request
+STATUS = 0.2  # s, between two statuses of an action server
 
 
 class BrokenError(Exception):
@@ -44,6 +46,7 @@ class Goal:
         server: the manipulator that has it.
         told: what the server has told of it, in order.
         done: is called with the answer.
+        heard: whether its client has heard of it from the server.
     """
 
     wanted: Wanted
@@ -51,6 +54,7 @@ class Goal:
     done: Callable[[Answer], object]
     told: list[str] = field(default_factory=list)
     answered: bool = False
+    heard: bool = False
 
 
 class Goals:
@@ -84,9 +88,12 @@ class Goals:
         return _ClientHandle(goal, name, kernel)
 
     def lost(self, server: ManipulatorPart) -> None:
-        """Have the clients of a manipulator that has died find their goals lost, once the next one tells its status."""
+        """Have the clients of a manipulator that has died find their goals lost, once the next one tells its status.
+
+        So does actionlib, but for a goal of which the former one has told nothing.
+        """
         for goal in self.all:
-            if goal.server is server and not goal.answered:
+            if goal.server is server and not goal.answered and goal.heard:
                 self._tell_lost(goal)
 
     def _tell_lost(self, goal: Goal) -> None:
@@ -94,6 +101,11 @@ class Goals:
             goal.done(Answer(False, "", None))
         else:
             self._host.kernel.after(0.2, lambda: self._tell_lost(goal))
+
+    def _tell_status(self, goal: Goal) -> None:
+        """Have the server list a goal, unless it has died or hangs."""
+        if goal.server.process.alive:
+            goal.server.process.call(lambda: setattr(goal, "heard", True))
 
     def _arrive(self, goal: Goal, name: str) -> None:
         requests, wanted = goal.server.requests, goal.wanted
@@ -104,6 +116,7 @@ class Goals:
         else:
             order, problem = requests.order_for(wanted.configuration)
         handle = _ServerHandle(goal, self._host)
+        self._host.kernel.after(self._host.kernel.uniform(0.001, STATUS), lambda: self._tell_status(goal))
         if order is None:
             requests.refuse(handle, problem, _result)
         else:
@@ -117,6 +130,9 @@ def _result(outcome: Outcome) -> int:
 class _ClientHandle:
     def __init__(self, goal: Goal, name: str, kernel: Any) -> None:
         self._goal, self._name, self._kernel = goal, name, kernel
+
+    def is_acknowledged(self) -> bool:
+        return self._goal.heard
 
     def cancel(self) -> None:
         server, name = self._goal.server, self._name
@@ -213,13 +229,20 @@ class ReasonerPart:
         except (MapeError, KnowledgeBaseError, ReasonerError):
             return
         if lasts:
-            self._host.heed_operator(command)
-            self._asked.heed(command)
-            self._host.parameters["/reasoner/asked"] = self._asked.as_parameter()
+            self._host.heed_operator(command, self.core.objectives)
+            self._asked.heed(command, self.core.objectives)
+            self._keep_asked()
+
+    def _keep_asked(self) -> None:
+        self._host.parameters["/reasoner/asked"] = self._asked.as_parameter()
 
     def _run(self) -> None:
+        for fact in remembered(self._host.parameters.get("/reasoner/remembered")):
+            self._take(fact)
         for command in self._asked.commands:
             self._apply_command(command, False)
+        if forgotten := self._host.held - self.core.view.locked:
+            raise BrokenError(f"a reasoner has forgotten that an operator has locked {', '.join(sorted(forgotten))}")
         heartbeat = self.kernel.now
         while True:
             now = self.kernel.now
@@ -229,6 +252,10 @@ class ReasonerPart:
             self._inbox.drain()
             self._requests.look()
             self._take(Step(is_heartbeat))
+            if self._asked.settle(self.core.view.locked):
+                self._host.held &= self.core.view.locked
+                self._keep_asked()
+            self._host.parameters["/reasoner/remembered"] = to_remember(self.core.view)
             self._requests.release(self.core.released)
             until = min(heartbeat, self._next_look())
             self._inbox.wait(max(0.0, until - self.kernel.now))

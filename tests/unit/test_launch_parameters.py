@@ -121,7 +121,7 @@ def test_one_launch_file_starts_the_meta_controller_of_a_project(server, tmp_pat
     [
         ("rosgraph_monitor/monitor", monitor.PARAMETERS, set()),
         ("mros1_reasoner/reasoner", reasoner.PARAMETERS, set()),
-        ("rosgraph_manipulator/rosgraph_manipulator", manipulator.PARAMETERS, set()),
+        ("rosgraph_manipulator/rosgraph_manipulator", manipulator.PARAMETERS, {"kept_goals"}),
         ("rosgraph_launcher/rosgraph_launcher", launcher.PARAMETERS, {"addresses"}),
     ],
 )

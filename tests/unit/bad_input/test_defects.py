@@ -136,8 +136,12 @@ def test_package_xml_with_an_odd_format_is_refused(tmp_path):
         read_package(tmp_path)
 
 
-def test_nested_loops_of_cmake_end_in_time(tmp_path):
-    text = "foreach(a 1 2 3 4 5 6 7 8 9)\n" * 12 + "set(x y)\n"
+@pytest.mark.parametrize(
+    "text",
+    ["foreach(a 1 2 3 4 5 6 7 8 9)\n" * 12 + "set(x y)\n", "foreach(a 1 2)\nset(b c)\n" * 8000],
+    ids=["many rounds", "many loops"],
+)
+def test_nested_loops_of_cmake_end_in_time(tmp_path, text):
     begin = time.process_time()
     assert len(list(commands(text, tmp_path))) < 20_000
     assert time.process_time() - begin < 5.0

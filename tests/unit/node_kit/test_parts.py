@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from node_kit.parts import HANGS_AFTER, SILENCE, STARTS_WITHIN, Answer, Parts, Sign
+from node_kit.parts import FORGOTTEN_AFTER, HANGS_AFTER, SILENCE, STARTS_WITHIN, Answer, Parts, Sign
 
 MONITOR = Sign("/greenhouse/rosgraph_monitor", "monitor", "http://a:1", 300.0)
 REASONER = Sign("/greenhouse/reasoner", "reasoner", "http://a:2", 100.0)
@@ -34,7 +34,7 @@ def test_who_answers_without_signs_is_not_lost(parts):
 def test_who_is_gone_is_lost_at_once(parts):
     parts.note(MONITOR.node, Answer.GONE, 2.0)
     assert parts.lost() == {MONITOR.node: "its process has ended"}
-    parts.hear(Sign(MONITOR.node, "monitor", "http://a:9"), 5.0)
+    parts.hear(Sign(MONITOR.node, "monitor", "http://a:9", 900.0), 5.0)
     assert parts.lost() == {}
 
 
@@ -101,11 +101,32 @@ def test_head_start_is_that_of_the_oldest_other_part(parts):
     assert parts.head_start() == 0.0, "the monitor was started later, and the reasoner is no more"
 
 
-@pytest.mark.parametrize("started", [math.inf, math.nan])
-def test_sign_without_a_time_gives_no_head_start(started):
-    parts = Parts(OWN, 200.0)
-    parts.hear(Sign(REASONER.node, "reasoner", "http://a:2", started), 0.0)
+@pytest.mark.parametrize(
+    ("uri", "started"),
+    [("", 50.0), ("a:4", 50.0), *(("http://a:4", started) for started in (0.0, -1.0, math.inf, -math.inf, math.nan))],
+)
+def test_sign_that_is_none_of_a_part_changes_nothing(parts, uri, started):
+    """Who gives one once would be lost for ever, or be the one that has run for longest and is to tell."""
+    parts.hear(Sign("/stranger", "", uri, started), 0.0)
+    parts.note(MONITOR.node, Answer.GONE, 2.0)
+    parts.note(REASONER.node, Answer.GONE, 2.0)
+    assert "/stranger" not in parts.known
+    assert list(parts.to_tell()) == [REASONER.node, MONITOR.node]
     assert parts.head_start() == 0.0
+
+
+def test_part_on_a_host_whose_clock_was_set_back_is_a_part(parts):
+    parts.hear(Sign("/late", "launcher", "http://a:4", 1e9), 0.0)
+    assert "/late" in parts.known
+
+
+def test_silent_part_that_the_master_does_not_know_is_forgotten_some_time(parts):
+    for answer, now in [(Answer.SILENT, FORGOTTEN_AFTER), (Answer.UNKNOWN, FORGOTTEN_AFTER - 0.1)]:
+        parts.note(REASONER.node, answer, now)
+        assert REASONER.node in parts.to_tell()
+    parts.note(REASONER.node, Answer.UNKNOWN, FORGOTTEN_AFTER)
+    assert REASONER.node not in parts.known
+    assert parts.to_tell() == {}, "it is not there again"
 
 
 def test_one_that_was_started_after_the_loss_keeps_nobody_from_telling_it(parts):

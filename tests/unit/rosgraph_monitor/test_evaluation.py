@@ -65,9 +65,10 @@ def test_start_up_raises_no_alarm_within_the_grace():
 def test_monitor_that_takes_anothers_place_waits_less_for_nodes_that_were_up_before(head_start, grace):
     dead = ALIVE | lives(front_laser=Life.DEAD)
     watched = monitor()
-    early = [watched.evaluate(BOTH, dead, DESIRED, now, head_start=head_start) for now in (10.0, 10.0 + grace - 0.1)]
+    assert Patience(5.0).grace(head_start) == grace
+    early = [watched.evaluate(BOTH, dead, DESIRED, now, grace=grace) for now in (10.0, 10.0 + grace - 0.1)]
     assert all(("ROS Graph", "running OK", "") in said(statuses) for statuses in early)
-    late = said(watched.evaluate(BOTH, dead, DESIRED, 10.0 + grace, head_start=head_start))
+    late = said(watched.evaluate(BOTH, dead, DESIRED, 10.0 + grace, grace=grace))
     assert ("laser_resender", "Component status", "FALSE") in late
 
 

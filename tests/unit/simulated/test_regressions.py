@@ -98,3 +98,12 @@ def test_dead_node_of_a_failed_function_is_not_started_again_when_the_other_func
         Fault(24.403, Kind.KILL_NODE, "/fleet/r7/mast"),
     )
     holds(History(507068, "orchard", faults, Policy.WAIT, starts_with_initial=True))
+
+
+def test_nodes_end_that_a_change_of_a_dead_manipulator_brings_while_its_successor_waits_for_the_launcher():
+    faults = (
+        Fault(49.367, Kind.DEAF, "/fleet/r7/sprayer"),
+        Fault(49.588, Kind.CANCELLED_REQUEST, "by_clock", 1.206),
+        Fault(55.188, Kind.KILL_PART, "manipulator"),
+    )
+    holds(History(5000037, "orchard", faults, Policy.WAIT, starts_with_initial=True))

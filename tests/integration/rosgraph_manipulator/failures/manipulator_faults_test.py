@@ -20,7 +20,7 @@ from integration.rosgraph_manipulator.manipulator_harness import (
     is_alive,
     pid_of,
 )
-from metacontrol_msgs.msg import NodeDescription
+from metacontrol_msgs.msg import LaunchedFunctions, NodeDescription
 from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, StandBy
 
 FOLDER = tempfile.mkdtemp()
@@ -93,6 +93,14 @@ class FaultsTest(PairTest):
             stand_by([node], "")
         self.assertFalse(mark.exists())
         self.wait_for_state("slow")
+
+    def test_report_of_a_stranger_changes_nothing(self):
+        stranger = rospy.Publisher("rosgraph_launcher/functions", LaunchedFunctions, queue_size=1, latch=True)
+        self.addCleanup(stranger.unregister)
+        stranger.publish(LaunchedFunctions(functions=[self.launcher_state]))  # as the replay of a bag does
+        wait_for(lambda: f"reports of {rospy.get_name()} are left out" in self.manipulator.said(), "it is heard")
+        self.assertEqual(self.request("fast"), 1, self.text)
+        self.wait_for_state("fast")
 
     def test_port_in_use_is_rolled_back(self):
         self.assertEqual(self.request("port"), 0)

@@ -229,6 +229,26 @@ class SurvivalTest(PairTest):
         self.assertEqual(self.request("fast"), 0)
         self.assertRegex(self.text, "rosgraph_launcher has failed .*: check that it runs; slow was restored")
 
+    def test_launcher_that_hangs_is_given_up_and_changes_nothing_when_it_goes_on(self):
+        self.set_launcher_timeout(5.0)
+        self.addCleanup(self.set_launcher_timeout, 40.0)
+        told = len(self.launcher_states)
+        os.kill(self.launcher.pid, signal.SIGSTOP)  # the kernel goes on to take connections for it
+        try:
+            self.assertEqual(self.request("stubborn"), -2)
+            self.assertIn("/rosgraph_launcher takes requests and does not answer", self.text)
+        finally:
+            os.kill(self.launcher.pid, signal.SIGCONT)
+        self.assertEqual(self.request("fast"), 1, self.text)
+        self.assertEqual({state.configuration for state in self.launcher_states[told:]}, {"slow", "fast"})
+
+    def set_launcher_timeout(self, timeout):
+        """Have another manipulator take over, which has another time to look for a launcher, s."""
+        rospy.set_param("rosgraph_manipulator/launcher_timeout", timeout)
+        self.manipulator.end()
+        self.start_manipulator()
+        self.wait_until_it_serves()
+
     def pretend_to_be_launcher(self, serve):
         """Let a function serve the requests to the launcher, in a thread; return that."""
         server = socket.create_server((QUIET_HOST, 0))

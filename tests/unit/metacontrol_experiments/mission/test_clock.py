@@ -32,6 +32,16 @@ def test_a_jump_that_lasts_is_believed():
     ]
 
 
+def test_a_jump_that_is_believed_is_told_once():
+    clock = SteadyClock()
+    for told, wall in ((22.0, 0.0), (34.0, 12.0)):
+        clock.believe(told, wall)
+    assert clock.take_jump() == 0.0
+    clock.believe(35.1, 13.1)
+    assert clock.take_jump() == 35.1 - 22.0
+    assert clock.take_jump() == 0.0
+
+
 @given(st.lists(st.integers(0, int(8 * STEP_S)), min_size=1))
 def test_a_clock_that_goes_on_is_followed(eighths):
     told = [total / 8 for total in itertools.accumulate(eighths)]

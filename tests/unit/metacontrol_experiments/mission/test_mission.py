@@ -95,6 +95,21 @@ def test_goal_that_the_server_forgot_is_given_up(driving):
     assert state.outcome is Outcome.ABORTED and actions == (Action.CANCEL_GOAL,)
 
 
+def test_goal_is_not_given_up_because_the_time_jumps(driving):
+    """As when somebody has stopped the mission's process for a while."""
+    after = 100.2 + 5.0 * mission.LOST_S
+    state = mission.on_jump(driving, after, after - 100.2)
+    assert mission.on_time(PLAN, state, after) == (state, ())
+    state, actions = mission.on_time(PLAN, state, after + mission.LOST_S + 0.1)
+    assert (state.outcome, actions) == (Outcome.ABORTED, (Action.CANCEL_GOAL,))
+
+
+def test_jump_moves_nothing_into_the_future(driving):
+    state, _ = mission.on_configuration(driving, 130.0, False)
+    state = mission.on_jump(state, 131.0, 30.0)
+    assert max(state.seen_s, state.asked_s, state.stable_since_s) <= 131.0
+
+
 def test_goal_that_nobody_acknowledged_is_sent_again():
     state = mission.start(PLAN, 100.0, 0.0, 0.0)
     state, actions = mission.on_time(PLAN, state, 105.1)

@@ -38,6 +38,29 @@ def test_later_commands_replace_what_they_take_back(given, holds):
     assert Asked(given).commands == tuple(holds)
 
 
+@pytest.mark.parametrize(
+    ("given", "holds"),
+    [
+        ([Lock()], [Lock("o_water"), Lock("o_light")]),
+        ([Lock(), Unlock("o_water")], [Lock("o_light"), Unlock("o_water")]),
+        ([FLOW], [SetNfr("o_water", "flow", 1.0), SetNfr("o_light", "flow", 1.0)]),
+        ([Lock(), Unlock()], []),
+    ],
+)
+def test_command_for_all_is_one_for_each_of_those_that_there_are(given, holds):
+    asked = Asked()
+    for command in given:
+        asked.heed(command, ["o_water", "o_light"])
+    assert asked.commands == tuple(holds)
+
+
+def test_locks_go_with_what_they_lock():
+    asked = Asked([Pause(), Lock("o_water"), Lock("o_light")])
+    assert not asked.settle({"o_water", "o_light"})
+    assert asked.settle({"o_light"})
+    assert asked.commands == (Pause(), Lock("o_light"))
+
+
 def test_it_is_the_same_from_a_parameter():
     asked = Asked([WATER, Pause(), SetNfr("o_water", "flow", 0.1), Lock("o_water")])
     assert Asked.from_parameter(asked.as_parameter()).commands == asked.commands

@@ -1,3 +1,4 @@
+import errno
 import importlib.util
 import os
 import signal
@@ -152,6 +153,17 @@ def test_child_that_runs_out_of_memory_is_replaced_and_then_given_up(load, caplo
         assert "starting it again" in caplog.text
     finally:
         reasoner.close()
+
+
+def test_jvm_that_cannot_be_started_again_counts_as_lost(knowledge_base, monkeypatch):
+    def refused(*_words, **_options):
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    reasoner = PelletReasoner()
+    reasoner.close()
+    monkeypatch.setattr(pellet_module, "spawn", refused)
+    with pytest.raises(ChildLostError, match=r"can't be started again: .*Too many open files"):
+        reasoner.load(knowledge_base.ontology)
 
 
 def test_jvm_that_does_not_start_is_told(knowledge_base):

@@ -1,15 +1,18 @@
 """A topic is connected to each of its publishers, once, however the lists of publishers come in."""
 
 import contextlib
+import errno
 import socket
 import threading
 import time
 from socketserver import ThreadingMixIn
+from types import SimpleNamespace
 from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 import rospy.topics
 from helpers.waiting import wait_for
+from node_kit.ros import shortages
 from node_kit.ros.connections import connect_to_all
 from rospy.impl import registration, tcpros_base
 from rospy.impl.masterslave import ROSHandler
@@ -80,3 +83,47 @@ def test_publisher_that_a_newer_list_has_is_not_lost_when_an_older_list_comes_la
     for topic, publishers in [("/news", ["http://b"]), ("/other", ["http://c"]), ("/news", ["http://a"])]:
         manager.publisher_update(topic, publishers)
     assert manager.updates[-1] == ("/news", ["http://a", "http://b"])
+
+
+@pytest.fixture
+def manager(topics, monkeypatch):
+    """What acts on lists of publishers."""
+    manager = RegManager(ROSHandler("/listener", "http://localhost:1"))
+    listeners = registration.RegistrationListeners()
+    listeners.add_listener(manager)
+    monkeypatch.setattr(registration, "_registration_listeners", listeners)
+    monkeypatch.setattr(shortages, "ASKS_AGAIN", 0.05)
+    thread = threading.Thread(target=manager.run)
+    thread.start()
+    yield manager
+    manager.handler.done = True
+    thread.join()
+
+
+def is_for_connection(thread):
+    return thread.name == "/news"
+
+
+def is_for_request(thread):
+    return getattr(thread._target, "__name__", "") == "_connect_topic_thread"
+
+
+@pytest.mark.parametrize("is_meant", [is_for_request, is_for_connection])
+@pytest.mark.parametrize("error", [RuntimeError("can't start new thread"), MemoryError()])
+def test_publisher_is_connected_once_there_are_threads_again(publisher, topics, manager, failing, error, is_meant):
+    topics.acquire_impl(Registration.SUB, "/news", String)
+    left = failing(threading.Thread, "start", error, is_meant)
+    manager.publisher_update("/news", [publisher.uri])
+    wait_for(lambda: publisher.connections, "a connection")
+    assert not left
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.ENOBUFS, errno.EHOSTUNREACH])
+def test_publisher_is_connected_once_it_can_be_reached_again(publisher, topics, manager, failing, monkeypatch, number):
+    topics.acquire_impl(Registration.SUB, "/news", String)
+    sockets = SimpleNamespace(**vars(socket))
+    monkeypatch.setattr(tcpros_base, "socket", sockets)
+    left = failing(sockets, "socket", OSError(number, ""), times=2)
+    manager.publisher_update("/news", [publisher.uri])
+    wait_for(lambda: publisher.connections, "a connection")
+    assert not left

@@ -3,6 +3,7 @@
 import os
 import signal
 import socket
+from dataclasses import replace
 
 import psutil
 import pytest
@@ -98,6 +99,21 @@ def test_node_that_takes_calls_and_answers_none_is_killed_soon(patient, stubborn
         patient.ask_to_end(["/lidar"])
         patient.end(["/lidar"])
     assert said[-1].endswith("does not answer: killing it")
+
+
+def test_node_that_the_kernel_holds_is_told_once_and_waited_for_in_the_background(nodes, command, said, debugger):
+    nodes.begin("/held", replace(command("held"), words=("/bin/sleep", "1000")), None)
+    nodes.begin("/other", replace(command("other"), words=("/bin/sleep", "1000")), None)
+    pid = nodes._running["/held"].pid
+    debugger(pid)
+    nodes.end(["/held", "/other"], patience=False)
+    told = f"process {pid} (/held) can't be ended: the kernel holds it"
+    assert [line for line in said if "kernel" in line] == [told]
+    nodes.take_ended()
+    assert psutil.pid_exists(pid)
+    debugger.end()
+    wait_for(lambda: nodes.take_ended() or not psutil.pid_exists(pid), "its end is noticed")
+    assert said.count(told) == 1
 
 
 def test_processes_that_stand_by_are_started_one_by_one(nodes, prepared, begun):

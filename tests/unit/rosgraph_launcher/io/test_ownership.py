@@ -3,11 +3,15 @@
 import os
 import subprocess
 import sys
+from io import BytesIO
 
 import pytest
+from metacontrol_msgs.msg import LaunchedFunctions
 from rosgraph_launcher.io import ownership
 from rosgraph_launcher.io.processes import MARK
 from rosgraph_launcher.launching.ownership import Owner
+from rosgraph_launcher.launching.report import LauncherReport
+from rosgraph_launcher.ros.node_messages import report_message
 
 LAUNCHER = "http://localhost:11311/rosgraph_launcher"
 NODE = "import os, socket, sys; s = socket.create_server(('127.0.0.1', 0)); print(s.getsockname()[1], os.getpid())"
@@ -70,6 +74,14 @@ def test_process_of_somebody_else_is_foreign(answer, serve):
     answer(f"http://localhost:{port}/", pid)
     assert owner() is Owner.FOREIGN
     assert f"process {pid} " in ownership.look_up("/n").conflict(LAUNCHER)
+
+
+def test_command_line_that_is_no_utf_8_fits_into_a_message(answer, serve):
+    port, pid = serve([sys.executable, "-X", b"m\xfcller", *SERVES[1:]], "")
+    answer(f"http://localhost:{port}/", pid)
+    conflict = ownership.look_up("/n").conflict(LAUNCHER)
+    assert r"m\xfcller" in conflict
+    LaunchedFunctions(functions=[report_message(LauncherReport("f", message=conflict))]).serialize(BytesIO())
 
 
 def test_process_that_does_not_serve_the_port_cannot_be_compared(answer, serve):

@@ -1,5 +1,6 @@
 """Processes of nodes: started, given their role, ended; none left behind."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -148,6 +149,63 @@ def test_children_of_a_node_end_with_it(command, tmp_path):
     wait_for(lambda: not is_alive(child), "the child has ended")
 
 
+def refuse(*_):
+    raise OSError(errno.EMFILE, "Too many open files")
+
+
+def test_system_that_has_no_pipe_is_told(command, monkeypatch):
+    monkeypatch.setattr(processes.os, "pipe", refuse)
+    with pytest.raises(StartError, match="node: Too many open files"):
+        processes.prepare(command("pass\n"))
+
+
+def test_process_whose_end_cannot_be_followed_is_killed(command, monkeypatch, tmp_path):
+    monkeypatch.setattr(processes, "open_pidfd", refuse)
+    wanted = command("echo $$ > pid; exec sleep 1000", python=False)
+    with pytest.raises(StartError, match="Too many open files"):
+        processes.start(wanted)
+    assert processes.kill_marked(str(tmp_path)) == []
+
+
+def test_process_that_the_kernel_holds_is_told(command, debugger):
+    process = processes.start(command("exec sleep 1000", python=False))
+    debugger(process.pid)
+    assert process.close() is False
+    debugger.end()
+    wait_for(lambda: process.status is not None, "it has ended")
+
+
+class Unkillable:
+    """A process with a mark that lives on, whatever is done to it, as one that waits for a device does."""
+
+    def __init__(self, pid):
+        self.pid, self.kills = pid, 0
+
+    def environ(self):
+        return {MARK: "mark"}
+
+    def status(self):
+        return psutil.STATUS_DISK_SLEEP
+
+    def create_time(self):
+        return 0.0
+
+    def kill(self):
+        self.kills += 1
+
+
+def test_reaper_looks_for_children_again_and_does_not_wait_for_what_cannot_be_killed(monkeypatch):
+    owner = subprocess.Popen(["true"])
+    owner.wait()
+    held, child = Unkillable(-1), Unkillable(-2)
+    seen = iter([[held], [held, child], [held, child]])  # a further look would raise StopIteration
+    monkeypatch.setattr(processes.psutil, "process_iter", lambda: next(seen))
+    monkeypatch.setattr(sys, "argv", ["reaper", str(owner.pid), "mark"])
+    processes.main()
+    assert held.kills and child.kills
+    assert next(seen, None) is None
+
+
 OWNER = """
 import os, sys, time
 from rosgraph_launcher.io import processes
@@ -179,7 +237,7 @@ def test_what_an_earlier_owner_left_is_killed_and_nothing_else(tmp_path):
     other = subprocess.Popen(["sleep", "1000"], env={MARK: "another", "PATH": os.environ["PATH"]})
     try:
         wait_for(lambda: psutil.Process(left.pid).environ().get(MARK) == str(tmp_path), "it runs")
-        assert processes.kill_marked(str(tmp_path)) == [left.pid]
+        assert [pid for pid, _ in processes.kill_marked(str(tmp_path))] == [left.pid]
         assert left.wait(DEADLINE_S) == -signal.SIGKILL
         assert other.poll() is None
     finally:

@@ -122,6 +122,11 @@ def test_system_that_was_ended_starts_anew():
     assert resume(ended, "good", False, "first", NOW) == Resumption(running="good", keep_goal=True)
 
 
+@pytest.mark.parametrize(("now", "is_due"), [(NOW - 1.0, False), (NOW + 5.0, True), (NOW - 3600.0, True)])
+def test_heartbeat_is_due_after_a_while_and_when_the_clock_was_set_back(now, is_due):
+    assert STEADY.needs_heartbeat(now) is is_due
+
+
 def test_journal_survives_the_parameter_server():
     assert parse_journal(BROKEN.as_parameter()) == BROKEN
     failed = STEADY.noted({}, NOW, failures={"f_pick": "it died"})

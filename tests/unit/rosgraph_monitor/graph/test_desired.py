@@ -54,6 +54,25 @@ def test_variant_that_can_not_be_read_keeps_the_last_good_model():
     assert model.follow([Grounding("f", "fast", "STABLE")]).problem == ""
 
 
+def test_variant_that_could_not_be_read_for_a_while_is_read_when_it_can_be():
+    files = {"slow": SLOW}
+
+    def read(name):
+        if name not in files:
+            raise ModelError(f"no model {name}")
+        return files[name]
+
+    model = DesiredModel(BASE, read)
+    model.follow([Grounding("f", "slow", "STABLE")])
+    model.follow([Grounding("f", "fast", "STABLE")])
+    assert "fast" in model.look_again().problem
+    files["fast"] = FAST
+    desired = model.look_again()
+    assert (desired.problem, desired.excused) == ("", frozenset())
+    assert names(desired) == {"laser", "move_base", "fast_helper"}
+    assert model.look_again() is desired, "nothing is read again where nothing is missing"
+
+
 CELL = RosSystem(
     "cell", components=tuple(Component(name) for name in ("conveyor", "camera", "gripper", "viewer", "welder"))
 )

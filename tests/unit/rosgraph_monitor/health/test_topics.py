@@ -31,6 +31,19 @@ def test_topic_may_bring_its_first_message_within_the_grace():
     assert said(followed, 5.1) == ["Silent topic"]
 
 
+def test_another_grace_may_hold_for_the_moment():
+    followed = health(max_age=1.0)
+    assert said(followed, 3.0, grace=3.0) == [""]
+    assert said(followed, 3.1, grace=3.0) == ["Silent topic"]
+    assert said(followed, 3.2) == [""]
+
+
+def test_first_message_of_a_slow_topic_has_two_of_its_periods():
+    followed = health(min_rate=0.25)
+    assert said(followed, 8.0, grace=3.0) == [""]
+    assert said(followed, 8.1, grace=3.0) == ["Silent topic"]
+
+
 @pytest.mark.parametrize(("ros", "wall"), [(60.0, 4.0), (4.0, 60.0)])
 def test_neither_a_fast_simulation_nor_a_paused_one_shortens_the_grace(ros, wall):
     assert health(max_age=1.0).judge(ros, wall)[0].message == ""

@@ -128,6 +128,22 @@ def test_node_that_registered_a_senseless_address_ends_no_watch(watcher, odd):
         wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE, known(watcher))
 
 
+def test_host_that_could_not_be_looked_up_for_want_of_a_thread_is_looked_up_later(watcher, monkeypatch):
+    begin, refused = threading.Thread.start, []
+
+    def start(thread):
+        if thread.name.startswith("resolve") and not refused:
+            refused.append(thread)
+            raise RuntimeError("can't start new thread")
+        begin(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    with node() as (uri, _end):
+        watcher.watch({"/n": uri})
+        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE, known(watcher))
+    assert refused
+
+
 @hasty
 def test_silent_node_is_hung_until_it_answers(watcher):
     with socket.create_server((QUIET_HOST, 0)) as silent:

@@ -18,6 +18,9 @@ HANGS_AFTER = 4.0
 """s without a sign or an answer after which a part hangs; one at whose address nobody listens is lost at once."""
 STARTS_WITHIN = 15.0
 """s without a sign after which a part that was started again has not come back."""
+FORGOTTEN_AFTER = 300.0
+"""s without a sign or an answer after which a part is forgotten that the master does not know any more: its host is
+gone, and somebody has cleaned up. Minutes, so that the loss is read before."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,14 @@ class Sign:
     started: float = 0.0
     ends: bool = False
 
+    @property
+    def is_usable(self) -> bool:
+        """Tell whether a part can have given it: it says where to ask the part, and since when the part has run.
+
+        One that was started in the future is no error: its host's clock may have been set back since then.
+        """
+        return self.uri.startswith("http://") and math.isfinite(self.started) and self.started > 0.0
+
 
 class Answer(Enum):
     """What came of asking a part."""
@@ -47,9 +58,15 @@ class Answer(Enum):
     ENDED = "it was asked to end"
     STARTS = "it was started again, but gives no sign of life"
     SILENT = "it does not answer"
+    UNKNOWN = "it does not answer, and the master does not know it"
 
 
-_PATIENCE = {Answer.GONE: 0.0, Answer.SILENT: HANGS_AFTER, Answer.STARTS: STARTS_WITHIN}
+_PATIENCE = {
+    Answer.GONE: 0.0,
+    Answer.SILENT: HANGS_AFTER,
+    Answer.UNKNOWN: HANGS_AFTER,
+    Answer.STARTS: STARTS_WITHIN,
+}
 
 
 @dataclass(frozen=True)
@@ -87,8 +104,8 @@ class Parts:
         return dict(sorted(self._known.items()))
 
     def hear(self, sign: Sign, now: float) -> None:
-        """Take in a sign of life."""
-        if sign.node == self._own:
+        """Take in a sign of life, if it is usable."""
+        if sign.node == self._own or not sign.is_usable:
             return
         if sign.ends:
             self.note(sign.node, Answer.ENDED, now)
@@ -104,7 +121,8 @@ class Parts:
         standing = self._known.get(node)
         if standing is None:
             return
-        if answer is Answer.ENDED:  # neither lost nor back
+        is_forgotten = answer is Answer.UNKNOWN and now - standing.heard >= FORGOTTEN_AFTER
+        if answer is Answer.ENDED or is_forgotten:  # neither lost nor back
             del self._known[node]
             self._told.discard(node)
         elif answer is Answer.LIVES:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _CONDITION = {Life.ALIVE: NodeCondition.ALIVE, Life.UNKNOWN: NodeCondition.UNKNOWN}
 _ENDED = "ended", "ended: it has unregistered from the master"
 _SHORTEST_GRACE = 3.0
-"""Wall s in which a node that the monitor has never seen may come up in a system that started long ago."""
+"""Wall s in which what the monitor has never seen may come up in a system that started long ago."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,15 @@ class Patience:
     restart: float = 1.0
     ports: float = 1.0
     recovery: float = DEFAULT_RECOVERY
+
+    def grace(self, head_start: float) -> float:
+        """Return for how long nodes may come up, and topics bring a first message, s from the monitor's own start.
+
+        Args:
+            head_start: for how long the system had run then, wall s. A monitor that takes another's place does not wait
+                long for what was there before.
+        """
+        return max(self.startup - head_start, min(self.startup, _SHORTEST_GRACE))
 
 
 class GraphEvaluator:
@@ -93,7 +102,7 @@ class GraphEvaluator:
         others: Mapping[str, NodeCondition] | None = None,
         reasons: Mapping[str, str] | None = None,
         is_fresh: bool = True,
-        head_start: float = 0.0,
+        grace: float | None = None,
     ) -> list[Status]:
         """Judge the graph.
 
@@ -107,8 +116,7 @@ class GraphEvaluator:
             reasons: why such a component has failed, by its name.
             is_fresh: whether the snapshot is newer than what is known of the nodes. Else a node that seems dead may
                 have unregistered since, so that the next evaluation says that it has ended.
-            head_start: for how long the system had run when this monitor was started, wall s. One that takes another's
-                place does not wait for nodes to come up that were up long ago.
+            grace: wall s in which expected nodes may come up, where it is not the usual time (see `Patience.grace`).
 
         Returns:
             The statuses of components, then the findings, or "running OK" where there are none.
@@ -124,7 +132,7 @@ class GraphEvaluator:
             now,
             excused=desired.excused,
             patience=dict.fromkeys(desired.variant_nodes, self._patience.restart),
-            grace=max(self._patience.startup - head_start, min(self._patience.startup, _SHORTEST_GRACE)),
+            grace=grace,
         )
         failed = [name for name, status in components if status is ComponentStatus.FALSE]
         found = {name: self._why(name, conditions, life, topics, reasons or {}, is_fresh) for name in failed}

@@ -9,12 +9,13 @@ DOUBT_S = 1.0
 
 
 class SteadyClock:
-    """Follows ROS time, and a jump only once that has lasted."""
+    """Follows ROS time, and a jump only once that has lasted: be it the clock's, or of a process that was held up."""
 
     def __init__(self) -> None:
         """Begin with the first time that is told."""
         self._believed: float | None = None
         self._doubted_since: float | None = None
+        self._jumped = 0.0
 
     def believe(self, told: float, wall: float) -> float:
         """Return the time, s.
@@ -28,5 +29,11 @@ class SteadyClock:
         elif self._doubted_since is None:
             self._doubted_since = wall
         elif wall - self._doubted_since > DOUBT_S:
+            self._jumped += told - self._believed
             self._believed, self._doubted_since = told, None
         return self._believed
+
+    def take_jump(self) -> float:
+        """Return how far the time that is believed has jumped since the last call, s."""
+        jumped, self._jumped = self._jumped, 0.0
+        return jumped

@@ -214,6 +214,22 @@ def on_time(plan: Plan, state: State, now_s: float) -> Step:
     return state, strikes
 
 
+def on_jump(state: State, now_s: float, by_s: float) -> State:
+    """Take in that the time has jumped: what was waited for has not been waited for any longer.
+
+    Args:
+        state: the mission so far.
+        now_s: simulated time after the jump.
+        by_s: how far it has jumped; below 0, back.
+    """
+
+    def moved(moment: float) -> float:
+        return min(moment + by_s, now_s)
+
+    seen = None if state.seen_s is None else moved(state.seen_s)
+    return replace(state, seen_s=seen, asked_s=moved(state.asked_s), stable_since_s=moved(state.stable_since_s))
+
+
 def interrupt(state: State, now_s: float, reason: str) -> State:
     """End a mission that was interrupted from outside."""
     return state if state.over else _end(state, now_s, Outcome.INTERRUPTED, reason)[0]

@@ -102,6 +102,9 @@ class NavigationMission(MissionNode[State]):
     def _advance(self, now: float) -> None:
         self._take(mission.on_time(self._plan, self.state, now))
 
+    def _follow_jump(self, now: float, by: float) -> None:
+        self._state = mission.on_jump(self.state, now, by)
+
     def _give_up(self, now: float, reason: str, *, interrupted: bool) -> None:
         end = mission.interrupt if interrupted else mission.abort
         self._state = end(self.state, now, reason)

@@ -110,6 +110,9 @@ class MissionNode(ABC, Generic[State]):
     def _advance(self, now: float) -> None:
         """Take in the time."""
 
+    def _follow_jump(self, now: float, by: float) -> None:
+        """Take in that the time has jumped, by so many s, to `now`; a mission that waits for nothing need not."""
+
     @abstractmethod
     def _give_up(self, now: float, reason: str, *, interrupted: bool) -> None:
         """End the mission for a reason from outside."""
@@ -186,7 +189,10 @@ class MissionNode(ABC, Generic[State]):
                 clock, moved = now, time.monotonic()
             elif time.monotonic() - moved > STANDSTILL_S:
                 self._give_up(self._now(), "the simulated clock stands still", interrupted=False)
-            self._advance(self._now())
+            moment = self._now()
+            if by := self._clock.take_jump():
+                self._follow_jump(moment, by)
+            self._advance(moment)
             try:
                 self._check()
             except StartError as error:

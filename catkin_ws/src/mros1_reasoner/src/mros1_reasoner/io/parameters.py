@@ -36,6 +36,7 @@ PARAMETERS = (
     "qa_direction",
     "reasoning_rate",
     "reconfigure_srv_name",
+    "remembered",
     "save_folder",
     "spares",
     "task_actions",
@@ -94,6 +95,11 @@ class Parameters:
     def asked(self) -> object:
         """What an operator had asked of a reasoner of this name that has died, as `loop.asked` writes it."""
         return self.values.get("asked")
+
+    @property
+    def remembered(self) -> object:
+        """What a reasoner of this name that has died has left, as `loop.remembered` writes it."""
+        return self.values.get("remembered")
 
     @property
     def nodes(self) -> dict[str, str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 
 from mros1_reasoner.loop import entries
 from mros1_reasoner.loop.entries import Command
@@ -23,15 +24,30 @@ class Asked:
         """The commands that hold."""
         return tuple(self._commands)
 
-    def heed(self, command: Command) -> None:
-        """Take in a command that was carried out."""
+    def heed(self, command: Command, objectives: Collection[str] = ()) -> None:
+        """Take in a command that was carried out.
+
+        Args:
+            command: what was asked for.
+            objectives: names of those that there are: one for all holds for each of them, also where they come into
+                being later, as they do in a reasoner that begins.
+        """
         if isinstance(command, entries.Approve | entries.Reject):
             return
         self._commands = [before for before in self._commands if not _replaces(command, before)]
-        if not isinstance(command, entries.Resume | entries.Unlock):
+        if isinstance(command, entries.Lock | entries.SetNfr) and not command.objective and objectives:
+            self._commands += [replace(command, objective=name) for name in objectives]
+        elif not isinstance(command, entries.Resume | entries.Unlock):
             self._commands.append(command)
         elif isinstance(command, entries.Unlock) and any(isinstance(c, entries.Lock) for c in self._commands):
             self._commands.append(command)  # all are locked but this one
+
+    def settle(self, locked: Collection[str]) -> bool:
+        """Forget the locks of objectives that are locked no longer, since they went; return whether there were any."""
+        before = len(self._commands)
+        locks = (entries.Lock, entries.Unlock)
+        self._commands = [c for c in self._commands if not isinstance(c, locks) or c.objective in ("", *locked)]
+        return len(self._commands) < before
 
     def as_parameter(self) -> list[list[str]]:
         """Return the commands as a value of a parameter: of each, its kind and values."""

@@ -39,17 +39,17 @@ class Operator:
         The loop publishes the adaptation that it would have done as a refusal.
 
         Raises:
-            MapeError: there is no such objective.
+            MapeError: there is no such objective, and no design may require it.
         """
-        self._state.lock(self._state.named(objective))
+        self._state.lock(self._names(objective))
 
     def unlock(self, objective: str = "") -> None:
         """Take `lock` back.
 
         Raises:
-            MapeError: there is no such objective.
+            MapeError: there is no such objective, and no design may require it.
         """
-        self._state.unlock(self._state.named(objective))
+        self._state.unlock(self._names(objective) if objective else self._state.locked)
 
     def approve(self, decision_id: str, now: float) -> Decision:
         """Approve the proposed decision. It is DECIDED now; the caller publishes it and has it carried out.
@@ -166,11 +166,16 @@ class Operator:
         """Give an objective another limit of a quality.
 
         Raises:
-            MapeError: there is no such objective or quality, or the limit is no level of it.
+            MapeError: there is no such objective and no design may require it, or there is no such quality, or the
+                limit is no level of it.
         """
-        self._state.named(objective)
+        self._names(objective)
         self._check_limit(quality, limit)
         self._state.set_limit(objective, quality, limit, f"the operator wants a limit of {limit:g} of {quality}")
+
+    def _names(self, objective: str) -> set[str]:
+        """Return the objective of a name, which may come into being when a design requires it; all if it is empty."""
+        return {objective} if objective in self._state.foreseen() else self._state.named(objective)
 
     def _proposed(self, decision_id: str) -> Decision:
         proposal = self._state.proposal

@@ -96,7 +96,37 @@ class ActiveFact:
     state: str
 
 
-Fact = LevelFact | StaleFact | ComponentFact | DriftFact | BindingFact | TaskFact | ActiveFact
+@dataclass(frozen=True, slots=True)
+class LeftFact:
+    """A reasoner that has died had left a better design of an objective, and waited for its way back.
+
+    Attributes:
+        objective: the objective.
+        design: what ran for it then; empty: nothing.
+        quality: for the sake of which it was left; empty: of none.
+        factor: observed levels were then so many times the expected ones,
+        difference: or differed from them by so much.
+        group: of designs that are corrected together, in which the design that was left is.
+        degraded: whether what ran did not keep every limit.
+    """
+
+    objective: str
+    design: str
+    quality: str = ""
+    factor: float = 1.0
+    difference: float = 0.0
+    group: str = ""
+    degraded: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FailedFact:
+    """A component did not work when a reasoner died: if it works now, that is news."""
+
+    component: str
+
+
+Fact = LevelFact | StaleFact | ComponentFact | DriftFact | BindingFact | TaskFact | ActiveFact | LeftFact | FailedFact
 
 # What an operator asks for
 
@@ -255,4 +285,8 @@ def subject(fact: Fact) -> tuple[str, ...]:
             found = ("task", fact.name)
         case ActiveFact():
             found = ("active", fact.function)
+        case LeftFact():
+            found = ("left", fact.objective, fact.quality)
+        case FailedFact():
+            found = ("failed", fact.component)
     return found

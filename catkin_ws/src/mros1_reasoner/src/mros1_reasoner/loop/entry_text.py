@@ -9,6 +9,8 @@
 | binding | grounding, in error |
 | task | objective or its function, failed, stamp, message; any other name means the only root objective |
 | active | function, configuration (empty: nothing runs), state |
+| left | objective, what ran, quality, factor and difference of levels, group of designs, whether limits were not kept |
+| failed | component that did not work when the reasoner before this one died |
 | step | whether it is a heartbeat |
 | result | decision, whether it is carried out, message, whether the configuration is to blame |
 | pause, resume | |
@@ -41,6 +43,8 @@ _KINDS: Mapping[str, type[entries.Content]] = {
     "binding": entries.BindingFact,
     "task": entries.TaskFact,
     "active": entries.ActiveFact,
+    "left": entries.LeftFact,
+    "failed": entries.FailedFact,
     "step": entries.Step,
     "result": entries.Result,
     "pause": entries.Pause,

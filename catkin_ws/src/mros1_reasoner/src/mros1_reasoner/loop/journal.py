@@ -12,7 +12,14 @@ from mros1_reasoner.loop import entries
 from mros1_reasoner.loop.entries import Entry
 from mros1_reasoner.loop.mape import Mape
 
-_LASTING = entries.ActiveFact | entries.ComponentFact | entries.BindingFact | entries.TaskFact
+_LASTING = (
+    entries.ActiveFact
+    | entries.ComponentFact
+    | entries.BindingFact
+    | entries.TaskFact
+    | entries.LeftFact
+    | entries.FailedFact
+)
 _COMMANDS = (
     entries.Pause
     | entries.Resume
@@ -37,20 +44,6 @@ def apply(core: Mape, entry: Entry) -> list[Decision]:
     """
     now, content = entry.now, entry.content
     match content:
-        case entries.LevelFact():
-            core.observe_level(now, content.quality, content.level, content.grounding, content.stamp)
-        case entries.StaleFact():
-            core.observe_stale(content.quality)
-        case entries.ComponentFact():
-            core.observe_component(now, content.component, content.status, content.stamp, content.reason)
-        case entries.DriftFact():
-            core.observe_drift(now, content.node, content.parameters, content.configurations.split(","), content.stamp)
-        case entries.BindingFact():
-            core.observe_binding(now, content.grounding, content.in_error)
-        case entries.TaskFact():
-            core.observe_task(now, _objective(core, content.name), content.failed, content.stamp, content.message)
-        case entries.ActiveFact():
-            core.observe_active(now, content.function, content.configuration, content.state)
         case entries.Step():
             return core.step(now, heartbeat=content.heartbeat)
         case entries.Result():
@@ -60,6 +53,8 @@ def apply(core: Mape, entry: Entry) -> list[Decision]:
             core.report_released(content.function)
         case entries.Decided():
             pass
+        case _ if isinstance(content, entries.Fact):
+            _observe(core, now, content)
         case _:
             return _carry_out(core, now, content)
     return []
@@ -102,6 +97,27 @@ class Journal:
         others = [item for item in old if isinstance(item.content, _COMMANDS)]
         kept = sorted([*last.values(), *others], key=lambda item: item.now)
         self._entries.extendleft(reversed(kept))
+
+
+def _observe(core: Mape, now: float, fact: entries.Fact) -> None:
+    """Have the loop take in a fact."""
+    match fact:
+        case entries.LevelFact():
+            core.observe_level(now, fact.quality, fact.level, fact.grounding, fact.stamp)
+        case entries.StaleFact():
+            core.observe_stale(fact.quality)
+        case entries.ComponentFact():
+            core.observe_component(now, fact.component, fact.status, fact.stamp, fact.reason)
+        case entries.DriftFact():
+            core.observe_drift(now, fact.node, fact.parameters, fact.configurations.split(","), fact.stamp)
+        case entries.BindingFact():
+            core.observe_binding(now, fact.grounding, fact.in_error)
+        case entries.TaskFact():
+            core.observe_task(now, _objective(core, fact.name), fact.failed, fact.stamp, fact.message)
+        case entries.ActiveFact():
+            core.observe_active(now, fact.function, fact.configuration, fact.state)
+        case entries.LeftFact() | entries.FailedFact():
+            core.observe_before(fact)
 
 
 def _carry_out(core: Mape, now: float, command: entries.Command) -> list[Decision]:

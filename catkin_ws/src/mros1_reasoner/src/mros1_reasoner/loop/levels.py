@@ -246,6 +246,14 @@ class Levels:
         if level and strain is not None:
             self._blames[key] = _Blame(strain, level.group)
 
+    def restore(self, key: Key, strain: Correction, group: str) -> None:
+        """Note that a design of a group was left because of a quality, when levels compared so with expected ones."""
+        self._blames[key] = _Blame(strain, group)
+
+    def blames(self, objective: str) -> dict[str, tuple[Correction, str]]:
+        """Return for which qualities designs of an objective were left, with what `restore` takes."""
+        return {key[1]: (blame.strain, blame.group) for key, blame in self._blames.items() if key[0] == objective}
+
     def acquit(self, objective: str) -> None:
         """Forget what designs of an objective were left for."""
         self._blames = {key: blame for key, blame in self._blames.items() if key[0] != objective}

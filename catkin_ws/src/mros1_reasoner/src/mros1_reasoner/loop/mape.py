@@ -19,6 +19,7 @@ from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Reasoner
 from mros1_reasoner.loop.commands import Operator
 from mros1_reasoner.loop.deliberation import Deliberation, Timing
+from mros1_reasoner.loop.entries import FailedFact, LeftFact
 from mros1_reasoner.loop.fulfilment import Fulfilment, fulfilment
 from mros1_reasoner.loop.readable_state import MapeError, View
 from mros1_reasoner.loop.repairs import UnderWay
@@ -184,6 +185,8 @@ class Mape:
             raise MapeError(f"component {component} has the unknown status {status!r}: expected TRUE, FALSE, RECOVERED")
         known = self._state.components.get(component)
         before = known.status if known else v.WORKS
+        if self._state.had_failed_before(component) and status != v.FAILED:
+            before = v.FAILED
         if status == v.WORKS and before in (v.FAILED, v.RECOVERED):
             status = v.RECOVERED
         elif status == v.RECOVERED and known and before == v.WORKS:
@@ -256,6 +259,21 @@ class Mape:
         if design is None or design.function != function:
             raise MapeError(f"running configuration {configuration!r} is no FunctionDesign of {function} in the model")
         self._state.note_active(now, function, configuration, state)
+
+    def observe_before(self, fact: LeftFact | FailedFact) -> None:
+        """Take in what a reasoner that has died had left, or knew to have failed.
+
+        Raises:
+            MapeError: the quality or the component is unknown.
+        """
+        if isinstance(fact, FailedFact):
+            if fact.component not in self._kb.components:
+                raise MapeError(f"component {fact.component}, which did not work, is not in the model: left out")
+            self._state.note_failed_before(fact.component)
+        elif fact.quality and fact.quality not in self._kb.qualities:
+            raise MapeError(f"a design was left for the quality {fact.quality!r}, which is not in the model: left out")
+        else:
+            self._state.note_left(fact)
 
     # R2, R3
 

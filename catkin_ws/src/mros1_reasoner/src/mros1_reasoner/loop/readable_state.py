@@ -146,6 +146,7 @@ class View:
         wanted: by objective, the design that waits for what it requires.
         released: functions that nothing needs any longer although they run, in the order in which to release them.
         components: last status of components.
+        failed_before: components that did not work when a reasoner before this one died, and are not heard of yet.
         levels: observed levels.
         surroundings: what is known of them.
         repairs: what is known of the repairs of components.
@@ -153,7 +154,7 @@ class View:
         error_log: until when a design is not tried again for an objective, and why.
         history: the last decisions that have been carried out or have failed.
         retries: from when on a design that failed may replace a working one of an objective, and why it failed.
-        locked: objectives that keep their configuration.
+        locked: objectives that keep their configuration; some may come into being later.
         paused: whether nothing is decided.
         proposal: decision that waits for approval.
         pending: decision that is under way.
@@ -175,6 +176,7 @@ class View:
     wanted: Mapping[str, str]
     released: Collection[str]
     components: Mapping[str, Component]
+    failed_before: Set[str]
     levels: Levels
     surroundings: Surroundings
     repairs: Repairs
@@ -231,6 +233,11 @@ class View:
         reserve = self.in_reserve.get(function)
         name = reserve.name if reserve else f"o_{function.removeprefix('f_')}"
         return name if name not in self.roots else f"o_{function}"
+
+    def foreseen(self) -> dict[str, str]:
+        """Return the objectives that designs may require, with the function of each."""
+        functions = {function for design in self.kb.designs.values() for function in design.requires}
+        return {self.provider(function): function for function in sorted(functions)}
 
     def objective_of(self, function: str) -> Objective:
         """Return the objective that provides a function to the designs that require it, as it is at its start."""

@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 from metacontrol_msgs.msg import ReconfigurationResult
 
 SERVER_WAIT = 1.0  # s, wall, at most, for the connections to the manipulator: after a start they may be on their way
 SERVER_LOOK = 0.02  # s, wall, between two looks whether they are there
+ACKNOWLEDGE_WAIT = 5.0  # s, wall, until a request must be acknowledged: else its manipulator has died with it
 RELEASE_WAIT = 5.0  # s, wall, until a release that has failed is tried again
 _MEANINGS = {
     ReconfigurationResult.FAILED: "the manipulator restored the former one",
@@ -58,6 +59,16 @@ class Answer:
     code: int | None
 
 
+class Handle(Protocol):
+    """A goal of the manipulator."""
+
+    def is_acknowledged(self) -> bool:
+        """Tell whether the manipulator has told of it."""
+
+    def cancel(self) -> None:
+        """Take it back."""
+
+
 class Client(Protocol):
     """An action of the manipulator."""
 
@@ -68,8 +79,8 @@ class Client(Protocol):
     def is_there(self) -> bool:
         """Tell at once whether the manipulator is connected."""
 
-    def send(self, wanted: Wanted, done: Callable[[Answer], object]) -> Any:
-        """Send a goal, and return what has `cancel()`; `done` is called in the loop's thread when it has ended."""
+    def send(self, wanted: Wanted, done: Callable[[Answer], object]) -> Handle:
+        """Send a goal; `done` is called in the loop's thread when it has ended."""
 
 
 class Trouble(Protocol):
@@ -84,7 +95,8 @@ class _Request:
     decision: str  # empty: a release
     wanted: Wanted
     ends: float = 0.0  # wall time
-    handle: Any = None  # None: it could not be sent yet
+    handle: Handle | None = None  # None: it could not be sent yet
+    unheard: float = math.inf  # wall time after which it must be acknowledged; infinite where it is
 
 
 class Requesting:
@@ -153,11 +165,18 @@ class Requesting:
             return
         if request.handle is None and (client := self._client_for(request)):
             request.ends = self._clock() + self._deadline
+            request.unheard = self._clock() + ACKNOWLEDGE_WAIT
             request.handle = client.send(request.wanted, lambda answer: self._take_answer(request, answer))
-        elif self._clock() < request.ends:
             return
-        elif request.handle is None:
+        if request.handle is not None and request.handle.is_acknowledged():
+            request.unheard = math.inf
+        if self._clock() < min(request.ends, request.unheard):
+            return
+        if request.handle is None:
             self._end(request, False, f"the manipulator's action server {self._client.name} is not there", blame=False)
+        elif self._clock() >= request.unheard:
+            request.handle.cancel()
+            self._end(request, False, f"the manipulator has said nothing of it in {ACKNOWLEDGE_WAIT:g} s", blame=False)
         else:
             request.handle.cancel()
             self._end(request, False, f"no result within {self._deadline:g} s")
@@ -167,7 +186,9 @@ class Requesting:
         """The wall time of the next `look`."""
         if self._request is None:
             return math.inf
-        return self._request.ends if self._request.handle is not None else self._clock() + SERVER_LOOK
+        if self._request.handle is None:
+            return self._clock() + SERVER_LOOK
+        return min(self._request.ends, self._request.unheard)
 
     def tell_trouble(self, *, is_over: bool = False) -> None:
         """Tell others while reconfigurations fail, and once more when they succeed again."""

@@ -14,8 +14,10 @@ from metacontrol_msgs.msg import FunctionGrounding
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Analysis, Design, Facts, Objective, ObjectiveAnalysis, Past
+from mros1_reasoner.knowledge.scale import Correction
 from mros1_reasoner.loop import drifts, lasting
 from mros1_reasoner.loop.causes import OPERATOR, RETRY, RULE, drifted_nodes, is_chance, is_drift, is_relief
+from mros1_reasoner.loop.entries import LeftFact
 from mros1_reasoner.loop.levels import Expectation, Judging, Levels
 from mros1_reasoner.loop.readable_state import BUSY, Component, Running, View
 from mros1_reasoner.loop.repairs import Repairs, UnderWay
@@ -46,7 +48,7 @@ class State(View):
         self._better: dict[tuple[str, str], float | None] = {}
         objectives = tuple(objectives)
         self.objectives: dict[str, Objective] = {o.name: o for o in objectives if not o.when_required}
-        self.in_reserve = {o.function: o for o in objectives if o.when_required}
+        self.in_reserve: dict[str, Objective] = {o.function: o for o in objectives if o.when_required}
         self.roots: dict[str, None] = dict.fromkeys(self.objectives)
         self.running: dict[str, Running] = {objective: Running() for objective in self.objectives}
         self.active: dict[str, tuple[str, str]] = {}
@@ -76,6 +78,8 @@ class State(View):
         self.retries: dict[tuple[str, str], tuple[float, str]] = {}
         self._failures: dict[tuple[str, str], int] = {}  # in a row, by design and objective
         self._at_fault: set[tuple[str, str]] = set()  # these failures were violations of their own making
+        self.failed_before: set[str] = set()
+        self._makeshifts: dict[str, str] = {}  # designs that did not keep every limit for a reasoner before
         self.locked: set[str] = set()
         self.paused = False
         self.proposal: Decision | None = None
@@ -142,6 +146,16 @@ class State(View):
             if design and component in {*design.components, *design.nodes, *design.bindings.values()}:
                 self._run(name, calm_until=max(running.calm_until, now + self.settings.cool_down))
                 self.levels.forget(name)
+
+    def note_failed_before(self, component: str) -> None:
+        """Note that a component did not work when a reasoner before this one died."""
+        self.failed_before.add(component)
+
+    def had_failed_before(self, component: str) -> bool:
+        """Return, once, whether that holds."""
+        known = component in self.failed_before
+        self.failed_before.discard(component)
+        return known
 
     def note_reason(self, name: str, reason: str) -> None:
         """Note another reason why a component has failed, whose status stays as it is."""
@@ -224,7 +238,8 @@ class State(View):
                 self._failures.pop((running.design or "", name), None)
                 self._at_fault.discard((running.design or "", name))
         self._run(name, way=() if self.wanted.get(name, design) == design else running.way)
-        self._run(name, design=design, degraded=False, binding_error=False, task_failure=None, refusal=())
+        is_makeshift = self._makeshifts.pop(name, None) == design
+        self._run(name, design=design, degraded=is_makeshift, binding_error=False, task_failure=None, refusal=())
         self._run(name, replaced=None, ending="", ruled_since=None)
         self._run(name, deployed_at=now, failed_nodes=(), drifts={}, drifts_from=now + self.settings.restart_grace)
         if self.wanted.get(name) == design:
@@ -258,6 +273,11 @@ class State(View):
 
     def set_limit(self, name: str, quality: str, limit: float, why: str) -> None:
         """Give an objective another limit of a quality, which may make another design the better one."""
+        if name not in self.objectives:  # it has it when a design requires it
+            function = self.foreseen()[name]
+            reserve = self.in_reserve.get(function) or Objective(name, function, when_required=True)
+            self.in_reserve[function] = replace(reserve, limits={**reserve.limits, quality: limit})
+            return
         before = self.objectives[name]
         self.replace_limits(replace(before, limits={**before.limits, quality: limit}), why)
 
@@ -408,16 +428,17 @@ class State(View):
         self.reconsider()
 
     def lock(self, names: Iterable[str]) -> None:
-        """Make objectives keep their configuration."""
+        """Make objectives keep their configuration, or the one they have when they come into being."""
         self.locked |= set(names)
         self.reconsider()
 
     def unlock(self, names: Iterable[str]) -> None:
         """Have objectives no longer keep their configuration; what they have missed is a chance now."""
-        for name in self.locked.intersection(names):
+        names = set(names)
+        for name in self.locked & names & self.running.keys():
             chance = math.inf, "it may take another design again"
             self._run(name, chances={**self.running[name].chances, OPERATOR: chance})
-        self.locked -= set(names)
+        self.locked -= names
         self.reconsider()
 
     # Decisions
@@ -498,6 +519,16 @@ class State(View):
             self._run(name, relapses=relapses, returned_at=-math.inf)
         elif not all(is_chance(cause) for cause in causes):  # what runs next is not what it returned to
             self._run(name, returned_at=-math.inf)
+
+    def note_left(self, fact: LeftFact) -> None:
+        """Note that a better design was left by a reasoner before this one."""
+        if fact.quality:
+            strain = Correction(fact.factor, fact.difference)
+            self.levels.restore((fact.objective, fact.quality), strain, fact.group)
+        if fact.degraded:
+            self._makeshifts[fact.objective] = fact.design
+            if (running := self.running.get(fact.objective)) and running.design == fact.design:
+                self._run(fact.objective, degraded=True)
 
     def was_at_fault(self, design: str, objective: str) -> bool:
         """Return whether a design has violated limits of its own making, and has not kept them for long since."""

@@ -156,7 +156,10 @@ class PelletReasoner:
         except _ChildError as error:
             _log.warning("Pellet's process %s: starting it again", error)
         self.close()
-        self._start()
+        try:
+            self._start()
+        except OSError as error:
+            raise ChildLostError(f"Pellet's process can't be started again: {error}") from error
         try:
             for name, ontology in self._loaded.items():
                 if (request["op"], request["name"]) != ("load", name):

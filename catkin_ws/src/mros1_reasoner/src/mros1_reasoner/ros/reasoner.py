@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import rospy
 from actionlib_msgs.msg import GoalStatusArray
@@ -16,6 +16,7 @@ from metacontrol_bags.decision import DECIDED, Decision
 from metacontrol_msgs import msg as messages
 from node_kit.io.inbox import Inbox
 from node_kit.ros.connections import latest
+from node_kit.ros.kept_parameter import KeptParameter
 from std_msgs.msg import Bool
 
 from mros1_reasoner.io.parameters import Parameters
@@ -31,6 +32,7 @@ from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.goals import Goals
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
+from mros1_reasoner.loop.remembered import remembered, to_remember
 from mros1_reasoner.loop.requesting import Wanted
 from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic
@@ -45,8 +47,7 @@ _FASTEST = 10.0  # ROS time may run so much faster than wall time
 _LONGEST_WAIT = 1.0  # s, wall, until it is seen that somebody has asked the node to end
 _QUEUE = 1000  # diagnostics that wait at most
 _ANSWER_DEADLINE = 60.0  # s, wall, for a service; an analysis may have to start Pellet again
-
-_ASKED = "~asked"  # the parameter that keeps what an operator has asked for
+_KEEP_DEADLINE = 1.0  # s, wall, for which an operator's command waits until it is kept
 
 _T = TypeVar("_T")
 
@@ -107,10 +108,14 @@ class ReasonerNode:
         self._listen(parameters.task_actions)
         self._services = Services(self, parameters.save_folder)
         self._asked = Asked.from_parameter(parameters.asked)
+        self._kept_asked, self._kept_memory = KeptParameter("~asked"), KeptParameter("~remembered")
+        self._memory: dict[str, Any] = {}
         self._goals_asked = Goals(self.core, lambda command: self.command(command, lasts=False))
         self._tasks = ObjectiveAction(self._goals_asked, self._inbox.put, self._log.tell)
         for objective in objectives:
             self._log.tell_objective(objective)
+        for fact in remembered(parameters.remembered):
+            self._take(fact)
         self._take_up_what_was_asked()
         self._log.tell("Reasoner Initialization Ok")
 
@@ -141,6 +146,7 @@ class ReasonerNode:
                 if is_heartbeat:
                     self._requests.tell_trouble()
             self._take(Step(is_heartbeat))
+            self._leave()
             self._tasks.look()
             if self._requests:
                 self._requests.release(self.core.released)
@@ -178,6 +184,15 @@ class ReasonerNode:
             except (MapeError, KnowledgeBaseError, ReasonerError) as error:
                 self._log.warn(kind_of(command), f"asked of the reasoner before, left out: {error}")
 
+    def _leave(self) -> None:
+        """Keep what a reasoner that takes this one's place has to know."""
+        if self._asked.settle(self.core.view.locked):
+            self._kept_asked.set(self._asked.as_parameter())
+        memory = to_remember(self.core.view)
+        if memory != self._memory:
+            self._memory = memory
+            self._kept_memory.set(memory)
+
     def command(self, command: entries.Command, *, lasts: bool = True) -> None:
         """Apply an operator's command in the loop's thread.
 
@@ -190,8 +205,8 @@ class ReasonerNode:
         """
         self._announce(self._applied(command))
         if lasts:
-            self._asked.heed(command)
-            rospy.set_param(_ASKED, self._asked.as_parameter())
+            self._asked.heed(command, self.core.objectives)
+            self._kept_asked.set(self._asked.as_parameter(), _KEEP_DEADLINE)
         self._log.tell(f"operator: {' '.join((kind_of(command), *values_of(command)))}".strip())
         if isinstance(command, entries.AddObjective):
             self._log.tell_objective(self.core.objectives[command.name])

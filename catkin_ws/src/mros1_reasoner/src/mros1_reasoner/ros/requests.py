@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_bags import ownership
 from metacontrol_msgs import msg as messages
 
-from mros1_reasoner.loop.requesting import Answer, Requesting, Wanted
+from mros1_reasoner.loop.requesting import Answer, Handle, Requesting, Wanted
 
 _ONE_LOOK = rospy.Duration(0, -1)
 _CHANGE = "rosgraph_manipulator/change_function"
@@ -37,9 +37,9 @@ class _Action:
         """Tell at once whether the manipulator is connected; actionlib can't look before the clock runs."""
         return not rospy.get_rostime().is_zero() and bool(self._client.wait_for_server(_ONE_LOOK))
 
-    def send(self, wanted: Wanted, done: Callable[[Answer], object]) -> Any:
+    def send(self, wanted: Wanted, done: Callable[[Answer], object]) -> Handle:
         """Send a goal; have `done` called in the loop's thread when it has ended."""
-        return self._client.send_goal(self._goal(wanted), partial(self._on_transition, done))
+        return _Goal(self._client.send_goal(self._goal(wanted), partial(self._on_transition, done)))
 
     def _on_transition(self, done: Callable[[Answer], object], handle: Any) -> None:
         if handle.get_comm_state() != actionlib.CommState.DONE:
@@ -49,6 +49,21 @@ class _Action:
         succeeded = handle.get_goal_status() == GoalStatus.SUCCEEDED
         answer = Answer(succeeded, text or getattr(result, "message", ""), code)
         self._queue(lambda: done(answer))
+
+
+class _Goal:
+    """A goal of actionlib, which finds a goal lost only once its server has told of it."""
+
+    def __init__(self, handle: Any) -> None:
+        self._handle = handle
+
+    def is_acknowledged(self) -> bool:
+        """Tell whether the manipulator has told of it."""
+        return bool(self._handle.get_comm_state() != actionlib.CommState.WAITING_FOR_GOAL_ACK)
+
+    def cancel(self) -> None:
+        """Take it back."""
+        self._handle.cancel()
 
 
 class Requests(Requesting):

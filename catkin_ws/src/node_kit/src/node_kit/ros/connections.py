@@ -7,6 +7,7 @@ With rospy alone, a node that listens to a topic of several publishers may never
   the older one may be handled last, and replaces the newer one. Both are closed, and nobody connects again.
 - The answer to the registration of a subscriber is a list of publishers, too. It may be handled after a newer list,
   which is then dropped.
+- A moment without threads or descriptors ends what connects topics (`shortages.py`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Callable
 from rospy.impl.masterslave import ROSHandler
 from rospy.impl.registration import RegManager
 
+from node_kit.ros.shortages import outlast_shortages
 from node_kit.succession import Succession
 
 if TYPE_CHECKING:
@@ -30,6 +32,7 @@ _connect_topic, _publisher_update = ROSHandler._connect_topic, RegManager.publis
 def connect_to_all() -> None:
     """Change rospy in this process, before `rospy.init_node` or after it; without effect a second time."""
     ROSHandler._connect_topic, RegManager.publisher_update = _connect_once, _update_with_earlier
+    outlast_shortages()
 
 
 def latest(callback: Callable[[Any], object]) -> Callable[[Any], None]:

@@ -4,6 +4,8 @@ rospy reads the header of a new TCPROS connection in the thread that accepts all
 who connects and says nothing, or takes the port for that of another node, as callers of an ended node may whose port
 was given anew, keeps all others out: topics are not connected any more, and services do not answer.
 
+Where no descriptor or thread is left for a client, the thread that accepts waits until there is one (`shortages.py`).
+
 A subscriber that connects twice has closed its first connection before it makes the second (`connections.py`). rospy
 would let the first replace the second where it is handled last; so connections that are closed already are left out.
 """
@@ -11,11 +13,12 @@ would let the first replace the second where it is handled last; so connections 
 from __future__ import annotations
 
 import socket
-import threading
 from collections.abc import Callable
 from typing import Any
 
 from rospy.impl import tcpros_base
+
+from node_kit.ros.shortages import PatientServer, PatientThread
 
 PATIENCE = 5.0
 """Wall s for a client to say what it wants."""
@@ -32,11 +35,12 @@ def greet_apart() -> None:
 
     def greet_in_thread(client: socket.socket, address: object) -> None:
         client.settimeout(PATIENCE)
-        threading.Thread(target=greet, args=(client, address), name="greeting", daemon=True).start()
+        PatientThread(target=greet, args=(client, address), name="greeting", daemon=True).start()
 
     server.topic_connection_handler = _without_deadline(server.topic_connection_handler)
     server.service_connection_handler = _without_deadline(server.service_connection_handler)
     server.tcp_ros_server.inbound_handler = greet_in_thread
+    server.tcp_ros_server.server_sock = PatientServer(server.tcp_ros_server.server_sock)
 
 
 def _without_deadline(handler: _Handler) -> _Handler:

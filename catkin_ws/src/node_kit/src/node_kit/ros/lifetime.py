@@ -29,8 +29,11 @@ BAD_START = 2
 """Exit status of a start that failed. The loss of the master ends a node with 0: it has done all it could."""
 
 STAYS = "NODE_KIT_STAYS"
-"""Environment variable, to be set beside `respawn="true"`: a node that can't start says so once, and then waits for its
-end. Its start would fail again and again otherwise."""
+"""Environment variable, to be set beside `respawn="true"`: a node whose input can't be used says so, and ends after
+`TRIES_AGAIN`. Its start would fail again every second otherwise; the input may be mended, or be wrong for a moment."""
+
+TRIES_AGAIN = 30.0
+"""Wall s after which such a node ends, so that it is started again."""
 
 LONGEST_END = 3.0
 """Wall s for a node to end; then its process is cut off, because rospy calls the master without a deadline."""
@@ -71,7 +74,7 @@ class Lifetime:
         self.watch = MasterWatch(self._tell, self._on_loss)
         self._name = name
         self._stays = bool(os.environ.pop(STAYS, ""))  # not for those that this node starts
-        self._refusals = (*refusals, _StartError)
+        self._refusals = refusals
         self._claim = threading.Lock()  # held for ever by whoever ends the process
         self._status = 0
         self._shutting_down: int | None = None  # the thread in which rospy shuts down
@@ -113,12 +116,11 @@ class Lifetime:
             self.end("it has done its work")
         if not self.watch.confirm():  # that is why, and was told
             self.end("the master is lost")
-        if isinstance(error, self._refusals):
+        if isinstance(error, (*self._refusals, _StartError)):
             self.say(" ".join(str(error).split()))
-            if self._stays:
-                self.say("it waits, since it would only be started again and again: mend that, and start it anew")
-                while True:
-                    time.sleep(LONGEST_END)
+            if self._stays and not isinstance(error, _StartError):  # a master that was in trouble may be well again
+                self.say(f"mend that; it tries again in {TRIES_AGAIN:g} s")
+                time.sleep(TRIES_AGAIN)
             self.end("it can't start", BAD_START)
         with contextlib.suppress(OSError, ValueError):  # nobody reads any more
             traceback.print_exception(kind, error, trace)

@@ -67,6 +67,8 @@ class PartsWatch:
         threading.Thread(target=self._run, name="watch parts", daemon=True).start()
 
     def _on_sign(self, status: DiagnosticStatus) -> None:
+        if status._connection_header.get("callerid") != status.name:  # one node can't speak for another
+            return
         sign = sign_of(status)
         self._inbox.put(lambda: self._parts.hear(sign, time.monotonic()))
 
@@ -125,7 +127,7 @@ class PartsWatch:
 
 
 def _ask(sign: Sign) -> Answer:
-    """Ask a node for its process; of one that is gone, ask the master.
+    """Ask a node for its process; of one that is gone or silent, ask the master.
 
     One that was asked to end, and whose last sign was lost, has taken its leave there, or has a successor.
     """
@@ -135,12 +137,12 @@ def _ask(sign: Sign) -> Answer:
     except GoneError:
         return _ask_master(sign)
     except CallError:
-        return Answer.SILENT
+        return Answer.UNKNOWN if _ask_master(sign) is Answer.ENDED else Answer.SILENT
     return Answer.LIVES
 
 
 def _ask_master(sign: Sign) -> Answer:
-    """Ask the master about a node whose process has ended."""
+    """Ask the master about a node, and answer as if its process had ended."""
     try:
         with Client(rosgraph.get_master_uri(), rospy.get_name(), _DEADLINE) as master:
             return Answer.GONE if master.call("lookupNode", sign.node) == sign.uri else Answer.STARTS

@@ -53,7 +53,7 @@ def commands(text: str, folder: Path, read: Callable[[Path], str] | None = None)
         folder: where it lies, for `file(GLOB ...)`.
         read: gives the content of a CMakeLists.txt by its path, for `add_subdirectory`; without it, those are left out.
     """
-    yield from _Run(folder, read).run(list(_raw(text)), folder)
+    yield from _Run(folder, read).run(_lines(text), folder)
 
 
 def sections(arguments: Sequence[str], keywords: Sequence[str]) -> dict[str, list[str]]:
@@ -70,7 +70,8 @@ def sections(arguments: Sequence[str], keywords: Sequence[str]) -> dict[str, lis
 
 
 _Words = list[tuple[str, bool]]
-_Line = tuple[str, _Words, int]
+_Line = tuple[str, _Words, int, int]
+"""Name, words and line of a command, and how many commands further its block ends; 0 where it begins none."""
 
 
 class _Run:
@@ -94,10 +95,10 @@ class _Run:
         """
         at = 0
         while at < len(lines) and self._left > 0 and depth <= _MAX_CALLS:
-            name, words, line = lines[at]
+            name, words, line, span = lines[at]
             self._left -= 1
             self._variables["CMAKE_CURRENT_SOURCE_DIR"] = str(folder)
-            end = _end(lines, at) if name in _BLOCKS else at
+            end = min(at + span, len(lines))
             inner = lines[at + 1 : end]
             arguments = tuple(_expanded(words, self._variables))
             at = end + 1
@@ -107,6 +108,7 @@ class _Run:
                 self._functions[arguments[0].lower()] = (name == "macro", list(arguments[1:]), list(inner))
             elif name in _BLOCKS:
                 if name == "if" and _is_for_tests(words):
+                    self._left -= len(inner) // 100  # to look for its end takes time, too
                     inner = inner[_otherwise(inner) :]
                 yield from self.run(inner, folder, call, depth + 1)
             elif name in self._functions:
@@ -167,7 +169,7 @@ class _Run:
             return
         self._added.add(below)
         outer, self._variables = self._variables, dict(self._variables)
-        yield from self.run(list(_raw(self._read(below / "CMakeLists.txt"))), below, 0, depth + 1)
+        yield from self.run(_lines(self._read(below / "CMakeLists.txt")), below, 0, depth + 1)
         self._variables = outer
 
     def _restore(self, before: dict[str, str | None]) -> None:
@@ -206,20 +208,24 @@ class _Run:
                     variables[f"{prefix}_{keyword or 'UNPARSED_ARGUMENTS'}"] = "TRUE" if is_option else ";".join(values)
 
 
-def _end(lines: Sequence[_Line], start: int) -> int:
-    """Return where the block ends that starts at a line; the number of lines if it does not end."""
-    block, depth = lines[start][0], 0
-    for at in range(start, len(lines)):
-        depth += (lines[at][0] == block) - (lines[at][0] == f"end{block}")
-        if depth == 0:
-            return at
-    return len(lines)
+def _lines(text: str) -> list[_Line]:
+    """Return the commands of a file; a block that does not end goes on to the end of what has it."""
+    found = list(_raw(text))
+    ends: dict[int, int] = {}
+    begun: dict[str, list[int]] = {block: [] for block in _BLOCKS}
+    for at, (name, _, _) in enumerate(found):
+        if name in begun:
+            begun[name].append(at)
+        elif name.startswith("end") and begun.get(name[3:]):
+            ends[begun[name[3:]].pop()] = at
+    spans = (ends.get(at, len(found)) - at if name in begun else 0 for at, (name, _, _) in enumerate(found))
+    return [(*line, span) for line, span in zip(found, spans, strict=True)]
 
 
 def _otherwise(inner: Sequence[_Line]) -> int:
     """Return where a condition's other branch starts; the number of lines if it has none."""
     depth = 0
-    for at, (name, _, _) in enumerate(inner):
+    for at, (name, *_) in enumerate(inner):
         depth += (name == "if") - (name == "endif")
         if depth == 0 and name in ("else", "elseif"):
             return at

@@ -45,7 +45,8 @@ class NodeProcesses:
         self._warm: dict[tuple[Any, ...], Process] = {}
         self._others: tuple[Command, ...] = ()  # of nodes that do not run now
         self._lost_warm: Counter[tuple[Any, ...]] = Counter()
-        for pid in processes.kill_marked(options.mark):
+        self._held: list[Process] = []  # killed, but not ended yet
+        for pid, _ in processes.kill_marked(options.mark):
             log(f"killed process {pid}, which an earlier launcher had left behind")
         self._reaper = processes.start_reaper(options.mark)
 
@@ -55,10 +56,10 @@ class NodeProcesses:
 
     def take_ended(self) -> dict[str, int]:
         """Return the exit status of each node that has ended by itself, and forget its process."""
+        self._held = [process for process in self._held if process.status is None]
         ended = {name: process.status for name, process in self._running.items()}
         statuses = {name: status for name, status in ended.items() if status is not None}
-        for name in statuses:
-            self._running.pop(name).close()
+        self._close({name: self._running.pop(name) for name in statuses})
         return statuses
 
     def prepare(self, command: Command) -> Process | None:
@@ -81,7 +82,7 @@ class NodeProcesses:
                 process.begin()
             except StartError as error:
                 self._log(f"node {name} starts without imports in advance: {error}")
-                process.close()
+                self.discard(process)
                 process = None
         if process is None:
             process = processes.start(command)
@@ -89,6 +90,10 @@ class NodeProcesses:
         self._hanging.discard(name)
         self._commands[name] = command
         return process.started
+
+    def discard(self, prepared: Process) -> None:
+        """End a process that nothing is begun in."""
+        self._close({prepared.executable: prepared})
 
     def begin_again(self, name: str, command: Command) -> float:
         """Begin a node that died, in a warm process where one stands by; return the time of its start.
@@ -106,7 +111,7 @@ class NodeProcesses:
         """
         process = processes.start(command)
         processes.wait_for_ends([process], timeout)
-        process.close()
+        self.discard(process)
 
     def ask_to_end(self, names: Iterable[str]) -> None:
         """Ask nodes to end over their own API, side by side, so that one that hangs does not delay the others."""
@@ -143,7 +148,7 @@ class NodeProcesses:
         for name, process in leaving.items():
             if process.status is None:
                 self._log(f"node {name} (process {process.pid}) does not end by itself: killing it")
-            process.close()
+        self._close(leaving)
         for name in forget:
             try:
                 forget_node(name)
@@ -171,6 +176,14 @@ class NodeProcesses:
                 self._log(f"node {name} (process {process.pid}) {why}: killing it")
                 process.signal(signal.SIGKILL)
 
+    def _close(self, leaving: Mapping[str, Process]) -> None:
+        """Kill processes, and forget them; those that the kernel holds are looked at again until they have ended."""
+        held = processes.close_all(list(leaving.values()))
+        for name, process in leaving.items():
+            if process in held:
+                self._log(f"process {process.pid} ({name}) can't be ended: the kernel holds it")
+        self._held += held
+
     # -- standby --------------------------------------------------------------------------------------------------
 
     def expect(self, commands: Iterable[Command]) -> None:
@@ -189,7 +202,7 @@ class NodeProcesses:
         for kind, process in list(self._warm.items()):
             if process.status is not None:
                 self._lost_warm[kind] += 1
-                self._warm.pop(kind).close()
+                self.discard(self._warm.pop(kind))
         running = list(names)
         commands = (self._commands[name] for name in running if name in self._commands)
         wanted = {_kind(command): command for command in commands if command.is_python}
@@ -198,14 +211,14 @@ class NodeProcesses:
             if command.is_python and len(wanted) < most:
                 wanted.setdefault(_kind(command), command)
         for kind in set(self._warm) - set(wanted):
-            self._warm.pop(kind).close()
+            self.discard(self._warm.pop(kind))
         lacking = [k for k in wanted if k not in self._warm and self._lost_warm[k] < MOST_LOST_WARM]
         return may_start and bool(lacking) and self._prepare_warm(lacking[0], wanted[lacking[0]])
 
     def end_standby(self) -> None:
         """End all warm processes."""
         for process in self._warm.values():
-            process.close()
+            self.discard(process)
         self._warm.clear()
 
     def close(self) -> None:
@@ -228,7 +241,7 @@ class NodeProcesses:
     def _take_warm(self, command: Command) -> Process | None:
         process = self._warm.pop(_kind(command), None)
         if process is not None and process.status is not None:
-            process.close()
+            self.discard(process)
             return None
         return process
 

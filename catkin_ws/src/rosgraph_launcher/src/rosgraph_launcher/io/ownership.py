@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
 from urllib.parse import urlsplit
 
 import psutil
@@ -37,6 +38,17 @@ def launcher_mark(name: str) -> str:
     return f"{rosgraph.get_master_uri()}{name}"
 
 
+def command_words(process: psutil.Process) -> list[str]:
+    """Return the words of a process's command line; none where it can't be read.
+
+    What is not UTF-8 is escaped, because no message can hold it.
+    """
+    with contextlib.suppress(psutil.Error, OSError):
+        words = map(os.fsencode, process.cmdline())
+        return [word.decode("utf-8", "backslashreplace") for word in words]
+    return []
+
+
 @functools.lru_cache(maxsize=256)
 def is_this_host(host: str) -> bool:
     """Tell whether a name or an address is one of this host."""
@@ -57,12 +69,10 @@ def _lineage(process: psutil.Process) -> tuple[ProcessFacts, ...]:
 
 
 def _facts(process: psutil.Process) -> ProcessFacts:
-    command = mark = ""
-    with contextlib.suppress(psutil.Error, OSError):
-        command = " ".join(process.cmdline())
+    mark = ""
     with contextlib.suppress(psutil.Error, OSError):
         mark = process.environ().get(MARK, "")
-    return ProcessFacts(process.pid, command, mark)
+    return ProcessFacts(process.pid, " ".join(command_words(process)), mark)
 
 
 def _may_serve(process: psutil.Process, port: int | None) -> bool:

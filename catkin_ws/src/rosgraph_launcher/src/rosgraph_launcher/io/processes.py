@@ -41,6 +41,9 @@ WARM_START = str(Path(__file__).with_name("warm_start"))
 PYTHON = re.compile(r"python(3(\.\d+)?)?")
 HARMLESS_FLAGS = {"-u", "-B", "-O", "-OO"}  # of Python: they leave `sitecustomize` and PYTHONPATH as they are
 
+REAP_TIMEOUT = 1.0
+"""s, wall, in which a killed process ends, unless the kernel holds it: it waits for a device, or a debugger has it."""
+
 
 class StartError(Exception):
     """A process can't be started; the message says why."""
@@ -92,7 +95,7 @@ class Process:
     executable: str
     popen: subprocess.Popen[bytes]
     started: float  # time.monotonic()
-    pidfd: int
+    pidfd: int = -1  # tells its end; -1: closed
     gate: int = -1  # file descriptor to which its permission to begin is written; -1: it has begun
 
     @property
@@ -132,10 +135,12 @@ class Process:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.pid, number)
 
-    def close(self) -> None:
-        """Kill what is left of the process group, and close the file descriptors of the process."""
-        self.signal(signal.SIGKILL)
-        self.popen.wait()
+    def close(self) -> bool:
+        """Do what `close_all` does with this process; return whether it has ended."""
+        return not close_all([self])
+
+    def close_descriptors(self) -> None:
+        """Close the file descriptors; nothing but `status` and `signal` may be used from then on."""
         for descriptor in (self.gate, self.pidfd):
             if descriptor >= 0:
                 os.close(descriptor)
@@ -173,7 +178,10 @@ def prepare(command: Command) -> Process | None:
     """
     if not command.is_python:
         return None
-    wait, gate = os.pipe()
+    try:
+        wait, gate = os.pipe()
+    except OSError as error:
+        raise StartError(f"{command.words[0]}: {error.strerror or error}") from error
     try:
         python_path = command.environment.get("PYTHONPATH")
         environment = {
@@ -212,7 +220,15 @@ def _start(command: Command, environment: Mapping[str, str], pass_fds: tuple[int
     finally:
         if log:
             log.close()
-    return Process(command.words[0], popen, time.monotonic(), open_pidfd(popen.pid))
+    process = Process(command.words[0], popen, time.monotonic())
+    try:
+        process.pidfd = open_pidfd(process.pid)
+    except OSError as error:
+        process.signal(signal.SIGKILL)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            popen.wait(REAP_TIMEOUT)
+        raise StartError(f"{command.words[0]}: its end can't be followed: {error.strerror or error}") from error
+    return process
 
 
 def wait_for_ends(processes: Sequence[Process], timeout: float) -> bool:
@@ -231,16 +247,30 @@ def wait_for_ends(processes: Sequence[Process], timeout: float) -> bool:
     return True
 
 
-def kill_marked(mark: str, spared: frozenset[int] = frozenset()) -> list[int]:
-    """Kill every process with this mark in its environment; return their ids."""
+def close_all(processes: Sequence[Process]) -> list[Process]:
+    """Kill what is left of the process groups, wait for the ends, and close the file descriptors of the processes.
+
+    Returns:
+        The processes that have not ended within REAP_TIMEOUT: the kernel holds them, and they end later.
+    """
+    for process in processes:
+        process.signal(signal.SIGKILL)
+    wait_for_ends(processes, REAP_TIMEOUT)
+    for process in processes:
+        process.close_descriptors()
+    return [process for process in processes if process.status is None]
+
+
+def kill_marked(mark: str) -> list[tuple[int, float]]:
+    """Kill every process with this mark in its environment; return the id and the start of each."""
     killed = []
     for process in psutil.process_iter():
-        if process.pid in spared or process.pid == os.getpid():
+        if process.pid == os.getpid():
             continue
         with contextlib.suppress(psutil.Error, OSError):
             if process.environ().get(MARK) == mark and process.status() != psutil.STATUS_ZOMBIE:
                 process.kill()
-                killed.append(process.pid)
+                killed.append((process.pid, process.create_time()))
     return killed
 
 
@@ -252,10 +282,16 @@ def start_reaper(mark: str) -> subprocess.Popen[bytes]:
 
 
 def main() -> None:
-    """Wait until process argv[1] has ended, then kill every process with the mark argv[2]."""
+    """Wait until process argv[1] has ended, then kill every process with the mark argv[2].
+
+    Again and again while there are others than before, which a dying process may have started. What was killed and
+    stays is not waited for: the kernel may hold it for long, and a new launcher has nodes of the same mark.
+    """
     with contextlib.suppress(ProcessLookupError):
         select.select([open_pidfd(int(sys.argv[1]))], [], [])
-    while kill_marked(sys.argv[2]):  # again: a dying process may have started another one
+    killed: set[tuple[int, float]] = set()
+    while not killed.issuperset(found := kill_marked(sys.argv[2])):
+        killed.update(found)
         time.sleep(0.05)
 
 

@@ -43,10 +43,13 @@ class Processes(Protocol):
         """Return the exit status of each node that has ended by itself, and forget its process."""
 
     def prepare(self, command: Any) -> Any:
-        """Return a process that does imports and then waits; None where that makes no sense. It has `close()`."""
+        """Return a process that does imports and then waits; None where that makes no sense."""
 
     def begin(self, name: str, command: Any, prepared: Any) -> float:
         """Begin a node, in a prepared process where there is one; return the time of its start."""
+
+    def discard(self, prepared: Any) -> None:
+        """End a process that nothing is begun in."""
 
     def begin_again(self, name: str, command: Any) -> float:
         """Begin a node that died; return the time of its start."""
@@ -190,7 +193,7 @@ class Supervisor:
             raise LauncherError(_one_line(error)) from error
         finally:
             for process in prepared.values():
-                process.close()
+                self._processes.discard(process)
         ended_at = self._clock()
         self._nodes.end_change(function, ended_at)
         self._report()

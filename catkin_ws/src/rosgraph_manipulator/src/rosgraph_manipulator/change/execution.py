@@ -158,7 +158,13 @@ class Execution:
             self._see_who_leaves(wanted.function, leaving)
         self._store_parameters(wanted.function, launch)
         given_up = self._progress.given_up(wanted.function, launch.system.nodes)
-        self._call(wanted.function, wanted.name, launch, tuple(dict.fromkeys((*stop, *given_up))), start)
+        stops = tuple(dict.fromkeys((*stop, *given_up)))
+        self._call(wanted.function, wanted.name, launch, stops, start)
+        report = self.report(wanted.function)
+        expected = {*launch.system.nodes, *stops}
+        if report and (come := tuple(node for node in report.nodes if node not in expected)):
+            # In between, the launcher has ended a change for a manipulator before this one, which has died since.
+            self._call(wanted.function, wanted.name, launch, come, ())
         self.system.deployed(wanted, launch)
 
     def wait_until_ready(self) -> None:
@@ -359,7 +365,8 @@ class Execution:
             asked = self._overwritten.unknown(wanted)
             self._overwritten.remember(asked, self._around.parameters(asked))
             values, gone = self._overwritten.transition(wanted, others)
-            handover = {self._around.resolve("~overwritten"): self._overwritten.as_parameter()} if asked else {}
+            # Each time, because the call that handed it over before may have failed.
+            handover = {self._around.resolve("~overwritten"): self._overwritten.as_parameter()}
             clear = launch.clear if launch else ()
             self._around.set_parameters({**handover, **values}, delete=[*clear, *gone])
         except (CallError, OSError) as error:

@@ -90,8 +90,8 @@ class Journal:
         return ""
 
     def needs_heartbeat(self, now: float) -> bool:
-        """Tell whether the last heartbeat is so old that another one is due."""
-        return now - self.alive > HEARTBEAT_PERIOD
+        """Tell whether a heartbeat is due: the last one is old, or the clock was set back since."""
+        return not 0.0 <= now - self.alive <= HEARTBEAT_PERIOD
 
     def as_parameter(self) -> dict[str, Any]:
         """Return the value of the parameter."""

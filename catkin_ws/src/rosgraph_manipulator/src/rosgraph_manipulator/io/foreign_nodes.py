@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import psutil
 from rosgraph_launcher.io.master import NodeApi
-from rosgraph_launcher.io.ownership import is_this_host
+from rosgraph_launcher.io.ownership import command_words, is_this_host
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.repairs import may_be_asked, may_be_killed
@@ -31,7 +31,7 @@ def end_node(node: str) -> None:
     """
     uri = NodeApi.address(node)
     process = _process_at(uri) if uri else None
-    words = _words(process)
+    words = command_words(process) if process else []
     if uri is None or not may_be_asked(node, words):
         return
     answers = NodeApi.pid(uri) is not None
@@ -61,12 +61,6 @@ def _process_at(uri: str) -> psutil.Process | None:
             if found.pid and listens:
                 return psutil.Process(found.pid)
     return None
-
-
-def _words(process: psutil.Process | None) -> list[str]:
-    with contextlib.suppress(psutil.Error):
-        return process.cmdline() if process else []
-    return []
 
 
 def _has_ended(process: psutil.Process | None, uri: str) -> bool:

@@ -36,11 +36,11 @@ ASKING = "ask a launcher"  # name of the threads that do
 
 @dataclass
 class _Known:
-    """A launcher that has been heard of.
+    """A launcher that has been heard of, or a stranger that may be one.
 
     Attributes:
         place: its name and its host.
-        is_here: whether it runs on this host, so that its end shows at once by its closed connection.
+        is_here: whether it runs on this host.
         reports: what it tells, by function.
         answered: when it was heard last, monotonic wall s.
         pid: of its process, as it says itself; None: nobody has asked.
@@ -73,6 +73,7 @@ class LauncherReports:
         self._main = rospy.resolve_name("rosgraph_launcher")
         self._lock = threading.RLock()
         self._known: dict[str, _Known] = {}
+        self._strangers: dict[str, _Known] = {}  # they report, and have not said where they run
         self._parts: dict[str, frozenset[str]] = {}  # by function: the launchers that should have a part of it
         self._subscriber = rospy.Subscriber(TOPIC, LaunchedFunctions, latest(self._take), queue_size=20)
         threading.Thread(target=self._watch, name="hosts", daemon=True).start()
@@ -120,9 +121,12 @@ class LauncherReports:
 
     def unconnected(self, function: str) -> str:
         """Return a launcher that should have a part of what runs for a function and has ended; empty: none has."""
-        connected = {connection.callerid_pub for connection in list(self._subscriber.impl.connections)}
+        connected = self._connected()
         with self._lock:
             return next((name for name in sorted(self._parts.get(function, ())) if name not in connected), "")
+
+    def _connected(self) -> set[str]:
+        return {connection.callerid_pub for connection in list(self._subscriber.impl.connections)}
 
     def adopt(self, function: str, nodes: Iterable[NodeDescription]) -> None:
         """Note which nodes should run for a function although no change has started them."""
@@ -162,15 +166,35 @@ class LauncherReports:
             rospy.logwarn_throttle(WARN_PERIOD, f"a report of {name} is left out: {error}: is its version another one?")
             return
         with self._lock:
-            unknown = name not in self._known
-        place = _place_of(name) if unknown else None
-        with self._lock:
-            if place:
-                self._known[name] = _Known(place, _is_here(place))
-            known = self._known[name]
+            known = self._known.get(name) or self._strangers.get(name)
+            is_new = known is None
+            if known is None:
+                known = self._strangers[name] = _Known(HostLauncher(name), is_here=True)
             known.reports = reports
             self._heard(known)
-        self.on_reports()
+        if is_new and not self._admit(name):
+            rospy.logwarn("reports of %s are left out until it has set %s/addresses, as each launcher does", name, name)
+        with self._lock:
+            is_launcher = name in self._known
+        if is_launcher:
+            self.on_reports()
+
+    def _admit(self, name: str) -> bool:
+        """Count a stranger among the launchers if it is one; tell whether it is.
+
+        A launcher sets the parameter that says where it runs before it reports. The main one counts in any case.
+        """
+        addresses = _addresses_of(name)
+        if addresses is None and name != self._main:
+            return False
+        place = HostLauncher(name, addresses or ())
+        is_here = _is_here(place)
+        with self._lock:
+            known = self._strangers.pop(name, None)
+            if known:
+                known.place, known.is_here = place, is_here
+                self._known[name] = known
+        return True
 
     def _heard(self, known: _Known) -> None:
         known.answered = time.monotonic()
@@ -180,10 +204,10 @@ class LauncherReports:
 
     def _line(self, known: _Known) -> str:
         nodes = ", ".join(sorted({node for report in known.reports.values() for node in report.nodes}))
-        return (
-            f"host {known.place.host} is lost: {known.place.name} has not answered for {self._host_timeout:g} s"
-            f"{nodes and f', and ran {nodes}'}: check its power and its network"
-        )
+        silence = f"{known.place.name} has not answered for {self._host_timeout:g} s{nodes and f', and ran {nodes}'}"
+        if known.is_here:
+            return f"{silence}: start it again"
+        return f"host {known.place.host} is lost: {silence}: check its power and its network"
 
     def _host(self, name: str) -> str:
         with self._lock:
@@ -193,13 +217,31 @@ class LauncherReports:
         return {name: k.reports[function] for name, k in self._known.items() if function in k.reports}
 
     def _watch(self) -> None:
-        """Ask the launchers of other hosts again and again whether they are there."""
         while not rospy.is_shutdown():
             time.sleep(WATCH_PERIOD)
-            with self._lock:
-                far = [known for known in self._known.values() if not known.is_here]
-            for known in far:
-                self._look(known)
+            self._look_around()
+
+    def _look_around(self) -> None:
+        """Ask the launchers whether they are there, and the master whether strangers are launchers.
+
+        The main one on this host is not asked: its end shows at once by its closed connection.
+        """
+        with self._lock:
+            asked = [known for name, known in self._known.items() if name != self._main or not known.is_here]
+        for known in asked:
+            self._look(known)
+        self._look_at_strangers()
+
+    def _look_at_strangers(self) -> None:
+        """Ask again whether they are launchers, since the master may not have answered; forget those that are gone."""
+        connected, now = self._connected(), time.monotonic()
+        with self._lock:
+            for name, stranger in list(self._strangers.items()):
+                if name not in connected and now - stranger.answered > self._host_timeout:
+                    del self._strangers[name]
+            names = list(self._strangers)
+        if [name for name in names if self._admit(name)]:
+            self.on_reports()
 
     def _look(self, known: _Known) -> None:
         pid = NodeApi.pid(known.uri) if known.uri else None  # without the master, which may be slow itself
@@ -218,20 +260,22 @@ class LauncherReports:
                 self.losses += not was_lost
             differs = known.lost is not was_lost
             concerns = any(known.place.name in parts for parts in self._parts.values())
+            if known.lost and known.is_here and not concerns and known.place.name not in self._connected():
+                del self._known[known.place.name]  # it has ended, and its nodes with it
         if differs and known.lost and not concerns:  # the failure of a function tells it, too
             rospy.logwarn("%s", self._line(known))
         if differs:
             self.on_reports()
 
 
-def _place_of(name: str) -> HostLauncher:
-    """Return where a launcher runs, as it says in its parameter."""
+def _addresses_of(name: str) -> tuple[str, ...] | None:
+    """Return the addresses of a launcher's host, as it says in its parameter; None: nothing is known."""
     parameter = f"{name}/addresses"
     try:
         addresses = get_parameters([parameter]).get(parameter)
     except CallError:
-        addresses = None
-    return HostLauncher(name, tuple(map(str, addresses)) if isinstance(addresses, list) else ())
+        return None
+    return tuple(map(str, addresses)) if isinstance(addresses, list) else None
 
 
 def _is_here(place: HostLauncher) -> bool:

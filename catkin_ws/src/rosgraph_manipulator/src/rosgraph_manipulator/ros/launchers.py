@@ -23,6 +23,7 @@ from metacontrol_msgs.srv import (
 from node_kit.io.background import in_background
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.hosts import no_launcher
+from rosgraph_launcher.io.master import NodeApi
 from rosgraph_launcher.io.secret import SecretError, sign
 from rosgraph_launcher.launching.report import ENDING, FAILED
 from rosgraph_launcher.ros.node_messages import to_message
@@ -31,7 +32,7 @@ from rospy.exceptions import TransportException, TransportInitError
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.hosts.merging import stale
 from rosgraph_manipulator.hosts.splitting import Part, split
-from rosgraph_manipulator.ros.launcher_reports import ASKING, REPEAT_PERIOD, LauncherReports
+from rosgraph_manipulator.ros.launcher_reports import ASKING, REPEAT_PERIOD, WATCH_PERIOD, LauncherReports
 
 _NOT_REACHED = (TransportInitError, rosgraph.MasterError)
 """What rospy has caught when it raises a ServiceException and has sent no request: no registration, no connection."""
@@ -225,11 +226,27 @@ class Launchers(LauncherReports):
             service.wait_for_service(max(deadline - time.monotonic(), REPEAT_PERIOD))
             found()
             try:
-                return service(request)
+                return self._answer(name, service, request)
             except (rospy.ServiceException, TransportException, OSError) as error:
                 if time.monotonic() > deadline or not self._is_undone(error, name, service.uri):
                     raise
                 time.sleep(REPEAT_PERIOD)
+
+    def _answer(self, name: str, service: rospy.ServiceProxy, request: ChangeNodesRequest) -> ChangeNodesResponse:
+        """Return a launcher's answer to a request; a change may take long, but the launcher lives meanwhile.
+
+        Raises:
+            DeploymentError: it does not answer, nor does its API, for the time to look for a launcher: it hangs.
+        """
+        answer = in_background(partial(service, request), ASKING)
+        heard = time.monotonic()
+        while not wait([answer], WATCH_PERIOD).done:
+            if NodeApi.is_answering(name):
+                heard = time.monotonic()
+            elif time.monotonic() - heard > self._timeout and not answer.done():
+                request.signature = ""  # a request that is not sent yet is refused when the launcher goes on
+                raise DeploymentError(f"{name} takes requests and does not answer: kill it, and start it again")
+        return answer.result()
 
     def _is_undone(self, error: Exception, name: str, uri: str) -> bool:
         """Tell whether nothing is left of a request that has failed: it reached no launcher, or that one has ended.

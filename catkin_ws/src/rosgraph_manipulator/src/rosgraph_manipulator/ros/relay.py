@@ -9,6 +9,7 @@ import actionlib
 import roslib.message
 import rospy
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
+from node_kit.io.inbox import Inbox
 from node_kit.ros.action_server import is_connected
 from node_kit.ros.connections import latest
 from node_kit.ros.lifetime import Lifetime
@@ -33,12 +34,17 @@ class _Goal:
 
 
 class Relay:
-    """Passes goals to the server, and feedback and results to the clients."""
+    """Passes goals to the server, and feedback and results to the clients.
+
+    actionlib calls back while it holds a lock: that of the server where a client wants something, that of a goal where
+    the server behind has done something. What follows may need the other lock. So callbacks only leave work, and the
+    thread that spins does it, without a lock.
+    """
 
     def __init__(self, action: str, server: str, kind: Any) -> None:
         """Begin to offer the action `action`, whose goals the action `server` pursues; `kind` is the type of both."""
         self._goals: dict[str, _Goal] = {}
-        self._lock = threading.RLock()
+        self._inbox = Inbox()
         self._changing = False
         self._client = actionlib.ActionClient(server, kind)
         self._server = ActionServer(action, kind, self._on_goal, self._on_cancel, auto_start=False)
@@ -51,64 +57,75 @@ class Relay:
         self._server.start()
 
     def spin(self) -> None:
-        """Send waiting goals when the server can take them, until the node ends."""
+        """Do what callbacks leave, and send waiting goals when the server can take them, until the node ends."""
         end = threading.Event()
         rospy.on_shutdown(end.set)
-        while not end.wait(PERIOD):
+        while not end.is_set():
+            self._inbox.drain(wait_s=PERIOD)
             self._send_goals()
 
     def _send_goals(self) -> None:
-        if not any(goal.link.needs_sending(self._changing) for goal in list(self._goals.values())):
+        if not any(goal.link.needs_sending(self._changing) for goal in self._goals.values()):
             return
         if not is_connected(self._client):
             return
-        again = [name for name, goal in list(self._goals.items()) if goal.inner and goal.link.needs_sending(False)]
+        again = [name for name, goal in self._goals.items() if goal.inner and goal.link.needs_sending(False)]
         gone = {name: why for name in again if (why := self._waits.why_gone(self._waiting.get(name)))}
-        with self._lock:
-            for name, goal in list(self._goals.items()):
-                if name in gone:
-                    rospy.logwarn("goal %s is not sent again: %s", name, gone[name])
-                    self._end(goal, Ending.CANCELLED, None, gone[name])
-                elif goal.link.needs_sending(self._changing):
-                    goal.link.sent = True
-                    goal.inner = self._client.send_goal(
-                        goal.outer.get_goal(),
-                        transition_cb=lambda inner, goal=goal: self._on_transition(goal, inner),
-                        feedback_cb=lambda _inner, feedback, goal=goal: goal.outer.publish_feedback(feedback),
-                    )
+        for name, goal in list(self._goals.items()):
+            if name in gone:
+                rospy.logwarn("goal %s is not sent again: %s", name, gone[name])
+                self._end(goal, Ending.CANCELLED, None, gone[name])
+            elif goal.link.needs_sending(self._changing):
+                goal.link.sent = True
+                goal.inner = self._client.send_goal(
+                    goal.outer.get_goal(),
+                    transition_cb=lambda inner, goal=goal: self._on_transition(goal, inner),
+                    feedback_cb=lambda _inner, feedback, goal=goal: goal.outer.publish_feedback(feedback),
+                )
 
     def _on_goal_message(self, message: Any) -> None:
         client = self._waits.of(message)
-        with self._lock:
-            known = {name: self._waiting[name] for name in self._goals if name in self._waiting}
-            self._waiting = {**known, message.goal_id.id: client}
+        self._inbox.put(lambda: self._note_client(message.goal_id.id, client))
+
+    def _note_client(self, goal_id: str, client: Client | None) -> None:
+        known = {name: self._waiting[name] for name in self._goals if name in self._waiting}
+        self._waiting = {**known, goal_id: client}
 
     def _on_goal(self, handle: actionlib.ServerGoalHandle) -> None:
-        with self._lock:
-            handle.set_accepted()
-            self._goals[handle.get_goal_id().id] = _Goal(handle)
-        self._send_goals()
+        handle.set_accepted()
+        self._inbox.put(lambda: self._take(handle))
+
+    def _take(self, handle: actionlib.ServerGoalHandle) -> None:
+        self._goals[handle.get_goal_id().id] = _Goal(handle)
 
     def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
-        with self._lock:
-            goal = self._goals.get(handle.get_goal_id().id)
-            if goal is None:
-                return
-            ending = goal.link.cancel()
-            if ending:
-                self._end(goal, ending, None, "taken back while there was no server")
-            elif goal.inner is not None:
-                goal.inner.cancel()
+        self._inbox.put(lambda: self._cancel(handle.get_goal_id().id))
+
+    def _cancel(self, name: str) -> None:
+        goal = self._goals.get(name)
+        if goal is None:
+            return
+        ending = goal.link.cancel()
+        if ending:
+            self._end(goal, ending, None, "taken back while there was no server")
+        elif goal.inner is not None:
+            goal.inner.cancel()
 
     def _on_transition(self, goal: _Goal, inner: actionlib.ClientGoalHandle) -> None:
-        with self._lock:
-            if inner.get_comm_state() != actionlib.CommState.DONE or not goal.link.sent:
-                return
-            ending = goal.link.ended_behind(inner.get_terminal_state(), self._changing)
-            if ending:
-                self._end(goal, ending, inner.get_result(), inner.get_goal_status_text())
-            else:
-                rospy.loginfo("goal %s is sent again to the next server", goal.outer.get_goal_id().id)
+        if inner.get_comm_state() != actionlib.CommState.DONE:
+            return
+        state, result, text = inner.get_terminal_state(), inner.get_result(), inner.get_goal_status_text()
+        changing = self._changing
+        self._inbox.put(lambda: self._take_end(goal, state, result, text, changing))
+
+    def _take_end(self, goal: _Goal, state: int, result: Any, text: str, changing: bool) -> None:
+        if not goal.link.sent:
+            return
+        ending = goal.link.ended_behind(state, changing)
+        if ending:
+            self._end(goal, ending, result, text)
+        else:
+            rospy.loginfo("goal %s is sent again to the next server", goal.outer.get_goal_id().id)
 
     def _end(self, goal: _Goal, ending: Ending, result: Any, text: str) -> None:
         self._goals.pop(goal.outer.get_goal_id().id, None)

@@ -91,11 +91,12 @@ class DesiredModel:
         self._of_functions: tuple[Component, ...] | None = None
         self._variants: dict[str, RosSystem] = {}
         self._stable: dict[str, str] = {}
+        self._groundings: tuple[Grounding, ...] = ()
         self.current = Desired(base)
 
     def follow(self, groundings: Iterable[Grounding]) -> Desired:
         """Take in the active configuration, and return what should run now."""
-        groundings = tuple(groundings)
+        self._groundings = groundings = tuple(groundings)
         try:
             active = [self._variant(g.configuration) for g in groundings if g.configuration]
             in_change = [self._variant(name) for g in groundings if g.state in _IN_CHANGE for name in self._names(g)]
@@ -108,6 +109,10 @@ class DesiredModel:
         desired = Desired(None, _nodes(active), _nodes(in_change), deployed=deployed)
         self.current = desired if self._base is None else self._with_system(desired, self._base, active)
         return self.current
+
+    def look_again(self) -> Desired:
+        """Try again to read what could not be read, and return what should run now."""
+        return self.follow(self._groundings) if self.current.problem else self.current
 
     def _with_system(self, desired: Desired, base: RosSystem, active: Sequence[RosSystem]) -> Desired:
         """Return what should run, with the base composed with the active variants, and without what is idle."""

@@ -183,11 +183,15 @@ class TopicHealth:
         if spec.min_rate:
             seen.arrivals.append(now)
 
-    def judge(self, ros: float, wall: float, excused: Collection[str] = ()) -> list[TopicVerdict]:
+    def judge(
+        self, ros: float, wall: float, excused: Collection[str] = (), grace: float | None = None
+    ) -> list[TopicVerdict]:
         """Return a verdict on each topic. An excused topic is fine, and begins anew when the excuse ends.
 
         All topics begin anew when ROS time jumps back or begins: it is 0 until a simulation's first clock message.
+        The grace (s) is that of this moment, where it is not the usual one.
         """
+        grace = self._grace if grace is None else grace
         jumped = ros < self._last_ros - _JUMP
         self._last_ros = ros
         verdicts = []
@@ -199,13 +203,14 @@ class TopicHealth:
                 self._seen[name] = _Seen(now, wall)
                 verdicts.append(TopicVerdict(spec, heard=False))
             else:
-                verdicts.append(self._judge(spec, self._seen[name], now, wall))
+                verdicts.append(self._judge(spec, self._seen[name], now, wall, grace))
         return verdicts
 
-    def _judge(self, spec: TopicSpec, seen: _Seen, now: float, wall: float) -> TopicVerdict:
+    def _judge(self, spec: TopicSpec, seen: _Seen, now: float, wall: float, grace: float) -> TopicVerdict:
         if seen.last is None:
             waited = min(now - seen.since, wall - seen.since_wall)
-            if waited <= max(self._grace, spec.max_age):
+            period = 1.0 / spec.min_rate if spec.min_rate else 0.0
+            if waited <= max(grace, spec.max_age, 2.0 * period):
                 return TopicVerdict(spec, heard=False)
             return TopicVerdict(spec, Words.SILENT_TOPIC, f"no message in {waited:.1f} s", "messages", "none")
         age = now - seen.last

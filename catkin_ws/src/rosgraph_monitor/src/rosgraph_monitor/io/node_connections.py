@@ -310,16 +310,24 @@ class NodeConnections:
             if host in self._resolving:
                 return
             self._resolving.add(host)
-        threading.Thread(target=self._look_up, args=(host,), name=f"resolve {host}", daemon=True).start()
+        try:
+            threading.Thread(target=self._look_up, args=(host,), name=f"resolve {host}", daemon=True).start()
+        except RuntimeError as error:  # as many threads as there may be: it is tried again, as after a failed lookup
+            _log.warning("%s is not looked up: %s", host, error)
+            self._found(host, None)
 
     def _look_up(self, host: str) -> None:
+        address = None
         try:
             found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
             families = sorted(found, key=lambda entry: entry[0] != socket.AF_INET)
             address = (int(families[0][0]), str(families[0][4][0]))
         except (OSError, UnicodeError, IndexError) as error:
             _log.debug("%s: %s", host, error)
-            address = None
+        finally:
+            self._found(host, address)
+
+    def _found(self, host: str, address: tuple[int, str] | None) -> None:
         with self._lock:
             self._addresses[host] = address
             self._resolving.discard(host)

@@ -36,12 +36,13 @@ from rosgraph_monitor.ros.topics import BatteryListener, TopicListener
 from rosgraph_monitor.ros.usage import UsageWatch
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from node_kit.ros.parts import PartsWatch
     from ros_model.graph.snapshot import GraphSnapshot
 
     from rosgraph_monitor.diagnostics.status import Status
+    from rosgraph_monitor.graph.desired import Desired
 
 NAME = "rosgraph_monitor"
 _MASTER_TIMEOUT = 1.2
@@ -88,11 +89,13 @@ class MonitorNode:
         self._namespace = rospy.get_namespace()
         components = parameters_node.components()
         self._topic_specs = merged(components.topics, parameters_node.topics())
-        patience = parameters_node.patience()
+        self._patience = parameters_node.patience()
+        self._grace = self._patience.startup
         self._monitor = GraphEvaluator(
-            components.of_node, scope=parameters_node.scope(self._topic_specs), patience=patience
+            components.of_node, scope=parameters_node.scope(self._topic_specs), patience=self._patience
         )
         base = parameters_node.text("desired_rossystem")
+        self._model_lock = threading.Lock()
         self._model = desired_model(base, parameters_node.text("variants"), rospy.logwarn)
         self._observers_due = 0.0
         self._running_observers = 0
@@ -106,7 +109,7 @@ class MonitorNode:
         self._observers.follow(self._model.current.system)
         for name in observers:
             self._observers.load(name)
-        self._topics = TopicListener(patience.startup)
+        self._topics = TopicListener(self._grace)
         self._topic_states: dict[str, str] = {}
         self._follow_topics()
         self._batteries = BatteryListener(components.batteries, self._events.set)
@@ -131,7 +134,8 @@ class MonitorNode:
             polled = self._poller.latest
             if polled:
                 begin = time.monotonic()
-                self._publish(self._evaluate(polled, parts.head_start))
+                self._grace = self._patience.grace(parts.head_start)
+                self._publish(self._evaluate(polled))
                 self._evaluation = time.monotonic() - begin
                 # It rests as long again, up to a limit: hundreds of nodes may come or go together.
                 time.sleep(min(max(_COALESCE, self._evaluation), _LONGEST_REST))
@@ -161,7 +165,7 @@ class MonitorNode:
             self._polled.wait(_FRESH)
 
     def _topics_changed(self) -> bool:
-        states = {v.spec.name: v.message for v in self._topics.judge(self._excused_topics())}
+        states = {v.spec.name: v.message for v in self._topics.judge(self._excused_topics(), self._grace)}
         return states != self._topic_states
 
     def _excused_topics(self) -> frozenset[str]:
@@ -169,14 +173,14 @@ class MonitorNode:
         desired = self._model.current
         return self._monitor.excused_topics(polled.snapshot, desired, self._topics.topics) if polled else frozenset()
 
-    def _evaluate(self, polled: PolledGraph, head_start: float) -> list[Status]:
+    def _evaluate(self, polled: PolledGraph) -> list[Status]:
         is_fresh = self._polled.is_set()
         lives = polled.lives if is_fresh else self._connections.lives()
         own = polled.snapshot.nodes.get(rospy.get_name())
         if own:
             lives[own.name, own.uri] = Life.ALIVE
         now = time.monotonic()
-        verdicts = self._topics.judge(self._excused_topics())
+        verdicts = self._topics.judge(self._excused_topics(), self._grace)
         self._topic_states = {verdict.spec.name: verdict.message for verdict in verdicts}
         statuses = self._monitor.evaluate(
             polled.snapshot,
@@ -187,10 +191,11 @@ class MonitorNode:
             others={**self._batteries.conditions, **self._drivers.conditions},
             reasons={**self._batteries.reasons, **self._drivers.reasons},
             is_fresh=is_fresh,
-            head_start=head_start,
+            grace=self._grace,
         )
         if now >= self._observers_due:
             self._observers_due = now + _OBSERVERS_PERIOD
+            self._take_model(self._model.look_again)
             self._running_observers = self._observers.supervise()
             self._updater.force_update()  # `update` would ask the master for its period, and wait for the answer
         return statuses
@@ -220,16 +225,21 @@ class MonitorNode:
 
     def _follow(self, msg: ActiveConfiguration) -> None:
         """Take the desired model from the active configuration."""
-        before = self._model.current
-        current = self._model.follow(Grounding(f.function, f.configuration, f.state) for f in msg.functions)
-        if current.problem and current.problem != before.problem:
-            rospy.logerr("desired model stays as it was: %s", current.problem)
-        if current.system != before.system:
-            self._observers.follow(current.system)
-            self._follow_topics()
+        groundings = [Grounding(f.function, f.configuration, f.state) for f in msg.functions]
+        self._take_model(lambda: self._model.follow(groundings))
         self._polled.clear()
         self._poller.request()
         self._events.set()
+
+    def _take_model(self, read: Callable[[], Desired]) -> None:
+        """Follow what should run now; callbacks and the main thread take turns."""
+        with self._model_lock:
+            before, current = self._model.current, read()
+            if current.problem and current.problem != before.problem:
+                rospy.logerr("desired model stays as it was: %s", current.problem)
+            if current.system != before.system:
+                self._observers.follow(current.system)
+                self._follow_topics()
 
     def _follow_topics(self) -> None:
         """Watch the topics for which the settings or the active model have expectations; settings take precedence."""

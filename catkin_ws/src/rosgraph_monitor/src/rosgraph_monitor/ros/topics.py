@@ -84,10 +84,10 @@ class TopicListener:
                 name, rospy.AnyMsg, self._receive, name, buff_size=_LARGEST_MESSAGE, tcp_nodelay=True
             )
 
-    def judge(self, excused: Collection[str] = ()) -> list[TopicVerdict]:
-        """Return a verdict on each topic."""
+    def judge(self, excused: Collection[str] = (), grace: float | None = None) -> list[TopicVerdict]:
+        """Return a verdict on each topic (see `TopicHealth.judge`)."""
         with self._lock:
-            return self._health.judge(rospy.get_time(), time.monotonic(), excused)
+            return self._health.judge(rospy.get_time(), time.monotonic(), excused, grace)
 
     def _receive(self, msg: Any, topic: str) -> None:
         digest = self._digest(msg) if topic in self._hashed else None

@@ -1,0 +1,57 @@
+"""What a reasoner leaves for the one that takes its place, which can't see it again: what failed, and what was left.
+
+Without it, the return of a component, or the end of what made a design violate a limit, would be no news to a reasoner
+that was started in between, and the robot would stay with the lesser design.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mros1_reasoner.knowledge import vocabulary as v
+from mros1_reasoner.loop.entries import FailedFact, LeftFact
+from mros1_reasoner.loop.entry_text import kind_of, read_entry, values_of
+from mros1_reasoner.loop.readable_state import View
+
+_LEFT = kind_of(LeftFact("", "", ""))
+
+
+def to_remember(view: View) -> dict[str, Any]:
+    """Return what is to be remembered now, as a value of a parameter."""
+    failed = {name for name, component in view.components.items() if component.status == v.FAILED}
+    return {"failed": sorted(failed | view.failed_before), "left": [list(values_of(fact)) for fact in _left(view)]}
+
+
+def remembered(value: object) -> list[FailedFact | LeftFact]:
+    """Return the facts that a parameter has; what can't be read is left out."""
+    known = value if isinstance(value, Mapping) else {}
+    facts: list[FailedFact | LeftFact] = [
+        FailedFact(name) for name in _list(known.get("failed")) if isinstance(name, str)
+    ]
+    for values in _list(known.get("left")):
+        try:
+            content = read_entry(0.0, _LEFT, [str(part) for part in _list(values)]).content
+        except ValueError:
+            continue
+        if isinstance(content, LeftFact):
+            facts.append(content)
+    return facts
+
+
+def _left(view: View) -> list[LeftFact]:
+    found = []
+    for name, running in view.running.items():
+        design = running.design or ""
+        blames = view.levels.blames(name)
+        found += [
+            LeftFact(name, design, quality, strain.factor, strain.difference, group, running.degraded)
+            for quality, (strain, group) in blames.items()
+        ]
+        if running.degraded and not blames:
+            found.append(LeftFact(name, design, degraded=True))
+    return found
+
+
+def _list(value: object) -> Sequence[Any]:
+    return value if isinstance(value, list) else ()

@@ -1,0 +1,87 @@
+"""What a change leaves on the parameter server for the next manipulator."""
+
+from types import SimpleNamespace
+
+import pytest
+from node_kit.io.xml_rpc import SilentError
+from rosgraph_launcher.description import SystemDescription
+from rosgraph_manipulator.change.deployment import DeploymentError
+from rosgraph_manipulator.change.execution import Execution
+from rosgraph_manipulator.change.parameters import OverwrittenParameters
+from rosgraph_manipulator.change.tactics import Plan
+from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
+from rosgraph_manipulator.io.launch_files import LaunchFile
+
+FAST = Configuration("fast", "f", "fast.launch")
+
+
+class Around:
+    """A parameter server, and launch files that set one parameter and start nothing."""
+
+    def __init__(self, server):
+        self.server, self.silent = server, False
+        self.log = SimpleNamespace(info=lambda line: None, warn=lambda line: None)
+
+    def now(self):
+        return 0.0
+
+    def resolve(self, name):
+        return name.replace("~", "/rosgraph_manipulator/")
+
+    def launch_file(self, configuration):
+        return LaunchFile(SystemDescription({}, {"/speed": 2}))
+
+    def parameters(self, names):
+        return {name: self.server[name] for name in names if name in self.server}
+
+    def set_parameters(self, values, delete=()):
+        if self.silent:
+            raise SilentError("the master does not answer", "timed out")
+        for name in delete:
+            self.server.pop(name, None)
+        self.server.update(values)
+
+    def wait_for_news(self, condition, timeout):
+        return True
+
+
+@pytest.fixture
+def around():
+    return Around({"/speed": 1})
+
+
+@pytest.fixture
+def execution(around):
+    launchers = SimpleNamespace(
+        reports=dict,
+        is_here=lambda node: True,
+        change=lambda *_, **__: SimpleNamespace(number=1, phases={}),
+    )
+    return Execution(
+        ManipulatorOptions({"fast": FAST}),
+        {},
+        OverwrittenParameters(),
+        ready_timeout=1.0,
+        settle_time=0.0,
+        launchers=launchers,
+        on_report=lambda: None,
+        around=around,
+        adjusting=None,
+        make_names=lambda *_: SimpleNamespace(begin=lambda: None, see_takers=lambda nodes: None),
+    )
+
+
+def change(execution):
+    execution.begin(FAST, Plan("restart", 1.0, ()))
+    execution.change_processes((), ())
+
+
+def test_former_values_are_handed_over_although_the_master_was_silent_when_they_were_first(execution, around):
+    around.silent = True
+    with pytest.raises(DeploymentError, match="does not answer"):
+        change(execution)
+    around.silent = False
+    change(execution)
+    assert around.server["/speed"] == 2
+    left = OverwrittenParameters.from_parameter(around.server["/rosgraph_manipulator/overwritten"])
+    assert left.transition({}) == ({"/speed": 1}, [])

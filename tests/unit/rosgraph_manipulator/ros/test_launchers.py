@@ -1,0 +1,193 @@
+"""Which launchers count, and which are given up, with a master and launchers that are played."""
+
+import threading
+from types import SimpleNamespace
+
+import pytest
+import rospy
+from metacontrol_msgs.msg import LaunchedFunction, LaunchedFunctions
+from metacontrol_msgs.srv import ChangeNodesResponse
+from node_kit.io.xml_rpc import SilentError
+from rosgraph_launcher.description import NodeDescription
+from rosgraph_manipulator.change.deployment import DeploymentError
+from rosgraph_manipulator.ros import launcher_reports, launchers
+from rosgraph_manipulator.ros.launchers import Launchers
+
+MAIN, SECOND, STRANGER = "/rosgraph_launcher", "/rosgraph_launcher_box", "/play_1"
+NODE = NodeDescription("/nav", "/", "p", "x")
+FAR_NODE = NodeDescription("/arm", "/", "p", "x", machine="box")
+
+
+class Surroundings:
+    """The master, the connections of the topic, and the launchers.
+
+    Attributes:
+        parameters: on the master; None: it does not answer.
+        connected: who is connected.
+        living: whose API answers.
+        change: what a launcher answers to a request.
+        requests: what launchers were asked, with their names.
+    """
+
+    def __init__(self):
+        self.parameters = {f"{MAIN}/addresses": ["robot"], f"{SECOND}/addresses": ["box"]}
+        self.connected = {MAIN, SECOND, STRANGER}
+        self.living = {MAIN, SECOND, STRANGER}
+        self.change = lambda: ChangeNodesResponse(ok=True, change=4)
+        self.requests = []
+
+    def get_parameters(self, names):
+        if self.parameters is None:
+            raise SilentError("the master does not answer", "timed out")
+        return {name: self.parameters[name] for name in names if name in self.parameters}
+
+    def subscriber(self, *_, **__):
+        return SimpleNamespace(impl=self)
+
+    @property
+    def connections(self):
+        return [SimpleNamespace(callerid_pub=name) for name in self.connected]
+
+    def address(self, name):
+        return f"http://localhost:1{name}"
+
+    def pid(self, uri):
+        return 1 if self.is_answering(uri.partition("1")[2]) else None
+
+    def is_answering(self, name):
+        return name in self.living
+
+    def proxy(self, name, _type):
+        def call(request):
+            self.requests.append((name.rpartition("/")[0], request))
+            return self.change()
+
+        return Proxy(call)
+
+
+class Proxy:
+    def __init__(self, call):
+        self._call, self.uri = call, "rosrpc://localhost:1"
+
+    def wait_for_service(self, timeout):
+        """The service is there."""
+
+    def __call__(self, request):
+        return self._call(request)
+
+
+@pytest.fixture
+def around(monkeypatch):
+    played = Surroundings()
+    monkeypatch.setattr(rospy, "Subscriber", played.subscriber)
+    monkeypatch.setattr(rospy, "ServiceProxy", played.proxy)
+    monkeypatch.setattr(rospy, "resolve_name", lambda name: f"/{name}")
+    monkeypatch.setattr(launcher_reports, "get_parameters", played.get_parameters)
+    monkeypatch.setattr(launcher_reports, "WATCH_PERIOD", 0.01)
+    monkeypatch.setattr(launchers, "WATCH_PERIOD", 0.01)
+    for module in (launcher_reports, launchers):
+        monkeypatch.setattr(module, "NodeApi", played)
+    monkeypatch.setattr(launchers, "sign", lambda request, _name: setattr(request, "signature", "signed"))
+    monkeypatch.setattr(Launchers, "_watch", lambda _: None)  # a test looks around when it wants to
+    return played
+
+
+@pytest.fixture
+def followed(around):
+    return Launchers(timeout=0.1, host_timeout=0.0)
+
+
+def tell(followed, who, change=3, nodes=("/nav",), configuration="slow"):
+    report = LaunchedFunction("f", configuration, change, "STABLE", list(nodes), [], "")
+    message = LaunchedFunctions(functions=[report])
+    message._connection_header = {"callerid": who}
+    followed._take(message)
+
+
+def ask(followed, *nodes):
+    return followed.change("f", "fast", nodes, [], [node.name for node in nodes], lambda: None)
+
+
+def test_reports_of_a_stranger_are_left_out(followed, around):
+    tell(followed, MAIN)
+    before = followed.reports()
+    tell(followed, STRANGER)
+    followed._look_around()
+    assert followed.reports() == before
+    ask(followed, NODE)
+    assert [name for name, _ in around.requests] == [MAIN]
+
+
+def test_launcher_is_found_as_soon_as_the_master_answers(followed, around):
+    told = []
+    followed.on_reports = lambda: told.append(followed.reports()["f"].nodes)
+    known, around.parameters = around.parameters, None
+    tell(followed, MAIN)
+    tell(followed, SECOND, nodes=["/arm"])
+    assert told == [("/nav",)]  # the main launcher is known by its name
+    followed._look_around()
+    around.parameters = known
+    followed._look_around()
+    assert told == [("/nav",), ("/nav", "/arm")]
+
+
+def test_stranger_that_is_gone_is_asked_about_no_more(followed, around):
+    tell(followed, STRANGER)
+    around.connected.discard(STRANGER)
+    followed._look_around()
+    around.parameters[f"{STRANGER}/addresses"] = ["robot"]
+    followed._look_around()
+    assert followed.reports() == {}
+
+
+def test_second_launcher_of_this_host_that_has_ended_is_forgotten(followed, around):
+    tell(followed, MAIN)
+    before = followed.reports()
+    tell(followed, SECOND, nodes=["/arm"])
+    followed._look_around()
+    assert followed.reports()["f"].nodes == ("/nav", "/arm")
+    around.living.discard(SECOND)
+    around.connected.discard(SECOND)
+    followed._look_around()
+    assert followed.reports() == before
+
+
+def test_function_of_a_second_launcher_that_has_ended_fails_and_can_be_changed(followed, around):
+    tell(followed, MAIN)
+    tell(followed, SECOND, nodes=["/arm"])
+    followed.adopt("f", [NODE, FAR_NODE])
+    around.living.discard(SECOND)
+    around.connected.discard(SECOND)
+    followed._look_around()
+    report = followed.reports()["f"]
+    assert (report.state, report.dead) == ("FAILED", ("/arm",))
+    assert report.message.endswith("and ran /arm: start it again")
+    ask(followed, NODE)
+    assert [name for name, _ in around.requests] == [MAIN]
+
+
+def test_launcher_that_takes_a_request_and_gives_no_sign_is_given_up(followed, around):
+    tell(followed, MAIN)
+    around.living.clear()
+    never = threading.Event()
+    around.change = never.wait
+    with pytest.raises(DeploymentError, match="takes requests and does not answer"):
+        ask(followed, NODE)
+    ((_, request),) = around.requests
+    assert request.signature == ""
+    never.set()
+
+
+def test_launcher_that_lives_may_take_its_time_for_a_change(followed, around, monkeypatch):
+    tell(followed, MAIN)
+    looks, done = [], threading.Event()
+
+    def is_answering(name):
+        looks.append(name)
+        if len(looks) > 30:  # each takes WATCH_PERIOD: longer than the time to look for a launcher
+            done.set()
+        return True
+
+    monkeypatch.setattr(around, "is_answering", is_answering)
+    around.change = lambda: done.wait() and ChangeNodesResponse(ok=True, change=4)
+    assert ask(followed, NODE).number == 4
