@@ -27,6 +27,7 @@ from ros_model.errors import ModelError
 from ros_model.project.schema_check import violations
 from ros_model_extraction.packages.catkin_package import read_package
 from ros_model_extraction.packages.cmake import commands
+from ros_model_extraction.packages.package_source import extract_package
 from rosgraph_launcher.ros.node_messages import report_from
 from rosgraph_monitor.observer import StaleInputError
 from rosgraph_monitor.observers.safety import cloud_points
@@ -145,6 +146,28 @@ def test_nested_loops_of_cmake_end_in_time(tmp_path, text):
     begin = time.process_time()
     assert len(list(commands(text, tmp_path))) < 20_000
     assert time.process_time() - begin < 5.0
+
+
+def test_class_that_a_file_declares_and_makes_again_and_again_is_read_in_time(tmp_path):
+    lines = (
+        "#include <ros/ros.h>",
+        "#include <std_msgs/String.h>",
+        "struct Node {",
+        '  explicit Node(ros::NodeHandle nh) : nh_(nh) { pub_ = nh_.advertise<std_msgs::String>("out", 1); }',
+        "  ros::NodeHandle nh_; ros::Publisher pub_;",
+        "};",
+        'int main() { Node n(ros::NodeHandle("~")); ros::spin(); }',
+    )
+    (tmp_path / "node.cpp").write_text("\n".join(lines) * 250)
+    (tmp_path / "CMakeLists.txt").write_text("project(mill)\nadd_executable(node node.cpp)\n")
+    (tmp_path / "package.xml").write_text(
+        "<package><name>mill</name><version>1.0.0</version><description>x</description>"
+        "<maintainer email='a@example.org'>a</maintainer><license>x</license></package>"
+    )
+    begin = time.process_time()
+    model = extract_package(tmp_path).model()
+    assert [port.name for port in model.packages[0].artifacts[0].nodes[0].ports] == ["~out"]
+    assert time.process_time() - begin < 10.0
 
 
 def test_report_with_an_unknown_state_is_refused_and_the_others_are_kept():

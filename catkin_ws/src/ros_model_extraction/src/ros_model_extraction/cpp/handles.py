@@ -15,6 +15,8 @@ _FUNCTION_HOMES = ("getNodeHandle", "getMTNodeHandle", "getPrivateNodeHandle", "
 _HANDLES = ("NodeHandle", "ImageTransport")  # the latter has one
 _NULL = ("nullptr", "NULL", "0")
 _POINTERS = ("_ptr", "Ptr")
+_MAX_CALLS = 32
+"""Calls of a function by which it is told what they pass."""
 
 
 class Handles:
@@ -22,6 +24,8 @@ class Handles:
 
     def __init__(self, program: Program) -> None:
         self._program = program
+        self._found: dict[tuple[str, Place, int], list[Const | Text]] = {}  # as far as variables are filled
+        self._fill_count = 0
 
     def of(self, node: Node | None, place: Place, depth: int = 0) -> list[Const | Text]:
         """Return the namespaces that a node handle may stand for: "" the node's own, "~" its private one."""
@@ -51,8 +55,17 @@ class Handles:
         return []
 
     def _named(self, name: str, place: Place, depth: int) -> list[Const | Text]:
+        if self._fill_count != self._program.fill_count:
+            self._fill_count = self._program.fill_count
+            self._found.clear()
+        key = name, place, depth
+        if key not in self._found:
+            self._found[key] = self._find_named(name, place, depth)
+        return self._found[key]
+
+    def _find_named(self, name: str, place: Place, depth: int) -> list[Const | Text]:
         found: list[Const | Text] = []
-        for declared in self._program.declared(name, place):
+        for declared in self._program.declared(name, place)[:MAX_VALUES]:
             kind = self._program.alias(declared.type, declared.place)
             if not _names_handle(kind) and not any("NodeHandle" in text(value) for value in declared.values):
                 continue
@@ -65,7 +78,7 @@ class Handles:
             else:
                 found += self._constructed(declared.values, declared.place, depth)
         if not found:
-            for argument, at in self._program.passed(name, place):
+            for argument, at in self._program.passed(name, place)[:_MAX_CALLS]:
                 found += self.of(argument, at, depth + 1)
         return list(dict.fromkeys(found))
 

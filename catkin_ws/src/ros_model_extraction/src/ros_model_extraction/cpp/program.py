@@ -63,7 +63,11 @@ class _Index:
 
 
 class Program:
-    """The sources of an executable, with the headers of its package that they include."""
+    """The sources of an executable, with the headers of its package that they include.
+
+    Attributes:
+        fill_count: how many variables calls have filled so far; what is found may change with each.
+    """
 
     def __init__(self, files: Sequence[File], nodelet: str = "") -> None:
         """Index the files: sources, then the headers that they include; `nodelet` is the class that is loaded."""
@@ -75,6 +79,7 @@ class Program:
         self._index = _Index()
         self._locals: dict[int, dict[str, list[Declared]]] = {}
         self._fills: dict[tuple[str, str], list[tuple[Node | str | None, Place, str]]] = defaultdict(list)
+        self.fill_count = 0
         for file in reversed(files):  # headers, which declare, before the sources that include them
             self._index_file(file)
         for name, values, place in self._index.initialised:  # a base class, or a member of some class
@@ -159,6 +164,7 @@ class Program:
     def note_fill(self, variable: Node, value: Node | str | None, place: Place, note: str) -> None:
         """Note that a call like `param(name, variable, value)` fills a variable."""
         owner = "" if self._is_local(text(variable), place) else place.owner
+        self.fill_count += 1
         self._fills[owner or _key(place), text(variable)].append((value, place, note))
 
     def declared(self, name: str, place: Place) -> list[Declared]:
