@@ -7,6 +7,7 @@ message of a latched topic once more. Subscribers of latched topics leave out wh
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -23,6 +24,7 @@ DELAY = (0.0005, 0.01)  # s, of a message on an idle machine
 @dataclass
 class _Connection:
     publisher: Process
+    number: int
     last_at: float = 0.0
     waiting: deque[Any] = field(default_factory=deque)
 
@@ -43,6 +45,7 @@ class Topic:
         self._kernel, self._counts, self._latched = kernel, counts, latched
         self._publishers: dict[Process, Any] = {}  # with the last message
         self._subscribers: list[_Subscriber] = []
+        self._connections = itertools.count()
         self.slow_until = 0.0
         self.slowness = 0.0
 
@@ -87,7 +90,7 @@ class Topic:
     def _connect(self, publisher: Process, subscriber: _Subscriber) -> None:
         def connected() -> None:
             if publisher.alive and subscriber.process.alive:
-                connection = subscriber.connections[id(publisher)] = _Connection(publisher)
+                connection = subscriber.connections[id(publisher)] = _Connection(publisher, next(self._connections))
                 last = self._publishers.get(publisher)
                 if self._latched and last is not None:
                     self._send(connection, subscriber, last)
@@ -113,6 +116,6 @@ class Topic:
             self._kernel.after(0.05, lambda: self._deliver(connection, subscriber))
         elif connection.waiting:
             message = connection.waiting.popleft()
-            is_late = self._latched and subscriber.succession.is_late(connection.publisher.name, connection)
+            is_late = self._latched and subscriber.succession.is_late(connection.publisher.name, connection.number)
             if subscriber.process.alive and not is_late:
                 subscriber.take(message)

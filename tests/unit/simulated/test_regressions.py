@@ -107,3 +107,15 @@ def test_nodes_end_that_a_change_of_a_dead_manipulator_brings_while_its_successo
         Fault(55.188, Kind.KILL_PART, "manipulator"),
     )
     holds(History(5000037, "orchard", faults, Policy.WAIT, starts_with_initial=True))
+
+
+def test_connection_that_was_broken_and_is_first_heard_after_its_successor_makes_nobody_deaf():
+    faults = (
+        Fault(43.105, Kind.CANCELLED_REQUEST, "f3_v1_r3_b", 2.765),
+        Fault(43.257, Kind.REQUEST, "f1_v2_r1"),
+        Fault(46.224, Kind.KILL_NODE, "/move_base"),
+        Fault(47.856, Kind.RECONNECT, "functions"),
+        Fault(47.999, Kind.SLOW, "functions", 4.884),
+        Fault(48.012, Kind.RECONNECT, "functions"),
+    )
+    holds(History(6009136, "d2", faults, Policy.REFUSE, starts_with_initial=True))

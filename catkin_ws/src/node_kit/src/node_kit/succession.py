@@ -6,29 +6,23 @@ the new one is heard. Where messages tell a state, the older one would be believ
 
 from __future__ import annotations
 
-from collections import deque
-from typing import Any
-
-_KEPT = 16
-"""Former connections of a publisher that are known; a message of an even older one is not on its way any more."""
-
 
 class Succession:
-    """The connections to the publishers of one topic, in the order in which they were heard first. Not thread-safe."""
+    """The newest connection of each publisher of one topic that was heard. Not thread-safe."""
 
     def __init__(self) -> None:
         """Begin with nobody."""
-        self._connections: dict[str, deque[Any]] = {}
+        self._newest: dict[str, int] = {}
 
-    def is_late(self, publisher: str, connection: object) -> bool:
+    def is_late(self, publisher: str, connection: int) -> bool:
         """Note a message, and tell whether a newer connection of its publisher was heard before.
 
         Args:
-            publisher: name of the node that sent it.
-            connection: by which it came; connections are told apart by identity.
+            publisher: name of the node that sent it; of those without a name, nothing is known.
+            connection: number of the connection by which it came; those that are made later have higher ones. It is not
+                the order in which they are first heard: a broken one may bring its first message last.
         """
-        known = self._connections.setdefault(publisher, deque(maxlen=_KEPT))
-        if any(one is connection for one in known):
-            return known[-1] is not connection
-        known.append(connection)
-        return False
+        newest = self._newest.get(publisher, connection)
+        if publisher:
+            self._newest[publisher] = max(newest, connection)
+        return bool(publisher) and connection < newest

@@ -12,13 +12,16 @@ With rospy alone, a node that listens to a topic of several publishers may never
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections import defaultdict
+from collections.abc import Mapping
 from functools import wraps
-from typing import TYPE_CHECKING, Any, Callable
+from typing import TYPE_CHECKING, Any, Callable, Dict
 
 from rospy.impl.masterslave import ROSHandler
 from rospy.impl.registration import RegManager
+from rospy.impl.tcpros_base import TCPROSTransport
 
 from node_kit.ros.shortages import outlast_shortages
 from node_kit.succession import Succession
@@ -26,13 +29,28 @@ from node_kit.succession import Succession
 if TYPE_CHECKING:
     import genpy
 
+_validate_header = TCPROSTransport._validate_header
 _connect_topic, _publisher_update = ROSHandler._connect_topic, RegManager.publisher_update
 
 
 def connect_to_all() -> None:
     """Change rospy in this process, before `rospy.init_node` or after it; without effect a second time."""
     ROSHandler._connect_topic, RegManager.publisher_update = _connect_once, _update_with_earlier
+    TCPROSTransport._validate_header = _number
     outlast_shortages()
+
+
+class ConnectionHeader(Dict[str, str]):
+    """The header of a connection, which all its messages have.
+
+    Attributes:
+        number: higher than that of each connection that was made before.
+    """
+
+    def __init__(self, header: Mapping[str, str]) -> None:
+        """Give the next connection its number, and keep what the other side has said of it."""
+        super().__init__(header)
+        self.number = next(_numbers)
 
 
 def latest(callback: Callable[[Any], object]) -> Callable[[Any], None]:
@@ -41,16 +59,27 @@ def latest(callback: Callable[[Any], object]) -> Callable[[Any], None]:
     For topics whose messages tell a state, such as latched ones. Each connection of rospy has a thread of its own;
     here one calls after the other.
     """
+    TCPROSTransport._validate_header = _number
     succession, lock = Succession(), threading.RLock()
 
     @wraps(callback)
     def take(message: genpy.Message) -> None:
-        header = message._connection_header  # one object for each connection
+        header = message._connection_header
         with lock:
-            if not succession.is_late(header.get("callerid", ""), header):
+            number = getattr(header, "number", -1)  # of one that was made before this function was called
+            if not succession.is_late(header.get("callerid", ""), number):
                 callback(message)
 
     return take
+
+
+_numbers = itertools.count()
+
+
+def _number(transport: TCPROSTransport, header: dict[str, str]) -> None:
+    """Take in the header of a new connection, as rospy does, and number it."""
+    _validate_header(transport, header)
+    transport.header = ConnectionHeader(header)
 
 
 class _Locks:
