@@ -61,6 +61,11 @@ class MasterWatch:
             self._news.wait_for(lambda: self.lost or self._answered_at >= now)
             return not self.lost
 
+    @property
+    def has_answered(self) -> bool:
+        """Whether the master was ever there."""
+        return self._answered_at > -math.inf
+
     def _run(self, ask: _Asker) -> None:
         view = View()
         while not view.lost:

@@ -96,7 +96,7 @@ class Lifetime:
         try:
             self.watch.start(rosgraph.get_master_uri())
             if not self.watch.confirm():
-                self.end("there is no master", BAD_START)
+                self.end("there is no master", 0 if self.watch.has_answered else BAD_START)
             connect_to_all()
             with quick_start():
                 rospy.init_node(self._name, anonymous=anonymous, disable_signals=True)
