@@ -9,7 +9,7 @@ from arm_motion.panda import HOME
 from arm_motion.planning import NoPathError, line, plan
 from arm_motion.scene import Box, Scene
 from arm_motion.timing import timed
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 TABLE = Box((0.70, -0.30, -0.10), (0.80, 1.60, 0.40))
@@ -45,6 +45,7 @@ def free_at_fine_steps(scene, path, held=None):
 
 
 @settings(max_examples=8, deadline=None)
+@example(x=0.46175333994393963, y=0.1484375, to=-0.24868381542211504, seed=291, holds=True)
 @given(
     x=st.floats(0.40, 0.58),
     y=st.floats(0.10, 0.25),

@@ -5,6 +5,7 @@ A path is a list of joints, to be followed straight from one to the next.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,7 @@ FINE = 0.01
 """rad; the norm of the steps in which a finished path is checked."""
 
 _COARSE = 0.04  # rad, steps while planning; halved if the finished path is not free at fine steps
+_ROOM = 0.003  # m that what the arm holds is wider on a path: between two checks it may come nearer than at both
 _ATTEMPTS = 3
 _DEPARTURES, _DEPARTURE_TRIALS = (0.02, 0.05, 0.1, 0.2), 25  # rad of each joint
 _SHORTCUTS = 30  # tries to cut a corner
@@ -69,6 +71,7 @@ def plan(
     if not scene.is_free(goal, held):
         raise NoPathError(f"the goal {_text(goal)} hits something or is beyond a limit: choose another posture")
     before, start = _departure(scene, start, held, seed)
+    held = _with_room(scene, held, start, goal)
     if is_free(scene, [start, goal], held):
         return [*before, start, goal]
     end = base.timedPlannerTerminationCondition(deadline)
@@ -116,6 +119,15 @@ def is_free(scene: Scene, path: Sequence[Array], held: Box | None = None, cleara
         for first, second in pairwise(path)
         for share in _shares(first, second)
     )
+
+
+def _with_room(scene: Scene, held: Box | None, *ends: Array) -> Box | None:
+    """Return a wider box than is held; the same one where that is free at the ends only without room, as on a table."""
+    if held is None:
+        return None
+    length, width, height = (extent + 2.0 * _ROOM for extent in held.size)
+    wider = replace(held, size=(length, width, height))
+    return wider if all(scene.is_free(end, wider) for end in ends) else held
 
 
 def _departure(scene: Scene, start: Array, held: Box | None, seed: int) -> tuple[list[Array], Array]:
