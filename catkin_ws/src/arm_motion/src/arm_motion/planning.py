@@ -50,7 +50,8 @@ def plan(
 ) -> list[Array]:
     """Return a short path between two postures that hits nothing.
 
-    An arm that stands nearer to something than the scene's clearance, but does not touch it, leaves first.
+    An arm that stands nearer to something than the scene's clearance, but does not touch it, leaves first. What it
+    holds counts as wider than it is, by 3 mm on each side, where both ends have that room.
 
     The same arguments give the same path if the search ends before its deadline, since nothing else depends on clocks;
     a search that ends by its deadline may succeed on a faster computer. OMPL has one generator of seeds in a process,

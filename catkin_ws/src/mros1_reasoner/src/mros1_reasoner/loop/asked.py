@@ -39,14 +39,11 @@ class Asked:
             self._commands += [replace(command, objective=name) for name in objectives]
         elif not isinstance(command, entries.Resume | entries.Unlock):
             self._commands.append(command)
-        elif isinstance(command, entries.Unlock) and any(isinstance(c, entries.Lock) for c in self._commands):
-            self._commands.append(command)  # all are locked but this one
 
     def settle(self, locked: Collection[str]) -> bool:
         """Forget the locks of objectives that are locked no longer, since they went; return whether there were any."""
         before = len(self._commands)
-        locks = (entries.Lock, entries.Unlock)
-        self._commands = [c for c in self._commands if not isinstance(c, locks) or c.objective in ("", *locked)]
+        self._commands = [c for c in self._commands if not isinstance(c, entries.Lock) or c.objective in locked]
         return len(self._commands) < before
 
     def as_parameter(self) -> list[list[str]]:
@@ -74,7 +71,7 @@ def _replaces(command: Command, before: Command) -> bool:
     match command, before:
         case entries.Pause() | entries.Resume(), entries.Pause():
             return True
-        case entries.Lock(name) | entries.Unlock(name), entries.Lock(other) | entries.Unlock(other):
+        case entries.Lock(name) | entries.Unlock(name), entries.Lock(other):
             return name in ("", other)
         case entries.SetNfr(name, quality, _), entries.SetNfr(other, same, _):
             return quality == same and name in ("", other)
