@@ -14,6 +14,7 @@ class Kind(enum.Enum):
     """The kinds of faults; `value` of a fault is in s where nothing else is said."""
 
     KILL_PART = "part killed"
+    DISMISS_PART = "part told to end"
     FREEZE_PART = "part hangs"  # for `value`
     KILL_NODE = "node killed"
     FREEZE_NODE = "node hangs"  # for `value`; 0: for ever
@@ -73,7 +74,9 @@ _VALUES: dict[Kind, tuple[float, float]] = {
     Kind.WALL_JUMPS: (-100.0, 100.0),
     Kind.CANCELLED_REQUEST: (0.0, 3.0),
 }
-_NO_VALUE = frozenset({Kind.KILL_PART, Kind.KILL_NODE, Kind.DEAF, Kind.RECONNECT, Kind.DRIFT, Kind.REQUEST})
+_NO_VALUE = frozenset(
+    {Kind.KILL_PART, Kind.DISMISS_PART, Kind.KILL_NODE, Kind.DEAF, Kind.RECONNECT, Kind.DRIFT, Kind.REQUEST}
+)
 
 
 def draw(system: System, chance: random.Random, most: int, duration: float) -> tuple[Fault, ...]:
@@ -104,7 +107,7 @@ def _target(system: System, kind: Kind, chance: random.Random) -> str:
         return chance.choice(base)
     names = {name for described in system.described.values() for name in described.all_parameters()}
     among: dict[Kind, Sequence[str]] = {
-        **dict.fromkeys((Kind.KILL_PART, Kind.FREEZE_PART), PARTS),
+        **dict.fromkeys((Kind.KILL_PART, Kind.DISMISS_PART, Kind.FREEZE_PART), PARTS),
         **dict.fromkeys((Kind.SLOW, Kind.RECONNECT), TOPICS),
         **dict.fromkeys((Kind.REQUEST, Kind.CANCELLED_REQUEST, Kind.FILE_GONE), sorted(system.variants)),
         **dict.fromkeys((Kind.MASTER_SILENT, Kind.CLOCK_STANDS, Kind.CLOCK_JUMPS, Kind.WALL_JUMPS, Kind.PAUSE), ("",)),

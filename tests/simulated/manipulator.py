@@ -34,6 +34,7 @@ TACTICS = {"nothing": nothing, "parameters": parameters, "restart": restart, "re
 LAUNCHER = "rosgraph_launcher"
 FIND = 10.0  # s, for a launcher to be found
 EPOCH = 1.7e9  # s, of the wall clock at the start
+ROSLAUNCH = "roslaunch"  # starts each manipulator
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class ManipulatorPart:
         topics["diagnostics"].advertise(process)
         topics["functions"].subscribe(process, self._take_reports, queue=20)
         self.requests: Requests | None = None
+        self.say_goodbye: Callable[[], object] = lambda: None
         self._launchers = _Launchers(self, launcher)
         process.start(self._run)
 
@@ -97,7 +99,7 @@ class ManipulatorPart:
         prefix = "/rosgraph_manipulator"
         journal = parse_journal(host.parameters.get(f"{prefix}/journal"))
         initial = {system.options.configurations[name].function: name for name in self._settings.initial}
-        begun = resumptions(system.options, journal, self._launchers.reports(), initial, self.wall())
+        begun = resumptions(system.options, journal, self._launchers.reports(), initial, self.wall(), ROSLAUNCH)
 
         def follow_launcher() -> None:
             manipulation.follow_launcher()
@@ -114,7 +116,7 @@ class ManipulatorPart:
             adjusting=_NoServers(),
             make_names=lambda _describe, has_finished: _Names(self, has_finished),
         )
-        keeper = _JournalKeeper(self, begin_journal(begun.values()))
+        keeper = _JournalKeeper(self, begin_journal(begun.values(), ROSLAUNCH))
         manipulation = Manipulation(
             system.options, TACTICS, 5.0, executor, _Announcer(self), keeper, around, lambda _runs: None
         )
@@ -128,6 +130,7 @@ class ManipulatorPart:
         )
         executor.check = requests.check
         self.process.start(lambda: self._beat(manipulation))
+        self.say_goodbye = manipulation.end
         manipulation.begin(begun)
         self.requests, self.serves = requests, True
         while True:

@@ -157,6 +157,11 @@ class World:
     def _kill_part(self, target: str, value: float) -> None:
         self._end_part(target)
 
+    def _dismiss_part(self, target: str, value: float) -> None:
+        if target == "manipulator" and self.manipulator is not None and not self.manipulator.process.frozen:
+            self.manipulator.say_goodbye()
+        self._end_part(target)
+
     def _freeze_part(self, target: str, value: float) -> None:
         part = getattr(self, target)
         if part is not None:

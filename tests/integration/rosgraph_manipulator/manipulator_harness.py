@@ -148,8 +148,8 @@ class PairTest(unittest.TestCase):
         cls.launcher = Node("rosgraph_launcher", "rosgraph_launcher", environment=cls.environment)
 
     @classmethod
-    def start_manipulator(cls):
-        cls.manipulator = Node("rosgraph_manipulator", "rosgraph_manipulator", environment=cls.environment)
+    def start_manipulator(cls, *arguments):
+        cls.manipulator = Node("rosgraph_manipulator", "rosgraph_manipulator", *arguments, environment=cls.environment)
 
     @classmethod
     def end_pair(cls):

@@ -170,6 +170,24 @@ class SurvivalTest(PairTest):
         self.wait_for_state("slow")
         self.wait_until_it_serves()
 
+    def test_manipulator_that_is_told_to_end_and_started_again_brings_the_mission_back(self):
+        """A signal or a node of its name may end it just when the launcher dies, too; roslaunch starts both again."""
+        log = self.enterContext(tempfile.NamedTemporaryFile())
+        self.manipulator.end()
+        self.start_manipulator(f"__log:={log.name}")  # as roslaunch starts it
+        self.wait_until_it_serves()
+        self.assertEqual(self.request("fast"), 1, self.text)  # it does not begin with this one
+        goal_id, _ = self.send_goal()
+        self.wait_until_kept(goal_id)
+        server = self.server
+        self.manipulator.end()
+        self.launcher.end(signal.SIGKILL)
+        self.start_launcher()
+        self.start_manipulator(f"__log:={log.name}")
+        self.wait_for_goal(goal_id, server)
+        self.wait_for_state("fast")
+        self.wait_until_it_serves()
+
     def test_killed_launcher_in_the_middle_of_a_change_is_waited_for(self):
         goal_id, _ = self.send_goal()
         server = self.server

@@ -12,8 +12,8 @@ CHANGING = Journal(GOOD, "better", alive=NOW - 1.0, attempts=1)
 BROKEN = CHANGING.broken("NameError: name 'x' is not defined", NOW - 1.0)
 
 
-def resume(journal, launched, failed, initial, now, function="f_pick"):
-    return module.resume(journal, KNOWN, function, launched, failed, initial, now)
+def resume(journal, launched, failed, initial, now, function="f_pick", supervisor=""):
+    return module.resume(journal, KNOWN, function, launched, failed, initial, now, supervisor)
 
 
 def test_what_runs_is_taken_over_with_its_goal():
@@ -36,7 +36,7 @@ def test_killed_pair_brings_the_mission_back():
 def die(journal, deploys):
     """Return the journal of a manipulator that begins as `journal` says, and dies before or while it deploys."""
     begun = resume(journal, "good", False, "first", NOW)
-    told = begin_journal([Resumption(running="far"), begun]).noted({"f_pick": begun.last_good}, NOW)
+    told = begin_journal([Resumption(running="far"), begun], "").noted({"f_pick": begun.last_good}, NOW)
     return told.noted({"f_pick": begun.last_good}, NOW, wanted=begun.deploy) if deploys else told
 
 
@@ -92,7 +92,7 @@ def test_refusal_of_another_time_is_not_believed():
 
 
 def test_manipulator_with_nothing_to_deploy_begins_without_a_change():
-    assert begin_journal([Resumption(running="good")]) == Journal()
+    assert begin_journal([Resumption(running="good")], "") == Journal()
 
 
 def test_error_is_kept_when_the_manipulator_ends_of_it():
@@ -114,6 +114,15 @@ def test_configuration_that_the_launcher_gave_up_is_not_taken_over():
 def test_journal_of_another_time_is_not_believed(journal):
     assert resume(journal, "", False, "first", NOW) == Resumption(deploy="first")
     assert resume(journal, "good", False, "first", NOW) == Resumption(running="good")
+
+
+def test_manipulator_that_was_told_to_end_but_is_started_again_by_its_supervisor_goes_on():
+    begun = begin_journal([Resumption(running="good")], "roslaunch 7")
+    ended = parse_journal(begun.noted(GOOD, NOW - 1.0, ended=True).as_parameter())
+    again = resume(ended, "", False, "first", NOW, supervisor="roslaunch 7")
+    assert again == Resumption(deploy="good", keep_goal=True)
+    for other in ("roslaunch 8", ""):
+        assert resume(ended, "", False, "first", NOW, supervisor=other) == Resumption(deploy="first")
 
 
 def test_system_that_was_ended_starts_anew():

@@ -32,6 +32,7 @@ class Journal:
         attempts: how often the wanted configuration was begun, by this manipulator and those before it.
         error: the error of the change under way that has ended the manipulator; empty: none has.
         failures: why nothing runs for a function, for each function that has failed, even if it was released since.
+        supervisor: who has started the manipulator, and starts it again when it ends; empty: nobody is known.
     """
 
     configurations: Mapping[str, str] = field(default_factory=dict)
@@ -41,6 +42,7 @@ class Journal:
     attempts: int = 0
     error: str = ""
     failures: Mapping[str, str] = field(default_factory=dict)
+    supervisor: str = ""
 
     def noted(
         self,
@@ -89,6 +91,16 @@ class Journal:
             return f"the manipulator has died {self.attempts} times while it deployed it"
         return ""
 
+    def is_over(self, supervisor: str) -> bool:
+        """Tell whether the whole system was ended: somebody told the manipulator to, and then started another one.
+
+        A node of the same name or a signal may have ended it, too. Then its supervisor starts it again.
+
+        Args:
+            supervisor: who has started the next manipulator.
+        """
+        return self.ended and not (supervisor and supervisor == self.supervisor)
+
     def needs_heartbeat(self, now: float) -> bool:
         """Tell whether a heartbeat is due: the last one is old, or the clock was set back since."""
         return not 0.0 <= now - self.alive <= HEARTBEAT_PERIOD
@@ -103,6 +115,7 @@ class Journal:
             "attempts": self.attempts,
             "error": self.error,
             "failures": dict(self.failures),
+            "supervisor": self.supervisor,
         }
 
 
@@ -144,14 +157,27 @@ class Resumption:
     failure: str = ""
 
 
-def begin_journal(resumptions: Iterable[Resumption]) -> Journal:
-    """Return the journal with which a manipulator begins; it counts the first of its changes as begun."""
+def begin_journal(resumptions: Iterable[Resumption], supervisor: str) -> Journal:
+    """Return the journal with which a manipulator begins; it counts the first of its changes as begun.
+
+    Args:
+        resumptions: how it begins with each function.
+        supervisor: see Journal.
+    """
     begun = next((resumption for resumption in resumptions if resumption.deploy), None)
-    return Journal(wanted=begun.deploy, attempts=begun.attempts + 1) if begun else Journal()
+    journal = Journal(supervisor=supervisor)
+    return replace(journal, wanted=begun.deploy, attempts=begun.attempts + 1) if begun else journal
 
 
 def resume(
-    journal: Journal, known: Mapping[str, str], function: str, launched: str, failed: bool, initial: str, now: float
+    journal: Journal,
+    known: Mapping[str, str],
+    function: str,
+    launched: str,
+    failed: bool,
+    initial: str,
+    now: float,
+    supervisor: str,
 ) -> Resumption:
     """Decide how to begin with a function.
 
@@ -163,7 +189,9 @@ def resume(
         failed: whether the launcher has given that configuration up.
         initial: the configuration to begin with where nothing is left to resume; empty: none.
         now: wall time, s since the epoch.
+        supervisor: who has started the manipulator that begins.
     """
+    over = journal.is_over(supervisor)
     fresh = 0.0 <= now - journal.alive <= MAX_AGE
     last_good = journal.configurations.get(function, "")
     last_good = last_good if known.get(last_good) == function else ""
@@ -175,14 +203,14 @@ def resume(
         if fresh and wanted:  # it was killed during a change: finish that
             return Resumption(deploy=wanted, last_good=last_good, keep_goal=True, attempts=attempts)
         return Resumption(running=launched, keep_goal=fresh)
-    if fresh and not journal.ended and (wanted or last_good):  # manipulator and launcher died
+    if fresh and not over and (wanted or last_good):  # manipulator and launcher died
         return Resumption(
             deploy=wanted or last_good,
             last_good=last_good if wanted else "",
             keep_goal=True,
             attempts=attempts,
         )
-    failure = journal.failures.get(function, "") if fresh and not journal.ended and not initial else ""
+    failure = journal.failures.get(function, "") if fresh and not over and not initial else ""
     return Resumption(deploy=initial, failure=failure)
 
 

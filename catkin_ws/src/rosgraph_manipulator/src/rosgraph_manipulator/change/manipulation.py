@@ -65,6 +65,7 @@ def resumptions(
     reports: Mapping[str, LauncherReport],
     initial: Mapping[str, str],
     now: float,
+    supervisor: str,
 ) -> dict[str, Resumption]:
     """Return how to begin with each function. A change that was under way comes first.
 
@@ -74,6 +75,7 @@ def resumptions(
         reports: what the launchers report, by function.
         initial: the configuration to begin with, by function.
         now: s since the epoch.
+        supervisor: who has started the manipulator that begins.
     """
     known = {name: configuration.function for name, configuration in options.configurations.items()}
     found = {}
@@ -81,7 +83,8 @@ def resumptions(
         report = reports.get(function, LauncherReport(function))
         launched = report.configuration if known.get(report.configuration) == function else ""
         failed = report.state == FAILED
-        found[function] = resume(journal, known, function, launched, failed, initial.get(function, ""), now)
+        first = initial.get(function, "")
+        found[function] = resume(journal, known, function, launched, failed, first, now, supervisor)
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -26,6 +27,7 @@ from rosgraph_manipulator.change.tactics import Tactic, load_tactics
 from rosgraph_manipulator.configuration.configurations import KEYS, ConfigurationError, ManipulatorOptions
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.master import set_parameters
+from rosgraph_manipulator.io.supervisor import find_supervisor
 from rosgraph_manipulator.ros.announcer import Announcer
 from rosgraph_manipulator.ros.goal import PendingGoal
 from rosgraph_manipulator.ros.launchers import Launchers
@@ -99,7 +101,8 @@ class Manipulator:
         if not launchers.find():
             rospy.logwarn("rosgraph_launcher is not there; start it beside this node: nothing can be deployed without")
         journal = parse_journal(parameters.value("journal"))
-        self._resumptions = resumptions(options, journal, launchers.reports(), initial, time.time())
+        supervisor = find_supervisor(sys.argv)
+        self._resumptions = resumptions(options, journal, launchers.reports(), initial, time.time(), supervisor)
         around = RosSurroundings()
         self._executor = Execution(
             options,
@@ -119,7 +122,7 @@ class Manipulator:
             probation,
             self._executor,
             announcer,
-            JournalParameter(begin_journal(self._resumptions.values())),
+            JournalParameter(begin_journal(self._resumptions.values(), supervisor)),
             around,
             self._on_change,
         )
