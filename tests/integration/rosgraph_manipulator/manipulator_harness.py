@@ -80,8 +80,8 @@ CONFIGURATIONS = {
 class Node:
     """A node as a process of the test's own, with what it says."""
 
-    def __init__(self, *words, environment=None):
-        self.output = tempfile.NamedTemporaryFile("w")  # noqa: SIM115, it lives as long as the node
+    def __init__(self, *words, environment=None, output=None):
+        self.output = output or tempfile.NamedTemporaryFile("w")  # noqa: SIM115, it lives as long as the node
         self._process = subprocess.Popen(
             ["/usr/bin/rosrun", *words],
             stdout=self.output,
@@ -99,7 +99,8 @@ class Node:
         return self._process.wait(DEADLINE_S)
 
     def said(self):
-        return Path(self.output.name).read_text()  # opened anew: the node's place in the file stays where it is
+        path = Path(self.output.name)  # opened anew: the node's place in the file stays where it is
+        return path.read_text() if path.is_file() else ""
 
 
 class PairTest(unittest.TestCase):
@@ -144,12 +145,13 @@ class PairTest(unittest.TestCase):
         assert cls.client.wait_for_server(rospy.Duration(DEADLINE_S)), cls.manipulator.said()
 
     @classmethod
-    def start_launcher(cls):
-        cls.launcher = Node("rosgraph_launcher", "rosgraph_launcher", environment=cls.environment)
+    def start_launcher(cls, output=None):
+        cls.launcher = Node("rosgraph_launcher", "rosgraph_launcher", environment=cls.environment, output=output)
 
     @classmethod
-    def start_manipulator(cls, *arguments):
-        cls.manipulator = Node("rosgraph_manipulator", "rosgraph_manipulator", *arguments, environment=cls.environment)
+    def start_manipulator(cls, *arguments, output=None):
+        name = "rosgraph_manipulator"
+        cls.manipulator = Node(name, name, *arguments, environment=cls.environment, output=output)
 
     @classmethod
     def end_pair(cls):

@@ -110,6 +110,22 @@ class FaultsTest(PairTest):
         self.assertEqual(self.request("full"), 1)
         self.assertIsNotNone(pid_of("/wait_server"))
 
+    def test_full_disk_ends_no_part_that_writes_to_its_log(self):
+        with open("/dev/full", "w") as disk:
+            self.start_again(disk)
+        self.addCleanup(self.start_again)
+        for name, result in (("full", 1), ("no_package", 0), ("no_such_configuration", -1), ("full", 1)):
+            with case(name):
+                self.assertEqual(self.request(name), result, self.text)
+        self.assertTrue(is_alive(self.launcher.pid) and is_alive(self.manipulator.pid))
+
+    def start_again(self, output=None):
+        for node in (self.manipulator, self.launcher):
+            node.end()
+        self.start_launcher(output=output)
+        self.start_manipulator(output=output)
+        self.wait_until_it_serves()
+
     def test_robot_is_stopped_when_nothing_can_be_restored(self):
         self.assertEqual(self.request("breaks"), 1)
         Path(self.configurations["breaks"]["launch"]).write_text("<launch>")

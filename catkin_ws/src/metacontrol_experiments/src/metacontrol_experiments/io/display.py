@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -48,7 +48,10 @@ def refusing(*kinds: type[Exception]) -> Iterator[None]:
 
 
 class Display:
-    """A mission: with a live bar on a terminal, else plain lines; silent if quiet."""
+    """A mission: with a live bar on a terminal, else plain lines; silent if quiet.
+
+    What can't be written, because a disk is full, is left out: the mission goes on.
+    """
 
     def __init__(self, quiet: bool = False) -> None:
         """Prepare a bar if there is a terminal."""
@@ -81,8 +84,12 @@ class Display:
 
     def say(self, text: str) -> None:
         """Show a line."""
+        self._print(Text(text))
+
+    def _print(self, shown: Text | Table) -> None:
         if not self._quiet:
-            tell(text)
+            with suppress(OSError):
+                CONSOLE.print(shown, soft_wrap=isinstance(shown, Text))
 
     def start(self, stamp: float) -> None:
         """Count times from this stamp on: the mission starts."""
@@ -93,8 +100,7 @@ class Display:
         line = Text(f"{entry.stamp - self._start:7.2f} s  ")
         line.append(f"{entry.step:<2}", _STYLES.get(entry.step, ""))
         line.append("  " + entry.text, "red" if entry.bad else "")
-        if not self._quiet:
-            CONSOLE.print(line, soft_wrap=True)
+        self._print(line)
 
     def progress(self, share: float, stamp: float, left: str) -> None:
         """How much is done (0..1), and in words what is left."""
@@ -107,9 +113,8 @@ class Display:
 
     def show(self, *tables: Table) -> None:
         """Show tables."""
-        if not self._quiet:
-            for table in tables:
-                CONSOLE.print(table)
+        for table in tables:
+            self._print(table)
 
     def summary(self, summary: dict[str, Any]) -> None:
         """Show the closing tables."""

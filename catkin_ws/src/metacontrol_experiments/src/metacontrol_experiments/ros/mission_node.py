@@ -16,6 +16,7 @@ from metacontrol_bags import messages
 from metacontrol_bags.record import CostReport, Event, QualityReport
 from metacontrol_bags.timeline import Timeline
 from metacontrol_msgs.msg import ActiveConfiguration, Decision, MissionEvent
+from node_kit.io.forgiving_logs import forgive
 from node_kit.io.inbox import Inbox
 from node_kit.ros.connections import connect_to_all
 
@@ -70,6 +71,7 @@ class MissionNode(ABC, Generic[State]):
         self._startup.wait_for_master()
         connect_to_all()
         rospy.init_node("mission", disable_signals=True)
+        forgive()
         self._events = rospy.Publisher("mission/event", MissionEvent, queue_size=10)
         self._goal = self._make_goal()
         self._subscribe("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)

@@ -17,6 +17,7 @@ from typing import NoReturn
 import rosgraph
 import rospy
 
+from node_kit.io.forgiving_logs import forgive
 from node_kit.io.master_watch import MasterWatch
 from node_kit.io.printable_logs import print_safely
 from node_kit.io.xml_rpc import CallError
@@ -100,6 +101,7 @@ class Lifetime:
             connect_to_all()
             with quick_start():
                 rospy.init_node(self._name, anonymous=anonymous, disable_signals=True)
+            forgive()
             greet_apart()
         except (CallError, OSError, rospy.ROSInitException) as error:
             raise _StartError(str(error)) from error
