@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from statistics import median
 
 from soak.observed import Observed, Pose, Sample, Told, Usage
-from soak.plan import DRIVERS, NO_VARIANT_SETS_IT, NODE, RECORDER, Fault, Kind, Mission
+from soak.plan import DRIVERS, NO_VARIANT_SETS_IT, NODE, PARTS, RECORDER, Fault, Kind, Mission
 
 SPEEDS = {"v1": 0.3, "v2": 0.5, "v3": 0.75}
 """m/s, of variants.csv."""
@@ -22,6 +22,8 @@ OLD_DATA_S, COMMAND_S, MARGIN_S = 1.0, 0.5, 0.4
 """ROS s: move_base takes older data as too old; the base stops without a command; a period of sensor and control."""
 NAMED_S = 20.0
 """Wall s until a standing fault is named on /diagnostics."""
+CHANGE_S = 10.0
+"""Wall s in which a change is mostly over."""
 MOVES, SPEED_MARGIN = 0.05, 1.15
 """m/s from which on the robot moves; how much faster than commanded ground truth may be: noise and slip."""
 GROWTH_MB, GROWTH_DESCRIPTORS = 40.0, 40
@@ -206,7 +208,34 @@ def excuse_of(mission: Mission, observed: Observed) -> str:
     dead = {role for strike in observed.struck() for role in _lost_for_good(mission.faults[strike.index])}
     if dead.issuperset(DRIVER_OF.values()):
         return "no sensor is left"
-    return "the frames of the robot are gone" if "robot_state_publisher" in dead else ""
+    if "robot_state_publisher" in dead:
+        return "the frames of the robot are gone"
+    return _hangs_when_needed(mission, observed)
+
+
+def _hangs_when_needed(mission: Mission, observed: Observed) -> str:
+    """Return which part was stopped for good before a change was needed, or was made for what had just been lost."""
+    struck = [(strike.t, mission.faults[strike.index]) for strike in observed.struck()]
+    for stopped, fault in struck:
+        part = next((role for role in fault.targets if role in PARTS), "")
+        if part and fault.kind is Kind.FREEZE_FOR_GOOD:
+            later = [other for t, other in struck if t > stopped - CHANGE_S]
+            lost = {role for other in later for role in _lost_for_good(other)} & set(DRIVER_OF.values())
+            ended = {role for other in later if other.kind in _ENDS for role in other.targets}
+            if lost or NODE in ended:
+                return f"{fault}, with nobody in its place"
+    return ""
+
+
+_ENDS = (
+    Kind.KILL,
+    Kind.FREEZE_FOR_GOOD,
+    Kind.INTERRUPT,
+    Kind.KILL_TWO,
+    Kind.USURP,
+    Kind.KILL_IN_CHANGE,
+    Kind.KILL_STARTING,
+)
 
 
 _AUTHORITIES = ("/tf", "/move_base/goal", "/move_base/cancel", "/move_base_simple/goal")

@@ -222,6 +222,20 @@ def test_who_tells_the_robot_where_it_is_is_obeyed():
     assert "/tf" in excuse_of(plan(fault), observed)
 
 
+@pytest.mark.parametrize(
+    ("target", "after", "is_excused"),
+    [("front_laser", 5.0, True), ("move_base", 5.0, True), ("front_laser", -20.0, False)],
+)
+def test_nobody_changes_what_a_stopped_part_would_have_to_change(target, after, is_excused):
+    observed = calm()
+    hang = Fault(Kind.FREEZE_FOR_GOOD, 30.0, ("rosgraph_manipulator",))
+    lost = Fault(Kind.KILL, 30.0 + after, (target,))
+    observed.strikes = [Strike(30.0, 0, False, ""), Strike(30.0 + after, 1, False, "")]
+    assert bool(excuse_of(plan(hang, lost), observed)) == is_excused
+    observed.strikes = observed.strikes[:1]
+    assert excuse_of(plan(hang, lost), observed) == ""
+
+
 def test_nodes_of_all_variants_need_what_the_base_sets():
     observed = calm()
     fault = Fault(Kind.PARAMETERS, 10.0, (), "huge")
