@@ -143,6 +143,8 @@ class ManipulatorPart:
         while True:
             self.process.pause(0.5)
             manipulation.heartbeat()
+            if self.serves and self.launcher is None:  # else follow_launcher looks
+                self._inbox.put(manipulation.look)
 
     def wall(self) -> float:
         """Return the time of the wall clock, s since the epoch."""
@@ -349,6 +351,9 @@ class _Launchers:
         topic = self._part._topics["functions"]
         connected = present is not None and topic.connected(self._part.process, present.process)
         return "" if connected or not self._parts.get(function) else f"/{LAUNCHER}"
+
+    def main_has_ended(self, function: str) -> bool:
+        return bool(self.unconnected(function))
 
     def is_here(self, node: NodeDescription) -> bool:
         return True

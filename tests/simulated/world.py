@@ -92,6 +92,8 @@ class World:
         for part in (self.launcher, self.manipulator, self.monitor, self.reasoner):
             if part is not None:
                 part.process.thaw()
+        if self.launcher is None:
+            self._start("launcher")
         self._command(entries.Resume())
         self._unlock("")
         self._disturb()
@@ -110,7 +112,8 @@ class World:
             setattr(self, name, _MAKERS[name](self, process))
             self._disturb()
 
-    def _end_part(self, name: str) -> None:
+    def _end_part(self, name: str, away: float = 0.0) -> None:
+        """End a part; it starts again after so many s, 0: after a usual time."""
         part = getattr(self, name)
         if part is None:
             return
@@ -121,7 +124,7 @@ class World:
         elif name == "manipulator":
             self.goals.lost(part)
         self._disturb()
-        self.kernel.after(self.kernel.uniform(*RESPAWN), lambda: self._start(name))
+        self.kernel.after(away or self.kernel.uniform(*RESPAWN), lambda: self._start(name))
 
     def _on_error(self, name: str, error: BaseException) -> None:
         where = traceback.format_exception(error)[-4:]
@@ -155,7 +158,7 @@ class World:
     # -- faults ---------------------------------------------------------------------------------------------------
 
     def _kill_part(self, target: str, value: float) -> None:
-        self._end_part(target)
+        self._end_part(target, value)
 
     def _dismiss_part(self, target: str, value: float) -> None:
         if target == "manipulator" and self.manipulator is not None and not self.manipulator.process.frozen:

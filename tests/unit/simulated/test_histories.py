@@ -3,13 +3,18 @@
 import os
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
 from metacontrol_msgs.msg import FunctionGrounding
+from mros1_reasoner.loop.settings import Settings as LoopSettings
 from simulated import systems
 from simulated.faults import Fault, Kind
 from simulated.history import History, history, run
+from simulated.invariants import unfulfilled
+from simulated.manipulator import Settings as ManipulatorSettings
+from simulated.world import World
 
 TESTS = Path(__file__).parents[2]
 SEEDS = range(120)
@@ -50,3 +55,22 @@ def test_system_adapts_to_a_driver_that_is_dead_for_good():
     after = deployed((Fault(20.0, Kind.KILL_DRIVER, "/valve_driver"),))
     assert before == {"f_water": ("drip", FunctionGrounding.STABLE)}
     assert after == {"f_water": ("sprinkle", FunctionGrounding.STABLE)}
+
+
+def test_functions_whose_launcher_stays_away_are_told_as_recovering_and_come_back():
+    system = systems.load("greenhouse")
+    world = World(system, 3, ManipulatorSettings(), LoopSettings(), Counter())
+
+    def told(until):
+        world.kernel.run(until)
+        return {active.state for active in world.manipulator.told.values()}
+
+    assert told(25.0) == {FunctionGrounding.STABLE}
+    world.strike(Fault(25.0, Kind.PAUSE, "", 60.0))  # the reasoner would ask for another configuration
+    world.strike(Fault(25.0, Kind.KILL_PART, "launcher", 15.0))
+    assert told(26.5) == {FunctionGrounding.STABLE}
+    assert told(28.5) == {FunctionGrounding.RECOVERING}
+    assert told(39.5) == {FunctionGrounding.RECOVERING}
+    assert told(50.0) == {FunctionGrounding.STABLE}
+    assert not unfulfilled(world) and not world.broken
+    world.close()

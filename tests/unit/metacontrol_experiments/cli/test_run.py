@@ -10,6 +10,7 @@ from metacontrol_experiments.cli import build
 from metacontrol_experiments.cli import run as cli
 from metacontrol_experiments.cli.main import metacontrol
 from metacontrol_experiments.lockstep.system import private_parameters
+from metacontrol_experiments.mission.mission import Outcome
 from metacontrol_experiments.ros import runner
 from ros_model.io.files import resolve
 from rosgraph_manipulator.io.launch_files import read_launch_file
@@ -171,3 +172,20 @@ def test_namespace_of_another_robot_is_not_the_missions(monkeypatch, tmp_path, o
         result = CliRunner().invoke(metacontrol, ["run", "--quiet", "--output", str(tmp_path), *options])
     assert "enough" in result.output
     assert seen == [(None, "localhost")]
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"), [("", ""), ("MISSION_END", "mission.bag: the end of the mission is not in it: the last message")]
+)
+def test_what_the_bag_of_a_mission_lacks_is_told(monkeypatch, tmp_path, mission_bag, kind, said):
+    mission_bag.messages = [entry for entry in mission_bag.messages if getattr(entry[2], "kind", None) != kind]
+
+    def drive(settings, _display, _make):
+        mission_bag.write(settings.output / "mission.bag")
+        return mock.Mock(state=mock.Mock(outcome=Outcome.REACHED))
+
+    monkeypatch.setattr(cli, "run_mission", drive)
+    result = CliRunner().invoke(metacontrol, ["run", "--output", str(tmp_path)])
+    assert result.exit_code == 0
+    told = [line for line in result.output.splitlines() if "mission.bag: " in line]
+    assert said in "".join(told) and len(told) == bool(said)

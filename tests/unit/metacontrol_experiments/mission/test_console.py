@@ -1,6 +1,6 @@
 """Why a system has ended, from its console."""
 
-from metacontrol_experiments.mission.console import cause_in
+from metacontrol_experiments.mission.console import cause_in, last_complaint_in
 
 MASTER_GONE = """[ERROR] [17957.1, 27.0]: /planner, a part of the meta-controller, is lost: its process has ended
 /watcher: ROS master http://localhost:56155/ is gone: it ends, start it again with the master
@@ -28,3 +28,9 @@ def test_last_error_is_told_where_nothing_tells_that_all_ends():
 
 def test_last_line_is_told_where_nothing_is_an_error():
     assert cause_in("one\ntwo\n") == "two" and cause_in("") == "it said nothing"
+
+
+def test_last_complaint_is_told_without_its_stamp():
+    text = "[ INFO] [17.5]: up\n\x1b[31m[ERROR] [17.5, 3.2]: disk full\x1b[0m\n[ INFO] [17.6]: Closing 'a.bag'.\n"
+    assert last_complaint_in(text) == "disk full"
+    assert last_complaint_in("[ INFO] [17.5]: up") == ""

@@ -121,6 +121,29 @@ def test_robots_own_area_is_cleared(local):
     assert at(snapshot, 0.3, 0.2) == FREE
 
 
+def test_every_cell_that_the_robot_covers_in_part_is_cleared(tree):
+    parameters = read_parameters(tree()).local_costmap
+    corners = np.array(parameters.footprint)
+    share = np.linspace(0.0, 1.0, 201)[:, None]
+    edge = np.concatenate([a + share * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)])
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        costmap, robot = Costmap(parameters), Pose(*rng.uniform(-0.5, 0.5, 2), rng.uniform(-3.0, 3.0))
+        costmap.update(robot, [])  # moves the costmap there
+        costmap.obstacles("obstacles_layer")[:] = LETHAL
+        costmap.update(robot, [])
+        costs, g = costmap.obstacles("obstacles_layer"), costmap.geometry
+        assert (costs[g.cells(robot.apply(edge))] == FREE).all()
+        rows, columns = np.nonzero(costs == FREE)
+        beside = np.abs(robot.inverse().apply(g.centres(rows, columns))) - corners.max(axis=0)
+        assert beside.max() <= g.resolution
+
+
+def test_clearing_at_the_edge_of_the_costmap_stays_within(tree):
+    costmap = Costmap(read_parameters(tree()).local_costmap)
+    costmap._clear_footprint(costmap.obstacles("obstacles_layer"), np.array([(2.0, 0.0), (9.0, 0.0), (9.0, 9.0)]))
+
+
 def test_clear_keeps_what_is_near(local):
     local.update(ORIGIN, [(seen(local, (1.0, 0.0), (4.0, 0.0)), sensor())])
     local.clear(ORIGIN, keep_radius=3.0)

@@ -254,6 +254,87 @@ def test_base_that_cannot_move_sideways_backs_off(simulate, walls, tree):
     assert chosen.velocity == Velocity(-0.1, 0.0, 0.0)
 
 
+def covered(simulation, pose):
+    """Area of obstacles that the robot covers at a pose, m2."""
+    x, y = np.meshgrid(np.linspace(-0.48, 0.48, 97), np.linspace(-0.40, 0.40, 81))
+    cells = simulation.geometry.cells(pose.apply(np.stack([x, y], axis=-1).reshape(-1, 2)))
+    return 1e-4 * simulation.solid[cells].sum()
+
+
+WALL = (1.1, 0.0, 0.2, 6.0, 0.0)  # its near face is at x = 1
+CORNER = math.hypot(0.48, 0.40)
+
+
+@pytest.mark.parametrize(
+    ("nearest", "yaw", "overlap"),
+    [
+        (0.48, 0.0, 0.01),
+        (0.48, 0.0, 0.06),
+        (0.40, math.pi / 2, 0.03),
+        (0.48, math.pi, 0.03),
+        (CORNER, -math.atan2(0.40, 0.48), 0.03),
+        (CORNER, math.pi - math.atan2(0.40, 0.48), 0.03),
+    ],
+    ids=["slightly in front", "in front", "beside", "behind", "front corner", "rear corner"],
+)
+def test_robot_that_touches_a_wall_comes_free_of_it(simulate, walls, nearest, yaw, overlap):
+    simulation = simulate([*walls(), WALL], start=(1.0 - nearest + overlap, 0.0, yaw))
+    log = drive(simulation, (-1.0, 0.5, yaw), seconds=30.0)
+    assert log.outcome is Outcome.SUCCEEDED
+    areas = [covered(simulation, pose) for _, pose, _ in log.states]
+    assert areas[0] > 0.0 and areas[-1] == 0.0
+    assert max(areas) <= areas[0] + 1e-4
+
+
+def test_robot_between_walls_that_it_touches_on_both_sides_stays(simulate, walls):
+    boxes = [*walls(), (0.0, 0.47, 6.0, 0.2, 0.0), (0.0, -0.47, 6.0, 0.2, 0.0)]
+    boxes += [(side * 0.6, 0.0, 0.3, 1.0, 0.0) for side in (-1, 1)]
+    simulation = simulate(boxes)
+    log = drive(simulation, (4.0, 0.0, 0.0), seconds=5.0)
+    areas = [covered(simulation, pose) for _, pose, _ in log.states]
+    assert areas[0] > 0.0
+    assert max(areas) <= areas[0] + 1e-4
+    assert simulation.pose.distance(Pose(0.0, 0.0, 0.0)) < 0.05
+
+
+def held(simulate, walls, tree, yaw, **changes):
+    """The controller of a robot that touches a wall, and what it needs to choose a velocity."""
+    nearest = 0.40 if abs(yaw) == math.pi / 2 else 0.48
+    changes = {f"TrajectoryPlannerROS__{name}": value for name, value in changes.items()}
+    simulation = simulate([*walls(), WALL], start=(1.03 - nearest, 0.0, yaw), tree=tree(**changes))
+    simulation.run(0.3)
+    robot = Pose.from_matrix(simulation.lookup("odom", "base_link", None))
+    return simulation.navigator._controller, robot, simulation.navigator.local_snapshot
+
+
+@pytest.mark.parametrize(
+    ("yaw", "changes", "expected"),
+    [
+        (0.0, {}, Velocity(-0.1, 0.0, 0.0)),
+        (0.0, {"escape_vel": -0.2}, Velocity(-0.2, 0.0, 0.0)),
+        (0.0, {"escape_vel": 0.0}, None),
+        (math.pi, {"escape_vel": 0.0}, Velocity(0.1, 0.0, 0.0)),
+        (math.pi, {"min_vel_x": 0.0, "max_vel_x": 0.05}, Velocity(0.05, 0.0, 0.0)),
+        (math.pi / 2, {"y_vels": [-0.1, 0.2]}, Velocity(0.0, 0.2, 0.0)),
+        (math.pi / 2, {"holonomic_robot": False}, None),
+    ],
+)
+def test_way_out_of_a_wall_is_one_that_the_base_can_take(simulate, walls, tree, yaw, changes, expected):
+    controller, robot, snapshot = held(simulate, walls, tree, yaw, **changes)
+    chosen = controller._ahead._come_free(robot, snapshot)
+    assert (chosen and chosen.velocity) == expected
+
+
+def test_turn_of_a_robot_that_touches_a_wall_begins_with_the_way_out(simulate, walls, tree):
+    controller, robot, snapshot = held(simulate, walls, tree, 0.0)
+    assert controller.turn(robot, 1.0, snapshot).velocity == Velocity(-0.1, 0.0, 0.0)
+
+
+def test_robot_that_touches_nothing_has_no_way_out(simulate, walls):
+    controller, robot, _, snapshot = at_a_wall(simulate, walls)
+    assert controller._ahead._come_free(robot, snapshot) is None
+
+
 def test_back_and_forth_on_the_spot_ends_until_the_robot_has_moved():
     for column, velocity in ((1, Velocity(0.0, 0.3, 0.0)), (2, Velocity(0.0, 0.0, 0.5))):
         flags, here = OscillationFlags(), Pose(0.0, 0.0, 0.0)

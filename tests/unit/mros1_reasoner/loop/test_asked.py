@@ -70,3 +70,35 @@ def test_it_is_the_same_from_a_parameter():
 )
 def test_what_can_not_be_read_is_left_out(value):
     assert Asked.from_parameter(value).commands == ()
+
+
+def test_lock_and_limit_wait_for_an_objective_that_a_task_asks_for_anew():
+    lock, limit = Lock("o_water"), SetNfr("o_water", "flow", 3.0)
+    asked = Asked([Pause(), lock, limit])
+    assert asked.put_off(lock, ["o_light"]) and asked.put_off(limit, ["o_light"])
+    assert not asked.settle([])
+    assert asked.due(["o_light"]) == []
+    assert asked.due(["o_light", "o_water"]) == [lock, limit]
+    assert asked.due(["o_light", "o_water"]) == []
+    assert asked.settle([])  # it went again, with its lock
+    assert asked.commands == (Pause(), limit)
+
+
+def test_what_waits_in_vain_is_forgotten():
+    asked = Asked([Pause(), Lock("o_water")])
+    assert asked.put_off(Lock("o_water"), [])
+    assert asked.wait_no_longer()
+    assert asked.commands == (Pause(),)
+    assert not asked.wait_no_longer()
+
+
+def test_only_what_names_an_objective_waits_and_an_operator_may_take_it_back():
+    asked = Asked([Lock("o_water")])
+    assert (
+        not asked.put_off(FLOW, [])
+        and not asked.put_off(Pause(), [])
+        and not asked.put_off(Lock("o_light"), ["o_light"])
+    )
+    assert asked.put_off(Lock("o_water"), [])
+    asked.heed(Unlock())
+    assert asked.due(["o_water"]) == []

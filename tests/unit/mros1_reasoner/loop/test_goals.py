@@ -181,6 +181,26 @@ def test_limit_of_an_operator_outlasts_the_goal(knowledge_base):
     assert tasks.core.objectives["o_move"].limits == {"energy": 0.62, "safety": 0.9}
 
 
+@pytest.mark.parametrize("is_during_the_goal", [False, True])
+def test_goal_ends_although_a_limit_of_an_operator_fits_no_band(knowledge_base, is_during_the_goal):
+    band = {"safety_min": 0.2, "safety": 0.75}
+    assert all(map(knowledge_base.admit, band))
+    tasks = Tasks(knowledge_base, [Objective("o_move", "f_move", band)])
+    tasks.settle()
+    if is_during_the_goal:
+        tasks.ask("a", limits=(("energy", 0.65),))  # it has no band of safety
+        tasks.take(entries.SetNfr("", "safety", 0.1))
+    else:
+        with pytest.raises(MapeError, match=r"the band of safety is 0.2 to 0.1: set its other limit first"):
+            tasks.take(entries.SetNfr("", "safety", 0.1))
+        tasks.ask("a", limits=(("energy", 0.65),))
+    tasks.settle()
+    tasks.goals.cancel("a")
+    tasks.settle()
+    assert tasks.ended("a") == "CANCELLED"
+    assert ("former limits can't be restored" in tasks.last("a").message) == is_during_the_goal
+
+
 def test_goal_of_another_name_gives_the_older_objective_up(knowledge_base):
     tasks = Tasks(knowledge_base, [OBJECTIVE, Objective("o_twin", "f_move", {"energy": 0.9})])
     tasks.ask("a", limits=(("energy", 0.35),))

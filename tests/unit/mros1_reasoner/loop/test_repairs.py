@@ -1,5 +1,7 @@
 """What fails is repaired before another design is taken, or beside it, by what each is expected to lose."""
 
+from itertools import pairwise
+
 import pytest
 from metacontrol_bags.decision import ADVISED, DECIDED, EXECUTED, FAILED, PROPOSED
 from mros1_reasoner.forward.engine import RuleEngine
@@ -134,6 +136,21 @@ def test_change_follows_a_repair_that_fails(loop):
     assert change.to_configuration == "pump"
     core.report(11.5, change.id, ok=True)
     assert [d for t in range(12, 200) for d in core.step(float(t), heartbeat=True)] == []  # no attempt is left
+
+
+def test_repair_that_could_not_be_tried_uses_no_attempt_and_is_asked_for_more_and_more_rarely(loop):
+    core = loop(designs=("pour",), repairable={"valve": (1.0, 0.9, 1)})
+    core.observe_component(10.0, "valve", "FALSE")
+    now, asked = 10.0, []
+    while now < 100.0:
+        for decision in core.step(now, heartbeat=True):
+            if decision.state == DECIDED:
+                asked.append(now)
+                assert "attempt 1 of 1" in decision.explanation
+                core.report(now, decision.id, ok=False, message="it is being repaired already", blame=False)
+        now += 0.5
+    waits = [later - earlier for earlier, later in pairwise(asked)]
+    assert len(waits) > 3 and waits == sorted(waits) and waits[-1] > 4.0 * waits[0]
 
 
 def test_repair_without_effect_has_failed_after_a_while(loop):

@@ -4,15 +4,24 @@ import os
 import signal
 import subprocess
 import sys
+from itertools import pairwise
 
 import pytest
 from helpers.waiting import wait_for
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.model import Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Assertion, InconsistentError, ReasonerError
+from mros1_reasoner.pellet import owlready
 from mros1_reasoner.pellet import process as pellet_module
 from mros1_reasoner.pellet.owlready import OwlreadyReasoner
-from mros1_reasoner.pellet.process import ChildLostError, PelletReasoner, PelletWithFallback, make_reasoner
+from mros1_reasoner.pellet.process import (
+    FIRST_RETRY,
+    LONGEST_RETRY,
+    ChildLostError,
+    PelletReasoner,
+    PelletWithFallback,
+    make_reasoner,
+)
 from mros1_reasoner.pellet.spawning import NoJavaError
 from ontology_text import APP, OWL, typed
 from reasoner_helpers import DESIGNS, OBJECTIVE, application
@@ -127,7 +136,7 @@ def test_child_that_is_lost_gives_way_to_owlready2_and_is_tried_again_later(know
     result = knowledge_base.analyse(facts, steady)
     assert set(result.unrealisable) == {name for name in DESIGNS if name.startswith("scan")}
     assert child.calls == 1
-    now[0] = pellet_module.RETRY_AFTER
+    now[0] = FIRST_RETRY
     knowledge_base.analyse(facts, steady)
     assert child.calls == 2
 
@@ -138,9 +147,78 @@ def test_lost_child_that_works_again_gets_its_ontology_back(knowledge_base, pell
     steady = PelletWithFallback(child, clock=lambda: now[0])
     steady.load(knowledge_base.ontology)
     pellet.load("")
-    steady._child, now[0] = pellet, pellet_module.RETRY_AFTER
+    steady._child, now[0] = pellet, FIRST_RETRY
     result = knowledge_base.analyse(Facts((OBJECTIVE,), components={"laser": "FALSE"}), steady)
     assert len(result.unrealisable) == 3
+
+
+class Flaky:
+    """A reasoner that is lost as long as the test says; each of its tries takes some time."""
+
+    def __init__(self):
+        self.now, self.tries, self.is_lost, self.lasts = 0.0, [], True, 0.0
+
+    def load(self, _):
+        self.tries.append(self.now)
+        self.now += self.lasts
+        if self.is_lost:
+            raise ChildLostError("Pellet's process has died, twice in a row")
+
+    def infer(self, _facts, _properties):
+        self.load("")
+        return []
+
+
+class Slow:
+    """A reasoner that always works."""
+
+    def load(self, _):
+        pass
+
+    def infer(self, _facts, _properties):
+        return []
+
+
+def waits(child, steady, until):
+    """Have an analysis each second; return the s between the tries of the child."""
+    child.tries.clear()
+    until += child.now
+    while child.now < until:
+        steady.infer((), ())
+        child.now += 1.0
+    return [round(later - earlier) for earlier, later in pairwise(child.tries)]
+
+
+def test_lost_child_is_tried_again_soon_and_ever_more_rarely():
+    child = Flaky()
+    steady = PelletWithFallback(child, Slow, lambda: child.now)
+    assert waits(child, steady, 1200.0) == [2, 4, 8, 16, 32, 64, 128, 256, LONGEST_RETRY, LONGEST_RETRY]
+    child.is_lost = False
+    child.now += LONGEST_RETRY
+    steady.infer((), ())
+    assert not steady.fallen_back
+    child.is_lost = True
+    assert waits(child, steady, 20.0) == [2, 4, 8], "the waits begin anew after a success"
+
+
+def test_child_that_hangs_takes_half_of_the_time_at_most():
+    child = Flaky()
+    child.lasts = 80.0
+    steady = PelletWithFallback(child, Slow, lambda: child.now)
+    assert waits(child, steady, 500.0) == [160, 240]
+
+
+def test_jvm_of_the_fallback_that_hangs_is_ended_after_its_deadline(knowledge_base, monkeypatch, tmp_path):
+    java = tmp_path / "java"
+    java.write_text("#!/bin/sh\nexec sleep 600\n")
+    java.chmod(0o755)
+    monkeypatch.setattr(owlready.owlready2, "JAVA_EXE", str(java))
+    assert owlready.owlready2.reasoning._subprocess_kargs["timeout"] == owlready.DEADLINE
+    monkeypatch.setitem(owlready.owlready2.reasoning._subprocess_kargs, "timeout", 0.2)
+    reasoner = OwlreadyReasoner()
+    reasoner.load(knowledge_base.ontology)
+    with pytest.raises(ReasonerError, match=r"does not answer within 0\.2 s"):
+        reasoner.infer([], v.CONCLUSIONS)
 
 
 def test_child_that_runs_out_of_memory_is_replaced_and_then_given_up(load, caplog):

@@ -1,10 +1,13 @@
 """What a change leaves on the parameter server for the next manipulator."""
 
+from contextlib import nullcontext
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 from node_kit.io.xml_rpc import SilentError
-from rosgraph_launcher.description import SystemDescription
+from rosgraph_launcher.description import NodeDescription, SystemDescription
+from rosgraph_launcher.launching.report import RECOVERING, LauncherReport
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.change.execution import Execution
 from rosgraph_manipulator.change.parameters import OverwrittenParameters
@@ -85,3 +88,85 @@ def test_former_values_are_handed_over_although_the_master_was_silent_when_they_
     assert around.server["/speed"] == 2
     left = OverwrittenParameters.from_parameter(around.server["/rosgraph_manipulator/overwritten"])
     assert left.transition({}) == ({"/speed": 1}, [])
+
+
+# -- recovery
+
+
+class Launchers:
+    """A launcher that makes each change at once."""
+
+    def __init__(self):
+        self.reported, self.number = {}, 0
+
+    def reports(self):
+        return self.reported
+
+    def is_here(self, node):
+        return True
+
+    def unconnected(self, function):
+        return ""
+
+    def change(self, function, configuration, nodes, stop, start, found):
+        self.number += 1
+        self.report(LauncherReport(function, configuration, self.number, nodes=tuple(node.name for node in nodes)))
+        return SimpleNamespace(number=self.number, phases={})
+
+    def report(self, report):
+        self.reported = {**self.reported, report.function: report}
+        self.on_reports()
+
+
+class LaunchFiles(Around):
+    """Launch files that start one node each, of the configuration's name."""
+
+    is_ending = False
+    gone = ()
+
+    def news(self):
+        return nullcontext()
+
+    def launch_file(self, configuration):
+        if configuration.name in self.gone:
+            raise DeploymentError(f"{configuration.launch_file}: no such file")
+        name = f"/{configuration.name}"
+        return LaunchFile(SystemDescription({name: NodeDescription(name, "/", "p", "x")}))
+
+    def drivers(self):
+        return set()
+
+
+def test_function_recovers_although_its_launch_file_can_not_be_read_just_then():
+    around, launchers = LaunchFiles({}), Launchers()
+    look = Configuration("look", "f_look", "look.launch")
+
+    def make_names(describe, has_finished):
+        return SimpleNamespace(
+            begin=lambda: None, see_takers=lambda nodes: None, contested=(), is_up=describe, conflict=lambda node: ""
+        )
+
+    execution = Execution(
+        ManipulatorOptions({"fast": FAST, "look": look}),
+        {},
+        OverwrittenParameters(),
+        ready_timeout=1.0,
+        settle_time=0.0,
+        launchers=launchers,
+        on_report=lambda: None,
+        around=around,
+        adjusting=None,
+        make_names=make_names,
+    )
+    for configuration in (FAST, look):
+        execution.begin(configuration, Plan("restart", 1.0, ()))
+        execution.change_processes((), (f"/{configuration.name}",))
+        execution.wait_until_ready()
+    around.gone = ("fast",)
+    runs = launchers.reported["f"]
+    launchers.report(replace(runs, state=RECOVERING, dead=("/fast",)))
+    execution.begin_recovery(launchers.reported["f"])
+    launchers.report(runs)
+    execution.end_recovery("f")
+    with pytest.raises(DeploymentError, match="no such file"):
+        change(execution)  # by what the file says now

@@ -27,10 +27,20 @@ def test_change_that_was_under_way_is_finished():
 
 
 def test_killed_pair_brings_the_mission_back():
-    assert resume(STEADY, "", False, "first", NOW) == Resumption(deploy="good", keep_goal=True)
+    assert resume(STEADY, "", False, "first", NOW) == Resumption(deploy="good", last_good="good", keep_goal=True)
     assert resume(CHANGING, "", False, "first", NOW) == Resumption(
         "better", last_good="good", keep_goal=True, attempts=1
     )
+
+
+def test_manipulator_that_dies_while_it_brings_back_one_function_forgets_no_other():
+    journal = Journal({**GOOD, "f_look": "near"}, "", alive=NOW - 1.0)
+    for _ in range(MAX_ATTEMPTS):
+        begun = {name: resume(journal, "", False, "", NOW, name) for name in ("f_pick", "f_look")}
+        assert begun["f_look"] == Resumption(deploy="near", last_good="near", keep_goal=True)
+        assert begun["f_pick"].deploy == "good"
+        last_good = {name: resumption.last_good for name, resumption in begun.items()}
+        journal = begin_journal(begun.values(), "").noted(last_good, NOW, wanted="good")
 
 
 def die(journal, deploys):
@@ -120,7 +130,7 @@ def test_manipulator_that_was_told_to_end_but_is_started_again_by_its_supervisor
     begun = begin_journal([Resumption(running="good")], "roslaunch 7")
     ended = parse_journal(begun.noted(GOOD, NOW - 1.0, ended=True).as_parameter())
     again = resume(ended, "", False, "first", NOW, supervisor="roslaunch 7")
-    assert again == Resumption(deploy="good", keep_goal=True)
+    assert again == Resumption(deploy="good", last_good="good", keep_goal=True)
     for other in ("roslaunch 8", ""):
         assert resume(ended, "", False, "first", NOW, supervisor=other) == Resumption(deploy="first")
 
@@ -172,7 +182,8 @@ def test_parameter_of_another_form_is_no_journal(value):
 def test_change_of_one_function_leaves_the_others_as_they_are():
     journal = Journal({**GOOD, "f_look": "near"}, "better", alive=NOW - 1.0, attempts=1)
     assert resume(journal, "far", False, "", NOW, "f_look") == Resumption(running="far", keep_goal=True)
-    assert resume(journal, "", False, "", NOW, "f_look") == Resumption(deploy="near", keep_goal=True)
+    near = Resumption(deploy="near", last_good="near", keep_goal=True)
+    assert resume(journal, "", False, "", NOW, "f_look") == near
     assert resume(journal, "good", False, "", NOW, "f_pick").deploy == "better"
 
 

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 from metacontrol_msgs.msg import FunctionGrounding
 from rosgraph_launcher.description import SystemDescription
+from rosgraph_launcher.launching.report import STABLE, LauncherReport
 from rosgraph_manipulator.change.deployment import DeploymentError, Result
 from rosgraph_manipulator.change.journal import Journal, Resumption
 from rosgraph_manipulator.change.manipulation import Manipulation
@@ -21,6 +22,10 @@ class Executor:
 
     launcher_phases: dict = {}
     losses = 0
+    launcher_gone = False
+    halts = 0
+    now = 0.0
+    launched = LauncherReport("f", "a", state=STABLE)
 
     def __init__(self, compare=None, change=None, nodes=False):
         self.done, self._compare, self._change, self._nodes = [], compare, change, nodes
@@ -33,7 +38,8 @@ class Executor:
 
     def change_processes(self, stop, start):
         self.done.append("touched")
-        raise self._change
+        if self._change:
+            raise self._change
 
     def has_nodes(self, function):
         return self._nodes
@@ -51,8 +57,26 @@ class Executor:
     def begin(self, wanted, plan):
         pass
 
-    def stop_robot(self, function):
+    def wait_until_ready(self):
         pass
+
+    def wait_until_settled(self):
+        pass
+
+    def stop_robot(self, function):
+        self.halts += 1
+
+    def launcher_has_ended(self, function):
+        return self.launcher_gone
+
+    def clear(self, function):
+        pass
+
+    def take_deaths(self, function):
+        return None
+
+    def report(self, function):
+        return self.launched
 
 
 class Told(list):
@@ -63,6 +87,7 @@ class Told(list):
 
     def announce(self, configuration, state, outcome=None, phases=None):
         self.append((configuration.name, state))
+        self.outcome = outcome
 
     def diagnose(self, ok, message, configuration):
         pass
@@ -78,7 +103,7 @@ def manipulation(executor, running):
         executor,
         told,
         SimpleNamespace(update=lambda change: change(Journal(), 0.0)),
-        SimpleNamespace(now=lambda: 0.0, log=log, failures=(OSError,)),
+        SimpleNamespace(now=lambda: executor.now, log=log, failures=(OSError,)),
         lambda runs: None,
     )
     made.begin({"f": Resumption(running=running)})
@@ -117,3 +142,24 @@ def test_change_that_can_not_begin_asks_the_launcher_nothing_where_it_has_no_nod
     manipulator, _ = manipulation(executor, running="")
     assert manipulator.carry_out(Order("f", "b")).result is Result.GENERAL_ERROR
     assert executor.done == []
+
+
+# -- the launcher has ended
+
+
+def test_function_whose_launcher_stays_away_is_told_as_recovering_until_it_is_deployed_again():
+    executor = Executor()
+    manipulator, told = manipulation(executor, running="a")
+    executor.launcher_gone = True
+    for executor.now in (10.0, 11.5):
+        manipulator.look()
+    assert told == []
+    for executor.now in (12.5, 14.0):
+        manipulator.look()
+        manipulator.follow_launcher()  # another host's launcher has reported
+    assert told == [("a", FunctionGrounding.RECOVERING)]
+    assert told.outcome.message == "rosgraph_launcher has ended, and its nodes with it"
+    assert executor.halts == 1
+    executor.launcher_gone, executor.launched = False, LauncherReport("f")
+    manipulator.follow_launcher()
+    assert told[1:] == [("a", FunctionGrounding.RECONFIGURING), ("a", FunctionGrounding.STABLE)]

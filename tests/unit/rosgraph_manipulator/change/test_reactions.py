@@ -3,7 +3,7 @@
 import pytest
 from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 from rosgraph_manipulator.change.deployment import Outcome, Result
-from rosgraph_manipulator.change.reactions import DeployedConfigurations, Reaction
+from rosgraph_manipulator.change.reactions import LAUNCHER_GRACE, DeployedConfigurations, Reaction
 from rosgraph_manipulator.configuration.configurations import Configuration
 
 A, B = Configuration("a", "f", "a.launch"), Configuration("b", "f", "b.launch")
@@ -157,3 +157,44 @@ def test_change_that_leaves_nothing_says_why():
     deployments = deployed(A)
     deployments.finished(Outcome(Result.GENERAL_ERROR, None, "b: no such node"), 1.0)
     assert deployments.failure == "b: no such node"
+
+
+# -- the launcher has ended
+
+LATE = LAUNCHER_GRACE + 0.1
+
+
+def test_launcher_that_does_not_come_back_is_told_once():
+    deployments = deployed(A)
+    ended = [deployments.lacks_launcher(True, now) for now in (10.0, 11.0, 10.0 + LATE, 20.0)]
+    assert ended == [False, False, True, False]
+
+
+def test_launcher_that_is_back_soon_is_not_told():
+    deployments = deployed(A)
+    ended = [deployments.lacks_launcher(gone, now) for gone, now in ((True, 0.0), (False, 1.0), (True, LATE))]
+    assert not any(ended)
+
+
+def test_function_that_lacks_its_launcher_does_not_recover_by_the_old_report():
+    deployments = deployed(A)
+    deployments.lacks_launcher(True, 0.0)
+    deployments.lacks_launcher(True, LATE)
+    assert deployments.react(report(A, STABLE), LATE) is Reaction.NONE
+    assert not deployments.lacks_launcher(False, LATE)
+    assert deployments.react(report(A, STABLE), LATE) is Reaction.END_RECOVERY  # only the connection was lost
+    assert deployments.react(report(None, STABLE), LATE) is Reaction.DEPLOY_AGAIN
+
+
+def test_function_that_does_not_run_lacks_no_launcher():
+    deployments = deployed(A)
+    deployments.released()
+    assert not any(deployments.lacks_launcher(True, now) for now in (0.0, LATE))
+
+
+def test_change_begins_a_new_wait_for_the_launcher():
+    deployments = deployed(A)
+    deployments.lacks_launcher(True, 0.0)
+    deployments.finished(Outcome(Result.OK, A, ""), LATE)
+    assert not deployments.lacks_launcher(True, LATE)
+    assert deployments.lacks_launcher(True, LATE + LATE)

@@ -3,6 +3,7 @@
 import pytest
 from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STABLE, LauncherReport
 from rosgraph_manipulator.change.repairs import (
+    RETRY_PERIOD,
     RepairedDrivers,
     RepairOutcome,
     RepairsUnderWay,
@@ -140,35 +141,46 @@ def test_driver_that_has_ended_with_its_launcher_is_started_again():
     repaired = drivers(launcher)
     repaired.started(GATE)
     launcher.take(report(STABLE))
-    assert repaired.lost() == []
+    assert repaired.lost(0.0) == []
     launcher.take()
-    assert repaired.lost() == [GATE]
-    assert repaired.lost() == []  # if it can't be started, it is not tried for ever
+    assert repaired.lost(0.0) == [GATE]
+    repaired.tried(GATE, 0.0)
+    launcher.take(report(STABLE))
+    assert repaired.lost(9.0) == []
+
+
+def test_lost_driver_that_can_not_be_started_is_tried_again_after_a_while():
+    repaired = drivers(launcher := Launcher(report(STABLE)))
+    launcher.take()
+    for now in (0.0, RETRY_PERIOD):
+        assert repaired.lost(now) == [GATE]
+        repaired.tried(GATE, now)
+        assert repaired.lost(now + RETRY_PERIOD / 2) == []
 
 
 def test_driver_of_an_earlier_manipulators_repair_is_started_again_too():
     launcher = Launcher(report(STABLE))
     repaired = drivers(launcher)
     launcher.take()
-    assert repaired.lost() == [GATE]
+    assert repaired.lost(0.0) == [GATE]
 
 
 @pytest.mark.parametrize("state", [CHANGING, RECOVERING])
 def test_driver_that_is_being_started_is_not_lost(state):
     repaired = drivers(launcher := Launcher(report(STABLE)))
     launcher.take(report(state, configuration="" if state == CHANGING else GATE.name))
-    assert repaired.lost() == []
+    assert repaired.lost(0.0) == []
 
 
 def test_driver_that_was_never_repaired_is_not_started():
-    assert drivers(Launcher()).lost() == []
-    assert drivers(Launcher(report(FAILED))).lost() == []
+    assert drivers(Launcher()).lost(0.0) == []
+    assert drivers(Launcher(report(FAILED))).lost(0.0) == []
 
 
 def test_nothing_is_lost_before_the_launcher_has_reported():
     repaired = RepairedDrivers([GATE], lambda _function: None)
     repaired.started(GATE)
-    assert repaired.lost() == []
+    assert repaired.lost(0.0) == []
 
 
 def test_driver_that_is_given_up_is_told_once_and_not_started_again():
@@ -178,7 +190,7 @@ def test_driver_that_is_given_up_is_told_once_and_not_started_again():
     assert repaired.given_up() == [failed]
     assert repaired.given_up() == []
     launcher.take()
-    assert repaired.lost() == []
+    assert repaired.lost(0.0) == []
 
 
 # -- nodes that somebody else has started

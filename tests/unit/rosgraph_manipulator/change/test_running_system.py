@@ -42,6 +42,14 @@ def test_node_that_starts_again_gets_its_parameters_back_but_no_expected_level(r
     assert running.parameters_of("f_arm", ["/drive"]) == {}
 
 
+def test_content_as_deployed_is_known_only_of_the_configuration_that_was_deployed(running):
+    arm = Configuration("arm", "f_arm", "arm.launch")
+    assert set(running.deployed_file(arm).system.nodes) == {"/arm"}
+    assert running.deployed_file(Configuration("other", "f_arm", "other.launch")) is None
+    running.released("f_arm")
+    assert running.deployed_file(arm) is None
+
+
 def test_drivers_yield_to_functions_and_to_one_another():
     look = Configuration("look", "f_look", "look")
     driver, twin = (Configuration(f"repair_of_{name}", f"repair_of_{name}", name) for name in ("eye", "twin"))

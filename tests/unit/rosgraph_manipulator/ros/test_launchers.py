@@ -1,5 +1,6 @@
 """Which launchers count, and which are given up, with a master and launchers that are played."""
 
+import itertools
 import threading
 from types import SimpleNamespace
 
@@ -7,6 +8,7 @@ import pytest
 import rospy
 from metacontrol_msgs.msg import LaunchedFunction, LaunchedFunctions
 from metacontrol_msgs.srv import ChangeNodesResponse
+from node_kit.io.background import NoThreadError
 from node_kit.io.xml_rpc import SilentError
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_manipulator.change.deployment import DeploymentError
@@ -191,3 +193,58 @@ def test_launcher_that_lives_may_take_its_time_for_a_change(followed, around, mo
     monkeypatch.setattr(around, "is_answering", is_answering)
     around.change = lambda: done.wait() and ChangeNodesResponse(ok=True, change=4)
     assert ask(followed, NODE).number == 4
+
+
+def test_end_of_the_main_launcher_concerns_the_functions_of_which_it_has_a_part(followed, around):
+    tell(followed, MAIN)
+    followed.adopt("f", [NODE])
+    assert not followed.main_has_ended("f")
+    around.connected.discard(MAIN)
+    assert followed.main_has_ended("f")
+    assert not followed.main_has_ended("another")
+
+
+# -- no thread
+
+
+def starts(*fail):
+    """Return a start of threads that fails at some of the next calls, by their numbers."""
+    start, count = threading.Thread.start, itertools.count()
+
+    def start_or_fail(thread):
+        if next(count) in fail:
+            raise RuntimeError("can't start new thread")
+        start(thread)
+
+    return start_or_fail
+
+
+def test_change_without_a_thread_to_ask_a_launcher_fails(followed, around, monkeypatch):
+    tell(followed, MAIN)
+    monkeypatch.setattr(threading.Thread, "start", starts(0))
+    with pytest.raises(DeploymentError, match=r"^no thread could be started: can't start new thread$"):
+        ask(followed, NODE)
+    assert around.requests == []
+    assert ask(followed, NODE).number == 4
+
+
+def test_request_that_was_not_sent_for_want_of_a_thread_is_repeated(followed, around, monkeypatch):
+    tell(followed, MAIN)
+    monkeypatch.setattr(threading.Thread, "start", starts(1))
+    assert ask(followed, NODE).number == 4
+    assert len(around.requests) == 1
+
+
+def test_launchers_that_no_thread_tells_what_to_be_ready_for_are_an_error(followed, monkeypatch):
+    monkeypatch.setattr(threading.Thread, "start", starts(0))
+    with pytest.raises(NoThreadError):
+        followed.stand_by([NODE])
+
+
+def test_launcher_that_can_not_be_asked_for_want_of_a_thread_is_asked_again(followed, around, monkeypatch):
+    asked = []
+    monkeypatch.setattr(launcher_reports, "publishers", lambda _topic: {MAIN})
+    monkeypatch.setattr(around, "answer", lambda name: asked.append(name) or tell(followed, name), raising=False)
+    monkeypatch.setattr(threading.Thread, "start", starts(0))
+    assert followed.find()
+    assert asked == [MAIN]

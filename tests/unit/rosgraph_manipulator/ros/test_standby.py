@@ -1,6 +1,7 @@
 """Which nodes launchers are told to be ready for."""
 
 import pytest
+from node_kit.io.background import NoThreadError
 from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions, Repair
 from rosgraph_manipulator.io import launch_files
@@ -10,9 +11,11 @@ from rosgraph_manipulator.ros.standby import Standby
 
 class Launchers:
     def __init__(self):
-        self.told = []
+        self.told, self.error = [], None
 
     def stand_by(self, nodes):
+        if self.error:
+            raise self.error
         self.told.append({node.name: node for node in nodes})
 
 
@@ -62,3 +65,11 @@ def test_launchers_are_told_again_after_each_change(standby, launchers):
     standby.changed()
     look(standby)
     assert len(launchers.told) == 2
+
+
+def test_launchers_that_can_not_be_told_now_are_told_at_the_next_look(standby, launchers):
+    launchers.error = NoThreadError(RuntimeError("can't start new thread"))
+    look(standby)
+    launchers.error = None
+    look(standby)
+    assert len(launchers.told) == 1

@@ -108,6 +108,29 @@ def test_nodes_that_the_running_design_of_a_function_does_without_are_idle():
     assert cell({"f_pick": "pick_blindly"}).idle_nodes == {"camera", "viewer"}
 
 
+def test_variants_that_can_not_be_read_at_first_are_tried_until_they_are_read():
+    unread, looks = {"pick", "pick_blindly"}, []
+
+    def read_all():
+        looks.append(set(unread))
+        return [ModelError(f"no model {name}") if name in unread else part for name, part in PARTS.items()]
+
+    model = DesiredModel(CELL, PARTS.__getitem__, read_all)
+    assert model.look_again() is model.current
+    assert not looks, "nobody has told yet what is deployed"
+    first = model.follow([Grounding("f_look", "look", "STABLE")])
+    assert first.idle_nodes == set()
+    assert model.look_again() is first, "nothing new could be read"
+    unread.clear()
+    desired = model.look_again()
+    assert desired.idle_nodes == {"gripper"}
+    assert names(desired) == {"conveyor", "camera", "viewer", "welder"}
+    count = len(looks)
+    assert model.look_again() is desired
+    model.follow([])
+    assert len(looks) == count, "all are read, and stay"
+
+
 def test_topics_that_only_idle_components_publish_are_idle():
     ports = {name: (Port(f"{name}/out", PortKind.PUBLISHER), Port("shared", PortKind.PUBLISHER)) for name in "abc"}
     base = RosSystem("base", components=(Component("a", ports=ports["a"]), Component("b", ports=ports["b"])))

@@ -94,12 +94,21 @@ def read_record(path: Path) -> MissionRecord:
         BagError: the file is missing, no bag, not closed, holds messages that do not fit their definition, or nothing
             of a mission.
     """
+    return read_whole(path).record
+
+
+def read_whole(path: Path) -> Salvaged:
+    """Return a mission from its bag, which must be whole, and which topics the bag has.
+
+    Raises:
+        BagError: as of `read_record`.
+    """
     found = salvage(path)
     if found.problems:
         raise BagError(f"{path}: not a readable mission bag ({found.problems[0]})")
     if not is_mission(found.record):
         raise BagError(f"{path}: {nothing_of_a_mission(found)}")
-    return found.record
+    return found
 
 
 def salvage(path: Path, topics: Collection[str] = (), namespace: str = "/") -> Salvaged:

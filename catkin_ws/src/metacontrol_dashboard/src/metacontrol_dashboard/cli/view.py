@@ -87,7 +87,7 @@ def _open(path: Path, namespace: str | None) -> Run:
         BagError: it can't be read.
     """
     recording = bags.read_run(path, namespace)
-    data = json.dumps(recording.as_dict(), separators=(",", ":")).encode()
+    data = json.dumps(recording.as_dict(), allow_nan=False, separators=(",", ":")).encode()
     export: Callable[[], str] = partial(standalone, recording)
     return Run(data, export, lambda limits: bags.replay(path, limits, namespace))
 

@@ -22,6 +22,7 @@ from urllib.parse import urlsplit
 from aiohttp import WSMsgType, web
 
 from metacontrol_dashboard.io.page import INDEX
+from metacontrol_dashboard.state.numbers import finite
 from metacontrol_dashboard.state.requests import LOOKS_ONLY, Request, RequestError, read_limits, read_request
 from metacontrol_dashboard.state.store import Store
 
@@ -137,7 +138,7 @@ class Viewers:
         self._sockets.add(socket)
         reading = asyncio.create_task(_read(socket))
         try:
-            await socket.send_str(json.dumps({"hello": hello}))
+            await socket.send_str(_dumps({"hello": hello}))
             known = 0
             while not (socket.closed or reading.done()):
                 known, text = self._news(known)
@@ -166,7 +167,7 @@ class Viewers:
         if cached is None or cached[0] != version:
             with self._lock:
                 change = self._store.changes(known)
-            cached = change["version"], json.dumps(change, separators=(",", ":"), default=str)
+            cached = change["version"], json.dumps(change, allow_nan=False, separators=(",", ":"), default=str)
             if len(self._written) > _MOST_VIEWERS:
                 self._written.clear()
             self._written[known] = cached
@@ -331,7 +332,7 @@ def read_request_or_refuse(data: Any, read: Callable[[Any], Any]) -> Any:
 
 
 def _dumps(data: Any) -> str:
-    return json.dumps(data, default=str)
+    return json.dumps(finite(data), allow_nan=False, default=str)
 
 
 class Server:

@@ -1,7 +1,7 @@
 """The state that viewers see: entries by section and key, and logs that grow. Each change has a number.
 
 A viewer says up to which number it knows the state, and gets all that is newer, of each entry only the last value. So a
-viewer that is slow skips what is between, and costs nobody anything.
+viewer that is slow skips what is between, and costs nobody anything. Numbers that are not finite are stored as None.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections import OrderedDict, deque
 from itertools import takewhile
 from typing import Any
+
+from metacontrol_dashboard.state.numbers import finite
 
 Change = dict[str, Any]
 """What a viewer gets: `version`, `set` (section -> key -> value), `drop` (section -> keys), `add` (log -> items)."""
@@ -47,7 +49,7 @@ class Store:
 
     def set(self, section: str, key: str, value: Any) -> bool:
         """Give an entry a value, fit for JSON; return whether that is a change."""
-        place = section, key
+        place, value = (section, key), finite(value)
         known = self._entries.get(place)
         if known is not None and known[1] == value:
             return False
@@ -77,7 +79,7 @@ class Store:
     def append(self, log: str, item: Any) -> None:
         """Add an item to a log; the oldest one may be forgotten."""
         self.version += 1
-        self._logs.setdefault(log, deque(maxlen=self._kept)).append((self.version, item))
+        self._logs.setdefault(log, deque(maxlen=self._kept)).append((self.version, finite(item)))
 
     def changes(self, since: int = 0) -> Change:
         """Return what has changed after a number; everything, with `whole`, for a viewer that knows nothing."""

@@ -60,7 +60,7 @@ def build(quiet: bool, output: Path, no_metacontrol: bool, **options: Any) -> No
     """Have D1 build its pyramid while a scenario strikes, and leave bag, summary and figure in a folder.
 
     Exit status: 0 it stands (where no design is left: the robot has stopped safely and says why), 1 it does not, 2 bad
-    input or a system that did not start, 130 interrupted.
+    input, a system that did not start or a bag that is not whole, 130 interrupted.
     """
     with refusing(BagError, RunError):
         settings = PyramidSettings(output, metacontrol=not no_metacontrol, commit=current_commit(), **options)

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from metacontrol_bags.bag import BagError, read_record
+from metacontrol_bags.bag import BagError, read_whole
 from metacontrol_bags.decision import DECIDED
+from metacontrol_bags.gaps import gaps
 from metacontrol_bags.metrics import DEFAULT_THRESHOLDS, TIMEOUT_S, MetricsError, summarise
 from metacontrol_bags.timeline import Timeline
 from mros1_reasoner.loop.settings import setting_names
@@ -151,7 +152,8 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
 
     For the options of another kind of mission: run --mission manipulation --help.
 
-    Exit status: 0 the goal was reached, 1 it was not, 2 bad input or a system that did not start, 130 interrupted.
+    Exit status: 0 the goal was reached, 1 it was not, 2 bad input, a system that did not start or a bag that is not
+    whole, 130 interrupted.
     """
     engine = options["engine"]
     with refusing(*_BAD_INPUT):
@@ -163,7 +165,10 @@ def run(quiet: bool, output: Path, **options: Any) -> None:
                 state, record = _run_lockstep(settings, display)
             else:
                 state = _run_on_ros(settings, display)
-                record = read_record(output / BAG_NAME)
+                found = read_whole(output / BAG_NAME)
+                record = found.record
+                if missing := gaps(found):
+                    display.say(f"{output / BAG_NAME}: {'; '.join(missing)}")
         summary = summarise(record)
         write_summary(summary, output / SUMMARY_NAME)
         draw_figure(record, output / FIGURE_NAME)
@@ -248,7 +253,7 @@ def _run_on_ros(settings: Settings, display: Display) -> State:
     """Run a mission on ROS and leave its bag.
 
     Raises:
-        RunError: the system did not come up, or the mission cannot be run as asked for.
+        RunError: the system did not come up, the mission cannot be run as asked for, or its bag is not whole.
     """
 
     def make(tree: ProcessTree, display: Display, check: Callable[[], None]) -> NavigationMission:

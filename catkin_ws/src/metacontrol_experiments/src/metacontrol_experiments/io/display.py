@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,19 @@ if TYPE_CHECKING:
 REFUSED, INTERRUPTED = 2, 130
 """Exit status of a command."""
 
-CONSOLE = Console(highlight=False)
+
+class LastingConsole(Console):
+    """A console whose reader may leave, as `head` does: the rest is shown to nobody, and the command goes on."""
+
+    def on_broken_pipe(self) -> None:
+        """Write nowhere from now on; Rich's own way is to end the program."""
+        self.quiet = True
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self.file.fileno())  # also for what is still in the file's buffer
+        os.close(nowhere)
+
+
+CONSOLE = LastingConsole(highlight=False)
 _STYLES = {"R1": "yellow", "R2": "cyan", "R3": "cyan", "R4": "green", "!": "bold red", "-": "bold"}
 
 
@@ -50,7 +63,7 @@ def refusing(*kinds: type[Exception]) -> Iterator[None]:
 class Display:
     """A mission: with a live bar on a terminal, else plain lines; silent if quiet.
 
-    What can't be written, because a disk is full, is left out: the mission goes on.
+    What can't be written, because a disk is full or nobody reads it, is left out: the mission goes on.
     """
 
     def __init__(self, quiet: bool = False) -> None:

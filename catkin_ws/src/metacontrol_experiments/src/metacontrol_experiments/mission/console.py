@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_STAMP = re.compile(r"^\[ *[A-Z]+\] \[[\d., ]+\]: *")
+"""What roscpp writes before what a node says."""
 _POINTER = ("The traceback for the exception", "log file:")
 _CAUSE = re.compile(r"ROS master \S+ is gone|REQUIRED process \[\S+\] has died!")
 _COMPLAINT = re.compile(r"error|exception|fatal|has died|unused args|invalid|no such", re.IGNORECASE)
@@ -22,5 +24,18 @@ def cause_in(text: str) -> str:
     text = _COLOUR.sub("", text)
     if (cause := _CAUSE.search(text)) is not None:
         return cause[0]
-    lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith(_POINTER)]
-    return ([line for line in lines if _COMPLAINT.search(line)] or lines or ["it said nothing"])[-1]
+    lines = _lines(text)
+    return (_complaints(lines) or lines or ["it said nothing"])[-1]
+
+
+def last_complaint_in(text: str) -> str:
+    """Return what the last line of a console that tells of an error says; empty where there is none."""
+    return _STAMP.sub("", (_complaints(_lines(_COLOUR.sub("", text))) or [""])[-1])
+
+
+def _lines(text: str) -> list[str]:
+    return [line.strip() for line in text.splitlines() if line.strip() and not line.startswith(_POINTER)]
+
+
+def _complaints(lines: list[str]) -> list[str]:
+    return [line for line in lines if _COMPLAINT.search(line)]

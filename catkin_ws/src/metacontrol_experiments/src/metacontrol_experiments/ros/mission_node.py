@@ -155,13 +155,15 @@ class MissionNode(ABC, Generic[State]):
 
         Raises:
             MissionError: the goal is no goal from here.
-            KeyboardInterrupt: after the end of the mission was published.
+            KeyboardInterrupt: after the end of the mission was published; so any other error on the way.
         """
         self._begin()
         try:
             self._loop()
-        except KeyboardInterrupt:
-            self._give_up(self._now(), "interrupted", interrupted=True)
+        except BaseException as error:  # the robot is not to drive on, whatever it is
+            interrupted = isinstance(error, KeyboardInterrupt)
+            reason = "interrupted" if interrupted else " ".join(f"{type(error).__name__}: {error}".split())
+            self._give_up(self._now(), reason, interrupted=interrupted)
             self._goal.cancel()
             self._end()
             raise

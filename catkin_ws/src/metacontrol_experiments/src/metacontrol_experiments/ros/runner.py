@@ -20,6 +20,7 @@ from metacontrol_experiments.io.processes import (
     reserved_port,
     signals_as_interrupts,
 )
+from metacontrol_experiments.io.recorder import Recorder
 from metacontrol_experiments.mission.console import cause_in
 from metacontrol_experiments.mission.settings import BAG_NAME, RESULTS
 
@@ -32,9 +33,8 @@ if TYPE_CHECKING:
 
 RECORDER = "/mission_recorder"
 
-_RECORDER_GRACE_S = 15.0
 _LAUNCH_GRACE_S = 12.0
-"""Wall seconds after which a process that was asked to end is made to."""
+"""Wall seconds after which the system, once asked to end, is made to."""
 
 
 class Settings(Protocol):
@@ -72,7 +72,7 @@ def run_mission(settings: Settings, display: Display, make: Make[Node]) -> Node:
     Whatever happens, no process of the run is left behind.
 
     Raises:
-        RunError: the system did not come up, or the mission cannot be run as asked for.
+        RunError: the system did not come up, the mission cannot be run as asked for, or its bag is not whole.
         KeyboardInterrupt: it was interrupted; the bag is complete up to then.
     """
     _check_windows(settings.windows)
@@ -85,7 +85,6 @@ def run_mission(settings: Settings, display: Display, make: Make[Node]) -> Node:
 
 
 def _run_alone(settings: Settings, display: Display, make: Make[Node], log: Path, bag: Path) -> Node:
-    bag.with_name(bag.name + ".active").unlink(missing_ok=True)
     if settings.port is not None and not is_free(settings.port):
         raise RunError(
             f"--port: port {settings.port} is in use or not allowed: choose another, or leave the option out"
@@ -116,20 +115,26 @@ def _run(settings: Settings, display: Display, make: Make[Node], tree: ProcessTr
     console = settings.output / "log" / "console.log"
     display.say(f"starting the system on port {port}, its console is {console}")
     launch = tree.start(settings.launch_command(port), console)
+    recorder = Recorder(tree, bag, settings.output / "log" / "recorder.log", display.say)
+    is_driving = False
 
     def check() -> None:
         if launch.poll() is not None:
             said = console.read_text(encoding="utf-8", errors="replace")
             raise StartError(f"roslaunch has ended: {cause_in(said)}")
+        if not is_driving and recorder.ended:
+            raise StartError(f"the recorder has ended: {recorder.ended}")
+        recorder.watch()
 
     node = None
     try:
         node = make(tree, display, check)
         node.start_up()
-        recorder = tree.start(_record_command(bag, settings.topics), settings.output / "log" / "recorder.log")
+        recorder.start(_record_command(bag, settings.topics))
         node.wait_recorded(RECORDER, settings.topics)
         for name in RESULTS:  # of an earlier run
             (settings.output / name).unlink(missing_ok=True)
+        is_driving = True
         node.drive()
     except (StartError, MissionError) as error:
         raise RunError(f"{error}; see {console}") from error
@@ -137,10 +142,8 @@ def _run(settings: Settings, display: Display, make: Make[Node], tree: ProcessTr
         if node is not None:
             node.close()
     display.say("mission over, ending the system")
-    tree.stop(recorder, _RECORDER_GRACE_S)
+    recorder.stop()
     tree.stop(launch, _LAUNCH_GRACE_S)
-    if not bag.exists():
-        raise RunError(f"the recorder left no {bag}; see {settings.output / 'log' / 'recorder.log'}")
     return node
 
 

@@ -1,7 +1,7 @@
 """Dynamic-window controller: samples velocities, rolls them out, checks the footprint, scores, takes the cheapest.
 
 As in base_local_planner the robot drives arcs and turns on the spot; sideways and backward samples are tried only where
-none of these is free, because the sensors look ahead.
+none of these is free, because the sensors look ahead. A robot that touches an obstacle moves slowly out of it.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from robot_formulas.geometry import Pose, Velocity, inscribed_radius, wrap
 
+from move_base.control.escape import Escape, escape_samples
 from move_base.control.oscillation import OscillationFlags
 from move_base.control.rollout import Footprint, Rollout, Trajectory, roll_out
 from move_base.costmap.grid import INSCRIBED
@@ -82,6 +83,7 @@ class DwaController:
         footprint, padded = np.array(parameters.local_costmap.footprint), parameters.local_costmap.padded_footprint()
         padding = inscribed_radius(padded) - inscribed_radius(footprint)
         self._shapes = [Footprint(footprint, share * padding) for share in HARD_PADDING]
+        self._escape = Escape(footprint, self._shapes[-1])
         self._reach = p.max_vel_x * p.sim_time + self._shapes[0].circumscribed
 
     def reset(self) -> None:
@@ -94,6 +96,8 @@ class DwaController:
         self, robot: Pose, velocity: Velocity, path: NDArray[np.float64], to_goal: float, snapshot: Snapshot
     ) -> Trajectory | None:
         """Return the best trajectory along a path, or None where every sample collides.
+
+        A robot that touches an obstacle may get a way out of it instead.
 
         Args:
             robot: in the local costmap's frame.
@@ -111,18 +115,20 @@ class DwaController:
         best = self._back_off(robot, scene)
         error = wrap(_direction_of(path) - robot.yaw)
         if best is None and abs(error) > self._align_angle(velocity, scene):
-            best = self.turn(robot, error, snapshot)
+            best = self._turn(robot, error, snapshot)
         arcs = self._arc_samples(velocity) if best is None else np.empty((0, 3))
         for shape in shapes:  # a narrow passage is entered with less margin rather than not at all
             if best is None:
                 best = self._best(arcs, robot, horizon, replace(scene, shape=shape))
         if best is None and abs(error) > ALIGNED_ANGLE:
-            best = self.turn(robot, error, snapshot)
+            best = self._turn(robot, error, snapshot)
         if best is None:
             best = self._best(self._sideways_samples(velocity), robot, MIN_HORIZON, scene)
         if best is None:
             best = self._best(self._backward_samples(), robot, MIN_HORIZON, scene)
             self._backing_from = None if best is None else robot
+        if best is None:
+            best = self._come_free(robot, snapshot)
         if best is not None:
             self._last = best.velocity
             self._oscillation.take(robot, best.velocity)
@@ -131,16 +137,28 @@ class DwaController:
     def turn(self, robot: Pose, angle: float, snapshot: Snapshot) -> Trajectory | None:
         """Return a turn on the spot by up to `angle` (rad, signed), or None if it is not free.
 
-        The speed falls with the angle left, so that the turn ends without overshoot.
+        The speed falls with the angle left, so that the turn ends without overshoot. A robot that touches an obstacle
+        may get a way out of it instead.
         """
+        chosen = self._turn(robot, angle, snapshot) or self._come_free(robot, snapshot)
+        if chosen is not None:
+            self._last = chosen.velocity
+        return chosen
+
+    def _turn(self, robot: Pose, angle: float, snapshot: Snapshot) -> Trajectory | None:
         p = self.parameters
         speed = min(p.max_vel_theta, max(p.min_in_place_vel_theta, abs(angle) / 0.5))
         command = np.array([[0.0, 0.0, np.copysign(speed, angle)]])
         rollout = roll_out(command, robot, min(abs(angle) / speed, 1.0), MAX_STEPS)
         if not any(shape.is_free(rollout, snapshot)[0] for shape in self._shapes_for(robot, snapshot)):
             return None
-        self._last = Velocity(0.0, 0.0, float(command[0, 2]))
         return rollout.trajectory(0, 0.0)
+
+    def _come_free(self, robot: Pose, snapshot: Snapshot) -> Trajectory | None:
+        """Return a way out of an obstacle that the robot itself touches, without its padding; None if there is none."""
+        if self._shapes[-1].is_free_at(robot, snapshot):
+            return None
+        return self._escape.best(escape_samples(self.parameters), robot, MIN_HORIZON, snapshot)
 
     def _back_off(self, robot: Pose, scene: _Scene) -> Trajectory | None:
         """Keep backing off if that has begun, the robot has not come far enough, and the way is free."""

@@ -129,7 +129,7 @@ class Costmap:
             self._observe(observation, transform)
         for layer in self._obstacle_layers:
             if layer.footprint_clearing_enabled:
-                self._fill(self._obstacles[layer.name], robot.apply(self._footprint))
+                self._clear_footprint(self._obstacles[layer.name], robot.apply(self._footprint))
         return self._combine(map_pose or ORIGIN)
 
     def clear(
@@ -263,8 +263,15 @@ class Costmap:
             corners[2::2, axis] = origin[axis] + bound * along[1:]
         self._fill(obstacles, corners)
 
+    def _clear_footprint(self, obstacles: NDArray[np.uint8], corners: NDArray[np.float64]) -> None:
+        """Free what the robot covers, even in part, as in costmap_2d: what is left would count as touched."""
+        self._fill(obstacles, corners)
+        rows, columns = _cells_along(self.geometry, corners)
+        inside = (rows >= 0) & (rows < self.geometry.height) & (columns >= 0) & (columns < self.geometry.width)
+        obstacles[rows[inside], columns[inside]] = FREE
+
     def _fill(self, obstacles: NDArray[np.uint8], corners: NDArray[np.float64]) -> None:
-        """Free a polygon."""
+        """Free a polygon, but not each cell that its edge runs through."""
         g = self.geometry
         scaled = corners - (g.origin_x, g.origin_y)
         scaled /= g.resolution
@@ -313,6 +320,22 @@ def _larger(costs: NDArray[np.uint8], other: NDArray[np.uint8]) -> NDArray[np.ui
     """Return the larger costs; an unknown cell takes the other cost."""
     known = np.where(other == UNKNOWN, costs, np.maximum(costs, other))
     return np.where(costs == UNKNOWN, other, known).astype(np.uint8)
+
+
+def _cells_along(geometry: Geometry, corners: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows and columns of all cells that the edges of a polygon (N, 2) run through."""
+    points = []
+    ends = (corners - (geometry.origin_x, geometry.origin_y)) / geometry.resolution
+    for start, end in zip(ends, np.roll(ends, -1, axis=0), strict=True):
+        along = end - start
+        crossings = [np.array([0.0, 1.0])]  # shares of the way at which the edge comes into another cell
+        for axis in (0, 1):
+            low, high = sorted((start[axis], end[axis]))
+            crossings.append((np.arange(math.ceil(low), math.floor(high) + 1) - start[axis]) / (along[axis] or 1.0))
+        shares = np.sort(np.concatenate(crossings).clip(0.0, 1.0))
+        points.append(start + (0.5 * (shares[:-1] + shares[1:]))[:, None] * along)
+    columns, rows = np.floor(np.concatenate(points)).astype(np.intp).T
+    return rows, columns
 
 
 def _overlap(shift: int, size: int) -> slice:

@@ -21,6 +21,9 @@ _SECONDS = (1 << 31) - 60
 """s: tf2 ends the process, by an exception or by a violation of memory, where a stamp has 2^31 or more (in 2038).
 A minute less, because nanoseconds may add seconds."""
 
+_UNKNOWN = (tf2_ros.TransformException, ValueError)
+"""What tf2 raises where it does not know a frame; a ValueError if the name has a character that C can't take."""
+
 
 class TfTransformer:
     """The navigator's access to /tf."""
@@ -36,7 +39,7 @@ class TfTransformer:
         when = rospy.Time() if stamp is None else rospy.Time.from_sec(stamp)
         try:
             transform = self.buffer.lookup_transform_core(target, source, when).transform
-        except tf2_ros.TransformException:
+        except _UNKNOWN:
             return None
         matrix = matrix_of(transform.translation, transform.rotation)
         return matrix if (np.abs(matrix) <= FARTHEST).all() else None  # tf2 takes infinity for a number
@@ -45,7 +48,7 @@ class TfTransformer:
         """Return the time of the newest transform in s, or None. Frames that never move are current at any time."""
         try:
             stamp: float = self.buffer.get_latest_common_time(target, source).to_sec()
-        except tf2_ros.TransformException:
+        except _UNKNOWN:
             return None
         return stamp or math.inf
 

@@ -16,6 +16,7 @@ class Asked:
     def __init__(self, commands: Iterable[Command] = ()) -> None:
         """Begin with the commands that hold already."""
         self._commands: list[Command] = []
+        self._early: list[Command] = []  # of these, what is for objectives that are still to come
         for command in commands:
             self.heed(command)
 
@@ -35,6 +36,7 @@ class Asked:
         if isinstance(command, entries.Approve | entries.Reject):
             return
         self._commands = [before for before in self._commands if not _replaces(command, before)]
+        self._early = [before for before in self._early if not _replaces(command, before)]
         if isinstance(command, entries.Lock | entries.SetNfr) and not command.objective and objectives:
             self._commands += [replace(command, objective=name) for name in objectives]
         elif not isinstance(command, entries.Resume | entries.Unlock):
@@ -43,8 +45,32 @@ class Asked:
     def settle(self, locked: Collection[str]) -> bool:
         """Forget the locks of objectives that are locked no longer, since they went; return whether there were any."""
         before = len(self._commands)
-        self._commands = [c for c in self._commands if not isinstance(c, entries.Lock) or c.objective in locked]
+        kept = {*locked, *(command.objective for command in self._early if isinstance(command, entries.Lock))}
+        self._commands = [c for c in self._commands if not isinstance(c, entries.Lock) or c.objective in kept]
         return len(self._commands) < before
+
+    def put_off(self, command: Command, objectives: Collection[str]) -> bool:
+        """Have a lock or limit wait for its objective, which a task asks for anew; return whether that makes sense.
+
+        Args:
+            command: what could not be carried out.
+            objectives: names of those that there are.
+        """
+        waits = isinstance(command, entries.Lock | entries.SetNfr) and command.objective not in ("", *objectives)
+        self._early += [command] if waits else []
+        return waits
+
+    def due(self, objectives: Collection[str]) -> list[Command]:
+        """Return what has waited for objectives that there are now; it waits no longer."""
+        found = [c for c in self._early if getattr(c, "objective", "") in objectives]
+        self._early = [c for c in self._early if c not in found]
+        return found
+
+    def wait_no_longer(self) -> bool:
+        """Forget what waits for objectives; return whether anything did."""
+        early, self._early = self._early, []
+        self._commands = [command for command in self._commands if command not in early]
+        return bool(early)
 
     def as_parameter(self) -> list[list[str]]:
         """Return the commands as a value of a parameter: of each, its kind and values."""

@@ -9,6 +9,7 @@ from dataclasses import replace
 from metacontrol_bags.decision import DECIDED, FAILED, Decision
 
 from mros1_reasoner.knowledge.model import LEAST, MOST, Objective
+from mros1_reasoner.loop.loop_time import LoopTime
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.state import State
 
@@ -16,14 +17,15 @@ from mros1_reasoner.loop.state import State
 class Operator:
     """Applies the operator's commands; they take effect with the loop's next step."""
 
-    def __init__(self, state: State, wall: Callable[[], float]) -> None:
+    def __init__(self, state: State, wall: Callable[[], float], loop_time: LoopTime) -> None:
         """Change the loop's state.
 
         Args:
             state: of the loop.
             wall: wall clock that measures durations, s.
+            loop_time: the loop's.
         """
-        self._state, self._wall = state, wall
+        self._state, self._wall, self._time = state, wall, loop_time
 
     def pause(self) -> None:
         """Decide nothing until `resume`; facts are still analysed, and a decision under way is still carried out."""
@@ -58,8 +60,8 @@ class Operator:
             MapeError: no decision of that id waits for approval.
         """
         decision = replace(self._proposed(decision_id), state=DECIDED)
-        self._state.begin(decision, now, self._wall())
-        return decision
+        self._state.begin(decision, self._time.take(now), self._wall())
+        return self._time.told(decision)
 
     def reject(self, decision_id: str, now: float) -> Decision:
         """Reject the proposed decision; its design is not proposed again until the error log forgets it.
@@ -71,14 +73,15 @@ class Operator:
             MapeError: no decision of that id waits for approval.
         """
         decision = self._proposed(decision_id)
-        words = "rejected by the operator"
+        words, now = "rejected by the operator", self._time.take(now)
         if decision.repair:
             self._state.repairs.refuse(now, decision.repair)
         else:
             self._state.note_in_vain(now, decision.to_configuration, decision.objective, words)
         self._state.propose(None)
         self._state.reconsider()
-        return replace(decision, state=FAILED, explanation=f"{decision.explanation}; {words}", stamp_executed=now)
+        told = replace(decision, state=FAILED, explanation=f"{decision.explanation}; {words}", stamp_executed=now)
+        return self._time.told(told)
 
     def add_objective(self, objective: Objective) -> None:
         """Ask for a function from now on.
@@ -163,15 +166,18 @@ class Operator:
         return limits
 
     def set_nfr(self, objective: str, quality: str, limit: float) -> None:
-        """Give an objective another limit of a quality.
+        """Give an objective another limit of a quality; all objectives if none is named.
 
         Raises:
             MapeError: there is no such objective and no design may require it, or there is no such quality, or the
-                limit is no level of it.
+                limit is no level of it, or makes no band with the other one.
         """
-        self._names(objective)
+        names = sorted(self._names(objective))
         self._check_limit(quality, limit)
-        self._state.set_limit(objective, quality, limit, f"the operator wants a limit of {limit:g} of {quality}")
+        for name in names:
+            self._check_bands({**self._state.limits_of(name), quality: limit}, "set its other limit first")
+        for name in names:
+            self._state.set_limit(name, quality, limit, f"the operator wants a limit of {limit:g} of {quality}")
 
     def _names(self, objective: str) -> set[str]:
         """Return the objective of a name, which may come into being when a design requires it; all if it is empty."""
@@ -199,12 +205,12 @@ class Operator:
             known = ", ".join(self._state.kb.functions)
             raise MapeError(f"{whose}no Function is called {function!r}: known: {known}")
 
-    def _check_bands(self, limits: Mapping[str, float]) -> None:
+    def _check_bands(self, limits: Mapping[str, float], remedy: str = "give the least level first") -> None:
         for quality in limits:
             for least, most in ((f"{quality}{LEAST}", quality), (quality, f"{quality}{MOST}")):
                 if least in limits and most in limits and limits[least] >= limits[most]:
                     band = f"{limits[least]:g} to {limits[most]:g}"
-                    raise MapeError(f"the band of {quality} is {band}: give the least level first")
+                    raise MapeError(f"the band of {quality} is {band}: {remedy}")
 
     def _check_limit(self, quality: str, limit: float) -> None:
         if not self._state.kb.admit(quality):

@@ -14,6 +14,7 @@ from metacontrol_bags.decision import FAILED, Decision
 from metacontrol_msgs.msg import ObjectiveWords as Words
 
 from mros1_reasoner.knowledge.model import Objective
+from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.loop import entries
 from mros1_reasoner.loop.fulfilment import Fulfilment
 from mros1_reasoner.loop.mape import Mape
@@ -198,12 +199,15 @@ class Goals:
         known = self._goals[goal]
         if known.end is None or not (known.before or self._core.operator.can_remove(known.objective)):
             return
-        before = known.before
-        if before is None:
-            self._command(entries.RemoveObjective(known.objective))
-        else:
-            self._command(entries.Pursue(before.name, before.function, before.limits, before.always_improve))
-        self._end(goal, known.end)
+        before, end = known.before, known.end
+        try:
+            if before is None:
+                self._command(entries.RemoveObjective(known.objective))
+            else:
+                self._command(entries.Pursue(before.name, before.function, before.limits, before.always_improve))
+        except (MapeError, KnowledgeBaseError) as error:  # an operator has set limits meanwhile that don't fit these
+            end = replace(end, message=f"{end.message}; its former limits can't be restored: {error}")
+        self._end(goal, end)
 
     def _end(self, goal: str, end: End) -> None:
         del self._goals[goal]

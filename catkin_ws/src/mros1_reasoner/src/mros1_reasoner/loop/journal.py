@@ -142,8 +142,7 @@ def _carry_out(core: Mape, now: float, command: entries.Command) -> list[Decisio
         case entries.RemoveObjective(name):
             core.operator.remove_objective(name)
         case entries.SetNfr(objective, quality, limit):
-            for name in [objective] if objective else list(core.objectives):
-                core.operator.set_nfr(name, quality, limit)
+            core.operator.set_nfr(objective, quality, limit)
     return []
 
 

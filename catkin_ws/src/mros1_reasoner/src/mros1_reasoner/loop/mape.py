@@ -21,6 +21,7 @@ from mros1_reasoner.loop.commands import Operator
 from mros1_reasoner.loop.deliberation import Deliberation, Timing
 from mros1_reasoner.loop.entries import FailedFact, LeftFact
 from mros1_reasoner.loop.fulfilment import Fulfilment, fulfilment
+from mros1_reasoner.loop.loop_time import LoopTime
 from mros1_reasoner.loop.readable_state import MapeError, View
 from mros1_reasoner.loop.repairs import UnderWay
 from mros1_reasoner.loop.settings import Settings
@@ -67,11 +68,11 @@ class Mape:
         """
         settings = settings or Settings()
         self._kb, self._reasoner = knowledge_base, reasoner
-        self._wall, self._clock = wall, clock
+        self._wall, self._clock, self._time = wall, clock, LoopTime()
         self._utility = utility or make_utility(settings.utility, knowledge_base.qualities)
         self._state = State(knowledge_base, objectives, settings, self._utility)
         self._deliberation = Deliberation(self._state, self._utility, distance, wall, self._stamp, name)
-        self.operator = Operator(self._state, wall)
+        self.operator = Operator(self._state, wall, self._time)
 
     @property
     def objectives(self) -> Mapping[str, Objective]:
@@ -150,6 +151,7 @@ class Mape:
         Raises:
             MapeError: the quality is unknown, or the level is not finite.
         """
+        now, stamp = self._time.take(now), self._time.of(stamp)
         if quality in self._kb.environment and math.isfinite(level):
             self._state.note_surroundings(now, quality, level, stamp)
             return
@@ -179,6 +181,7 @@ class Mape:
         Raises:
             MapeError: the component or the status is unknown.
         """
+        now, stamp = self._time.take(now), self._time.of(stamp)
         if component not in self._kb.components:
             raise MapeError(f"component {component} is not in the model: its status is left out")
         if status not in v.COMPONENT_STATUSES:
@@ -202,6 +205,7 @@ class Mape:
         self, now: float, node: str, parameters: str, configurations: Collection[str], stamp: float = 0.0
     ) -> None:
         """Take in that parameters of a node, named in one text, do not have the values of deployed configurations."""
+        now, stamp = self._time.take(now), self._time.of(stamp)
         for objective, running in self._state.running.items():
             if running.design in configurations:
                 self._state.note_drift(now, objective, node, parameters, stamp)
@@ -212,6 +216,7 @@ class Mape:
         Raises:
             MapeError: no objective has this grounding.
         """
+        now = self._time.take(now)
         for name, running in self._state.running.items():
             if running.design and self._kb.grounding(name, running.design) == grounding:
                 self._state.note_binding(now, name, in_error)
@@ -231,6 +236,7 @@ class Mape:
         Raises:
             MapeError: there is no such objective, or nothing is deployed for it.
         """
+        now, stamp = self._time.take(now), self._time.of(stamp)
         for objective in self._state.pursuing(name):
             running = self._state.running[objective]
             if running.design is None and failed:
@@ -252,6 +258,7 @@ class Mape:
         Raises:
             MapeError: the model does not hold the configuration, or not for that function.
         """
+        now = self._time.take(now)
         if not configuration:
             self._state.note_inactive(now, function)
             return
@@ -295,6 +302,10 @@ class Mape:
         Raises:
             ReasonerError: the analysis failed; the next step tries it again.
         """
+        now = self._time.take(now)
+        return [self._time.told(decision) for decision in self._step(now, heartbeat)]
+
+    def _step(self, now: float, heartbeat: bool) -> list[Decision]:
         self._state.begin_step(now)
         ended = [self._outcome(now, repair, why) for repair, why in self._state.end_repairs(now)]
         if ended or self._state.pending:
@@ -316,11 +327,12 @@ class Mape:
 
     def due(self, now: float) -> float | None:
         """Return when the next step is needed even without a new fact; None if none is."""
-        return self._state.due(now)
+        moment = self._state.due(self._time.take(now))
+        return None if moment is None else self._time.ros(moment)
 
     def fulfilment(self, objective: str, now: float) -> Fulfilment:
         """Return how an objective stands, by the last analysis."""
-        return fulfilment(self._state, objective, now)
+        return fulfilment(self._state, objective, self._time.take(now))
 
     def feasible(self) -> dict[str, tuple[str, ...]]:
         """Return the designs by which each function could be fulfilled now, the most useful first.
@@ -359,12 +371,13 @@ class Mape:
         Raises:
             MapeError: no decision of that id is pending.
         """
+        now = self._time.take(now)
         if repair := self._state.repairs.begun_by(decision_id):
             if ok:
                 return None
             self._state.repairs.fail(now, repair.decision.repair, counts=blame)
             self._state.reconsider()
-            return self._outcome(now, repair, message or "no reason given")
+            return self._time.told(self._outcome(now, repair, message or "no reason given"))
         decision, began = self._state.pending, self._state.pending_since
         if decision is None or decision.id != decision_id:
             raise MapeError(f"decision {decision_id} is not under way")
@@ -381,7 +394,7 @@ class Mape:
             execute_wall_s=self._wall() - began,
         )
         self._state.note_past(outcome)
-        return outcome
+        return self._time.told(outcome)
 
     def report_released(self, function: str) -> None:
         """Take in that a function was released."""
@@ -390,7 +403,7 @@ class Mape:
     # Parts
 
     def _stamp(self, now: float) -> float:
-        return max(now, self._clock()) if self._clock else now
+        return max(now, self._time.take(self._clock())) if self._clock else now
 
     def _decide_all(self, timing: Timing) -> list[Decision]:
         """Decide for every objective in error, from the roots down, until there is something to do."""

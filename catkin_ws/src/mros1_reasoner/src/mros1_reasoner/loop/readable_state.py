@@ -245,6 +245,11 @@ class View:
         known = self.objectives.get(name)
         return known or replace(self.in_reserve.get(function) or Objective(name, function), name=name)
 
+    def limits_of(self, name: str) -> Mapping[str, float]:
+        """Return the limits of an objective, or those that it will have when a design requires it."""
+        known = self.objectives.get(name)
+        return (known or self.objective_of(self.foreseen()[name])).limits
+
     def required(self, design: str | None) -> tuple[str, ...]:
         """Return the objectives that a design requires."""
         return tuple(self.provider(f) for f in self.kb.designs[design].requires) if design else ()

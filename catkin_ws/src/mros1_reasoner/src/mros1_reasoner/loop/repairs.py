@@ -44,6 +44,7 @@ class _Record:
         tried: how many in a row have not led to a component that works for long.
         succeeded: how many have, of all.
         failed: how many have not, of all.
+        in_vain: how many in a row could not be tried.
         not_before: none begins before.
         works_since: when it worked again last; -inf where that is not known.
     """
@@ -51,6 +52,7 @@ class _Record:
     tried: int = 0
     succeeded: int = 0
     failed: int = 0
+    in_vain: int = 0
     not_before: float = -math.inf
     works_since: float = -math.inf
 
@@ -125,7 +127,7 @@ class Repairs:
             if component not in failed:
                 del self._under_way[component]
                 record = self._records[component]
-                self._records[component] = replace(record, succeeded=record.succeeded + 1)
+                self._records[component] = replace(record, succeeded=record.succeeded + 1, in_vain=0)
                 found.append((repair, ""))
             elif now >= repair.until:
                 why = f"{component} does not work after {now - repair.since:.1f} s"
@@ -135,9 +137,14 @@ class Repairs:
     def fail(self, now: float, component: str, *, counts: bool = True) -> UnderWay:
         """End a repair that is under way and has failed; where it could not be tried, it does not count as one."""
         record = self._records[component]
-        wait = self._settings.wait_after(max(0, record.tried - 1))
-        tried, failed = record.tried - (not counts), record.failed + counts
-        self._records[component] = replace(record, tried=tried, failed=failed, not_before=now + wait)
+        wait = self._settings.wait_after(max(0, record.tried - 1) if counts else record.in_vain)
+        self._records[component] = replace(
+            record,
+            tried=record.tried - (not counts),
+            failed=record.failed + counts,
+            in_vain=0 if counts else record.in_vain + 1,
+            not_before=now + wait,
+        )
         return self._under_way.pop(component)
 
     def refuse(self, now: float, component: str) -> None:

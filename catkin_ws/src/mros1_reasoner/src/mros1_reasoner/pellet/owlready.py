@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import subprocess
 from collections.abc import Sequence
 
 import owlready2
@@ -13,6 +14,9 @@ from mros1_reasoner.knowledge.triples import assertion_triple, iri_of, literal_o
 from mros1_reasoner.knowledge.vocabulary import XSD
 
 _log = logging.getLogger(__name__)
+
+DEADLINE = 60.0  # s, wall, for Pellet in a new JVM, which takes 1.1 to 3 s on a machine that has nothing else to do
+owlready2.reasoning._subprocess_kargs["timeout"] = DEADLINE  # of its subprocess.run; it has no public option for that
 
 
 class OwlreadyReasoner:
@@ -66,11 +70,13 @@ def run_pellet(world: owlready2.World) -> None:
 
     Raises:
         InconsistentError: the ontology contradicts itself.
-        ReasonerError: Java or Pellet failed.
+        ReasonerError: Java or Pellet failed, or took too long.
     """
     try:
         owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
     except owlready2.OwlReadyInconsistentOntologyError as error:
         raise InconsistentError(" ".join(str(error).split())) from error
+    except subprocess.TimeoutExpired as error:
+        raise ReasonerError(f"Pellet in a JVM of its own does not answer within {error.timeout:g} s") from error
     except (owlready2.OwlReadyJavaError, OSError) as error:
         raise ReasonerError(f"owlready2 could not run Pellet: {' '.join(str(error).split())}") from error

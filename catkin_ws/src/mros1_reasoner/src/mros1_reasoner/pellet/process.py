@@ -25,7 +25,7 @@ _log = logging.getLogger(__name__)
 _Answer = TypeVar("_Answer")
 
 START_DEADLINE = 20.0  # s, wall: a JVM and its jars, on a loaded machine
-RETRY_AFTER = 300.0  # s, wall, until the child is tried again; until then owlready2 calls Pellet
+FIRST_RETRY, LONGEST_RETRY = 2.0, 300.0  # s, wall, until a lost child is tried again; meanwhile owlready2 calls Pellet
 _WHOLE, _COMMON = "whole", "common"  # names of the child's ontologies
 
 
@@ -222,7 +222,11 @@ class PelletReasoner:
 
 
 class PelletWithFallback:
-    """Pellet in its child process, or a slower reasoner while the child keeps failing."""
+    """Pellet in its child process, or a slower reasoner while the child keeps failing.
+
+    The child is tried again soon, since it may have failed for want of descriptors or memory for a moment. Each wait is
+    twice the one before, and no shorter than the last try took: a child that hangs costs its deadlines.
+    """
 
     def __init__(
         self,
@@ -240,6 +244,7 @@ class PelletWithFallback:
         self._child, self._slow, self._clock = child, slow, clock
         self._ontology = ""
         self._retry_at = -math.inf
+        self._wait = 0.0  # s, the last one; 0 after a success
 
     @property
     def fallen_back(self) -> bool:
@@ -260,19 +265,25 @@ class PelletWithFallback:
         self._child.close()
 
     def _by_child(self, fast: Callable[[], _Answer], otherwise: Callable[[Reasoner], _Answer]) -> _Answer:
-        if self._clock() >= self._retry_at:
+        begin = self._clock()
+        if begin >= self._retry_at:
             try:
                 if self.fallen_back:  # the child has gone since it has loaded the ontology
                     self._child.load(self._ontology)
                     self._retry_at = -math.inf
-                return fast()
+                answer = fast()
             except ChildLostError as error:
-                self._retry_at = self._clock() + RETRY_AFTER
+                now = self._clock()
+                self._wait = min(max(FIRST_RETRY, 2 * self._wait, now - begin), LONGEST_RETRY)
+                self._retry_at = now + self._wait
                 _log.warning(
-                    "%s; going on with a new JVM for every analysis, more than a second each; next try in %g s",
+                    "%s; going on with a new JVM for every analysis, more than a second each; next try in %.0f s",
                     error,
-                    RETRY_AFTER,
+                    self._wait,
                 )
+            else:
+                self._wait = 0.0
+                return answer
         slow = self._slow()
         slow.load(self._ontology)
         return otherwise(slow)

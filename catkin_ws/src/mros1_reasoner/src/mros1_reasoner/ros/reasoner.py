@@ -26,7 +26,7 @@ from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.loop import entries, journal
 from mros1_reasoner.loop.asked import Asked
-from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark, newest_goal
+from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark
 from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Released, Result, StaleFact, Step, TaskFact
 from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.goals import Goals
@@ -34,6 +34,7 @@ from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.remembered import remembered, to_remember
 from mros1_reasoner.loop.requesting import Wanted
+from mros1_reasoner.loop.task_goals import TaskGoals
 from mros1_reasoner.ros.decisions import DecisionTopic
 from mros1_reasoner.ros.journal import JournalTopic
 from mros1_reasoner.ros.log import Log
@@ -47,6 +48,7 @@ _FASTEST = 10.0  # ROS time may run so much faster than wall time
 _LONGEST_WAIT = 1.0  # s, wall, until it is seen that somebody has asked the node to end
 _QUEUE = 1000  # diagnostics that wait at most
 _ANSWER_DEADLINE = 60.0  # s, wall, for a service; an analysis may have to start Pellet again
+_TASKS_RETURN = 60.0  # s, wall, in which tasks ask a new reasoner again for what they have asked the one before it
 _KEEP_DEADLINE = 1.0  # s, wall, for which an operator's command waits until it is kept
 
 _T = TypeVar("_T")
@@ -88,7 +90,7 @@ class ReasonerNode:
         self._node_of = {component: node for node, component in parameters.nodes.items()}
         self._log = Log()
         self._taken_over: set[str] = set()
-        self._goals: dict[str, tuple[str, bool]] = {}  # newest goal of an objective's task, and whether it failed
+        self._task_goals = TaskGoals()
         self._journal = JournalTopic(name, parameters, knowledge_base.files)
         self._decisions = DecisionTopic()
         self._decisions.offer_last()
@@ -117,6 +119,7 @@ class ReasonerNode:
         for fact in remembered(parameters.remembered):
             self._take(fact)
         self._take_up_what_was_asked()
+        self._tasks_are_back = time.monotonic() + _TASKS_RETURN
         self._log.tell("Reasoner Initialization Ok")
 
     def _listen(self, task_actions: dict[str, str]) -> None:
@@ -139,6 +142,7 @@ class ReasonerNode:
             if is_heartbeat:
                 heartbeat = now + self._period
             self._inbox.drain()
+            self._take_up_the_rest(now)
             if self._repairs:
                 self._repairs.look()
             if self._requests:
@@ -182,7 +186,18 @@ class ReasonerNode:
             try:
                 self.command(command, lasts=False)  # it is kept already
             except (MapeError, KnowledgeBaseError, ReasonerError) as error:
+                if not self._asked.put_off(command, self.core.objectives):
+                    self._log.warn(kind_of(command), f"asked of the reasoner before, left out: {error}")
+
+    def _take_up_the_rest(self, now: float) -> None:
+        """Carry out what waits for objectives that tasks have asked for anew; `now` in wall s."""
+        for command in self._asked.due(self.core.objectives):
+            try:
+                self.command(command, lasts=False)
+            except (MapeError, KnowledgeBaseError, ReasonerError) as error:
                 self._log.warn(kind_of(command), f"asked of the reasoner before, left out: {error}")
+        if now > self._tasks_are_back and self._asked.wait_no_longer():
+            self._kept_asked.set(self._asked.as_parameter())
 
     def _leave(self) -> None:
         """Keep what a reasoner that takes this one's place has to know."""
@@ -231,11 +246,9 @@ class ReasonerNode:
 
     def _on_task_status(self, objective: str, action: str, statuses: GoalStatusArray) -> None:
         """Note the state of the newest goal of an objective's action, if it has changed."""
-        newest = newest_goal(statuses)
-        if newest is None or self._goals.get(objective) == newest:
-            return
-        self._goals[objective] = newest
-        self._inbox.put(lambda: self._take(TaskFact(objective, newest[1], message=f"a goal of {action} was aborted")))
+        failed = self._task_goals.take(objective, statuses)
+        if failed is not None:
+            self._inbox.put(lambda: self._take(TaskFact(objective, failed, message=f"a goal of {action} was aborted")))
 
     def _take(self, content: entries.Content) -> bool:
         """Apply an input and announce what follows; log what is wrong if the input does not fit."""

@@ -10,12 +10,17 @@ from typing import Any
 
 import actionlib
 import rospy
+from actionlib_msgs.msg import GoalStatus
 from metacontrol_msgs import msg as messages
+
+from mros1_reasoner.loop.requesting import ACKNOWLEDGE_WAIT
 
 _ACTION = "rosgraph_manipulator/repair"
 _SERVER_WAIT = 1.0  # s, wall, at most, for the connections to the manipulator
 _SERVER_LOOK = 0.02  # s, wall, between two looks whether they are there
 _ONE_LOOK = rospy.Duration(0, -1)
+_TRIED = frozenset({GoalStatus.SUCCEEDED, GoalStatus.ABORTED})
+"""How a repair ends that was tried. Others were refused or cancelled, or were lost with their manipulator."""
 
 
 @dataclass
@@ -24,6 +29,7 @@ class _Request:
     component: str
     ends: float  # wall time by which the manipulator must be there
     handle: Any = None  # None: it could not be sent yet
+    unheard: float = math.inf  # wall time by which it must be acknowledged; infinite where it is, or was not sent
 
 
 class RepairRequests:
@@ -53,20 +59,32 @@ class RepairRequests:
             request.handle.cancel()
 
     def look(self) -> None:
-        """Send the requests that could not be sent before; give up those that the manipulator is not there for."""
-        for request in [request for request in self._requests.values() if request.handle is None]:
-            if not rospy.get_rostime().is_zero() and self._client.wait_for_server(_ONE_LOOK):
-                goal = messages.RepairGoal(request.component)
-                request.handle = self._client.send_goal(goal, lambda handle, of=request: self._on_change(of, handle))
-            elif time.monotonic() >= request.ends:
-                name = rospy.resolve_name(_ACTION)
-                self._end(request, False, f"the manipulator's action server {name} is not there", blame=False)
+        """Send the requests that could not be sent before; give up those that no manipulator has heard."""
+        for request in list(self._requests.values()):
+            if request.handle is None:
+                self._send(request)
+            elif request.handle.get_comm_state() != actionlib.CommState.WAITING_FOR_GOAL_ACK:
+                request.unheard = math.inf
+            elif time.monotonic() >= request.unheard:
+                request.handle.cancel()
+                silence = f"the manipulator has said nothing of it in {ACKNOWLEDGE_WAIT:g} s"
+                self._end(request, False, silence, blame=False)
+
+    def _send(self, request: _Request) -> None:
+        if not rospy.get_rostime().is_zero() and self._client.wait_for_server(_ONE_LOOK):
+            goal = messages.RepairGoal(request.component)
+            request.unheard = time.monotonic() + ACKNOWLEDGE_WAIT
+            request.handle = self._client.send_goal(goal, lambda handle: self._on_change(request, handle))
+        elif time.monotonic() >= request.ends:
+            name = rospy.resolve_name(_ACTION)
+            self._end(request, False, f"the manipulator's action server {name} is not there", blame=False)
 
     @property
     def next_look(self) -> float:
         """The wall time of the next `look`."""
-        waits = any(request.handle is None for request in self._requests.values())
-        return time.monotonic() + _SERVER_LOOK if waits else math.inf
+        if any(request.handle is None for request in self._requests.values()):
+            return time.monotonic() + _SERVER_LOOK
+        return min((request.unheard for request in self._requests.values()), default=math.inf)
 
     def _on_change(self, request: _Request, handle: Any) -> None:
         if handle.get_comm_state() != actionlib.CommState.DONE:
@@ -74,7 +92,8 @@ class RepairRequests:
         text, result = handle.get_goal_status_text(), handle.get_result()
         ok, message = (result.ok, result.message) if result is not None else (False, "")
         reason = message or text or "the manipulator gave no result"
-        self._queue(lambda: self._end(request, ok, "" if ok else reason))
+        was_tried = result is not None and handle.get_goal_status() in _TRIED
+        self._queue(lambda: self._end(request, ok, "" if ok else reason, blame=was_tried))
 
     def _end(self, request: _Request, ok: bool, message: str, *, blame: bool = True) -> None:
         if self._requests.pop(request.decision, None) is not None:  # else it was given up

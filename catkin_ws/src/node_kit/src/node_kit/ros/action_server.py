@@ -13,6 +13,7 @@ from typing import Any
 import rospy
 
 _LOOK_PERIOD = 0.01  # s, wall, as in actionlib
+_MOST_AHEAD = 1.0  # s, how far the clock of a client's host may be ahead
 
 
 class _OneLook(rospy.Duration):
@@ -55,7 +56,13 @@ class Sturdy:
     one wrong message on /clock: clients would see their goals LOST. Where the timer fires just when the node closes its
     topics, actionlib lets a traceback be printed. rospy closes them before `is_shutdown` says so, but after the end was
     asked for.
+
+    A request to cancel with a stamp cancels all goals up to then, even those that come later. So one stamp from the
+    future, or from before the clock was set back, would end each new goal at once, for ever.
     """
+
+    lock: Any  # as actionlib has them
+    last_cancel: rospy.Time
 
     def initialize(self) -> None:
         """Begin, with a timer that goes on where time goes back."""
@@ -65,6 +72,24 @@ class Sturdy:
             timer.shutdown()
             self.status_timer = rospy.Timer(timer._period, self.publish_status_async, reset=True)  # type: ignore[attr-defined]
 
+    def internal_cancel_callback(self, goal_id: Any) -> None:
+        """Cancel goals (called by rospy); a stamp from the future counts for none but the goal that is named."""
+        if _is_ahead(goal_id.stamp):
+            if not goal_id.id:
+                rospy.logwarn_throttle(
+                    10.0, f"a request to cancel is ignored: its stamp ({goal_id.stamp.to_sec():g} s) is in the future"
+                )
+                return
+            goal_id = type(goal_id)(id=goal_id.id)  # a new one, because other listeners get the same message
+        super().internal_cancel_callback(goal_id)  # type: ignore[misc]
+
+    def internal_goal_callback(self, goal: Any) -> None:
+        """Take a goal (called by rospy), whatever was cancelled before the clock was set back."""
+        with self.lock:
+            if _is_ahead(self.last_cancel):
+                self.last_cancel = rospy.Time.now()
+            super().internal_goal_callback(goal)  # type: ignore[misc]
+
     def publish_status(self) -> None:
         """Publish the status of all goals, unless the node is ending."""
         try:
@@ -72,3 +97,8 @@ class Sturdy:
         except rospy.ROSException:
             if not rospy.core.is_shutdown_requested():
                 raise
+
+
+def _is_ahead(stamp: rospy.Time) -> bool:
+    """Tell whether a stamp lies in the future, and the clocks of two hosts don't explain it."""
+    return bool(stamp.to_sec() > rospy.get_time() + _MOST_AHEAD)

@@ -41,21 +41,28 @@ class CameraNode(rospy.SubscribeListener):
         self._outlet = Outlet()
         listen(self._outlet)
         self._lock = threading.Lock()
-        self._points = rospy.Publisher("camera/depth/points", PointCloud2, subscriber_listener=self, queue_size=1)
+        with self._lock:  # a listener may come before the publisher is assigned
+            self._points = rospy.Publisher("camera/depth/points", PointCloud2, subscriber_listener=self, queue_size=1)
+        self._follow_listeners()
         self._lamp = rospy.Subscriber("simulator/light", Float32, self._on_light, queue_size=1)
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
         """Start to take images: somebody wants points (called by rospy)."""
+        self._follow_listeners()
+
+    def peer_unsubscribe(self, _topic: str, _num_peers: int) -> None:
+        """Stop to take images when the last listener is gone (called by rospy)."""
+        self._follow_listeners()
+
+    def _follow_listeners(self) -> None:
+        """Take images while there are listeners; see LaserNode."""
         with self._lock:
-            if self._depth is None:
+            is_heard = self._points.impl.has_connections()
+            if is_heard and self._depth is None:
                 self._depth = rospy.Subscriber(
                     "simulator/depth", Image, self._on_depth, queue_size=1, buff_size=1 << 20, tcp_nodelay=True
                 )
-
-    def peer_unsubscribe(self, _topic: str, num_peers: int) -> None:
-        """Stop to take images when the last listener is gone (called by rospy)."""
-        with self._lock:
-            if num_peers == 0 and self._depth is not None:
+            elif not is_heard and self._depth is not None:
                 self._depth.unregister()
                 self._depth = None
 

@@ -38,20 +38,31 @@ class LaserNode(rospy.SubscribeListener):
         self._outlet = Outlet()
         listen(self._outlet)
         self._lock = threading.Lock()
-        self._scan = rospy.Publisher(
-            f"{side}/scan", LaserScan, subscriber_listener=self, queue_size=1, tcp_nodelay=True
-        )
+        with self._lock:  # a listener may come before the publisher is assigned
+            self._scan = rospy.Publisher(
+                f"{side}/scan", LaserScan, subscriber_listener=self, queue_size=1, tcp_nodelay=True
+            )
+        self._follow_listeners()
 
     def peer_subscribe(self, _topic: str, _publish: object, _peer_publish: object) -> None:
         """Start to take rays: somebody wants scans (called by rospy)."""
-        with self._lock:
-            if self._rays is None:
-                self._rays = rospy.Subscriber(self._raw, LaserScan, self._on_rays, queue_size=1, tcp_nodelay=True)
+        self._follow_listeners()
 
-    def peer_unsubscribe(self, _topic: str, num_peers: int) -> None:
+    def peer_unsubscribe(self, _topic: str, _num_peers: int) -> None:
         """Stop to take rays when the last listener is gone (called by rospy)."""
+        self._follow_listeners()
+
+    def _follow_listeners(self) -> None:
+        """Take rays while there are listeners.
+
+        rospy tells of them late, and not always in order, so the number that it passes may be an old one. The
+        connections are looked at without rospy's lock: rospy may hold it while it waits for the one here.
+        """
         with self._lock:
-            if num_peers == 0 and self._rays is not None:
+            is_heard = self._scan.impl.has_connections()
+            if is_heard and self._rays is None:
+                self._rays = rospy.Subscriber(self._raw, LaserScan, self._on_rays, queue_size=1, tcp_nodelay=True)
+            elif not is_heard and self._rays is not None:
                 self._rays.unregister()
                 self._rays = None
 

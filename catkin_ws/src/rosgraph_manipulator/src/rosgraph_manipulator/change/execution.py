@@ -93,6 +93,7 @@ class Execution:
         self._names = make_names(self._description, self._progress.has_finished)
         self._servers_died: dict[str, bool] = {}  # by function: whether the kept action's server died
         self._follows = False  # whether the reports of the launcher that made the last change arrive
+        self._recovers = False  # whether it waits for nodes that the launcher has started again
         launchers.on_reports = self._follow
         if launchers.reports():
             self._follow()
@@ -123,6 +124,14 @@ class Execution:
     def lost_hosts(self, function: str) -> list[str]:
         """Return the lost hosts that have a part of what should run for a function."""
         return self._launchers.lost_hosts(function)
+
+    def is_unconnected(self, function: str) -> bool:
+        """Tell whether a launcher that should have a part of what runs for a function has ended."""
+        return bool(self._launchers.unconnected(function))
+
+    def launcher_has_ended(self, function: str) -> bool:
+        """Tell whether this host's main launcher should have a part of what runs for a function and has ended."""
+        return self._launchers.main_has_ended(function)
 
     @property
     def losses(self) -> int:
@@ -302,7 +311,11 @@ class Execution:
             configuration = self._options.configurations.get(report.configuration)
             new_server = self._servers_died.get(function, False)
             self._progress.recover(function, configuration, self._around.now(), new_server)
-            self.wait_until_ready()
+            self._recovers = True
+            try:
+                self.wait_until_ready()
+            finally:
+                self._recovers = False
             self._servers_died.pop(function, None)
 
     def hears_more(self, function: str) -> bool:
@@ -396,7 +409,10 @@ class Execution:
 
     def _description(self, node: str) -> NodeDescription | None:
         wanted = self._progress.wanted
-        return self.system.launch_file(wanted).system.nodes.get(node) if wanted else None
+        if wanted is None:
+            return None
+        launch = self._recovers and self.system.deployed_file(wanted)
+        return (launch or self.system.launch_file(wanted)).system.nodes.get(node)
 
     def _end_foreign_nodes(self, function: str) -> None:
         """End nodes of the same function that somebody else started."""

@@ -139,7 +139,7 @@ class Resumption:
     Attributes:
         deploy: the configuration to deploy; empty: none.
         running: the configuration that runs already and is left as it is; empty: none.
-        last_good: the configuration to restore if `deploy` fails; empty: none.
+        last_good: the configuration that came up last; it is restored if another one fails; empty: none.
         keep_goal: whether the pending goal that an earlier manipulator left is kept.
         attempts: how often `deploy` was begun before.
         refused: the configuration whose change was under way and is not begun again; empty: there is none.
@@ -206,7 +206,7 @@ def resume(
     if fresh and not over and (wanted or last_good):  # manipulator and launcher died
         return Resumption(
             deploy=wanted or last_good,
-            last_good=last_good if wanted else "",
+            last_good=last_good,  # in the next journal, too: this manipulator may die before its turn comes
             keep_goal=True,
             attempts=attempts,
         )

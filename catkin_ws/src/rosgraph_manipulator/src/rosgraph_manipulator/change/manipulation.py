@@ -29,6 +29,8 @@ from rosgraph_manipulator.change.surroundings import Surroundings
 from rosgraph_manipulator.change.tactics import Plan, Tactic, plan_change
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
 
+NO_LAUNCHER = "rosgraph_launcher has ended, and its nodes with it"
+
 
 class Announcer(Protocol):
     """Tells others what is deployed, and how changes ended."""
@@ -285,10 +287,25 @@ class Manipulation:
         """React to the launchers' last reports."""
         for function in self._deployments:
             self._executor.clear(function)
+            self._look_for_launcher(function)
             deaths = self._executor.take_deaths(function)
             if deaths is not None:
                 self._follow_function(function, deaths)
             self._follow_function(function, self._executor.report(function))
+
+    def look(self) -> None:
+        """See whether the launcher has ended and does not come back, of which nobody reports; call it now and then."""
+        for function in self._deployments:
+            self._look_for_launcher(function)
+
+    def _look_for_launcher(self, function: str) -> None:
+        deployments = self._deployments[function]
+        has_ended = deployments.running is not None and self._executor.launcher_has_ended(function)
+        if deployments.lacks_launcher(has_ended, self._around.now()) and (running := deployments.running):
+            self._log.error(f"{running.name}: {NO_LAUNCHER}: start it again")
+            self._executor.stop_robot(function)
+            self._announcer.announce(running, FunctionGrounding.RECOVERING, Outcome(Result.OK, running, NO_LAUNCHER))
+            self._announcer.diagnose(False, NO_LAUNCHER, running.name)
 
     def _follow_function(self, function: str, report: LauncherReport | None) -> None:
         deployments = self._deployments[function]

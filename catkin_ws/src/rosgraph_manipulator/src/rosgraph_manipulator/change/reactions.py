@@ -12,6 +12,10 @@ from rosgraph_launcher.launching.report import CHANGING, FAILED, RECOVERING, STA
 from rosgraph_manipulator.change.deployment import Outcome, Result
 from rosgraph_manipulator.configuration.configurations import Configuration
 
+LAUNCHER_GRACE = 2.0
+"""Time after the end of a launcher in which nothing is told, s: a respawned one is back within 2 s, and what it should
+run is deployed again at once."""
+
 
 class Reaction(enum.Enum):
     """What the manipulator does about a report of the launcher."""
@@ -40,6 +44,8 @@ class DeployedConfigurations:
         self._previous: Configuration | None = None  # what the running one has replaced
         self._waiting: Configuration | None = None
         self._recovering = False
+        self._launcher_ended: float | None = None  # when the launcher was seen to have ended, while it has
+        self._told_of_launcher = False
         self._torn = False
         self._deployed_at = float("-inf")
         self._failure = ""
@@ -91,12 +97,33 @@ class DeployedConfigurations:
     def finished(self, outcome: Outcome, now: float) -> None:
         """Note how a change ended."""
         self._running, self._waiting, self._recovering = outcome.running, None, False
+        self._launcher_is_there()
         self._torn = outcome.running is None and outcome.result is not Result.GENERAL_ERROR
         self._failure = outcome.message if outcome.result is Result.GENERAL_ERROR else ""
         if outcome.running:
             replaces = outcome.result is Result.OK and self._last_good != outcome.running
             self._previous = self._last_good if replaces else None
             self._last_good, self._deployed_at = outcome.running, now
+
+    def lacks_launcher(self, has_ended: bool, now: float) -> bool:
+        """Tell, once, that nothing runs because the launcher has ended and does not come back; a recovery has begun.
+
+        Args:
+            has_ended: whether it has ended, and no other one has started since.
+            now: the time.
+        """
+        if not has_ended or self._running is None:
+            self._launcher_is_there()
+            return False
+        if self._launcher_ended is None:
+            self._launcher_ended = now
+        if self._told_of_launcher or now - self._launcher_ended <= LAUNCHER_GRACE:
+            return False
+        self._told_of_launcher = self._recovering = True
+        return True
+
+    def _launcher_is_there(self) -> None:
+        self._launcher_ended, self._told_of_launcher = None, False
 
     def react(self, report: LauncherReport | None, now: float) -> Reaction:
         """Return what to do about a report of the launcher; None: it has made none yet."""
@@ -111,7 +138,8 @@ class DeployedConfigurations:
         if report.state == RECOVERING and not self._recovering:
             on_probation = self._previous is not None and now - self._deployed_at < self._probation
             return Reaction.GO_BACK if on_probation else Reaction.BEGIN_RECOVERY
-        return Reaction.END_RECOVERY if report.state == STABLE and self._recovering else Reaction.NONE
+        recovers = self._recovering and not self._told_of_launcher  # else the report is of the one that has ended
+        return Reaction.END_RECOVERY if report.state == STABLE and recovers else Reaction.NONE
 
     def lost(self) -> None:
         """Note that the running configuration runs no more, though it was the last good one."""

@@ -12,6 +12,7 @@ from rosgraph_manipulator.configuration.configurations import Configuration, Rep
 
 _NAME = "__name:="
 TRIGGER, EMPTY = "std_srvs/Trigger", "std_srvs/Empty"
+RETRY_PERIOD = 1.0  # s, wall, between two tries to start a lost driver
 
 
 @dataclass(frozen=True)
@@ -146,6 +147,7 @@ class RepairedDrivers:
         """
         self._report = report
         self._running = {driver for driver in drivers if self._is_running(driver)}
+        self._next_try: dict[Configuration, float] = {}
 
     def started(self, driver: Configuration) -> None:
         """Note that the launcher runs a driver."""
@@ -158,12 +160,20 @@ class RepairedDrivers:
         self._running -= failed.keys()
         return list(failed.values())
 
-    def lost(self) -> list[Configuration]:
-        """Return the drivers that have ended with their launcher, which is there again; they do not run any more."""
+    def lost(self, now: float) -> list[Configuration]:
+        """Return the drivers that have ended with their launcher, which is there again, and that are to be started now.
+
+        Args:
+            now: monotonic s.
+        """
         reports = {driver: self._report(driver.function) for driver in self._running}
         lost = [d for d, report in reports.items() if report and report.state != CHANGING and not self._is_running(d)]
-        self._running -= set(lost)
-        return sorted(lost, key=lambda driver: driver.name)
+        due = [driver for driver in lost if now >= self._next_try.get(driver, now)]
+        return sorted(due, key=lambda driver: driver.name)
+
+    def tried(self, driver: Configuration, now: float) -> None:
+        """Note that a lost driver was started again, or could not be; `lost` leaves it out for a while."""
+        self._next_try[driver] = now + RETRY_PERIOD
 
     def _is_running(self, driver: Configuration) -> bool:
         report = self._report(driver.function)

@@ -125,7 +125,7 @@ class Requests:
         """Take in a request.
 
         Args:
-            name: id of its goal.
+            name: its own among all requests: goals of two actions may have the same id.
             order: what it asks for.
             handle: its goal.
             result: makes the goal's result.

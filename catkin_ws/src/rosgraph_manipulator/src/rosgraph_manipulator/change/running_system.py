@@ -148,6 +148,11 @@ class RunningSystem:
         """Note that the launcher has deployed a configuration, and by which content of its launch file."""
         self._deployed[configuration.function] = configuration, launch
 
+    def deployed_file(self, configuration: Configuration) -> LaunchFile | None:
+        """Return the launch file by which a configuration was deployed last; None: it was not."""
+        deployed, launch = self._deployed.get(configuration.function, (None, None))
+        return launch if deployed == configuration else None
+
     def released(self, function: str) -> None:
         """Note that nothing runs for a function."""
         self._deployed.pop(function, None)

@@ -163,6 +163,9 @@ class Launchers(Protocol):
     def unconnected(self, function: str) -> str:
         """Return a launcher that should have a part of what runs for a function and has ended; empty: none has."""
 
+    def main_has_ended(self, function: str) -> bool:
+        """Tell whether this host's main launcher should have a part of what runs for a function and has ended."""
+
     def is_here(self, node: NodeDescription) -> bool:
         """Tell whether a node runs on this host, as far as is known."""
 

@@ -13,7 +13,7 @@ from typing import Any
 import rosgraph
 import rospy
 from metacontrol_msgs.msg import LaunchedFunctions
-from node_kit.io.background import in_background
+from node_kit.io.background import NoThreadError, in_background
 from node_kit.io.xml_rpc import CallError
 from node_kit.ros.connections import latest
 from rosgraph_launcher.description import NodeDescription
@@ -94,7 +94,10 @@ class LauncherReports:
                 registered = set()
             for name in registered - asked.keys():
                 asked[name] = in_background(partial(NodeApi.answer, name), ASKING)
-            silent = {name for name, answer in asked.items() if answer.done() and answer.result() is None}
+            answers = {name: answer.exception() or answer.result() for name, answer in asked.items() if answer.done()}
+            for name in [name for name, answer in answers.items() if isinstance(answer, NoThreadError)]:
+                del asked[name]  # ask again
+            silent = {name for name, answer in answers.items() if answer is None}
             with self._lock:
                 heard = set(self._known)
             waited = time.monotonic() - begun
@@ -124,6 +127,16 @@ class LauncherReports:
         connected = self._connected()
         with self._lock:
             return next((name for name in sorted(self._parts.get(function, ())) if name not in connected), "")
+
+    def main_has_ended(self, function: str) -> bool:
+        """Tell whether this host's main launcher should have a part of what runs for a function and has ended.
+
+        `_look_around` sees the ends of all others.
+        """
+        connected = self._connected()
+        with self._lock:
+            known, parts = self._known.get(self._main), self._parts.get(function, ())
+            return known is not None and known.is_here and self._main in parts and self._main not in connected
 
     def _connected(self) -> set[str]:
         return {connection.callerid_pub for connection in list(self._subscriber.impl.connections)}

@@ -20,7 +20,7 @@ from metacontrol_msgs.srv import (
     StandBy,
     StandByRequest,
 )
-from node_kit.io.background import in_background
+from node_kit.io.background import NoThreadError, in_background, start_thread
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.hosts import no_launcher
 from rosgraph_launcher.io.master import NodeApi
@@ -34,8 +34,9 @@ from rosgraph_manipulator.hosts.merging import stale
 from rosgraph_manipulator.hosts.splitting import Part, split
 from rosgraph_manipulator.ros.launcher_reports import ASKING, REPEAT_PERIOD, WATCH_PERIOD, LauncherReports
 
-_NOT_REACHED = (TransportInitError, rosgraph.MasterError)
-"""What rospy has caught when it raises a ServiceException and has sent no request: no registration, no connection."""
+_NOT_REACHED = (TransportInitError, rosgraph.MasterError, NoThreadError)
+"""How a request fails that was not sent: what rospy has caught when it raises a ServiceException (no registration, no
+connection), and no thread that asks."""
 
 _FAILURES = (rospy.ServiceException, rospy.ROSException, TransportException, OSError)
 """What a call of a launcher's service raises."""
@@ -116,14 +117,18 @@ class Launchers(LauncherReports):
         return Changed(sum(numbers.values()), phases)
 
     def stand_by(self, nodes: Iterable[NodeDescription]) -> None:
-        """Tell each launcher which nodes may be needed next, without waiting; where that fails, they start cold."""
+        """Tell each launcher which nodes may be needed next, without waiting; where that fails, they start cold.
+
+        Raises:
+            NoThreadError: not all could be told now.
+        """
         told: dict[str, list[NodeDescription]] = {}
         for node in nodes:
             name = self._find(node.machine)
             if name:
                 told.setdefault(name, []).append(node)
         for name, own in told.items():
-            in_background(partial(self._tell_expected, name, own), ASKING)
+            start_thread(partial(self._tell_expected, name, own), ASKING)
 
     def _tell_expected(self, name: str, nodes: Sequence[NodeDescription]) -> None:
         service = rospy.ServiceProxy(f"{name}/stand_by", StandBy)
@@ -203,7 +208,7 @@ class Launchers(LauncherReports):
                 answers[name] = answer = self._result(name, future)
                 if not answer.ok:
                     failures.append(answer.message if len(parts) == 1 else f"{self._host(name)}: {answer.message}")
-            except DeploymentError as error:
+            except (DeploymentError, NoThreadError) as error:
                 failures.append(str(error))
             except _FAILURES as error:
                 failures.append(f"{name.rpartition('/')[2]} has failed ({error}): check that it runs")

@@ -155,6 +155,8 @@ class Manipulator:
         while not rospy.is_shutdown():
             self._inbox.do_next(wait_s=0.2)
             if not self._inbox:
+                self._manipulation.look()
+                self._repairs.look()
                 self._standby.look()
 
     def _on_change(self, runs: bool) -> None:
@@ -162,7 +164,10 @@ class Manipulator:
         if runs:
             ask = threading.Timer(ASK_DELAY, self._executor.system.ask_for_adjustable)
             ask.daemon = True
-            ask.start()
+            try:
+                ask.start()
+            except RuntimeError as error:  # the next plan asks, then
+                rospy.logwarn("nodes are not asked for what they take by dynamic_reconfigure yet: %s", error)
         self._standby.changed()
 
     def _follow_launcher(self) -> None:

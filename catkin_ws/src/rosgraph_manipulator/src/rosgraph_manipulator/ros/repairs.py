@@ -17,7 +17,7 @@ from typing import Any
 import actionlib
 import rospy
 from metacontrol_msgs.msg import RepairAction, RepairResult
-from node_kit.io.background import in_background
+from node_kit.io.background import NoThreadError, in_background, start_thread
 from node_kit.io.inbox import Inbox
 from rosservice import ROSServiceException, get_service_type
 from std_srvs.srv import Empty, Trigger
@@ -66,6 +66,7 @@ class RepairServer:
         """
         self._repairs, self._inbox, self._executor, self._timeout = options.repairs, inbox, executor, timeout
         self._drivers = RepairedDrivers(options.drivers.values(), executor.report)
+        self._told: dict[str, str] = {}  # why a driver could not be started again, by its name
         self._under_way = RepairsUnderWay(options.repairs)
         self._lock = threading.Lock()
         self._runs: dict[str, _Run] = {}  # by the goal's id
@@ -79,12 +80,22 @@ class RepairServer:
         """Start drivers again that have ended with their launcher, and tell which ones it has given up."""
         for report in self._drivers.given_up():
             rospy.logerr("%s: %s", report.function, report.message)
-        for driver in self._drivers.lost():
-            rospy.logwarn("%s: starting it again, because the launcher has ended", driver.name)
+        self.look()
+
+    def look(self) -> None:
+        """Start drivers again that have ended with their launcher; try it again where that has failed a while ago."""
+        for driver in self._drivers.lost(time.monotonic()):
+            if self._executor.is_unconnected(driver.function):
+                continue  # a launcher that is gone would be waited for, and functions could not be changed meanwhile
             try:
                 self._start_now(driver)
+                rospy.logwarn("%s: started again, because the launcher has ended", driver.name)
+                self._told.pop(driver.name, None)
             except (DeploymentError, rospy.ROSException, OSError) as error:
-                rospy.logerr("%s: %s", driver.name, _line(error))
+                if self._told.get(driver.name) != _line(error):
+                    self._told[driver.name] = _line(error)
+                    rospy.logerr("%s: %s; it is tried again", driver.name, _line(error))
+            self._drivers.tried(driver, time.monotonic())
 
     # -- the action -----------------------------------------------------------------------------------------------
 
@@ -100,7 +111,10 @@ class RepairServer:
             handle.set_rejected(RepairResult(False, refusal), refusal)
             return
         handle.set_accepted()
-        in_background(partial(self._make, run), f"repair {component}")
+        try:
+            start_thread(partial(self._make, run), f"repair {component}")
+        except NoThreadError as error:
+            self._end(run, RepairOutcome(False, _line(error)))
 
     def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
         with self._lock:
@@ -110,19 +124,23 @@ class RepairServer:
 
     def _make(self, run: _Run) -> None:
         """Make a repair, in a thread of its own."""
-        component, outcome = run.repair.component, None
+        outcome = None
         try:
             outcome = self._start(run, run.repair.driver) if run.repair.driver else self._call(run)
         except _CancelledError:
-            rospy.loginfo("the repair of %s is cancelled", component)
-        except (DeploymentError, ROSServiceException, rospy.ServiceException) as error:
+            rospy.loginfo("the repair of %s is cancelled", run.repair.component)
+        except (DeploymentError, ROSServiceException, rospy.ServiceException, NoThreadError) as error:
             outcome = RepairOutcome(False, _line(error))
         except Exception as error:  # nobody would hear of it in this thread
             outcome = RepairOutcome(False, f"{type(error).__name__}: {_line(error)}")
-        finally:
-            with self._lock:
-                self._under_way.end(component)
-                self._runs.pop(run.handle.get_goal_id().id)
+        self._end(run, outcome)
+
+    def _end(self, run: _Run, outcome: RepairOutcome | None) -> None:
+        """End a repair, and tell how; None: it was cancelled."""
+        component = run.repair.component
+        with self._lock:
+            self._under_way.end(component)
+            self._runs.pop(run.handle.get_goal_id().id)
         if outcome is None:
             run.handle.set_canceled(RepairResult(False, "cancelled"), "cancelled")
         elif outcome.ok:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import actionlib
@@ -47,10 +48,11 @@ class RequestServer:
         """
         self._requests = Requests(options, policy, carry_out, inbox.put, threading.Lock(), none_follows)
         self.check = self._requests.check
+        self._reconfiguration = options.reconfiguration_action_name
         self._servers = [
-            ActionServer(name, kind, on_goal, self._on_cancel, auto_start=False)
+            ActionServer(name, kind, on_goal, partial(self._on_cancel, name), auto_start=False)
             for name, kind, on_goal in (
-                (options.reconfiguration_action_name, MvpReconfigurationAction, self._on_configuration),
+                (self._reconfiguration, MvpReconfigurationAction, self._on_configuration),
                 (CHANGE_FUNCTION, ChangeFunctionAction, self._on_function),
             )
         ]
@@ -62,16 +64,22 @@ class RequestServer:
 
     def _on_configuration(self, handle: actionlib.ServerGoalHandle) -> None:
         order, problem = self._requests.order_for(handle.get_goal().desired_configuration_name)
-        self._take(handle, order, problem, lambda outcome: MvpReconfigurationResult(int(outcome.result)))
+        action = self._reconfiguration
+        self._take(action, handle, order, problem, lambda outcome: MvpReconfigurationResult(int(outcome.result)))
 
     def _on_function(self, handle: actionlib.ServerGoalHandle) -> None:
         goal = handle.get_goal()
         restart = tuple(map(rospy.resolve_name, goal.restart))
         order, problem = self._requests.order_of_function(goal.function, goal.configuration, restart)
-        self._take(handle, order, problem, lambda outcome: ChangeFunctionResult(int(outcome.result), outcome.message))
+
+        def result(outcome: Outcome) -> ChangeFunctionResult:
+            return ChangeFunctionResult(int(outcome.result), outcome.message)
+
+        self._take(CHANGE_FUNCTION, handle, order, problem, result)
 
     def _take(
         self,
+        action: str,
         handle: actionlib.ServerGoalHandle,
         order: Order | None,
         problem: str,
@@ -81,7 +89,12 @@ class RequestServer:
             rospy.logerr("%s", problem)
             self._requests.refuse(handle, problem, result)
         else:
-            self._requests.take(handle.get_goal_id().id, order, handle, result)
+            self._requests.take(_request(action, handle), order, handle, result)
 
-    def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
-        self._requests.take_back(handle.get_goal_id().id)
+    def _on_cancel(self, action: str, handle: actionlib.ServerGoalHandle) -> None:
+        self._requests.take_back(_request(action, handle))
+
+
+def _request(action: str, handle: actionlib.ServerGoalHandle) -> str:
+    """Return the name of a request: ids of goals are chosen by clients, so both actions may have the same one."""
+    return f"{action} {handle.get_goal_id().id}"

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import rospy
+from node_kit.io.background import NoThreadError
 from rosgraph_launcher.description import NodeDescription
 
 from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.configuration.configurations import ManipulatorOptions
 from rosgraph_manipulator.io.launch_files import read_configuration
+from rosgraph_manipulator.ros.launcher_reports import WARN_PERIOD
 from rosgraph_manipulator.ros.launchers import Launchers
 
 
@@ -37,8 +40,11 @@ class Standby:
             self._read()
             self._is_told = False
         elif not self._is_told:
-            self._is_told = True
-            self._launchers.stand_by(self._nodes.values())
+            try:
+                self._launchers.stand_by(self._nodes.values())
+                self._is_told = True
+            except NoThreadError as error:
+                rospy.logwarn_throttle(WARN_PERIOD, f"no processes stand by for the next change: {error}")
 
     def _read(self) -> None:
         try:

@@ -12,6 +12,7 @@ from typing import Any
 
 import rospy
 from geometry_msgs.msg import Twist
+from node_kit.io.background import NoThreadError
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io.command_lines import CommandLineError, command_line
 from rosgraph_launcher.io.master import NodeApi, advertised
@@ -124,12 +125,19 @@ class RosSurroundings:
             raise DeploymentError(" ".join(str(error).split())) from error
 
     def silent(self, nodes: Collection[str]) -> set[str]:
-        """Return the nodes that do not answer, though their processes run."""
+        """Return the nodes that do not answer, though their processes run.
+
+        Raises:
+            NoThreadError: they can't be asked now.
+        """
         if not nodes:
             return set()
         with ThreadPoolExecutor(ASK_THREADS, thread_name_prefix="ask whether it hangs") as pool:
-            answers = dict(zip(nodes, pool.map(NodeApi.is_answering, nodes), strict=True))
-        return {node for node, answers_now in answers.items() if not answers_now}
+            try:
+                asked = {node: pool.submit(NodeApi.is_answering, node) for node in nodes}
+            except RuntimeError as error:
+                raise NoThreadError(error) from error
+        return {node for node, answer in asked.items() if not answer.result()}
 
     def shut_down(self, node: str, reason: str) -> bool:
         """Ask a node to end; return whether it has answered."""

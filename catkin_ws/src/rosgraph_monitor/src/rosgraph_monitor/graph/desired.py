@@ -70,25 +70,27 @@ class Desired:
 
 
 class DesiredModel:
-    """Follows the active configuration. A variant that can't be read leaves the last good model in force."""
+    """Follows the active configuration. A deployed variant that can't be read leaves the last good model in force."""
 
     def __init__(
         self,
         base: RosSystem | None,
         read_variant: Callable[[str], RosSystem],
-        read_all: Callable[[], Iterable[RosSystem]] = tuple,
+        read_all: Callable[[], Iterable[RosSystem | ModelError]] = tuple,
     ) -> None:
         """Start from the base alone: as long as nobody tells what is deployed, all of it should run.
 
         Args:
             base: the base system, or None to desire nothing in particular.
             read_variant: reads the variant of a name; raises ModelError.
-            read_all: reads all variants: a component that one of them has belongs to a function.
+            read_all: reads all variants: a component that one of them has belongs to a function. Gives an error in the
+                place of each that can't be read, and is called again until there are no errors.
         """
         self._base = base
         self._read = read_variant
         self._read_all = read_all
-        self._of_functions: tuple[Component, ...] | None = None
+        self._of_functions: tuple[Component, ...] = ()
+        self._is_all_read: bool | None = None  # None: nothing was read so far
         self._variants: dict[str, RosSystem] = {}
         self._stable: dict[str, str] = {}
         self._groundings: tuple[Grounding, ...] = ()
@@ -112,12 +114,13 @@ class DesiredModel:
 
     def look_again(self) -> Desired:
         """Try again to read what could not be read, and return what should run now."""
-        return self.follow(self._groundings) if self.current.problem else self.current
+        is_more_known = self._is_all_read is False and self._look_at_functions()
+        return self.follow(self._groundings) if self.current.problem or is_more_known else self.current
 
     def _with_system(self, desired: Desired, base: RosSystem, active: Sequence[RosSystem]) -> Desired:
         """Return what should run, with the base composed with the active variants, and without what is idle."""
-        if self._of_functions is None:
-            self._of_functions = tuple(c for variant in self._read_all() for c in variant.components)
+        if not self._is_all_read:
+            self._look_at_functions()
         idle = {c.name for c in self._of_functions} - {c.name for variant in active for c in variant.components}
         system = reduce(compose, active, _without(base, idle))
         return replace(
@@ -126,6 +129,13 @@ class DesiredModel:
             idle=tuple(component for component in base.components if component.name in idle),
             idle_topics=_published(self._of_functions) - _published(system.components),
         )
+
+    def _look_at_functions(self) -> bool:
+        """Read what belongs to functions. Return whether that is other than before."""
+        before, found = self._of_functions, tuple(self._read_all())
+        self._of_functions = tuple(c for variant in found if isinstance(variant, RosSystem) for c in variant.components)
+        self._is_all_read = all(isinstance(variant, RosSystem) for variant in found)
+        return self._of_functions != before
 
     def _names(self, grounding: Grounding) -> list[str]:
         """Return the configurations between which a function changes."""

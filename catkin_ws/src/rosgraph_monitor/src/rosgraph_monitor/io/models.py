@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 from ros_model.errors import ModelError
@@ -13,8 +14,11 @@ from rosgraph_monitor.graph.desired import DesiredModel
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     from ros_model.language.metamodel import RosSystem
+
+_EXTENSION = ".rossystem"
 
 
 def desired_model(base: str, variants: str, warn: Callable[[str], None]) -> DesiredModel:
@@ -23,7 +27,7 @@ def desired_model(base: str, variants: str, warn: Callable[[str], None]) -> Desi
     Args:
         base: path of the base system, or `package://PACKAGE/path`; empty: none.
         variants: folder with NAME.rossystem of each configuration, written likewise; empty: none.
-        warn: is told of a variant that can't be read; that is a problem only when it is deployed.
+        warn: is told, once, of a variant that can't be read; that is a problem only when it is deployed.
 
     Raises:
         ModelError: the base can't be read.
@@ -32,13 +36,53 @@ def desired_model(base: str, variants: str, warn: Callable[[str], None]) -> Desi
     def read(name: str) -> RosSystem:
         if not variants:
             raise ModelError(f"configuration {name!r}: set ~variants to the folder of the variants' models")
-        return read_system(resolve(variants) / f"{safe_file_name(name, 'configuration')}.rossystem")
+        return read_system(resolve(variants) / f"{safe_file_name(name, 'configuration')}{_EXTENSION}")
 
-    def read_all() -> Iterator[RosSystem]:
-        for path in sorted(resolve(variants).glob("*.rossystem")) if variants else ():
-            try:
-                yield read_system(path)
-            except ModelError as error:
-                warn(f"left out, so nodes that only this variant has count as the base's: {error}")
-
+    read_all = _Variants(variants, warn).read if variants else tuple
     return DesiredModel(read_system(resolve(base)) if base else None, read, read_all)
+
+
+class _Variants:
+    """All models of a folder. A model is read until that succeeds once."""
+
+    def __init__(self, folder: str, warn: Callable[[str], None]) -> None:
+        self._folder, self._warn = folder, warn
+        self._known: dict[Path, RosSystem] = {}
+        self._told: set[str] = set()
+
+    def read(self) -> Iterator[RosSystem | ModelError]:
+        """Give each model, or in its place the error with which it can't be read."""
+        try:
+            paths = _models_in(resolve(self._folder))
+        except ModelError as error:
+            yield from self._known.values()
+            yield self._tell(error)
+            return
+        for path in paths:
+            try:
+                if path not in self._known:
+                    self._known[path] = read_system(path)
+            except ModelError as error:
+                yield self._tell(error)
+            else:
+                yield self._known[path]
+
+    def _tell(self, error: ModelError) -> ModelError:
+        if str(error) not in self._told:
+            self._told.add(str(error))
+            self._warn(f"left out for now, so nodes that only this variant has count as the base's: {error}")
+        return error
+
+
+def _models_in(folder: Path) -> list[Path]:
+    """Return the models in a folder; one that is not there has none.
+
+    Raises:
+        ModelError: the folder can't be listed.
+    """
+    try:
+        return [folder / name for name in sorted(os.listdir(folder)) if name.endswith(_EXTENSION)]
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise ModelError(f"{folder}: can't be listed ({error.strerror or error})") from error

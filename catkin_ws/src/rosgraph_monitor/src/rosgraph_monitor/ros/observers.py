@@ -41,14 +41,19 @@ _BASE = "Observer"
 
 
 class ObserverHost:
-    """Loads, runs and unloads observers, and offers the four services. A failing observer never stops another."""
+    """Loads, runs and unloads observers, and offers the four services. A failing observer never stops another.
+
+    A plug-in may never return: no code of one runs while `_lock` is held, for which the monitor's main loop waits.
+    """
 
     def __init__(self, diagnostics: DiagnosticsTopic) -> None:
         """Publish statuses on this topic."""
         self._diagnostics = diagnostics
         self._runners: dict[str, _Runner] = {}
         self._system: RosSystem | None = None
-        self._lock = threading.RLock()
+        self._lock = threading.Lock()
+        self._loading: set[str] = set()
+        self._turn = threading.Lock()
         self._services = (
             rospy.Service("load_observer", LoadObserver, lambda r: LoadObserverResponse(self.load(r.name))),
             rospy.Service("unload_observer", UnloadObserver, lambda r: UnloadObserverResponse(self.unload(r.name))),
@@ -59,20 +64,21 @@ class ObserverHost:
     def load(self, name: str) -> bool:
         """Start an observer. Return False, with a line that says why, if that fails or the observer runs already."""
         with self._lock:
-            if name in self._runners:
-                rospy.logwarn("observer %s runs already", name)
+            if name in self._runners or name in self._loading:
+                rospy.logwarn("observer %s %s already", name, "runs" if name in self._runners else "is being loaded")
                 return False
-            try:
-                observer = plugins.make(name)
-                observer.configure(rospy.get_param(f"~{observer.name}", {}))
-                observer.follow(self._system)
-                self._runners[name] = _Runner(observer, self._diagnostics)
-            except plugins.PluginError as error:
-                rospy.logerr("%s", error)
-                return False
-            except (Exception, SystemExit) as error:  # a plug-in is somebody else's code
-                rospy.logerr("observer %s can't start: %s: %s", name, type(error).__name__, error)
-                return False
+            self._loading.add(name)
+        try:
+            observer = self._start(name)
+        except plugins.PluginError as error:
+            rospy.logerr("%s", error)
+            return False
+        except (Exception, SystemExit) as error:  # a plug-in is somebody else's code
+            rospy.logerr("observer %s can't start: %s: %s", name, type(error).__name__, error)
+            return False
+        finally:
+            with self._lock:
+                self._loading.discard(name)
         rospy.loginfo("observer %s at %g Hz", name, observer.rate_hz)
         return True
 
@@ -104,6 +110,29 @@ class ObserverHost:
             if lasted:
                 runner.say_stale(f"observer hangs: its evaluation has been going on for {lasted:.0f} s")
         return len(runners)
+
+    def _start(self, name: str) -> Observer:
+        """Make, configure and run the observer whose name is reserved.
+
+        Raises:
+            PluginError: there is none, it can't be made, or another one is being made for long.
+            Exception: as its code does.
+        """
+        if not self._turn.acquire(timeout=_PATIENCE):  # importing one gives it modules that another must not see
+            raise plugins.PluginError(f"observer {name} is not loaded: another observer is still being loaded")
+        try:
+            observer = plugins.make(name)
+        finally:
+            self._turn.release()
+        observer.configure(rospy.get_param(f"~{observer.name}", {}))
+        system = self._system
+        observer.follow(system)
+        runner = _Runner(observer, self._diagnostics)
+        with self._lock:
+            self._runners[name] = runner
+            if self._system is not system:
+                runner.follow(self._system)
+        return observer
 
     def _active(self) -> ListObserversResponse:
         with self._lock:
