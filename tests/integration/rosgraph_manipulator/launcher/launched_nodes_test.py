@@ -17,7 +17,7 @@ import rospy
 import rostest
 from helpers.waiting import DEADLINE_S, wait_for
 from integration.rosgraph_manipulator.manipulator_harness import PairTest, is_alive, pid_of
-from rosgraph_launcher.io.processes import MARK
+from rosgraph_launcher.io.processes import MARK, OWNER
 from rosgraph_launcher.io.warm_start.sitecustomize import SETTING
 
 DATA = Path(__file__).resolve().parent / "data"
@@ -28,7 +28,7 @@ ALL = (
     *("/cpp/manager", "/cpp/counter"),
 )
 SCRIPT = "launched_script.sh"
-OF_THE_CALLER = {"_", "SHLVL", "PWD", "OLDPWD", "ROS_LOG_FILENAME", MARK}
+OF_THE_CALLER = {"_", "SHLVL", "PWD", "OLDPWD", "ROS_LOG_FILENAME", MARK, OWNER}
 """Variables that tell of who starts a node: the shell script rosrun starts the launcher."""
 TAKEN_BACK = {"PYTHONPATH", SETTING}
 """Variables that a prepared process takes back before its script begins; from outside, the former ones are seen."""

@@ -3,17 +3,20 @@
 import os
 import signal
 import socket
+import subprocess
+import threading
 from dataclasses import replace
 
 import psutil
 import pytest
 from helpers.ports import QUIET_HOST
 from helpers.waiting import wait_for
-from rosgraph_launcher.io import processes
+from rosgraph_launcher.io import node_processes, processes
 from rosgraph_launcher.io.master import NodeApi
 from rosgraph_launcher.io.node_processes import MOST_LOST_WARM, NodeProcesses
-from rosgraph_launcher.io.processes import Command
+from rosgraph_launcher.io.processes import OWNER, Command
 from rosgraph_launcher.launching.options import LauncherOptions
+from rosgraph_launcher.launching.ownership import Answer, ProcessFacts
 
 
 @pytest.fixture
@@ -169,3 +172,88 @@ def test_system_that_refuses_a_process_that_stands_by_is_asked_only_so_often(nod
     for _ in range(MOST_LOST_WARM + 2):
         assert not nodes.stand_by(begun[:1], may_start=True)
     assert said == ["no process stands by: no memory"] * MOST_LOST_WARM
+
+
+def stop(process):
+    process.signal(signal.SIGSTOP)
+    wait_for(lambda: process.is_stopped, "it is stopped")
+
+
+def test_process_that_stands_by_and_is_stopped_is_not_taken(nodes, prepared, begun, command):
+    nodes.stand_by(begun[:1], may_start=True)
+    stop(prepared[0])
+    taken = nodes.prepare(command("a"))
+    assert prepared[0].status == -signal.SIGKILL
+    assert taken is prepared[1]
+    nodes.discard(taken)
+
+
+def test_prepared_process_that_is_stopped_is_not_begun(nodes, command, said):
+    process = nodes.prepare(command("a"))
+    stop(process)
+    nodes.begin("/a", command("a"), process)
+    assert process.status == -signal.SIGKILL
+    assert nodes._running["/a"] is not process
+    assert said == ["node /a starts without imports in advance: the process that stood by is stopped"]
+
+
+@pytest.fixture
+def no_thread(monkeypatch):
+    """Have the next thread not start."""
+    usual, left = threading.Thread.start, ["can't start new thread"]
+
+    def start(thread):
+        if left:
+            raise RuntimeError(left.pop())
+        usual(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    return left
+
+
+def test_node_gets_sigint_where_there_is_no_thread_to_ask_it(nodes, command, said, no_thread):
+    nodes.begin("/n", replace(command("n"), words=("/bin/sleep", "1000")), None)
+    (process,) = nodes._running.values()
+    nodes.ask_to_end(["/n"])
+    assert not no_thread
+    wait_for(lambda: process.status == -signal.SIGINT, "it has ended")
+    assert said == ["node /n is ended by SIGINT: can't start new thread"]
+
+
+def test_close_leaves_the_processes_of_a_successor_alone(nodes, command, begun):
+    environment = command("a").environment
+    successor = subprocess.Popen(["sleep", "1000"], env={**environment, OWNER: "1@2.5"})
+    own = list(nodes._running.values())
+    try:
+        wait_for(lambda: psutil.Process(successor.pid).environ().get(OWNER) == "1@2.5", "it runs")
+        nodes.close()
+        assert successor.poll() is None
+        assert all(process.popen.wait() is not None for process in own)
+    finally:
+        successor.kill()
+        successor.wait()
+
+
+def test_close_leaves_the_rest_to_the_reaper_while_no_descriptor_is_left(nodes, monkeypatch, said):
+    def refuse(*_):
+        raise OSError("Too many open files")
+
+    with monkeypatch.context() as moment:
+        moment.setattr(processes, "kill_marked", refuse)
+        nodes.close()
+    assert nodes._reaper.poll() is None
+
+
+@pytest.mark.parametrize(("launcher", "is_asked"), [("1@2.5", False), ("", True)])
+def test_node_of_a_successor_is_not_asked_to_end(nodes, command, monkeypatch, launcher, is_asked):
+    asked = []
+    mark = command("a").environment[processes.MARK]
+    found = Answer(True, True, (ProcessFacts(1, "node", mark, launcher),), "http://localhost:1/")
+    monkeypatch.setattr(NodeApi, "address", lambda _name: found.address)
+    monkeypatch.setattr(NodeApi, "ask_pid", lambda _uri: 1)
+    monkeypatch.setattr(NodeApi, "request_shutdown", lambda name, _reason: asked.append(name) or True)
+    monkeypatch.setattr(node_processes, "look_up", lambda _name: found)
+    nodes.begin("/a", replace(command("a"), words=("/bin/true",)), None)
+    (process,) = nodes._running.values()
+    nodes._ask_to_end("/a", process)
+    assert asked == (["/a"] if is_asked else [])

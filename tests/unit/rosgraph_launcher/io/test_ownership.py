@@ -1,5 +1,6 @@
 """Looking up, with real processes, who answers under a node's name."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -8,7 +9,7 @@ from io import BytesIO
 import pytest
 from metacontrol_msgs.msg import LaunchedFunctions
 from rosgraph_launcher.io import ownership
-from rosgraph_launcher.io.processes import MARK
+from rosgraph_launcher.io.processes import MARK, OWNER
 from rosgraph_launcher.launching.ownership import Owner
 from rosgraph_launcher.launching.report import LauncherReport
 from rosgraph_launcher.ros.node_messages import report_message
@@ -94,3 +95,34 @@ def test_process_that_does_not_serve_the_port_cannot_be_compared(answer, serve):
 def test_process_of_another_host_cannot_be_compared(answer, address):
     answer(address, os.getpid())
     assert owner() is Owner.UNKNOWN
+
+
+@pytest.mark.parametrize("pid", [-1, 2**31 - 1])
+def test_number_that_is_no_process_cannot_be_compared(answer, pid):
+    answer("http://localhost:1234/", pid)
+    found = ownership.look_up("/n")
+    assert (found.answers, found.address, found.lineage) == (True, "http://localhost:1234/", ())
+    assert owner() is Owner.UNKNOWN
+
+
+@pytest.mark.parametrize("call", ["environ", "parent", "net_connections"])
+def test_process_is_unknown_while_no_descriptor_is_left(answer, serve, monkeypatch, call):
+    def refuse(*_):
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    port, pid = serve(SERVES, "" if call != "environ" else LAUNCHER)
+    answer(f"http://localhost:{port}/", pid)
+    if call == "net_connections" and not hasattr(ownership.psutil.Process, call):
+        call = "connections"
+    monkeypatch.setattr(ownership.psutil.Process, call, refuse)
+    assert owner() is Owner.UNKNOWN
+    monkeypatch.undo()
+
+
+def test_process_names_the_launcher_that_started_it(answer, serve, monkeypatch):
+    monkeypatch.setenv(OWNER, "7@1.5")
+    port, pid = serve(SERVES, LAUNCHER)
+    answer(f"http://localhost:{port}/", pid)
+    found = ownership.look_up("/n")
+    assert found.may_be_of(LAUNCHER, "7@1.5")
+    assert not found.may_be_of(LAUNCHER, "8@1.5")

@@ -11,7 +11,7 @@ import psutil
 import pytest
 from helpers.waiting import DEADLINE_S, wait_for
 from rosgraph_launcher.io import processes
-from rosgraph_launcher.io.processes import MARK, Command, StartError
+from rosgraph_launcher.io.processes import MARK, OWNER, Command, StartError
 
 
 def is_alive(pid):
@@ -182,7 +182,7 @@ class Unkillable:
         self.pid, self.kills = pid, 0
 
     def environ(self):
-        return {MARK: "mark"}
+        return {MARK: "mark", OWNER: "7@1.5"}
 
     def status(self):
         return psutil.STATUS_DISK_SLEEP
@@ -200,13 +200,13 @@ def test_reaper_looks_for_children_again_and_does_not_wait_for_what_cannot_be_ki
     held, child = Unkillable(-1), Unkillable(-2)
     seen = iter([[held], [held, child], [held, child]])  # a further look would raise StopIteration
     monkeypatch.setattr(processes.psutil, "process_iter", lambda: next(seen))
-    monkeypatch.setattr(sys, "argv", ["reaper", str(owner.pid), "mark"])
+    monkeypatch.setattr(sys, "argv", ["reaper", str(owner.pid), "mark", "7@1.5"])
     processes.main()
     assert held.kills and child.kills
     assert next(seen, None) is None
 
 
-OWNER = """
+OWNER_SCRIPT = """
 import os, sys, time
 from rosgraph_launcher.io import processes
 from rosgraph_launcher.io.processes import Command, MARK
@@ -220,7 +220,7 @@ time.sleep(1000)
 
 def test_nothing_outlives_an_owner_that_is_killed(command, tmp_path):
     node = command("setsid sleep 1000 & echo $! > child; wait", python=False)
-    owner = subprocess.Popen([sys.executable, "-c", OWNER, node.words[0], str(tmp_path)], stdout=subprocess.PIPE)
+    owner = subprocess.Popen([sys.executable, "-c", OWNER_SCRIPT, node.words[0], str(tmp_path)], stdout=subprocess.PIPE)
     pid = int(owner.stdout.readline())
     # the node's folder is /, so the child's id is looked up
     wait_for(lambda: psutil.Process(pid).children(), "the child runs")
@@ -230,6 +230,46 @@ def test_nothing_outlives_an_owner_that_is_killed(command, tmp_path):
     owner.stdout.close()
     wait_for(lambda: not is_alive(pid), "the node has ended")
     wait_for(lambda: not is_alive(child), "its child in another session has ended")
+
+
+@pytest.fixture
+def owner(command, tmp_path):
+    """Start an owner with the one mark; return its process and the id of its node."""
+    started = []
+
+    def begin():
+        node = command("exec sleep 1000", python=False).words[0]
+        process = subprocess.Popen([sys.executable, "-c", OWNER_SCRIPT, node, str(tmp_path)], stdout=subprocess.PIPE)
+        started.append(process)
+        return process, int(process.stdout.readline())
+
+    yield begin
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def test_owner_that_is_killed_takes_nothing_of_its_successor_along(owner):
+    (first, of_first), (_second, of_second) = owner(), owner()
+    reaper = next(child for child in psutil.Process(first.pid).children() if child.pid != of_first)
+    first.kill()
+    first.wait()
+    wait_for(lambda: not is_alive(of_first), "the node of the first one has ended")
+    wait_for(lambda: not is_alive(reaper.pid), "its reaper has done its work")
+    assert is_alive(of_second)
+
+
+def test_process_names_its_owner_also_where_it_was_prepared(command):
+    for process in (processes.start(command("exec sleep 1000", python=False)), processes.prepare(command("pass\n"))):
+        environment = psutil.Process(process.pid).environ()
+        assert environment[MARK]
+        assert environment[OWNER] == processes.owner_id(os.getpid())
+        process.close()
+
+
+def test_word_with_a_null_character_is_told(command):
+    with pytest.raises(StartError, match="node: embedded null byte"):
+        processes.start(command("exit 0", "a\0b", python=False))
 
 
 def test_what_an_earlier_owner_left_is_killed_and_nothing_else(tmp_path):

@@ -1,9 +1,11 @@
 """What processes use, as it is read."""
 
+import errno
 import os
 import subprocess
 import sys
 
+from rosgraph_launcher.io import usage
 from rosgraph_launcher.io.usage import read_sample
 
 
@@ -21,3 +23,11 @@ def test_process_that_has_ended_and_number_of_none_are_left_out():
     child.wait()
     assert read_sample(child.pid) is None
     assert read_sample(-1) is None
+
+
+def test_process_is_left_out_while_no_descriptor_is_left(monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    monkeypatch.setattr(usage.psutil.Process, "create_time", refuse)
+    assert read_sample(os.getpid()) is None

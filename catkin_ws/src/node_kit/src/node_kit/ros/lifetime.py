@@ -25,6 +25,7 @@ from node_kit.master import View
 from node_kit.ros.connections import connect_to_all
 from node_kit.ros.handshakes import greet_apart
 from node_kit.ros.quick_start import quick_start
+from node_kit.ros.rosout_parameter import read_rosout_parameter
 
 BAD_START = 2
 """Exit status of a start that failed. The loss of the master ends a node with 0: it has done all it could."""
@@ -101,6 +102,7 @@ class Lifetime:
             connect_to_all()
             with quick_start():
                 rospy.init_node(self._name, anonymous=anonymous, disable_signals=True)
+            read_rosout_parameter()
             forgive()
             greet_apart()
         except (CallError, OSError, rospy.ROSInitException) as error:

@@ -43,7 +43,8 @@ class NodeCommands:
         if folder:
             words.append(f"__log:={folder}/{file_name}.log")
             log = f"{folder}/{file_name}-stdout.log" if node.output != "screen" else None
-        cwd = {"node": os.path.dirname(words[prefixed]), "cwd": os.getcwd()}.get(node.cwd or "", rospkg.get_ros_home())
+        # roslaunch knows no other value than "node" and "ROS_HOME". The launcher's own folder may be gone.
+        cwd = os.path.dirname(words[prefixed]) if node.cwd == "node" else rospkg.get_ros_home()
         environment = process_environment(node, {**os.environ, MARK: self._mark})
         safe = safe_imports(node.package)
         return Command(tuple(words), cwd, environment, log, prefixed=bool(prefixed), safe_imports=safe)

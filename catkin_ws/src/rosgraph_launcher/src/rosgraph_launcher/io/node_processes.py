@@ -5,6 +5,7 @@ For one thread only: the main thread of the node rosgraph_launcher.
 
 from __future__ import annotations
 
+import os
 import signal
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -39,6 +40,7 @@ class NodeProcesses:
         """
         self._options = options
         self._log = log
+        self._id = processes.owner_id(os.getpid())
         self._running: dict[str, Process] = {}
         self._commands: dict[str, Command] = {}  # by which each node was begun last
         self._hanging: set[str] = set()  # nodes that do not answer the request to end
@@ -77,6 +79,10 @@ class NodeProcesses:
             StartError: the system refuses.
         """
         process = prepared
+        if process is not None and process.is_stopped:
+            self._log(f"node {name} starts without imports in advance: the process that stood by is stopped")
+            self.discard(process)
+            process = None
         if process is not None:
             try:
                 process.begin()
@@ -114,13 +120,21 @@ class NodeProcesses:
         self.discard(process)
 
     def ask_to_end(self, names: Iterable[str]) -> None:
-        """Ask nodes to end over their own API, side by side, so that one that hangs does not delay the others."""
+        """Ask nodes to end over their own API, side by side, so that one that hangs does not delay the others.
+
+        Where the system has no thread for that, they get SIGINT.
+        """
         asked = {name: self._running[name] for name in names if name in self._running}
         if not asked:
             return
         pool = ThreadPoolExecutor(ASK_THREADS, thread_name_prefix="ask to end")
         for name, process in asked.items():
-            pool.submit(self._ask_to_end, name, process)
+            try:
+                pool.submit(self._ask_to_end, name, process)
+            except RuntimeError as error:
+                self._log(f"node {name} is ended by SIGINT: {error}")
+                if process.status is None:
+                    process.signal(signal.SIGINT)
         pool.shutdown(wait=False)
 
     def end(self, names: Iterable[str], forget: Collection[str] = (), patience: bool = True) -> None:
@@ -165,7 +179,7 @@ class NodeProcesses:
             self._hanging.add(name)
         except CallError:
             pid = None
-        is_other = pid is None or (pid != process.pid and not look_up(name).is_up(self._options.mark))
+        is_other = pid is None or (pid != process.pid and not look_up(name).may_be_of(self._options.mark, self._id))
         if (is_other or not NodeApi.request_shutdown(name, REASON)) and process.status is None:
             process.signal(signal.SIGINT)
 
@@ -223,9 +237,13 @@ class NodeProcesses:
 
     def close(self) -> None:
         """Kill what is left of all that was started; the launcher ends."""
+        try:
+            processes.kill_marked(self._options.mark, self._id)
+        except OSError as error:
+            self._log(f"processes of nodes may be left, which end with the launcher: {error}")
+            return  # the reaper does it
         self._reaper.kill()
         self._reaper.wait()
-        processes.kill_marked(self._options.mark)
 
     def _prepare_warm(self, kind: tuple[Any, ...], command: Command) -> bool:
         try:
@@ -240,8 +258,8 @@ class NodeProcesses:
 
     def _take_warm(self, command: Command) -> Process | None:
         process = self._warm.pop(_kind(command), None)
-        if process is not None and process.status is not None:
-            self.discard(process)
+        if process is not None and (process.status is not None or process.is_stopped):
+            self.discard(process)  # one that is stopped would stand still as the node, too
             return None
         return process
 

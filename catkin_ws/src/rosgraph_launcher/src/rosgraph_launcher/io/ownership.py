@@ -11,7 +11,7 @@ import psutil
 import rosgraph
 
 from rosgraph_launcher.io.master import NodeApi
-from rosgraph_launcher.io.processes import MARK
+from rosgraph_launcher.io.processes import MARK, OWNER
 from rosgraph_launcher.io.this_host import resolved
 from rosgraph_launcher.launching.ownership import Answer, ProcessFacts
 
@@ -23,14 +23,16 @@ def look_up(node: str) -> Answer:
         return Answer()
     address, pid = found
     parts = urlsplit(address)
-    if not is_this_host(parts.hostname or ""):
-        return Answer(answers=True, address=address)
+    unknown = Answer(answers=True, address=address)
     try:
+        if not is_this_host(parts.hostname or ""):
+            return unknown
         process = psutil.Process(pid)
         lineage = _lineage(process)
-    except psutil.Error:  # it has ended, or it has another number here than in its container
-        return Answer(answers=True, address=address)
-    return Answer(True, bool(lineage[-1].mark) or _may_serve(process, parts.port), lineage, address)
+        return Answer(True, bool(lineage[-1].mark) or _may_serve(process, parts.port), lineage, address)
+    except (psutil.Error, OSError, ValueError):
+        # It has ended, it has another number here than in its container, that number is none, or no descriptor is left.
+        return unknown
 
 
 def launcher_mark(name: str) -> str:
@@ -69,10 +71,11 @@ def _lineage(process: psutil.Process) -> tuple[ProcessFacts, ...]:
 
 
 def _facts(process: psutil.Process) -> ProcessFacts:
-    mark = ""
-    with contextlib.suppress(psutil.Error, OSError):
-        mark = process.environ().get(MARK, "")
-    return ProcessFacts(process.pid, " ".join(command_words(process)), mark)
+    environment = {}
+    with contextlib.suppress(psutil.Error):  # no OSError: a process of ours must not seem to be without the mark
+        environment = process.environ()
+    command = " ".join(command_words(process))
+    return ProcessFacts(process.pid, command, environment.get(MARK, ""), environment.get(OWNER, ""))
 
 
 def _may_serve(process: psutil.Process, port: int | None) -> bool:

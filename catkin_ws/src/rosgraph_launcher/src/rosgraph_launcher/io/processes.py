@@ -3,13 +3,15 @@
 Three things keep a dying owner from leaving processes behind:
 
 - The kernel kills the nodes (parent-death signal).
-- A reaper process kills all that carry the owner's mark in their environment, also the children of nodes.
-- An owner that starts kills what an earlier owner with the same mark left.
+- A reaper process kills all that the owner started, also the children of nodes: their environment says so.
+- An owner that starts kills what an earlier owner with the same mark left. Nobody else kills by the mark alone: an
+  owner that hangs may have a successor with the same mark.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import re
 import select
@@ -30,6 +32,9 @@ from rosgraph_launcher.io.warm_start.sitecustomize import SETTING
 
 MARK = "MROS_LAUNCHER"
 """Environment variable of every process that a launcher starts; its value names the launcher and its master."""
+
+OWNER = "MROS_LAUNCHER_OWNER"
+"""Environment variable beside it; its value names the process of the launcher, see `owner_id`."""
 
 DIE_WITH_OWNER = ("/usr/bin/setpriv", "--pdeathsig", "KILL", "--")
 """From util-linux, which every Debian has. The kernel sends the signal when the *thread* ends that started the process,
@@ -111,7 +116,7 @@ class Process:
     @property
     def is_stopped(self) -> bool:
         """Whether a signal has stopped it (SIGSTOP, SIGTSTP), so that it heeds nothing but SIGCONT and SIGKILL."""
-        with contextlib.suppress(psutil.Error):
+        with contextlib.suppress(psutil.Error, OSError):
             return psutil.Process(self.pid).status() == psutil.STATUS_STOPPED
         return False
 
@@ -202,21 +207,21 @@ def prepare(command: Command) -> Process | None:
 def _start(command: Command, environment: Mapping[str, str], pass_fds: tuple[int, ...] = ()) -> Process:
     log = None
     if command.log:
-        with contextlib.suppress(OSError):  # a full disk must not keep a robot from driving
+        with contextlib.suppress(OSError, ValueError):  # a full disk must not keep a robot from driving
             log = open(command.log, "ab")  # noqa: SIM115
     try:
         os.makedirs(command.cwd, exist_ok=True)
         popen = subprocess.Popen(
             (*DIE_WITH_OWNER, *command.words),
             cwd=command.cwd,
-            env=dict(environment),
+            env={**environment, OWNER: owner_id(os.getpid())},
             stdin=subprocess.DEVNULL,
             stdout=log,
             start_new_session=True,
             pass_fds=pass_fds,
         )
-    except OSError as error:
-        raise StartError(f"{command.words[0]}: {error.strerror or error}") from error
+    except (OSError, ValueError) as error:  # ValueError: a word has a null character
+        raise StartError(f"{command.words[0]}: {getattr(error, 'strerror', '') or error}") from error
     finally:
         if log:
             log.close()
@@ -261,28 +266,45 @@ def close_all(processes: Sequence[Process]) -> list[Process]:
     return [process for process in processes if process.status is None]
 
 
-def kill_marked(mark: str) -> list[tuple[int, float]]:
-    """Kill every process with this mark in its environment; return the id and the start of each."""
+@functools.lru_cache(maxsize=1)
+def owner_id(pid: int) -> str:
+    """Return what names a process among all that were started since the host was: its id and its start."""
+    return f"{pid}@{psutil.Process(pid).create_time()!r}"
+
+
+def kill_marked(mark: str, owner: str = "") -> list[tuple[int, float]]:
+    """Kill every process with this mark in its environment; return the id and the start of each.
+
+    Args:
+        mark: names the launcher and its master.
+        owner: kill only what this one has started; empty: kill all.
+
+    Raises:
+        OSError: the system has no descriptor for looking at the processes.
+    """
     killed = []
     for process in psutil.process_iter():
         if process.pid == os.getpid():
             continue
         with contextlib.suppress(psutil.Error, OSError):
-            if process.environ().get(MARK) == mark and process.status() != psutil.STATUS_ZOMBIE:
+            environment = process.environ()
+            if environment.get(MARK) != mark or (owner and environment.get(OWNER) != owner):
+                continue
+            if process.status() != psutil.STATUS_ZOMBIE:
                 process.kill()
                 killed.append((process.pid, process.create_time()))
     return killed
 
 
 def start_reaper(mark: str) -> subprocess.Popen[bytes]:
-    """Start the reaper: it waits until this process has ended, and then kills every process with the mark."""
-    return subprocess.Popen(
-        [sys.executable, "-m", __name__, str(os.getpid()), mark], start_new_session=True, stdin=subprocess.DEVNULL
-    )
+    """Start the reaper: it waits until this process has ended, and then kills what it started with the mark."""
+    pid = os.getpid()
+    words = [sys.executable, "-m", __name__, str(pid), mark, owner_id(pid)]
+    return subprocess.Popen(words, start_new_session=True, stdin=subprocess.DEVNULL)
 
 
 def main() -> None:
-    """Wait until process argv[1] has ended, then kill every process with the mark argv[2].
+    """Wait until process argv[1] has ended, then kill every process with the mark argv[2] and the owner argv[3].
 
     Again and again while there are others than before, which a dying process may have started. What was killed and
     stays is not waited for: the kernel may hold it for long, and a new launcher has nodes of the same mark.
@@ -290,7 +312,7 @@ def main() -> None:
     with contextlib.suppress(ProcessLookupError):
         select.select([open_pidfd(int(sys.argv[1]))], [], [])
     killed: set[tuple[int, float]] = set()
-    while not killed.issuperset(found := kill_marked(sys.argv[2])):
+    while not killed.issuperset(found := kill_marked(*sys.argv[2:4])):
         killed.update(found)
         time.sleep(0.05)
 

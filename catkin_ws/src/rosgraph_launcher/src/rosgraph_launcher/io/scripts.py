@@ -28,7 +28,7 @@ def script_is_at_work(node: NodeDescription, mark: str) -> bool:
     if not path:
         return False
     name = f"__name:={node.name.rpartition('/')[2]}"
-    for process in psutil.process_iter():
+    for process in _all_processes():
         with contextlib.suppress(psutil.Error, OSError):
             words = process.cmdline()
             if path in words and name in words:
@@ -37,6 +37,13 @@ def script_is_at_work(node: NodeDescription, mark: str) -> bool:
                 if same_launcher(environment.get(MARK, ""), mark) and namespace == node.namespace.strip("/"):
                     return _look_at(process).is_at_work()
     return False
+
+
+def _all_processes() -> list[psutil.Process]:
+    """Return the processes of this host; none where the system has no descriptor for looking at them."""
+    with contextlib.suppress(OSError):
+        return list(psutil.process_iter())
+    return []
 
 
 def _look_at(process: psutil.Process) -> ScriptProcess:
@@ -57,14 +64,22 @@ def _has_sockets(pid: int) -> bool:
     return False
 
 
-@functools.lru_cache(maxsize=None)
 def _shell_script(package: str, executable: str) -> str:
     """Return the path of an executable that is a shell script; empty for any other one."""
+    with contextlib.suppress(CommandLineError, OSError):
+        return _read_script(package, executable)
+    return ""
+
+
+@functools.lru_cache(maxsize=None)
+def _read_script(package: str, executable: str) -> str:
+    """Do the same, once for all. An error is not kept: descriptors may be lacking for a moment only."""
+    path = command_line(NodeDescription("/any", "/", package, executable))[0][0]
+    with open(path, "rb") as file:
+        line = file.readline(256)
     try:
-        path = command_line(NodeDescription("/any", "/", package, executable))[0][0]
-        with open(path, "rb") as file:
-            first = file.readline(256).decode()
-    except (CommandLineError, OSError, ValueError):
+        first = line.decode()
+    except ValueError:
         return ""
     words = first[2:].split() if first.startswith("#!") else []
     return path if any(os.path.basename(word) in SHELLS for word in words) else ""

@@ -31,11 +31,13 @@ class ProcessFacts:
         pid: its id.
         command: its command line.
         mark: the launcher's mark in its environment; empty: it has none, or may not be read.
+        launcher: names the process of the launcher that started it; empty in the same cases.
     """
 
     pid: int
     command: str = ""
     mark: str = ""
+    launcher: str = ""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,15 @@ class Answer:
     def is_up(self, mark: str) -> bool:
         """Tell whether a node answers that is not known to be somebody else's."""
         return self.owner(mark) in (Owner.LAUNCHER, Owner.UNKNOWN)
+
+    def may_be_of(self, mark: str, launcher: str) -> bool:
+        """Tell whether a node is up that may be of one process of the launcher, and not of its successor.
+
+        Args:
+            mark: of the launcher.
+            launcher: names its process.
+        """
+        return self.is_up(mark) and all(process.launcher in ("", launcher) for process in self.lineage)
 
     def conflict(self, mark: str) -> str:
         """Return who has taken the node's name, with the remedy, in one line; empty where nobody has."""

@@ -165,16 +165,19 @@ class Supervisor:
         began = self._clock()
         self._nodes.ask_for_change(function)
         if not configuration:
-            self._release(function)
+            try:
+                self._release(function)
+            except Exception as error:
+                raise LauncherError(_told(error)) from error
             return {"stop": self._clock() - began}
         commands = self._look_up(nodes, start)
         idle = [name for name in start if not self._nodes.runs(name)]
         taken = {name: self._names.successor(name) for name in idle}
         leaving = self._nodes.begin_change(function, stop, start)
-        self._report()
-        self._processes.ask_to_end(leaving)
         prepared: dict[str, Any] = {}
         try:
+            self._report()
+            self._processes.ask_to_end(leaving)
             for name, command in commands.items():
                 process = self._processes.prepare(command)
                 if process:
@@ -186,11 +189,13 @@ class Supervisor:
             self._report()
             for name, command in commands.items():
                 self._nodes.started(name, self._processes.begin(name, command, prepared.pop(name, None)))
-        except (CallError, StartError, OSError) as error:
-            self._end(start)
-            self._nodes.end_change(function, self._clock(), failed_to_start=start)
-            self._report()
-            raise LauncherError(_one_line(error)) from error
+        except Exception as error:  # whatever it is, the function must not stay CHANGING
+            try:
+                self._end(start)
+            finally:
+                self._nodes.end_change(function, self._clock(), failed_to_start=start)
+                self._report()
+            raise LauncherError(_told(error)) from error
         finally:
             for process in prepared.values():
                 self._processes.discard(process)
@@ -214,12 +219,14 @@ class Supervisor:
 
     def _release(self, function: str) -> None:
         leaving = self._nodes.begin_release(function)
-        self._report()
-        self._processes.ask_to_end(leaving)
-        self._end(leaving, forget=leaving)
-        self._nodes.end_release(function, self._clock())
+        try:
+            self._report()
+            self._processes.ask_to_end(leaving)
+            self._end(leaving, forget=leaving)
+        finally:
+            self._nodes.end_release(function, self._clock())
+            self._report()
         self._processes.stand_by(self._nodes.needed, may_start=False)
-        self._report()
 
     # -- supervision ----------------------------------------------------------------------------------------------
 
@@ -317,6 +324,12 @@ class Supervisor:
 
     def _report(self) -> None:
         self._changed(self._nodes.reports())
+
+
+def _told(error: Exception) -> str:
+    """Return what is wrong, in one line, with the class of an error that nobody expects."""
+    line = _one_line(error)
+    return line if isinstance(error, (CallError, StartError, OSError)) else f"{type(error).__name__}: {line}"
 
 
 def _one_line(error: Exception) -> str:
