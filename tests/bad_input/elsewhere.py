@@ -69,7 +69,6 @@ FILES: dict[str, str] = {
     "rosgraph_launcher/io/secret.py": _OWN,
     "rosgraph_launcher/io/scripts.py": "looks at the first line of a program that it is to start",
     "rosgraph_launcher/io/warm_start/sitecustomize.py": "reads a program that is about to be run",
-    "rosgraph_manipulator/io/supervisor.py": _OWN,
     "rosgraph_manipulator/ros/goal.py": "reads a parameter that the manipulator itself has written",
     "rosgraph_monitor/ros/topics.py": _CALLED,
     "rosgraph_monitor/ros/watch.py": _OUTPUT,

@@ -33,6 +33,10 @@ SETTLED_S = 10.0
 LIFE_S = 25.0
 """Shorter lives say nothing of growth."""
 
+_STOPS = (Kind.KILL, Kind.FREEZE_FOR_GOOD, Kind.INTERRUPT, Kind.KILL_TWO)
+"""After these a process does its work no more, unless somebody starts it again."""
+_ENDS = (*_STOPS, Kind.USURP, Kind.KILL_IN_CHANGE, Kind.KILL_STARTING)
+
 STABLE, RECONFIGURING, RECOVERING, FAILED = "STABLE", "RECONFIGURING", "RECOVERING", "FAILED"
 MANIPULATOR, LAUNCHER = "rosgraph_manipulator", "rosgraph_launcher"
 
@@ -151,7 +155,7 @@ def names_what_is_broken(mission: Mission, observed: Observed) -> Iterator[str]:
     last = observed.samples[-1].t if observed.samples else 0.0
     for strike in observed.struck():
         fault = mission.faults[strike.index]
-        if fault.kind not in (Kind.KILL, Kind.FREEZE_FOR_GOOD, Kind.INTERRUPT, Kind.KILL_TWO):
+        if fault.kind not in _STOPS:
             continue
         for role in fault.targets:
             until = strike.t + NAMED_S * observed.stretch(strike.t, strike.t + NAMED_S)
@@ -227,24 +231,13 @@ def _hangs_when_needed(mission: Mission, observed: Observed) -> str:
     return ""
 
 
-_ENDS = (
-    Kind.KILL,
-    Kind.FREEZE_FOR_GOOD,
-    Kind.INTERRUPT,
-    Kind.KILL_TWO,
-    Kind.USURP,
-    Kind.KILL_IN_CHANGE,
-    Kind.KILL_STARTING,
-)
-
-
 _AUTHORITIES = ("/tf", "/move_base/goal", "/move_base/cancel", "/move_base_simple/goal")
 """Whoever publishes there tells the robot where it is, or what it shall do: wrong words are obeyed."""
 
 
 def _lost_for_good(fault: Fault) -> tuple[str, ...]:
     """Return the drivers that a fault takes: nobody starts them again."""
-    if fault.kind in (Kind.KILL, Kind.FREEZE_FOR_GOOD, Kind.INTERRUPT, Kind.KILL_TWO, Kind.USURP):
+    if fault.kind in (*_STOPS, Kind.USURP):
         return tuple(role for role in fault.targets if role in DRIVERS)
     return ()
 

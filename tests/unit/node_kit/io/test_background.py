@@ -1,17 +1,7 @@
 """Work in threads of its own, also where the system gives no thread."""
 
-import threading
-
 import pytest
 from node_kit.io.background import NoThreadError, in_background, start_thread
-
-
-@pytest.fixture
-def without_threads(monkeypatch):
-    def start(_thread):
-        raise RuntimeError("can't start new thread")
-
-    monkeypatch.setattr(threading.Thread, "start", start)
 
 
 def test_what_comes_of_the_work_is_returned():
@@ -19,7 +9,8 @@ def test_what_comes_of_the_work_is_returned():
     assert isinstance(in_background(lambda: 1 / 0, "work").exception(5.0), ZeroDivisionError)
 
 
-def test_work_without_a_thread_fails_as_a_call_of_the_system_does(without_threads):
+def test_work_without_a_thread_fails_as_a_call_of_the_system_does(no_thread):
+    no_thread(times=2)
     error = in_background(lambda: 3, "work").exception(0.0)
     assert isinstance(error, OSError)
     assert str(error) == "no thread could be started: can't start new thread"

@@ -1,7 +1,6 @@
 """The launcher's own work in a change, with real processes and a master that is played."""
 
 import signal
-import threading
 from dataclasses import replace
 
 import pytest
@@ -112,29 +111,15 @@ def test_change_that_was_planned_for_a_launcher_with_more_nodes_is_refused(launc
     assert launcher.pidfds() == {}
 
 
-@pytest.fixture
-def no_thread(launcher, monkeypatch):
-    """Have the next thread not start."""
-    usual, left = threading.Thread.start, []
-
-    def start(thread):
-        if left:
-            raise RuntimeError(left.pop())
-        usual(thread)
-
-    monkeypatch.setattr(threading.Thread, "start", start)
-    return left
-
-
 def test_change_and_release_go_on_in_a_moment_without_threads(launcher, reports, no_thread):
     launcher.change("f", "first", nodes("/a"), [], ["/a"])
-    no_thread.append("can't start new thread")
+    left = no_thread()
     launcher.change("f", "second", nodes("/b"), ["/a"], ["/b"])
-    assert not no_thread
+    assert not left
     assert set(running(launcher)) == {"/b"}
-    no_thread.append("can't start new thread")
+    left = no_thread()
     launcher.change("f", "", {}, [], [])
-    assert not no_thread
+    assert not left
     assert running(launcher) == {}
     assert last(reports, "f").state == "STABLE"
 
@@ -142,38 +127,27 @@ def test_change_and_release_go_on_in_a_moment_without_threads(launcher, reports,
 def test_configuration_is_given_up_in_a_moment_without_threads(launcher, reports, no_thread):
     required = {"/a": replace(nodes("/a")["/a"], required=True), **nodes("/b")}
     launcher.change("f", "first", required, [], ["/a", "/b"])
-    no_thread.append("can't start new thread")
+    left = no_thread()
     launcher._real._running["/a"].signal(signal.SIGKILL)
     wait_for(lambda: launcher.look_after() or not running(launcher), "it is given up")
-    assert not no_thread
+    assert not left
     assert last(reports, "f").state == "FAILED"
 
 
 @pytest.mark.parametrize("step", ["ask_to_end", "prepare", "begin", "end"])
 @pytest.mark.parametrize("error", [RuntimeError("no thread"), ValueError("no value")])
-def test_change_that_fails_for_any_reason_is_over(launcher, reports, monkeypatch, step, error):
+def test_change_that_fails_for_any_reason_is_over(launcher, reports, failing, step, error):
     launcher.change("f", "first", nodes("/a"), [], ["/a"])
-    left, usual = [error], getattr(launcher._real, step)
-
-    def fail(*arguments, **options):
-        if left:
-            raise left.pop()
-        return usual(*arguments, **options)
-
-    monkeypatch.setattr(launcher._real, step, fail)
+    failing(launcher._real, step, error, times=1)
     with pytest.raises(LauncherError, match=f"^{type(error).__name__}: {error}$"):
         launcher.change("f", "second", nodes("/b"), ["/a"], ["/b"])
     assert last(reports, "f").state == "STABLE"
     assert "/b" not in running(launcher)
 
 
-def test_release_that_fails_is_over(launcher, reports, monkeypatch):
-    def fail(_names):
-        raise RuntimeError("no thread")
-
+def test_release_that_fails_is_over(launcher, reports, failing):
     launcher.change("f", "first", nodes("/a"), [], ["/a"])
-    with monkeypatch.context() as moment:
-        moment.setattr(launcher._real, "ask_to_end", fail)
-        with pytest.raises(LauncherError, match="RuntimeError: no thread"):
-            launcher.change("f", "", {}, [], [])
+    failing(launcher._real, "ask_to_end", RuntimeError("no thread"), times=1)
+    with pytest.raises(LauncherError, match="RuntimeError: no thread"):
+        launcher.change("f", "", {}, [], [])
     assert (last(reports, "f").state, last(reports, "f").nodes) == ("STABLE", ())

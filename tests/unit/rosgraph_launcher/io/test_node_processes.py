@@ -4,7 +4,6 @@ import os
 import signal
 import socket
 import subprocess
-import threading
 from dataclasses import replace
 
 import psutil
@@ -197,25 +196,12 @@ def test_prepared_process_that_is_stopped_is_not_begun(nodes, command, said):
     assert said == ["node /a starts without imports in advance: the process that stood by is stopped"]
 
 
-@pytest.fixture
-def no_thread(monkeypatch):
-    """Have the next thread not start."""
-    usual, left = threading.Thread.start, ["can't start new thread"]
-
-    def start(thread):
-        if left:
-            raise RuntimeError(left.pop())
-        usual(thread)
-
-    monkeypatch.setattr(threading.Thread, "start", start)
-    return left
-
-
 def test_node_gets_sigint_where_there_is_no_thread_to_ask_it(nodes, command, said, no_thread):
     nodes.begin("/n", replace(command("n"), words=("/bin/sleep", "1000")), None)
     (process,) = nodes._running.values()
+    left = no_thread()
     nodes.ask_to_end(["/n"])
-    assert not no_thread
+    assert not left
     wait_for(lambda: process.status == -signal.SIGINT, "it has ended")
     assert said == ["node /n is ended by SIGINT: can't start new thread"]
 

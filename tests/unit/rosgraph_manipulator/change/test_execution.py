@@ -60,8 +60,15 @@ def execution(around):
         is_here=lambda node: True,
         change=lambda *_, **__: SimpleNamespace(number=1, phases={}),
     )
+    return execution_of(
+        around, launchers, lambda *_: SimpleNamespace(begin=lambda: None, see_takers=lambda nodes: None)
+    )
+
+
+def execution_of(around, launchers, make_names, *more):
+    """Return what carries out changes to FAST and other configurations."""
     return Execution(
-        ManipulatorOptions({"fast": FAST}),
+        ManipulatorOptions({configuration.name: configuration for configuration in (FAST, *more)}),
         {},
         OverwrittenParameters(),
         ready_timeout=1.0,
@@ -70,7 +77,7 @@ def execution(around):
         on_report=lambda: None,
         around=around,
         adjusting=None,
-        make_names=lambda *_: SimpleNamespace(begin=lambda: None, see_takers=lambda nodes: None),
+        make_names=make_names,
     )
 
 
@@ -146,18 +153,7 @@ def test_function_recovers_although_its_launch_file_can_not_be_read_just_then():
             begin=lambda: None, see_takers=lambda nodes: None, contested=(), is_up=describe, conflict=lambda node: ""
         )
 
-    execution = Execution(
-        ManipulatorOptions({"fast": FAST, "look": look}),
-        {},
-        OverwrittenParameters(),
-        ready_timeout=1.0,
-        settle_time=0.0,
-        launchers=launchers,
-        on_report=lambda: None,
-        around=around,
-        adjusting=None,
-        make_names=make_names,
-    )
+    execution = execution_of(around, launchers, make_names, look)
     for configuration in (FAST, look):
         execution.begin(configuration, Plan("restart", 1.0, ()))
         execution.change_processes((), (f"/{configuration.name}",))

@@ -1,6 +1,5 @@
 """Which launchers count, and which are given up, with a master and launchers that are played."""
 
-import itertools
 import threading
 from types import SimpleNamespace
 
@@ -207,44 +206,32 @@ def test_end_of_the_main_launcher_concerns_the_functions_of_which_it_has_a_part(
 # -- no thread
 
 
-def starts(*fail):
-    """Return a start of threads that fails at some of the next calls, by their numbers."""
-    start, count = threading.Thread.start, itertools.count()
-
-    def start_or_fail(thread):
-        if next(count) in fail:
-            raise RuntimeError("can't start new thread")
-        start(thread)
-
-    return start_or_fail
-
-
-def test_change_without_a_thread_to_ask_a_launcher_fails(followed, around, monkeypatch):
+def test_change_without_a_thread_to_ask_a_launcher_fails(followed, around, no_thread):
     tell(followed, MAIN)
-    monkeypatch.setattr(threading.Thread, "start", starts(0))
+    no_thread()
     with pytest.raises(DeploymentError, match=r"^no thread could be started: can't start new thread$"):
         ask(followed, NODE)
     assert around.requests == []
     assert ask(followed, NODE).number == 4
 
 
-def test_request_that_was_not_sent_for_want_of_a_thread_is_repeated(followed, around, monkeypatch):
+def test_request_that_was_not_sent_for_want_of_a_thread_is_repeated(followed, around, no_thread):
     tell(followed, MAIN)
-    monkeypatch.setattr(threading.Thread, "start", starts(1))
+    no_thread(after=1)
     assert ask(followed, NODE).number == 4
     assert len(around.requests) == 1
 
 
-def test_launchers_that_no_thread_tells_what_to_be_ready_for_are_an_error(followed, monkeypatch):
-    monkeypatch.setattr(threading.Thread, "start", starts(0))
+def test_launchers_that_no_thread_tells_what_to_be_ready_for_are_an_error(followed, no_thread):
+    no_thread()
     with pytest.raises(NoThreadError):
         followed.stand_by([NODE])
 
 
-def test_launcher_that_can_not_be_asked_for_want_of_a_thread_is_asked_again(followed, around, monkeypatch):
+def test_launcher_that_can_not_be_asked_for_want_of_a_thread_is_asked_again(followed, around, monkeypatch, no_thread):
     asked = []
     monkeypatch.setattr(launcher_reports, "publishers", lambda _topic: {MAIN})
     monkeypatch.setattr(around, "answer", lambda name: asked.append(name) or tell(followed, name), raising=False)
-    monkeypatch.setattr(threading.Thread, "start", starts(0))
+    no_thread()
     assert followed.find()
     assert asked == [MAIN]

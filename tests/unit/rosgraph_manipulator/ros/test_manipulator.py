@@ -1,16 +1,12 @@
 """The node itself, without ROS."""
 
-import threading
 from types import SimpleNamespace
 
 from rosgraph_manipulator.ros.manipulator import Manipulator
 
 
-def test_change_ends_well_where_no_thread_asks_nodes_for_their_parameters_afterwards(monkeypatch):
-    def start(_thread):
-        raise RuntimeError("can't start new thread")
-
-    monkeypatch.setattr(threading.Thread, "start", start)
+def test_change_ends_well_where_no_thread_asks_nodes_for_their_parameters_afterwards(no_thread):
+    no_thread()
     told = []
     manipulator = Manipulator.__new__(Manipulator)
     manipulator._executor = SimpleNamespace(system=SimpleNamespace(ask_for_adjustable=lambda: None))

@@ -1,6 +1,5 @@
 """Repairs and repaired drivers of which something can't be started just then."""
 
-import threading
 from types import SimpleNamespace
 
 import pytest
@@ -66,13 +65,9 @@ class Goal:
         return lambda *arguments: self.told.append((name, *arguments[1:]))
 
 
-def test_repair_without_a_thread_ends_and_can_be_asked_for_again(monkeypatch, server):
-    def start(_thread):
-        raise RuntimeError("can't start new thread")
-
-    with monkeypatch.context() as patched:
-        patched.setattr(threading.Thread, "start", start)
-        server._on_goal(first := Goal("1"))
+def test_repair_without_a_thread_ends_and_can_be_asked_for_again(monkeypatch, no_thread, server):
+    no_thread()
+    server._on_goal(first := Goal("1"))
     assert first.told == [("set_accepted",), ("set_aborted", "no thread could be started: can't start new thread")]
     monkeypatch.setattr(repairs, "start_thread", lambda _work, _name: None)
     server._on_goal(second := Goal("2"))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
+
+from rosgraph_launcher.io.processes import owner_id
 
 _BY_ROSLAUNCH = "__log:="  # an argument that roslaunch gives to each node, and nobody else
-_START = 19  # of the fields after the command's name: when the process started, in ticks since boot (proc(5))
 
 
 def find_supervisor(arguments: Sequence[str]) -> str:
@@ -18,9 +18,7 @@ def find_supervisor(arguments: Sequence[str]) -> str:
     """
     if not any(argument.startswith(_BY_ROSLAUNCH) for argument in arguments):
         return ""
-    parent = os.getppid()
     try:
-        fields = Path(f"/proc/{parent}/stat").read_text(errors="replace").rpartition(")")[2].split()
+        return owner_id(os.getppid())
     except OSError:  # it has ended
         return ""
-    return f"{parent} {fields[_START]}"
