@@ -22,7 +22,7 @@ PAGE = ROOT / "docs" / "reference" / "nodes.md"
 ROW = re.compile(
     r"^\| (publishes|subscribes|service|action|action client|reconfigure|parameter) \| `([^`]+)` \| (.*?) \|"
 )
-OF_EVERY_NODE = ("/rosout", "/tf_static", "/tf", "/clock")
+OF_EVERY_NODE = ("/rosout", "/tf_static", "/tf", "/clock", "/rosout_disable_topics_generation")
 SERVICE_TYPES = {}
 MASTER = rosgraph.Master("/node_reference_test")
 
@@ -111,7 +111,8 @@ def parameters(node, entries):
             name = re.sub(r"^~(global|local)_costmap/", "~*_costmap/", relative(name, node))
             found[name] = entry["default"] if found.get(name) is None else found[name]
     anywhere = {name for name in found if f"~{name}" in found}  # private, or, where it is not given, the robot's
-    return {("parameter", name, shown(default)) for name, default in found.items() if name not in anywhere}
+    left_out = anywhere.union(OF_EVERY_NODE)
+    return {("parameter", name, shown(default)) for name, default in found.items() if name not in left_out}
 
 
 def shown(default):

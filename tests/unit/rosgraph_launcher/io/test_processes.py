@@ -236,9 +236,9 @@ def test_nothing_outlives_an_owner_that_is_killed(command, tmp_path):
 def owner(command, tmp_path):
     """Start an owner with the one mark; return its process and the id of its node."""
     started = []
+    node = command("exec sleep 1000", python=False).words[0]
 
     def begin():
-        node = command("exec sleep 1000", python=False).words[0]
         process = subprocess.Popen([sys.executable, "-c", OWNER_SCRIPT, node, str(tmp_path)], stdout=subprocess.PIPE)
         started.append(process)
         return process, int(process.stdout.readline())
@@ -259,12 +259,13 @@ def test_owner_that_is_killed_takes_nothing_of_its_successor_along(owner):
     assert is_alive(of_second)
 
 
-def test_process_names_its_owner_also_where_it_was_prepared(command):
-    for process in (processes.start(command("exec sleep 1000", python=False)), processes.prepare(command("pass\n"))):
-        environment = psutil.Process(process.pid).environ()
-        assert environment[MARK]
-        assert environment[OWNER] == processes.owner_id(os.getpid())
-        process.close()
+@pytest.mark.parametrize("begin", [processes.start, processes.prepare])
+def test_process_names_its_owner(command, begin):
+    process = begin(command("import time\ntime.sleep(1000)\n"))
+    environment = psutil.Process(process.pid).environ()
+    assert environment[MARK]
+    assert environment[OWNER] == processes.owner_id(os.getpid())
+    process.close()
 
 
 def test_word_with_a_null_character_is_told(command):
