@@ -1,5 +1,6 @@
 """What a mission shows."""
 
+import io
 import os
 import subprocess
 import sys
@@ -7,34 +8,50 @@ import sys
 import pytest
 from metacontrol_bags.timeline import Entry
 from metacontrol_experiments.io import display
-from rich.console import Console
 from rich.table import Table
 
 
-class FullDisk:
-    """A file whose disk is full."""
+class Disk(io.StringIO):
+    """A file on a disk that may be full."""
+
+    full = False
 
     def write(self, text):
-        raise OSError(28, "No space left on device")
-
-    def flush(self):
-        pass
+        if self.full:
+            raise OSError(28, "No space left on device")
+        return super().write(text)
 
 
 @pytest.fixture
-def shown(monkeypatch):
-    monkeypatch.setattr(display, "CONSOLE", Console(file=FullDisk(), force_terminal=False))
-    with pytest.raises(OSError, match="No space"):
-        display.tell("this is how it was")
-    return display.Display()
+def disk(monkeypatch):
+    disk = Disk()
+    monkeypatch.setattr(display, "CONSOLE", display.LastingConsole(file=disk, force_terminal=False))
+    return disk
 
 
-def test_mission_goes_on_when_what_it_shows_meets_a_full_disk(shown):
-    with shown:
+def test_mission_goes_on_when_what_it_shows_meets_a_full_disk(disk):
+    with display.Display() as shown:
+        disk.full = True
         shown.say("starting")
         shown.entry(Entry(1.0, "R1", "laser lost", bad=True))
         shown.progress(0.5, 2.0, "3 m")
         shown.show(Table())
+        display.tell("1 of 2 is done")
+        disk.full = False
+        display.tell("2 of 2 are done")
+        shown.say("ended")
+    assert disk.getvalue() == "2 of 2 are done\nended\n"
+
+
+def test_command_whose_output_meets_a_full_disk_has_its_own_exit_status():
+    code = (
+        "import sys\nfrom metacontrol_experiments.cli import main\nfrom metacontrol_experiments.io.display import tell\n"
+        "main.metacontrol = lambda **_: (tell('one'), tell('two'), sys.exit(1))\nmain.main()"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, env=environment)
+    assert (done.returncode, done.stderr) == (1, b"")
 
 
 @pytest.fixture

@@ -70,6 +70,18 @@ def test_answer_that_is_none_is_garbage(answer):
         assert client.call_all([("size",)]) == [(False, None)]
 
 
+def test_process_id_is_a_number():
+    with server(getPid=lambda _: [1, "", 17]) as uri, Client(uri, "/me") as client:
+        assert client.pid() == 17
+
+
+@pytest.mark.parametrize("told", [float("inf"), float("nan"), "x", None, [], {}])
+def test_process_id_that_is_no_number_is_garbage(told):
+    with server(getPid=lambda _: [1, "", told]) as uri, Client(uri, "/me") as client:
+        with pytest.raises(GarbageError, match=f"{uri}: its process id is"):
+            client.pid()
+
+
 def test_method_that_there_is_not_is_garbage():
     with server() as uri, Client(uri, "/me") as client, pytest.raises(GarbageError, match="size is garbage"):
         client.call("size")

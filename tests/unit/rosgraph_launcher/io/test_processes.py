@@ -262,7 +262,13 @@ def test_owner_that_is_killed_takes_nothing_of_its_successor_along(owner):
 @pytest.mark.parametrize("begin", [processes.start, processes.prepare])
 def test_process_names_its_owner(command, begin):
     process = begin(command("import time\ntime.sleep(1000)\n"))
-    environment = psutil.Process(process.pid).environ()
+    environment = {}
+
+    def is_read():  # there is none for a moment, while a program takes the place of another one
+        environment.update(psutil.Process(process.pid).environ())
+        return environment
+
+    wait_for(is_read, "it runs")
     assert environment[MARK]
     assert environment[OWNER] == processes.owner_id(os.getpid())
     process.close()
@@ -271,6 +277,23 @@ def test_process_names_its_owner(command, begin):
 def test_word_with_a_null_character_is_told(command):
     with pytest.raises(StartError, match="node: embedded null byte"):
         processes.start(command("exit 0", "a\0b", python=False))
+
+
+def test_process_that_has_no_environment_yet_is_found(tmp_path, monkeypatch):
+    """For a moment, while a program takes the place of another one."""
+    left = subprocess.Popen(["sleep", "1000"], env={MARK: str(tmp_path), "PATH": os.environ["PATH"]})
+    wait_for(lambda: MARK in psutil.Process(left.pid).environ(), "it runs")
+    environ, looks = psutil.Process.environ, []
+
+    def seen(process):
+        if process.pid != left.pid or looks:
+            return environ(process)
+        looks.append(process)
+        return {}
+
+    monkeypatch.setattr(psutil.Process, "environ", seen)
+    assert [pid for pid, _ in processes.kill_marked(str(tmp_path))] == [left.pid]
+    assert left.wait(DEADLINE_S) == -signal.SIGKILL
 
 
 def test_what_an_earlier_owner_left_is_killed_and_nothing_else(tmp_path):

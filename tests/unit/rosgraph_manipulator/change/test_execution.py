@@ -115,6 +115,9 @@ class Launchers:
     def unconnected(self, function):
         return ""
 
+    def adopt(self, function, nodes):
+        pass
+
     def change(self, function, configuration, nodes, stop, start, found):
         self.number += 1
         self.report(LauncherReport(function, configuration, self.number, nodes=tuple(node.name for node in nodes)))
@@ -144,20 +147,28 @@ class LaunchFiles(Around):
         return set()
 
 
-def test_function_recovers_although_its_launch_file_can_not_be_read_just_then():
+LOOK = Configuration("look", "f_look", "look.launch")
+
+
+def all_up(describe, has_finished):
+    """Return names of which all are up."""
+    return SimpleNamespace(
+        begin=lambda: None, see_takers=lambda nodes: None, contested=(), is_up=describe, conflict=lambda node: ""
+    )
+
+
+@pytest.mark.parametrize("is_adopted", [False, True])
+def test_function_recovers_although_its_launch_file_can_not_be_read_just_then(is_adopted):
     around, launchers = LaunchFiles({}), Launchers()
-    look = Configuration("look", "f_look", "look.launch")
-
-    def make_names(describe, has_finished):
-        return SimpleNamespace(
-            begin=lambda: None, see_takers=lambda nodes: None, contested=(), is_up=describe, conflict=lambda node: ""
-        )
-
-    execution = execution_of(around, launchers, make_names, look)
-    for configuration in (FAST, look):
+    execution = execution_of(around, launchers, all_up, LOOK)
+    for configuration in (FAST, LOOK):
         execution.begin(configuration, Plan("restart", 1.0, ()))
         execution.change_processes((), (f"/{configuration.name}",))
         execution.wait_until_ready()
+    if is_adopted:  # by the next manipulator
+        execution = execution_of(around, launchers, all_up, LOOK)
+        for configuration in (FAST, LOOK):
+            execution.adopt(configuration)
     around.gone = ("fast",)
     runs = launchers.reported["f"]
     launchers.report(replace(runs, state=RECOVERING, dead=("/fast",)))

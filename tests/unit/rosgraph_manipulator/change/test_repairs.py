@@ -177,6 +177,13 @@ def test_driver_that_was_never_repaired_is_not_started():
     assert drivers(Launcher(report(FAILED))).lost(0.0) == []
 
 
+def test_driver_that_was_given_up_just_now_is_not_lost():
+    repaired = drivers(launcher := Launcher(report(STABLE)))
+    launcher.take(failed := report(FAILED, message="too many deaths"))
+    assert repaired.lost(0.0) == []
+    assert repaired.given_up() == [failed]
+
+
 def test_nothing_is_lost_before_the_launcher_has_reported():
     repaired = RepairedDrivers([GATE], lambda _function: None)
     repaired.started(GATE)

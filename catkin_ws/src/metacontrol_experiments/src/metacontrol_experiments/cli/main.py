@@ -16,6 +16,7 @@ from metacontrol_experiments.cli.run import run
 from metacontrol_experiments.cli.summary import summary
 from metacontrol_experiments.cli.variants import variants
 from metacontrol_experiments.cli.yardstick import yardstick
+from metacontrol_experiments.io.display import CONSOLE
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -29,7 +30,10 @@ for _command in (run, summary, figure, calibrate, variants, compare, delays, cam
 
 def main() -> None:
     """Run the command."""
-    metacontrol(prog_name="metacontrol")
+    try:
+        metacontrol(prog_name="metacontrol")
+    finally:
+        CONSOLE.finish()
 
 
 if __name__ == "__main__":

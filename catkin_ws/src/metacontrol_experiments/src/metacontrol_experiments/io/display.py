@@ -24,7 +24,18 @@ REFUSED, INTERRUPTED = 2, 130
 
 
 class LastingConsole(Console):
-    """A console whose reader may leave, as `head` does: the rest is shown to nobody, and the command goes on."""
+    """A console for what a command says while it works: what can't be shown is left out, and the command goes on.
+
+    The reader may leave, as `head` does: then nothing is shown any more. The disk may be full, maybe for a while.
+    """
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Show something."""
+        try:
+            super().print(*objects, **options)
+        except OSError:
+            with suppress(OSError), self.capture():  # takes it, or it would be shown together with what comes next
+                pass
 
     def on_broken_pipe(self) -> None:
         """Write nowhere from now on; Rich's own way is to end the program."""
@@ -32,6 +43,13 @@ class LastingConsole(Console):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self.file.fileno())  # also for what is still in the file's buffer
         os.close(nowhere)
+
+    def finish(self) -> None:
+        """Write what is still in the file's buffer, if that can be; Python's own way is another exit status."""
+        try:
+            self.file.flush()
+        except OSError:
+            self.on_broken_pipe()
 
 
 CONSOLE = LastingConsole(highlight=False)
@@ -61,10 +79,7 @@ def refusing(*kinds: type[Exception]) -> Iterator[None]:
 
 
 class Display:
-    """A mission: with a live bar on a terminal, else plain lines; silent if quiet.
-
-    What can't be written, because a disk is full or nobody reads it, is left out: the mission goes on.
-    """
+    """A mission: with a live bar on a terminal, else plain lines; silent if quiet."""
 
     def __init__(self, quiet: bool = False) -> None:
         """Prepare a bar if there is a terminal."""
@@ -101,8 +116,7 @@ class Display:
 
     def _print(self, shown: Text | Table) -> None:
         if not self._quiet:
-            with suppress(OSError):
-                CONSOLE.print(shown, soft_wrap=isinstance(shown, Text))
+            CONSOLE.print(shown, soft_wrap=isinstance(shown, Text))
 
     def start(self, stamp: float) -> None:
         """Count times from this stamp on: the mission starts."""

@@ -230,7 +230,7 @@ def _pid_of(node: str) -> int | None:
         if not rosgraph.network.is_local_address(urlsplit(uri).hostname):
             return None
         with Client(uri, caller, _CALL_S, peer=f"node {node} at") as api:
-            return int(api.call("getPid"))
+            return api.pid()
     except (CallError, ValueError):
         return None
 

@@ -109,10 +109,10 @@ class _Asker:
     def __call__(self, timeout: float) -> Answer | Refusal | Silence:
         """Ask, and wait for so many wall s."""
         try:
-            return Answer(int(self._master.call("getPid", timeout=timeout)))
+            return Answer(self._master.pid(timeout))
         except GoneError:
             return Refusal()
         except SilentError as error:
             return Silence(error.reason)
-        except (CallError, TypeError, ValueError) as error:
-            return Silence(f"garbage: {getattr(error, 'reason', error)}")
+        except CallError as error:
+            return Silence(f"garbage: {error.reason}")

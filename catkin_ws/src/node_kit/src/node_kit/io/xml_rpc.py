@@ -111,6 +111,22 @@ class Client:
             raise DeniedError(f"{self._peer} refuses {method}: {text}", str(text))
         return value
 
+    def pid(self, timeout: float | None = None) -> int:
+        """Return the process id that the callee tells.
+
+        Args:
+            timeout: as for `call`.
+
+        Raises:
+            GoneError, SilentError, GarbageError, DeniedError: it tells none.
+        """
+        told = self.call("getPid", timeout=timeout)
+        try:
+            return int(told)
+        except (TypeError, ValueError, OverflowError) as error:
+            reason = f"its process id is {told!r}"
+            raise GarbageError(f"{self._peer}: {reason}", reason) from error
+
     def call_all(self, calls: Sequence[tuple[Any, ...]]) -> list[tuple[bool, Any]]:
         """Make many calls (method, argument, ...) in one request. Return for each whether it succeeded, and its value.
 

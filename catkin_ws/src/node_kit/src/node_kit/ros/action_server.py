@@ -73,21 +73,20 @@ class Sturdy:
             self.status_timer = rospy.Timer(timer._period, self.publish_status_async, reset=True)  # type: ignore[attr-defined]
 
     def internal_cancel_callback(self, goal_id: Any) -> None:
-        """Cancel goals (called by rospy); a stamp from the future counts for none but the goal that is named."""
-        if _is_ahead(goal_id.stamp):
-            if not goal_id.id:
-                rospy.logwarn_throttle(
-                    10.0, f"a request to cancel is ignored: its stamp ({goal_id.stamp.to_sec():g} s) is in the future"
-                )
-                return
-            goal_id = type(goal_id)(id=goal_id.id)  # a new one, because other listeners get the same message
-        super().internal_cancel_callback(goal_id)  # type: ignore[misc]
+        """Cancel goals (called by rospy), as far as `heeded` says."""
+        heeded_id = heeded(goal_id)
+        if heeded_id is None:
+            rospy.logwarn_throttle(
+                10.0, f"a request to cancel is ignored: its stamp ({goal_id.stamp.to_sec():g} s) is in the future"
+            )
+            return
+        super().internal_cancel_callback(heeded_id)  # type: ignore[misc]
 
     def internal_goal_callback(self, goal: Any) -> None:
         """Take a goal (called by rospy), whatever was cancelled before the clock was set back."""
         with self.lock:
             if _is_ahead(self.last_cancel):
-                self.last_cancel = rospy.Time.now()
+                self.last_cancel = rospy.Time()
             super().internal_goal_callback(goal)  # type: ignore[misc]
 
     def publish_status(self) -> None:
@@ -97,6 +96,17 @@ class Sturdy:
         except rospy.ROSException:
             if not rospy.core.is_shutdown_requested():
                 raise
+
+
+def heeded(goal_id: Any) -> Any | None:
+    """Return what a `Sturdy` server heeds of a request to cancel: without a stamp from the future; None: nothing.
+
+    Args:
+        goal_id: an actionlib_msgs/GoalID.
+    """
+    if not _is_ahead(goal_id.stamp):
+        return goal_id
+    return type(goal_id)(id=goal_id.id) if goal_id.id else None  # a new one: other listeners get the same message
 
 
 def _is_ahead(stamp: rospy.Time) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import os
 import signal
 import sys
@@ -78,8 +79,12 @@ class Lifetime:
         self._stays = bool(os.environ.pop(STAYS, ""))  # not for those that this node starts
         self._refusals = refusals
         self._claim = threading.Lock()  # held for ever by whoever ends the process
+        self._cut_off_at = math.inf  # monotonic s
+        self._cut_off_sooner = threading.Condition()
         self._status = 0
         self._shutting_down: int | None = None  # the thread in which rospy shuts down
+        # Begun now, because there may be no thread to be had when the node is to end.
+        threading.Thread(target=self._cut_off_in_time, name="cut off", daemon=True).start()
 
     def __enter__(self) -> Lifetime:
         """Have signals end the process from now on, whatever it does."""
@@ -153,13 +158,16 @@ class Lifetime:
             time.sleep(LONGEST_END)
 
     def cut_off(self, patience: float) -> None:
-        """End the process after `patience` wall s, whatever it waits for."""
+        """End the process after `patience` wall s at the latest, whatever it waits for."""
+        with self._cut_off_sooner:
+            self._cut_off_at = min(self._cut_off_at, time.monotonic() + patience)
+            self._cut_off_sooner.notify()
 
-        def wait() -> None:
-            time.sleep(patience)
-            os._exit(self._status)  # no more: locks of the log may be held by who waits
-
-        threading.Thread(target=wait, name="cut off", daemon=True).start()
+    def _cut_off_in_time(self) -> None:
+        with self._cut_off_sooner:
+            while (left := self._cut_off_at - time.monotonic()) > 0.0:
+                self._cut_off_sooner.wait(None if left == math.inf else left)
+        os._exit(self._status)  # no more: locks of the log may be held by who waits
 
     def _on_shutdown(self) -> None:
         self._shutting_down = threading.get_ident()

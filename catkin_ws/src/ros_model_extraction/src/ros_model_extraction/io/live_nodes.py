@@ -54,10 +54,10 @@ def _pid(uri: str, timeout: float) -> int | str:
     try:
         host = urlsplit(uri).hostname or ""
         with Client(uri, _CALLER, timeout, peer="node") as node:
-            pid = int(node.call("getPid"))
+            pid = node.pid()
     except GoneError:
         return _DEAD
-    except (CallError, TypeError, ValueError):
+    except (CallError, ValueError):
         return "it does not answer"
     return pid if rosgraph.network.is_local_address(host) else f"it runs on the host {host}"
 

@@ -59,11 +59,7 @@ class NodeApi:
             CallError: its answer makes no sense.
         """
         with Client(uri, CALLER, CALL_TIMEOUT, peer="node") as node:
-            answer = node.call("getPid")
-        try:
-            return int(answer)
-        except (TypeError, ValueError) as error:
-            raise GarbageError(f"node {uri}: its process id is {answer!r}") from error
+            return node.pid()
 
     @classmethod
     def is_answering(cls, name: str) -> bool:

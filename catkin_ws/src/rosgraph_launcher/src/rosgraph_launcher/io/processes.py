@@ -48,6 +48,9 @@ WARM_START = str(Path(__file__).with_name("warm_start"))
 PYTHON = re.compile(r"python(3(\.\d+)?)?")
 HARMLESS_FLAGS = {"-u", "-B", "-O", "-OO"}  # of Python: they leave `sitecustomize` and PYTHONPATH as they are
 
+EXEC_TIME = 0.01
+"""s, wall, by far more than the kernel takes to put a program in place of another."""
+
 REAP_TIMEOUT = 1.0
 """s, wall, in which a killed process ends, unless the kernel holds it: it waits for a device, or a debugger has it."""
 
@@ -291,18 +294,33 @@ def kill_marked(mark: str, owner: str = "") -> list[tuple[int, float]]:
     Raises:
         OSError: the system has no descriptor for looking at the processes.
     """
-    killed = []
+    killed, unread = [], []
     for process in psutil.process_iter():
-        if process.pid == os.getpid():
-            continue
-        with contextlib.suppress(psutil.Error, OSError):
-            environment = process.environ()
-            if environment.get(MARK) != mark or (owner and environment.get(OWNER) != owner):
-                continue
-            if process.status() != psutil.STATUS_ZOMBIE:
-                process.kill()
-                killed.append((process.pid, process.create_time()))
+        if process.pid != os.getpid():
+            _kill_if_marked(process, mark, owner, killed, unread)
+    if unread:
+        time.sleep(EXEC_TIME)
+    for process in unread:
+        _kill_if_marked(process, mark, owner, killed, [])
     return killed
+
+
+def _kill_if_marked(
+    process: psutil.Process, mark: str, owner: str, killed: list[tuple[int, float]], unread: list[psutil.Process]
+) -> None:
+    """Kill a process if it is meant, and add it to the killed; or to the unread ones, where it has no environment.
+
+    A process has none for a moment while it begins to run its program. Threads of the kernel never have any.
+    """
+    with contextlib.suppress(psutil.Error, OSError):
+        environment = process.environ()
+        if not environment:
+            unread.append(process)
+        if environment.get(MARK) != mark or (owner and environment.get(OWNER) != owner):
+            return
+        if process.status() != psutil.STATUS_ZOMBIE:
+            process.kill()
+            killed.append((process.pid, process.create_time()))
 
 
 def start_reaper(mark: str) -> subprocess.Popen[bytes]:

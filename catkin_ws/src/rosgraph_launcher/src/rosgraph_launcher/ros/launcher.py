@@ -72,10 +72,10 @@ class LauncherNode:
 
     def end(self, reason: str) -> None:
         """Tell the main thread to stop the nodes and then to end this node."""
+        self._life.cut_off(self._longest_end)
         self._ends = self._ends or reason
         self._inbox.close(ENDING)
         self._wake()
-        self._life.cut_off(self._longest_end)  # at last: it wants a thread, and there may be none
 
     def _end_on_request(self) -> None:
         self.end("it was asked to end")

@@ -109,8 +109,9 @@ class Execution:
     def adopt(self, configuration: Configuration) -> None:
         """Note that a configuration runs, or should, although the last change was not to it."""
         with contextlib.suppress(DeploymentError):  # what the launchers tell is all that is known of it
-            nodes = self.system.launch_file(configuration).system.nodes.values()
-            self._launchers.adopt(configuration.function, nodes)
+            launch = self.system.launch_file(configuration)
+            self.system.deployed(configuration, launch)
+            self._launchers.adopt(configuration.function, launch.system.nodes.values())
 
     def stop_rest(self, function: str) -> None:
         """Stop the nodes of a function that has failed on one host on all others, too."""

@@ -88,7 +88,7 @@ class Journal:
         if self.error:
             return f"it has ended the manipulator: {self.error}"
         if self.attempts >= MAX_ATTEMPTS:
-            return f"the manipulator has died {self.attempts} times while it deployed it"
+            return f"the manipulator has ended {self.attempts} times while it deployed it"
         return ""
 
     def is_over(self, supervisor: str) -> bool:

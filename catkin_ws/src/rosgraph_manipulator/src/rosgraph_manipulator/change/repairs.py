@@ -146,7 +146,7 @@ class RepairedDrivers:
             report: returns the launcher's last report of a function; None: it has made none at all yet.
         """
         self._report = report
-        self._running = {driver for driver in drivers if self._is_running(driver)}
+        self._running = {driver for driver in drivers if _runs(driver, report(driver.function))}
         self._next_try: dict[Configuration, float] = {}
 
     def started(self, driver: Configuration) -> None:
@@ -167,7 +167,11 @@ class RepairedDrivers:
             now: monotonic s.
         """
         reports = {driver: self._report(driver.function) for driver in self._running}
-        lost = [d for d, report in reports.items() if report and report.state != CHANGING and not self._is_running(d)]
+        lost = [
+            driver
+            for driver, report in reports.items()
+            if report and report.state not in (CHANGING, FAILED) and report.configuration != driver.name
+        ]
         due = [driver for driver in lost if now >= self._next_try.get(driver, now)]
         return sorted(due, key=lambda driver: driver.name)
 
@@ -175,6 +179,6 @@ class RepairedDrivers:
         """Note that a lost driver was started again, or could not be; `lost` leaves it out for a while."""
         self._next_try[driver] = now + RETRY_PERIOD
 
-    def _is_running(self, driver: Configuration) -> bool:
-        report = self._report(driver.function)
-        return report is not None and report.configuration == driver.name and report.state != FAILED
+
+def _runs(driver: Configuration, report: LauncherReport | None) -> bool:
+    return report is not None and report.configuration == driver.name and report.state != FAILED

@@ -21,6 +21,7 @@ import genpy
 import roslib.message
 import rospy
 from actionlib_msgs.msg import GoalID, GoalStatusArray
+from node_kit.ros.action_server import heeded
 
 from rosgraph_manipulator.configuration.configurations import ConfigurationError
 from rosgraph_manipulator.goals.clients import Client
@@ -65,7 +66,7 @@ class PendingGoal:
         self._subscribers = [
             rospy.Subscriber(f"{action}/goal", goal_class, self._on_goal, queue_size=QUEUE),
             rospy.Subscriber(f"{action}/result", result_class, self._locked(self._keeper.on_result), queue_size=QUEUE),
-            rospy.Subscriber(f"{action}/cancel", GoalID, self._locked(self._keeper.on_cancel), queue_size=QUEUE),
+            rospy.Subscriber(f"{action}/cancel", GoalID, self._locked(self._on_cancel), queue_size=QUEUE),
             rospy.Subscriber(f"{action}/status", GoalStatusArray, self._on_status, queue_size=QUEUE),
         ]
 
@@ -147,6 +148,11 @@ class PendingGoal:
         with self._lock:
             self._keeper.on_goal(goal, client)
             self._store()
+
+    def _on_cancel(self, goal_id: GoalID) -> None:
+        goal_id = heeded(goal_id)
+        if goal_id is not None:
+            self._keeper.on_cancel(goal_id)
 
     def _on_status(self, status: GoalStatusArray) -> None:
         # Each connection has a header of its own, so another one is another process.

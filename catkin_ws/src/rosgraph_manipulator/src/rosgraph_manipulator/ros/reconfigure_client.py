@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor, TimeoutError  # noqa: A004
+from concurrent.futures import TimeoutError  # noqa: A004
 from functools import partial
 from typing import Any
 
@@ -18,6 +18,7 @@ from dynamic_reconfigure.msg import (
     StrParameter,
 )
 from dynamic_reconfigure.srv import Reconfigure
+from node_kit.io.background import NoThreadError, in_background
 from node_kit.io.xml_rpc import CallError
 from rosgraph_launcher.io.master import NodeApi
 
@@ -36,7 +37,6 @@ class ReconfigureClient:
 
     def __init__(self) -> None:
         self._known: dict[str, tuple[object, Mapping[str, Adjustable]]] = {}
-        self._pool = ThreadPoolExecutor(4, thread_name_prefix="dynamic_reconfigure")
 
     def adjustable(self, node: str) -> Mapping[str, Adjustable]:
         """Return what a node takes, by the parameter's name relative to the node's; nothing if it does not answer."""
@@ -59,12 +59,13 @@ class ReconfigureClient:
         Raises:
             DeploymentError: the server does not answer, or has other values.
         """
-        future = self._pool.submit(rospy.ServiceProxy(server + SERVICE, Reconfigure), _config(values))
+        proxy = rospy.ServiceProxy(server + SERVICE, Reconfigure)
+        future = in_background(partial(proxy, _config(values)), f"values for {server}")
         try:
             answer = future.result(SET_TIMEOUT)
         except TimeoutError as error:
             raise DeploymentError(f"{server} does not answer within {SET_TIMEOUT:g} s") from error
-        except (rospy.ServiceException, rospy.ROSException) as error:
+        except (rospy.ServiceException, rospy.ROSException, NoThreadError) as error:
             raise DeploymentError(f"{server} does not take the parameters: {error}") from error
         taken = _values(answer.config)
         for name, value in values.items():
