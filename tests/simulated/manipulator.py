@@ -176,8 +176,7 @@ class _Announcer:
     def begin(self, states: Mapping[Configuration, str]) -> None:
         for configuration, state in states.items():
             self._part.told[configuration.function] = Active(configuration.function, configuration.name, state)
-        if states:
-            self._publish()
+        self._publish()
 
     def announce(
         self,

@@ -12,7 +12,7 @@ from mros1_reasoner.forward.engine import RuleEngine
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop import entries, journal
-from mros1_reasoner.loop.asked import Asked
+from mros1_reasoner.loop.asked import Asked, carry_out
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader
 from mros1_reasoner.loop.entries import ActiveFact, Entry, Released, Result, Step
 from mros1_reasoner.loop.mape import Mape
@@ -221,17 +221,16 @@ class ReasonerPart:
 
     def command(self, command: entries.Command) -> None:
         """Take in an operator's command."""
-        self._inbox.put(lambda: self._apply_command(command, True))
+        self._inbox.put(lambda: self._apply_command(command))
 
-    def _apply_command(self, command: entries.Command, lasts: bool) -> None:
+    def _apply_command(self, command: entries.Command) -> None:
         try:
             self._announce(self._applied(command))
         except (MapeError, KnowledgeBaseError, ReasonerError):
             return
-        if lasts:
-            self._host.heed_operator(command, self.core.objectives)
-            self._asked.heed(command, self.core.objectives)
-            self._keep_asked()
+        self._host.heed_operator(command, self.core.objectives)
+        self._asked.heed(command, self.core.objectives)
+        self._keep_asked()
 
     def _keep_asked(self) -> None:
         self._host.parameters["/reasoner/asked"] = self._asked.as_parameter()
@@ -239,8 +238,7 @@ class ReasonerPart:
     def _run(self) -> None:
         for fact in remembered(self._host.parameters.get("/reasoner/remembered")):
             self._take(fact)
-        for command in self._asked.commands:
-            self._apply_command(command, False)
+        carry_out(self._asked.commands, lambda command: self._announce(self._applied(command)))
         if forgotten := self._host.held - self.core.view.locked:
             raise BrokenError(f"a reasoner has forgotten that an operator has locked {', '.join(sorted(forgotten))}")
         heartbeat = self.kernel.now
@@ -252,10 +250,11 @@ class ReasonerPart:
             self._inbox.drain()
             self._requests.look()
             self._take(Step(is_heartbeat))
-            if self._asked.settle(self.core.view.locked):
-                self._host.held &= self.core.view.locked
+            view = self.core.view
+            if self._asked.settle(view.locked, {*view.objectives, *view.foreseen()}):
+                self._host.held &= view.locked
                 self._keep_asked()
-            self._host.parameters["/reasoner/remembered"] = to_remember(self.core.view)
+            self._host.parameters["/reasoner/remembered"] = to_remember(view, {})
             self._requests.release(self.core.released)
             until = min(heartbeat, self._next_look())
             self._inbox.wait(max(0.0, until - self.kernel.now))

@@ -119,3 +119,13 @@ def test_connection_that_was_broken_and_is_first_heard_after_its_successor_makes
         Fault(48.012, Kind.RECONNECT, "functions"),
     )
     holds(History(6009136, "d2", faults, Policy.REFUSE, starts_with_initial=True))
+
+
+def test_manipulator_that_begins_with_nothing_says_so_to_who_believes_the_last_one():
+    faults = (
+        Fault(34.312, Kind.FOREIGN, "/waterer", 16.159),
+        Fault(38.751, Kind.KILL_PART, "manipulator"),
+        Fault(40.313, Kind.KILL_PART, "launcher"),
+        Fault(40.799, Kind.WALL_JUMPS, "", 43.819),  # the journal is too old for the next one
+    )
+    holds(History(30014334, "greenhouse", faults, Policy.WAIT))

@@ -45,12 +45,15 @@ def test_mission_goes_on_when_what_it_shows_meets_a_full_disk(disk):
 
 def test_command_whose_output_meets_a_full_disk_has_its_own_exit_status():
     code = (
-        "import sys\nfrom metacontrol_experiments.cli import main\nfrom metacontrol_experiments.io.display import tell\n"
+        "import sys\n"
+        "from metacontrol_experiments.cli import main\n"
+        "from metacontrol_experiments.io.display import tell\n"
         "main.metacontrol = lambda **_: (tell('one'), tell('two'), sys.exit(1))\nmain.main()"
     )
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     with open("/dev/full", "w") as full:
-        done = subprocess.run([sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE, env=environment)
+        command = [sys.executable, "-c", code]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, env=environment, check=False)
     assert (done.returncode, done.stderr) == (1, b"")
 
 

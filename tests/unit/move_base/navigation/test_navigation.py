@@ -286,6 +286,32 @@ def test_robot_that_touches_a_wall_comes_free_of_it(simulate, walls, nearest, ya
     assert max(areas) <= areas[0] + 1e-4
 
 
+def test_robot_comes_free_by_the_beginning_of_a_turn_that_would_touch_again(simulate, walls, tree):
+    """It stands in a pocket nearly along its wall, can't move sideways, and a whole turn is more than it needs."""
+    yaw = math.pi / 2 - 0.12
+    corner = Pose(0.0, 0.0, yaw).apply(np.array([[0.48, -0.40]]))[0, 0]
+    start = Pose(1.01 - corner, 0.0, yaw)
+    pocket = [(start.x, side * 0.84, 2.0, 0.6, 0.0) for side in (-1, 1)]
+    settings = tree(TrajectoryPlannerROS__holonomic_robot=False)
+    simulation = simulate([*walls(), WALL, *pocket], start=(start.x, start.y, yaw), tree=settings)
+    log = drive(simulation, (start.x - 2.0, 0.0, math.pi), seconds=5.0)
+    assert covered(simulation, start) > 0.0
+    assert covered(simulation, log.states[-1][1]) == 0.0
+
+
+@pytest.mark.parametrize("boxes", [[], [WALL]], ids=["free", "touching"])
+def test_goal_of_a_robot_that_does_not_turn_to_its_heading_ends(simulate, walls, monkeypatch, boxes):
+    simulation = simulate([*walls(), *boxes], start=(1.03 - 0.48, 0.0, 0.0))
+
+    def jam(_command, duration):
+        simulation.time += duration
+        simulation.history[round(simulation.time / 0.01)] = simulation.pose
+
+    monkeypatch.setattr(simulation, "move", jam)
+    log = drive(simulation, (1.03 - 0.48, 0.0, math.pi))
+    assert (log.outcome, log.text) == (Outcome.ABORTED, "the robot does not turn to the goal's heading")
+
+
 def test_robot_between_walls_that_it_touches_on_both_sides_stays(simulate, walls):
     boxes = [*walls(), (0.0, 0.47, 6.0, 0.2, 0.0), (0.0, -0.47, 6.0, 0.2, 0.0)]
     boxes += [(side * 0.6, 0.0, 0.3, 1.0, 0.0) for side in (-1, 1)]

@@ -1,7 +1,7 @@
 """What an operator has asked for and still holds."""
 
 import pytest
-from mros1_reasoner.loop.asked import Asked
+from mros1_reasoner.loop.asked import Asked, carry_out
 from mros1_reasoner.loop.entries import (
     AddObjective,
     Approve,
@@ -12,6 +12,7 @@ from mros1_reasoner.loop.entries import (
     SetNfr,
     Unlock,
 )
+from mros1_reasoner.loop.readable_state import MapeError
 
 WATER = AddObjective("o_water", "f_water", {"flow": 2.0})
 FLOW = SetNfr("", "flow", 1.0)
@@ -55,9 +56,32 @@ def test_command_for_all_is_one_for_each_of_those_that_there_are(given, holds):
 
 def test_locks_go_with_what_they_lock():
     asked = Asked([Pause(), Lock("o_water"), Lock("o_light")])
-    assert not asked.settle({"o_water", "o_light"})
-    assert asked.settle({"o_light"})
+    assert not asked.settle({"o_water", "o_light"}, ())
+    assert asked.settle({"o_light"}, ())
     assert asked.commands == (Pause(), Lock("o_light"))
+
+
+def test_limits_go_with_their_objectives():
+    asked = Asked([FLOW, SetNfr("o_water", "flow", 3.0), SetNfr("o_light", "flow", 4.0)])
+    assert not asked.settle((), {"o_water", "o_light"})
+    assert asked.settle((), {"o_light"})
+    assert asked.commands == (FLOW, SetNfr("o_light", "flow", 4.0))
+
+
+def test_commands_that_fit_in_one_order_only_are_carried_out_in_that():
+    done = []
+
+    def do(command):
+        if command.quality == "flow_min" and "flow" not in done:
+            raise MapeError("set its other limit first")
+        if command.quality == "beauty":
+            raise MapeError("there is no beauty")
+        done.append(command.quality)
+
+    wanted = [SetNfr("", quality, 1.0) for quality in ("flow_min", "beauty", "flow", "warmth")]
+    ((failed, error),) = carry_out(wanted, do)
+    assert (failed, str(error)) == (wanted[1], "there is no beauty")
+    assert done == ["flow", "warmth", "flow_min"]
 
 
 def test_it_is_the_same_from_a_parameter():
@@ -76,12 +100,12 @@ def test_lock_and_limit_wait_for_an_objective_that_a_task_asks_for_anew():
     lock, limit = Lock("o_water"), SetNfr("o_water", "flow", 3.0)
     asked = Asked([Pause(), lock, limit])
     assert asked.put_off(lock, ["o_light"]) and asked.put_off(limit, ["o_light"])
-    assert not asked.settle([])
+    assert not asked.settle([], [])
     assert asked.due(["o_light"]) == []
     assert asked.due(["o_light", "o_water"]) == [lock, limit]
     assert asked.due(["o_light", "o_water"]) == []
-    assert asked.settle([])  # it went again, with its lock
-    assert asked.commands == (Pause(), limit)
+    assert asked.settle([], [])  # it went again, with its lock and its limit
+    assert asked.commands == (Pause(),)
 
 
 def test_what_waits_in_vain_is_forgotten():

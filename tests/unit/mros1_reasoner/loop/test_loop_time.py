@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from metacontrol_bags.decision import DECIDED, Decision
+from metacontrol_bags.decision import DECIDED, Cause, Decision
 from mros1_reasoner.forward.engine import RuleEngine
 from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.loop_time import LoopTime
@@ -64,5 +64,5 @@ def test_time_goes_on_where_the_clock_is_set_back():
     assert time.of(1999.0) == 2998.0
     assert time.of(2990.0) == 2999.0  # a stamp of before
     assert time.of(0.0) == 0.0
-    decision = Decision("d", DECIDED, "o", "t", "from", "to", stamp_planned=2999.0)
-    assert time.told(decision) == replace(decision, stamp_planned=2000.0)
+    decision = Decision("d", DECIDED, "o", "t", "from", "to", stamp_planned=2999.0, reasons=(Cause(2998.0, "t", "x"),))
+    assert time.told(decision) == replace(decision, stamp_planned=2000.0, reasons=(Cause(1999.0, "t", "x"),))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from mros1_reasoner.forward.engine import RuleEngine
 from mros1_reasoner.loop import journal
-from mros1_reasoner.loop.asked import Asked
+from mros1_reasoner.loop.asked import Asked, carry_out
 from mros1_reasoner.loop.entries import (
     ActiveFact,
     ComponentFact,
@@ -23,7 +23,7 @@ from mros1_reasoner.loop.entries import (
 )
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
-from mros1_reasoner.loop.remembered import remembered, to_remember
+from mros1_reasoner.loop.remembered import remembered, remembered_goals, to_remember
 from mros1_reasoner.loop.settings import Settings
 from simulated import systems
 
@@ -85,13 +85,12 @@ class Line:
 
     def die(self) -> None:
         """Have another reasoner take the place of the present one, with nothing but what parameters can tell."""
-        memory, asked = to_remember(self.core.view), self.asked.as_parameter()
+        memory, asked = to_remember(self.core.view, {}), self.asked.as_parameter()
         self.begin()
         for fact in remembered(memory):
             self.take(fact)
         self.asked = Asked.from_parameter(asked)
-        for command in self.asked.commands:
-            self.take(command)
+        assert carry_out(self.asked.commands, self.take) == []
         self.tell_what_runs()
 
 
@@ -153,7 +152,7 @@ def test_what_has_failed_is_not_forgotten_by_who_dies_before_it_hears_of_it():
     robot = Line("d2")
     robot.take(ComponentFact("front_laser", "FALSE", 0.0, "dead"))
     robot.die()
-    assert to_remember(robot.core.view)["failed"] == ["front_laser"]
+    assert to_remember(robot.core.view, {})["failed"] == ["front_laser"]
 
 
 @pytest.mark.parametrize("dies", [False, True])
@@ -189,10 +188,20 @@ def test_objective_that_no_design_may_require_is_refused():
 
 
 @pytest.mark.parametrize(
-    "value", [None, 3, "left", [], {"failed": 3, "left": "x"}, {"left": [3, [], ["o"], ["o", "d", "q", "much"]]}]
+    "value",
+    [
+        None,
+        3,
+        "left",
+        [],
+        {"failed": 3, "left": "x"},
+        {"left": [3, [], ["o"], ["o", "d", "q", "much"]]},
+        {"goals": [3, ["o"], ["o", 3]]},
+    ],
 )
 def test_memory_that_makes_no_sense_is_left_out(value):
     assert remembered(value) == []
+    assert remembered_goals(value) == {}
 
 
 def test_memory_reads_back():
@@ -201,7 +210,11 @@ def test_memory_reads_back():
     robot.deploy(f_navigate="f1_v2_r1")
     robot.take(left)
     robot.take(FailedFact("rear_laser"))
-    assert remembered(to_remember(robot.core.view)) == [FailedFact("rear_laser"), left]
+    assert remembered(to_remember(robot.core.view, {})) == [FailedFact("rear_laser"), left]
+    assert remembered_goals(to_remember(robot.core.view, {"o_navigate": "a", "o_look": "b"})) == {
+        "o_navigate": "a",
+        "o_look": "b",
+    }
 
 
 @pytest.mark.parametrize("fact", [LeftFact("o_navigate", "f1_v2_r1", "beauty"), FailedFact("third_laser")])

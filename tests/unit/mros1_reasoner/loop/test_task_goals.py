@@ -19,7 +19,7 @@ def goals(**states):
 
 
 def news(*arrays):
-    known = TaskGoals()
+    known = TaskGoals({})
     return [known.take("o_move", array) for array in arrays]
 
 
@@ -45,7 +45,28 @@ def test_first_goal_of_a_server_that_had_none_is_news_however_it_ends():
 
 
 def test_each_objective_has_an_action_of_its_own():
-    known = TaskGoals()
+    known = TaskGoals({})
     assert known.take("o_move", goals()) is None
     assert known.take("o_grip", goals(a=ABORTED)) is None
     assert known.take("o_move", goals(a=ABORTED)) is True
+
+
+@pytest.mark.parametrize(("status", "told"), [(ABORTED, True), (SUCCEEDED, False)])
+def test_end_of_a_goal_that_a_reasoner_before_has_left_at_work_is_news(status, told):
+    known = TaskGoals({"o_move": "a", "o_grip": "b"})
+    assert known.at_work == {"o_move": "a", "o_grip": "b"}
+    assert known.take("o_move", goals(a=status)) is told
+    assert known.take("o_move", goals(a=status)) is None
+    assert known.at_work == {"o_grip": "b"}
+    assert known.take("o_grip", goals(c=ABORTED)) is None  # another one
+    assert known.at_work == {}
+
+
+def test_goals_at_work_are_those_that_have_not_ended():
+    known = TaskGoals({})
+    known.take("o_move", goals(a=ACTIVE))
+    assert known.at_work == {"o_move": "a"}
+    known.take("o_move", goals(a=ACTIVE, b=GoalStatus.PENDING))
+    assert known.at_work == {"o_move": "b"}
+    known.take("o_move", goals(b=SUCCEEDED))
+    assert known.at_work == {}

@@ -2,6 +2,7 @@ import errno
 import importlib.util
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 from itertools import pairwise
@@ -217,7 +218,28 @@ def test_jvm_of_the_fallback_that_hangs_is_ended_after_its_deadline(knowledge_ba
     monkeypatch.setitem(owlready.owlready2.reasoning._subprocess_kargs, "timeout", 0.2)
     reasoner = OwlreadyReasoner()
     reasoner.load(knowledge_base.ontology)
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(owlready.tempfile, "tempdir", str(folder))
     with pytest.raises(ReasonerError, match=r"does not answer within 0\.2 s"):
+        reasoner.infer([], v.CONCLUSIONS)
+    assert os.listdir(folder) == [], "owlready2 has left its file"
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        owlready.owlready2.OwlReadyOntologyParsingError("Cannot parse"),
+        OSError(24, "Too many open files"),
+        MemoryError(),
+        sqlite3.OperationalError("unable to open database file"),
+    ],
+)
+def test_fallback_that_lacks_descriptors_or_memory_fails_as_a_reasoner(knowledge_base, failing, error):
+    failing(owlready.owlready2.Ontology, "load", error, times=1)
+    reasoner = OwlreadyReasoner()
+    reasoner.load(knowledge_base.ontology)
+    with pytest.raises(ReasonerError, match=r"owlready2 could not run Pellet: .*[a-z]"):
         reasoner.infer([], v.CONCLUSIONS)
 
 

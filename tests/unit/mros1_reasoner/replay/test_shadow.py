@@ -76,6 +76,13 @@ def test_limit_that_the_present_level_violates_leads_to_a_change_after_a_while(m
     assert [d.to_configuration for d in supposed.decisions] == ["scan_slower"]
 
 
+def test_limits_of_a_band_are_supposed_in_any_order(make, life):
+    _, _, taken = life
+    for order in (1, -1):
+        limits = dict([("safety_min", 0.7), ("safety", 0.9)][::order])
+        assert shadow_of(make, taken).suppose(6.0, limits=limits)
+
+
 def test_paused_reasoner_would_decide_nothing_and_says_so(make, life):
     _, take, taken = life
     take(1.0, Pause())

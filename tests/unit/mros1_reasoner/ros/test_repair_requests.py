@@ -8,9 +8,8 @@ import rospy
 from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 from metacontrol_msgs.msg import RepairResult
-from mros1_reasoner.loop.requesting import ACKNOWLEDGE_WAIT
 from mros1_reasoner.ros import repairs as module
-from mros1_reasoner.ros.repairs import RepairRequests
+from mros1_reasoner.ros.repairs import ACKNOWLEDGE_WAIT, RepairRequests
 
 
 class Handle:

@@ -77,7 +77,7 @@ def test_process_id_is_a_number():
 
 @pytest.mark.parametrize("told", [float("inf"), float("nan"), "x", None, [], {}])
 def test_process_id_that_is_no_number_is_garbage(told):
-    with server(getPid=lambda _: [1, "", told]) as uri, Client(uri, "/me") as client:
+    with server(getPid=lambda _: [1, "", told]) as uri, Client(uri, "/me") as client:  # noqa: SIM117
         with pytest.raises(GarbageError, match=f"{uri}: its process id is"):
             client.pid()
 

@@ -60,6 +60,22 @@ def test_folder_that_can_not_be_listed_for_a_while_is_listed_later(cell, monkeyp
     assert model.look_again().idle_nodes == {"gripper"}
 
 
+@pytest.mark.parametrize("gone", ["pick.rossystem", "."])
+def test_variants_that_are_not_there_for_a_while_are_read_later_and_then_kept(cell, gone):
+    model, folder, warnings = cell
+    (folder / "pick.rossystem").write_text(text("pick", "gripper"))
+    away = folder / gone if gone != "." else folder
+    aside = folder.parent / "aside"
+    away.rename(aside)
+    model.follow([])
+    assert model.look_again().idle_nodes == ({"camera"} if gone != "." else set())
+    aside.rename(away)
+    assert model.look_again().idle_nodes == {"camera", "gripper"}
+    (folder / "pick.rossystem").unlink()
+    assert model.look_again().idle_nodes == {"camera", "gripper"}
+    assert warnings == []
+
+
 def test_base_must_be_readable(tmp_path):
     with pytest.raises(ModelError):
         desired_model(str(tmp_path / "none.rossystem"), "", print)

@@ -57,10 +57,13 @@ class Escape:
         now = self._touched(here, snapshot)[0, 0]
         rollout = roll_out(samples, robot, horizon, STEPS)
         touched = self._touched(rollout, snapshot)
-        leads_out = (touched.max(axis=1) <= now) & (touched[:, -1] < now)
-        if not leads_out.any():
-            return None
-        return rollout.trajectory(int(np.where(leads_out, touched.mean(axis=1), np.inf).argmin()), 0.0)
+        allowed = np.maximum.accumulate(touched, axis=1) <= now
+        leads_out = allowed[:, -1] & (touched[:, -1] < now)
+        if leads_out.any():
+            return rollout.trajectory(int(np.where(leads_out, touched.mean(axis=1), np.inf).argmin()), 0.0)
+        # One may set the robot free and touch again later. What follows is decided anew in each period.
+        sets_free = (allowed & (touched == 0.0)).any(axis=1)
+        return rollout.trajectory(int(sets_free.argmax()), 0.0) if sets_free.any() else None
 
     def _touched(self, rollout: Rollout, snapshot: Snapshot) -> NDArray[np.float64]:
         """Return how many points are in an obstacle, or outside the costmap, at each pose (C, S).

@@ -27,6 +27,7 @@ class Work:
         stale_since: since when sensor data are too old.
         not_ready_since: since when map or transforms are missing.
         reached_xy: whether the robot was within the goal's position tolerance.
+        turned: heading at which the robot was last seen to turn to the goal's, rad; None: it has not begun.
         recovery: what was tried against being stuck.
     """
 
@@ -40,6 +41,7 @@ class Work:
     stale_since: float | None = None
     not_ready_since: float | None = None
     reached_xy: bool = False
+    turned: float | None = None
     recovery: Recovery = field(default_factory=Recovery)
 
     @classmethod

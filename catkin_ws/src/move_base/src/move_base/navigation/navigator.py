@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 ROTATE_SPEED = 1.0
 """Speed of the recovery's turn, rad/s: rotate_recovery's default."""
 
+TURNED = 0.05
+"""A robot that has turned by so many rad turns still."""
+
 QUIET_WAIT = 0.5
 """Waiting is worth a warning after this time, s: the first messages after a start take a few tenths."""
 
@@ -210,11 +213,14 @@ class Navigator:
             return self._end(robot, Outcome.SUCCEEDED, "Goal reached.")
         snapshot = self._local.snapshot
         turn = self._controller.turn(local_robot, error, snapshot) if snapshot is not None else None
+        before = self._work.turned
+        if turn is not None and (before is None or abs(wrap(robot.yaw - before)) >= TURNED):
+            self._work.controlled, self._work.turned = now, robot.yaw
+        if now - self._work.controlled >= self.parameters.controller_patience:
+            why = "the robot does not turn" if turn is not None else "there is no room to turn"
+            return self._abort(robot, f"{why} to the goal's heading")
         if turn is None:
-            if now - self._work.controlled >= self.parameters.controller_patience:
-                return self._abort(robot, "there is no room to turn to the goal's heading")
             return Result(velocity=STOP, robot=robot, warning="No room to turn to the goal's heading")
-        self._work.controlled = now
         return Result(velocity=turn.velocity, robot=robot, trajectory=turn)
 
     def _drive(self, now: float, frames: Transformer, robot: Pose, local_robot: Pose, velocity: Velocity) -> Result:

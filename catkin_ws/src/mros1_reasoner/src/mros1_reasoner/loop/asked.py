@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 
+from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
+from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop import entries
 from mros1_reasoner.loop.entries import Command
 from mros1_reasoner.loop.entry_text import kind_of, read_entry, values_of
+from mros1_reasoner.loop.readable_state import MapeError
 
 
 class Asked:
@@ -42,11 +45,23 @@ class Asked:
         elif not isinstance(command, entries.Resume | entries.Unlock):
             self._commands.append(command)
 
-    def settle(self, locked: Collection[str]) -> bool:
-        """Forget the locks of objectives that are locked no longer, since they went; return whether there were any."""
+    def settle(self, locked: Collection[str], objectives: Collection[str]) -> bool:
+        """Forget the locks and limits of objectives that went; return whether there were any.
+
+        Args:
+            locked: the objectives that are locked.
+            objectives: names of those that there are, or that a design may require.
+        """
+
+        def holds(command: Command) -> bool:
+            if isinstance(command, entries.Lock):
+                return command.objective in locked or command in self._early
+            if isinstance(command, entries.SetNfr):
+                return command.objective in ("", *objectives) or command in self._early
+            return True
+
         before = len(self._commands)
-        kept = {*locked, *(command.objective for command in self._early if isinstance(command, entries.Lock))}
-        self._commands = [c for c in self._commands if not isinstance(c, entries.Lock) or c.objective in kept]
+        self._commands = [command for command in self._commands if holds(command)]
         return len(self._commands) < before
 
     def put_off(self, command: Command, objectives: Collection[str]) -> bool:
@@ -90,6 +105,27 @@ class Asked:
             if isinstance(content, Command):
                 found.append(content)
         return cls(found)
+
+
+def carry_out(commands: Iterable[Command], do: Callable[[Command], object]) -> list[tuple[Command, Exception]]:
+    """Carry out commands. Those that fail are tried again after the others, as long as that helps.
+
+    The two limits of a band may fit the former ones, and each other, in one order only.
+
+    Returns:
+        The commands that have failed, and why.
+    """
+    left = list(commands)
+    while True:
+        failed: list[tuple[Command, Exception]] = []
+        for command in left:
+            try:
+                do(command)
+            except (MapeError, KnowledgeBaseError, ReasonerError) as error:
+                failed.append((command, error))
+        if len(failed) in (0, len(left)):
+            return failed
+        left = [command for command, _ in failed]
 
 
 def _replaces(command: Command, before: Command) -> bool:

@@ -41,6 +41,7 @@ class LoopTime:
             return decision
         return replace(
             decision,
+            reasons=tuple(replace(cause, stamp=self._ros_stamp(cause.stamp)) for cause in decision.reasons),
             stamp_monitored=self._ros_stamp(decision.stamp_monitored),
             stamp_analysed=self._ros_stamp(decision.stamp_analysed),
             stamp_planned=self._ros_stamp(decision.stamp_planned),

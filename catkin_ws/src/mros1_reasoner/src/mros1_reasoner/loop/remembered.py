@@ -17,10 +17,19 @@ from mros1_reasoner.loop.readable_state import View
 _LEFT = kind_of(LeftFact("", "", ""))
 
 
-def to_remember(view: View) -> dict[str, Any]:
-    """Return what is to be remembered now, as a value of a parameter."""
+def to_remember(view: View, goals: Mapping[str, str]) -> dict[str, Any]:
+    """Return what is to be remembered now, as a value of a parameter.
+
+    Args:
+        view: what the loop knows.
+        goals: ids of the tasks' goals that are at work, by objective.
+    """
     failed = {name for name, component in view.components.items() if component.status == v.FAILED}
-    return {"failed": sorted(failed | view.failed_before), "left": [list(values_of(fact)) for fact in _left(view)]}
+    return {
+        "failed": sorted(failed | view.failed_before),
+        "left": [list(values_of(fact)) for fact in _left(view)],
+        "goals": [list(pair) for pair in sorted(goals.items())],
+    }
 
 
 def remembered(value: object) -> list[FailedFact | LeftFact]:
@@ -37,6 +46,13 @@ def remembered(value: object) -> list[FailedFact | LeftFact]:
         if isinstance(content, LeftFact):
             facts.append(content)
     return facts
+
+
+def remembered_goals(value: object) -> dict[str, str]:
+    """Return the goals that a parameter has, by objective; what can't be read is left out."""
+    known = value if isinstance(value, Mapping) else {}
+    pairs = [pair for pair in _list(known.get("goals")) if isinstance(pair, list) and len(pair) == 2]
+    return {name: goal for name, goal in pairs if isinstance(name, str) and isinstance(goal, str)}
 
 
 def _left(view: View) -> list[LeftFact]:

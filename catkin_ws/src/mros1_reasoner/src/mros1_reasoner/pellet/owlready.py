@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import io
 import logging
+import os
+import sqlite3
 import subprocess
-from collections.abc import Sequence
+import tempfile
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import Any
 
 import owlready2
 
@@ -31,11 +37,12 @@ class OwlreadyReasoner:
 
     def infer(self, facts: Sequence[Assertion], properties: Sequence[str]) -> list[Assertion]:
         """See Reasoner.infer."""
-        world = owlready2.World()
-        try:
-            return self._infer(world, facts, properties)
-        finally:
-            world.close()
+        with _failing_as_reasoner():
+            world = owlready2.World()
+            try:
+                return self._infer(world, facts, properties)
+            finally:
+                world.close()
 
     def close(self) -> None:
         """See Reasoner.close."""
@@ -72,11 +79,46 @@ def run_pellet(world: owlready2.World) -> None:
         InconsistentError: the ontology contradicts itself.
         ReasonerError: Java or Pellet failed, or took too long.
     """
-    try:
+    with _failing_as_reasoner(), _Temporary.taking_away():
         owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
+
+
+@contextmanager
+def _failing_as_reasoner() -> Iterator[None]:
+    """Raise errors of owlready2, also for want of descriptors or memory, as those of a reasoner."""
+    try:
+        yield
     except owlready2.OwlReadyInconsistentOntologyError as error:
         raise InconsistentError(" ".join(str(error).split())) from error
     except subprocess.TimeoutExpired as error:
         raise ReasonerError(f"Pellet in a JVM of its own does not answer within {error.timeout:g} s") from error
-    except (owlready2.OwlReadyJavaError, OSError) as error:
-        raise ReasonerError(f"owlready2 could not run Pellet: {' '.join(str(error).split())}") from error
+    except (owlready2.base.OwlReadyError, OSError, MemoryError, sqlite3.Error) as error:
+        said = " ".join(str(error).split()) or type(error).__name__
+        raise ReasonerError(f"owlready2 could not run Pellet: {said}") from error
+
+
+class _Temporary:
+    """Stands for the module `tempfile` in owlready2, which leaves its file where Pellet fails."""
+
+    _made = threading.local()
+
+    @classmethod
+    def NamedTemporaryFile(cls, *arguments: Any, **options: Any) -> Any:  # noqa: N802, as in that module
+        """Make a file, and note it."""
+        file = tempfile.NamedTemporaryFile(*arguments, **options)  # noqa: SIM115
+        cls._made.path = file.name
+        return file
+
+    @classmethod
+    @contextmanager
+    def taking_away(cls) -> Iterator[None]:
+        """Delete the file in the end, if it is still there."""
+        cls._made.path = ""
+        try:
+            yield
+        finally:
+            with suppress(FileNotFoundError):
+                os.unlink(cls._made.path)
+
+
+owlready2.reasoning.tempfile = _Temporary

@@ -16,6 +16,7 @@ from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.reasoner import Reasoner
 from mros1_reasoner.loop import journal
+from mros1_reasoner.loop.asked import carry_out
 from mros1_reasoner.loop.entries import Approve, ComponentFact, Decided, Entry, Reject, Result, SetNfr, Step
 from mros1_reasoner.loop.entry_text import kind_of
 from mros1_reasoner.loop.mape import Mape
@@ -103,8 +104,9 @@ class Shadow:
         before = core.proposal
         for component in failed:
             journal.apply(core, Entry(now, ComponentFact(component, v.FAILED, now)))
-        for quality, limit in (limits or {}).items():
-            journal.apply(core, Entry(now, SetNfr("", quality, limit)))
+        wanted = [SetNfr("", quality, limit) for quality, limit in (limits or {}).items()]
+        for _, error in carry_out(wanted, lambda command: journal.apply(core, Entry(now, command))):
+            raise error
         levels = {quality: level for (_, quality), level in core.facts.levels.items()}
         moment = now
         while moment <= now + _LONGEST:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any, TypeVar
 
@@ -25,14 +25,14 @@ from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import Reasoner, ReasonerError
 from mros1_reasoner.loop import entries, journal
-from mros1_reasoner.loop.asked import Asked
+from mros1_reasoner.loop.asked import Asked, carry_out
 from mros1_reasoner.loop.diagnostics import DiagnosticsReader, Reading, Remark
 from mros1_reasoner.loop.entries import ActiveFact, Entry, LevelFact, Released, Result, StaleFact, Step, TaskFact
 from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.goals import Goals
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
-from mros1_reasoner.loop.remembered import remembered, to_remember
+from mros1_reasoner.loop.remembered import remembered, remembered_goals, to_remember
 from mros1_reasoner.loop.requesting import Wanted
 from mros1_reasoner.loop.task_goals import TaskGoals
 from mros1_reasoner.ros.decisions import DecisionTopic
@@ -90,7 +90,7 @@ class ReasonerNode:
         self._node_of = {component: node for node, component in parameters.nodes.items()}
         self._log = Log()
         self._taken_over: set[str] = set()
-        self._task_goals = TaskGoals()
+        self._task_goals = TaskGoals(remembered_goals(parameters.remembered))
         self._journal = JournalTopic(name, parameters, knowledge_base.files)
         self._decisions = DecisionTopic()
         self._decisions.offer_last()
@@ -180,30 +180,30 @@ class ReasonerNode:
 
     def _take_up_what_was_asked(self) -> None:
         """Carry out what was asked of a reasoner of this name that has died."""
-        for command in self._asked.commands:
-            if isinstance(command, entries.RemoveObjective) and command.name not in self.core.roots:
-                continue
-            try:
-                self.command(command, lasts=False)  # it is kept already
-            except (MapeError, KnowledgeBaseError, ReasonerError) as error:
-                if not self._asked.put_off(command, self.core.objectives):
-                    self._log.warn(kind_of(command), f"asked of the reasoner before, left out: {error}")
+        self._carry_out_again(
+            command
+            for command in self._asked.commands
+            if not isinstance(command, entries.RemoveObjective) or command.name in self.core.roots
+        )
 
     def _take_up_the_rest(self, now: float) -> None:
         """Carry out what waits for objectives that tasks have asked for anew; `now` in wall s."""
-        for command in self._asked.due(self.core.objectives):
-            try:
-                self.command(command, lasts=False)
-            except (MapeError, KnowledgeBaseError, ReasonerError) as error:
-                self._log.warn(kind_of(command), f"asked of the reasoner before, left out: {error}")
+        self._carry_out_again(self._asked.due(self.core.objectives))
         if now > self._tasks_are_back and self._asked.wait_no_longer():
             self._kept_asked.set(self._asked.as_parameter())
 
+    def _carry_out_again(self, commands: Iterable[entries.Command]) -> None:
+        """Carry out what was asked of a reasoner before; it is kept already."""
+        for command, error in carry_out(commands, partial(self.command, lasts=False)):
+            if not self._asked.put_off(command, self.core.objectives):
+                self._log.warn(kind_of(command), f"asked of the reasoner before, left out: {error}")
+
     def _leave(self) -> None:
         """Keep what a reasoner that takes this one's place has to know."""
-        if self._asked.settle(self.core.view.locked):
+        view = self.core.view
+        if self._asked.settle(view.locked, {*view.objectives, *view.foreseen()}):
             self._kept_asked.set(self._asked.as_parameter())
-        memory = to_remember(self.core.view)
+        memory = to_remember(view, self._task_goals.at_work)
         if memory != self._memory:
             self._memory = memory
             self._kept_memory.set(memory)

@@ -13,11 +13,12 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 from metacontrol_msgs import msg as messages
 
-from mros1_reasoner.loop.requesting import ACKNOWLEDGE_WAIT
-
 _ACTION = "rosgraph_manipulator/repair"
 _SERVER_WAIT = 1.0  # s, wall, at most, for the connections to the manipulator
 _SERVER_LOOK = 0.02  # s, wall, between two looks whether they are there
+ACKNOWLEDGE_WAIT = 2.0
+"""Wall s until a request must be acknowledged: else its manipulator has died with it. The loop waits longer than that
+for the component to work, so it does not take a repair for tried of which nobody knows."""
 _ONE_LOOK = rospy.Duration(0, -1)
 _TRIED = frozenset({GoalStatus.SUCCEEDED, GoalStatus.ABORTED})
 """How a repair ends that was tried. Others were refused or cancelled, or were lost with their manipulator."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import rosgraph
-from node_kit.io.xml_rpc import CallError, Client, GarbageError, SilentError
+from node_kit.io.xml_rpc import CallError, Client, SilentError
 
 CALL_TIMEOUT = 1.0  # s, wall
 CALLER = "/rosgraph_launcher"

@@ -294,7 +294,8 @@ def kill_marked(mark: str, owner: str = "") -> list[tuple[int, float]]:
     Raises:
         OSError: the system has no descriptor for looking at the processes.
     """
-    killed, unread = [], []
+    killed: list[tuple[int, float]] = []
+    unread: list[psutil.Process] = []
     for process in psutil.process_iter():
         if process.pid != os.getpid():
             _kill_if_marked(process, mark, owner, killed, unread)

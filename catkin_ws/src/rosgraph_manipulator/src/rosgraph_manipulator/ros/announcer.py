@@ -26,6 +26,8 @@ class Announcer:
     def begin(self, states: Mapping[Configuration, str]) -> None:
         """Publish what runs and what is being deployed when the manipulator starts, all functions at once.
 
+        Also where that is nothing: others may still have what an earlier manipulator has told.
+
         Args:
             states: one of metacontrol_msgs/FunctionGrounding for each configuration.
         """
@@ -33,8 +35,7 @@ class Announcer:
             self._groundings[configuration.function] = FunctionGrounding(
                 configuration.function, configuration.name, state
             )
-        if states:
-            self._publish(None, None)
+        self._publish(None, None)
 
     def announce(
         self,

@@ -83,22 +83,22 @@ class DesiredModel:
         Args:
             base: the base system, or None to desire nothing in particular.
             read_variant: reads the variant of a name; raises ModelError.
-            read_all: reads all variants: a component that one of them has belongs to a function. Gives an error in the
-                place of each that can't be read, and is called again until there are no errors.
+            read_all: gives all variants: a component that one of them has belongs to a function. Gives an error in the
+                place of each that can't be read. It is asked again and again, since files may come later.
         """
         self._base = base
         self._read = read_variant
         self._read_all = read_all
         self._of_functions: tuple[Component, ...] = ()
-        self._is_all_read: bool | None = None  # None: nothing was read so far
         self._variants: dict[str, RosSystem] = {}
         self._stable: dict[str, str] = {}
         self._groundings: tuple[Grounding, ...] = ()
+        self._is_told = False  # what is deployed
         self.current = Desired(base)
 
     def follow(self, groundings: Iterable[Grounding]) -> Desired:
         """Take in the active configuration, and return what should run now."""
-        self._groundings = groundings = tuple(groundings)
+        self._groundings, self._is_told = (groundings := tuple(groundings)), True
         try:
             active = [self._variant(g.configuration) for g in groundings if g.configuration]
             in_change = [self._variant(name) for g in groundings if g.state in _IN_CHANGE for name in self._names(g)]
@@ -114,13 +114,12 @@ class DesiredModel:
 
     def look_again(self) -> Desired:
         """Try again to read what could not be read, and return what should run now."""
-        is_more_known = self._is_all_read is False and self._look_at_functions()
+        is_more_known = self._base is not None and self._is_told and self._look_at_functions()
         return self.follow(self._groundings) if self.current.problem or is_more_known else self.current
 
     def _with_system(self, desired: Desired, base: RosSystem, active: Sequence[RosSystem]) -> Desired:
         """Return what should run, with the base composed with the active variants, and without what is idle."""
-        if not self._is_all_read:
-            self._look_at_functions()
+        self._look_at_functions()
         idle = {c.name for c in self._of_functions} - {c.name for variant in active for c in variant.components}
         system = reduce(compose, active, _without(base, idle))
         return replace(
@@ -134,7 +133,6 @@ class DesiredModel:
         """Read what belongs to functions. Return whether that is other than before."""
         before, found = self._of_functions, tuple(self._read_all())
         self._of_functions = tuple(c for variant in found if isinstance(variant, RosSystem) for c in variant.components)
-        self._is_all_read = all(isinstance(variant, RosSystem) for variant in found)
         return self._of_functions != before
 
     def _names(self, grounding: Grounding) -> list[str]:

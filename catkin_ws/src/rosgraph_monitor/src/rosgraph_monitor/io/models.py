@@ -43,7 +43,7 @@ def desired_model(base: str, variants: str, warn: Callable[[str], None]) -> Desi
 
 
 class _Variants:
-    """All models of a folder. A model is read until that succeeds once."""
+    """All models of a folder. A model is read until that succeeds once, and then kept, also where its file goes."""
 
     def __init__(self, folder: str, warn: Callable[[str], None]) -> None:
         self._folder, self._warn = folder, warn
@@ -51,21 +51,18 @@ class _Variants:
         self._told: set[str] = set()
 
     def read(self) -> Iterator[RosSystem | ModelError]:
-        """Give each model, or in its place the error with which it can't be read."""
+        """Give each model, and the errors with which others can't be read."""
         try:
-            paths = _models_in(resolve(self._folder))
-        except ModelError as error:
-            yield from self._known.values()
-            yield self._tell(error)
-            return
-        for path in paths:
-            try:
-                if path not in self._known:
+            for path in _models_in(resolve(self._folder)):
+                if path in self._known:
+                    continue
+                try:
                     self._known[path] = read_system(path)
-            except ModelError as error:
-                yield self._tell(error)
-            else:
-                yield self._known[path]
+                except ModelError as error:
+                    yield self._tell(error)
+        except ModelError as error:
+            yield self._tell(error)
+        yield from self._known.values()
 
     def _tell(self, error: ModelError) -> ModelError:
         if str(error) not in self._told:
