@@ -110,6 +110,7 @@ def parameters(node, entries):
             name = entry["name"] if entry["name"][0] in "~/" else rospy.resolve_name(entry["name"], node)
             name = re.sub(r"^~(global|local)_costmap/", "~*_costmap/", relative(name, node))
             found[name] = entry["default"] if found.get(name) is None else found[name]
+    found.pop("", None)  # the robot's namespace as a whole, in which limits are looked for
     anywhere = {name for name in found if f"~{name}" in found}  # private, or, where it is not given, the robot's
     left_out = anywhere.union(OF_EVERY_NODE)
     return {("parameter", name, shown(default)) for name, default in found.items() if name not in left_out}

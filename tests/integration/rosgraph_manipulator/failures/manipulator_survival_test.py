@@ -149,7 +149,7 @@ class SurvivalTest(PairTest):
             self.manipulator.end(signal.SIGKILL)
             self.states.clear()
             self.restart_manipulator()
-        refusal = "hangs is not deployed again: the manipulator has died 2 times"
+        refusal = "hangs is not deployed again: the manipulator has ended 2 times"
         wait_for(
             lambda: self.states and refusal in self.states[-1].message,
             lambda: f"the change is refused; told last: {self.states[-1:]}",
