@@ -94,7 +94,7 @@ class World:
                 part.process.thaw()
         if self.launcher is None:
             self._start("launcher")
-        self._command(entries.Resume())
+        self._resume()
         self._unlock("")
         self._disturb()
 
@@ -262,11 +262,19 @@ class World:
         self._later(value, lambda: self._unlock(target))
 
     def _unlock(self, target: str) -> None:
-        self._command(entries.Unlock(target))
+        self._insist(entries.Unlock(target), lambda: target in self.host.held or bool(self.host.held and not target))
 
     def _pause(self, target: str, value: float) -> None:
         self._command(entries.Pause())
-        self._later(value, lambda: self._command(entries.Resume()))
+        self._later(value, self._resume)
+
+    def _resume(self) -> None:
+        self._insist(entries.Resume(), lambda: self.host.is_paused)
+
+    def _insist(self, command: entries.Command, is_needed: Callable[[], bool]) -> None:
+        """Give a command, and repeat it: a service says so where there is no reasoner, or where that dies with it."""
+        self._command(command)
+        self._later(1.0, lambda: self._insist(command, is_needed) if is_needed() else None)
 
     def _command(self, command: entries.Command) -> None:
         if self.reasoner is not None:
