@@ -129,3 +129,15 @@ def test_manipulator_that_begins_with_nothing_says_so_to_who_believes_the_last_o
         Fault(40.799, Kind.WALL_JUMPS, "", 43.819),  # the journal is too old for the next one
     )
     holds(History(30014334, "greenhouse", faults, Policy.WAIT))
+
+
+def test_function_whose_change_was_given_up_for_nothing_has_failed_where_it_can_not_be_released():
+    faults = (
+        Fault(14.506, Kind.FOREIGN, "/cell/three/looker", 16.797),
+        Fault(15.7, Kind.LOCK, "", 11.7),
+        Fault(30.158, Kind.MASTER_SILENT, "", 2.087),
+        Fault(33.316, Kind.REQUEST, "grasp_rough"),
+        Fault(33.902, Kind.CANCELLED_REQUEST, "grasp_rough", 0.368),
+        Fault(33.961, Kind.MASTER_SILENT, "", 1.449),
+    )
+    holds(History(50016143, "station", faults, Policy.REPLACE))

@@ -6,7 +6,7 @@ import pytest
 from metacontrol_msgs.msg import FunctionGrounding
 from rosgraph_launcher.description import SystemDescription
 from rosgraph_launcher.launching.report import STABLE, LauncherReport
-from rosgraph_manipulator.change.deployment import DeploymentError, Result
+from rosgraph_manipulator.change.deployment import CancelledError, DeploymentError, Result
 from rosgraph_manipulator.change.journal import Journal, Resumption
 from rosgraph_manipulator.change.manipulation import Manipulation
 from rosgraph_manipulator.change.requests import Order
@@ -135,6 +135,24 @@ def test_change_that_can_not_begin_stops_what_is_left_where_nothing_whole_runs()
     assert executor.done == ["f released"]
     assert (outcome.result, outcome.running) == (Result.GENERAL_ERROR, None)
     assert told[-1] == ("b", FunctionGrounding.FAILED)
+
+
+@pytest.mark.parametrize("failure", [DeploymentError("no answer in time"), OSError("no answer in time")])
+@pytest.mark.parametrize("asked", [False, True])
+def test_torn_function_that_can_not_be_stopped_has_failed(failing, failure, asked):
+    executor = Executor(change=CancelledError("given up for a", superseded=True))
+    manipulator, told = manipulation(executor, running="")
+    manipulator.carry_out(Order("f", "b"))
+    assert told[-1] == ("b", FunctionGrounding.RECONFIGURING)  # what it was given up for follows
+    failing(executor, "release", failure, times=1)
+    if asked:
+        assert "no answer in time" in manipulator.carry_out(Order("f", "")).message
+    else:
+        manipulator.make_whole("f")  # it was taken back
+    assert told[-1] == ("b", FunctionGrounding.FAILED)
+    assert executor.halts == 1
+    manipulator.make_whole("f")
+    assert executor.done == ["touched"]
 
 
 def test_change_that_can_not_begin_asks_the_launcher_nothing_where_it_has_no_nodes():

@@ -13,7 +13,7 @@ PROBATION = 5.0
 def deployed(*configurations, now=0.0):
     deployments = DeployedConfigurations(PROBATION)
     for configuration in configurations:
-        deployments.finished(Outcome(Result.OK, configuration, ""), now)
+        deployments.finished(configuration, Outcome(Result.OK, configuration, ""), now)
     return deployments
 
 
@@ -28,13 +28,13 @@ def test_configuration_that_ran_is_restored_when_the_next_one_does_not_come_up()
 
 def test_restored_configuration_is_the_last_good_one_and_has_replaced_none():
     deployments = deployed(A)
-    deployments.finished(Outcome(Result.FAILED, A, "b died"), 1.0)
+    deployments.finished(B, Outcome(Result.FAILED, A, "b died"), 1.0)
     assert (deployments.running, deployments.last_good, deployments.previous) == (A, A, None)
 
 
 def test_superseded_request_leaves_the_last_good_one_to_restore():
     deployments = deployed(A)
-    deployments.finished(Outcome(Result.FAILED, None, "given up", cancelled=True), 1.0)
+    deployments.finished(B, Outcome(Result.FAILED, None, "given up", cancelled=True), 1.0)
     assert deployments.running is None
     assert deployments.fallback(B) == A
 
@@ -118,7 +118,7 @@ def test_what_a_lost_host_has_stopped_is_deployed_again_when_it_is_back():
 def test_what_is_lost_again_during_its_deployment_waits_once_more():
     deployments = deployed(A)
     deployments.failed("it died", waits=True)
-    deployments.finished(Outcome(Result.GENERAL_ERROR, None, "host arm is lost"), 2.0)
+    deployments.finished(B, Outcome(Result.GENERAL_ERROR, None, "host arm is lost"), 2.0)
     assert deployments.react(report(None, STABLE), 3.0) is Reaction.NONE
     deployments.wait_for(A)
     assert deployments.react(report(None, FAILED), 3.0) is Reaction.NONE
@@ -128,7 +128,7 @@ def test_what_is_lost_again_during_its_deployment_waits_once_more():
 @pytest.mark.parametrize(
     "meanwhile",
     [
-        lambda deployments: deployments.finished(Outcome(Result.OK, B, ""), 2.0),
+        lambda deployments: deployments.finished(B, Outcome(Result.OK, B, ""), 2.0),
         lambda deployments: deployments.released(),
         lambda deployments: deployments.failed("it died"),
     ],
@@ -147,7 +147,7 @@ def test_why_nothing_runs_is_known_until_something_does_even_after_a_release():
     assert deployments.failure == "a: it died"
     deployments.released()
     assert deployments.failure == "a: it died"
-    deployments.finished(Outcome(Result.OK, B, "b is deployed"), 1.0)
+    deployments.finished(B, Outcome(Result.OK, B, "b is deployed"), 1.0)
     assert deployments.failure == ""
     deployments.released()
     assert deployments.failure == ""
@@ -155,7 +155,7 @@ def test_why_nothing_runs_is_known_until_something_does_even_after_a_release():
 
 def test_change_that_leaves_nothing_says_why():
     deployments = deployed(A)
-    deployments.finished(Outcome(Result.GENERAL_ERROR, None, "b: no such node"), 1.0)
+    deployments.finished(B, Outcome(Result.GENERAL_ERROR, None, "b: no such node"), 1.0)
     assert deployments.failure == "b: no such node"
 
 
@@ -195,6 +195,6 @@ def test_function_that_does_not_run_lacks_no_launcher():
 def test_change_begins_a_new_wait_for_the_launcher():
     deployments = deployed(A)
     deployments.lacks_launcher(True, 0.0)
-    deployments.finished(Outcome(Result.OK, A, ""), LATE)
+    deployments.finished(A, Outcome(Result.OK, A, ""), LATE)
     assert not deployments.lacks_launcher(True, LATE)
     assert deployments.lacks_launcher(True, LATE + LATE)

@@ -193,9 +193,9 @@ class Manipulation:
     def make_whole(self, function: str) -> None:
         """Restore a function whose change was given up for a request that was taken back before its turn."""
         deployments = self._deployments[function]
-        if deployments.is_torn and deployments.last_good:
+        if deployments.torn and deployments.last_good:
             self._deploy_unasked(deployments.last_good)
-        elif deployments.is_torn:
+        elif deployments.torn:
             self._release(function)
 
     def _deploy(self, wanted: Configuration, restart: tuple[str, ...] = ()) -> Outcome:
@@ -218,7 +218,7 @@ class Manipulation:
                 plans = self._plans(found := self._executor.system.compare(wanted, restart))
         except self._failures as error:
             outcome = deployments.refused(wanted, " ".join(str(error).split()))
-            if outcome.running is None and (deployments.is_torn or self._executor.has_nodes(wanted.function)):
+            if outcome.running is None and (deployments.torn or self._executor.has_nodes(wanted.function)):
                 outcome = self._clear_away(wanted, outcome.message, watch)
         else:
             last_good, runs = deployments.fallback(wanted), deployments.running is not None
@@ -250,7 +250,7 @@ class Manipulation:
 
     def _finish(self, wanted: Configuration, outcome: Outcome, phases: Mapping[str, float]) -> None:
         """Note how a change ended, and tell it."""
-        self._deployments[wanted.function].finished(outcome, self._around.now())
+        self._deployments[wanted.function].finished(wanted, outcome, self._around.now())
         if outcome.running:
             self._announcer.announce(outcome.running, FunctionGrounding.STABLE, outcome, phases)
         elif outcome.result is Result.GENERAL_ERROR:
@@ -273,6 +273,9 @@ class Manipulation:
             deployments.released()
             self._announcer.announce_release(function, outcome, watch.phases)
             self._note(wanted="")
+        elif deployments.torn and not outcome.cancelled:  # nothing whole runs, and maybe nobody asks again
+            self._finish(deployments.torn, outcome, watch.phases)
+            return outcome
         self._tell(outcome, function, watch.phases)
         return outcome
 

@@ -46,7 +46,7 @@ class DeployedConfigurations:
         self._recovering = False
         self._launcher_ended: float | None = None  # when the launcher was seen to have ended, while it has
         self._told_of_launcher = False
-        self._torn = False
+        self._torn: Configuration | None = None
         self._deployed_at = float("-inf")
         self._failure = ""
 
@@ -76,8 +76,8 @@ class DeployedConfigurations:
         return self._previous
 
     @property
-    def is_torn(self) -> bool:
-        """Whether the last change was given up half-way for another request, and nothing was restored."""
+    def torn(self) -> Configuration | None:
+        """The configuration whose change was given up half-way for another request, with nothing restored; or None."""
         return self._torn
 
     def resume(self, running: Configuration | None, last_good: Configuration | None, failure: str = "") -> None:
@@ -94,11 +94,11 @@ class DeployedConfigurations:
             return Outcome(Result.GENERAL_ERROR, None, f"{wanted.name}: {reason}")
         return Outcome(Result.FAILED, self._running, f"{wanted.name}: {reason}; {self._running.name} runs on")
 
-    def finished(self, outcome: Outcome, now: float) -> None:
-        """Note how a change ended."""
+    def finished(self, wanted: Configuration, outcome: Outcome, now: float) -> None:
+        """Note how a change to a configuration ended."""
         self._running, self._waiting, self._recovering = outcome.running, None, False
         self._launcher_is_there()
-        self._torn = outcome.running is None and outcome.result is not Result.GENERAL_ERROR
+        self._torn = wanted if outcome.running is None and outcome.result is not Result.GENERAL_ERROR else None
         self._failure = outcome.message if outcome.result is Result.GENERAL_ERROR else ""
         if outcome.running:
             replaces = outcome.result is Result.OK and self._last_good != outcome.running
@@ -168,7 +168,7 @@ class DeployedConfigurations:
     def released(self) -> None:
         """Note that the function is needed no longer: nothing is restored."""
         self._running = self._last_good = self._previous = self._waiting = None
-        self._recovering = self._torn = False
+        self._recovering, self._torn = False, None
 
     def begin_recovery(self) -> None:
         """Note that the launcher starts dead nodes again."""
