@@ -20,6 +20,12 @@ def driving():
     return mission.on_goal_status(state, 100.2, GoalStatus.ACTIVE)[0]
 
 
+def test_goal_that_is_listed_as_reached_is_reached_though_its_result_is_missed(driving):
+    state, _ = mission.on_goal_status(driving, 120.0, GoalStatus.SUCCEEDED)
+    assert (state.outcome, state.reason) == (Outcome.REACHED, "goal reached")
+    assert mission.on_goal_status(state, 121.0, GoalStatus.SUCCEEDED) == (state, ())
+
+
 def test_perturbation_strikes_once_when_its_share_is_done(driving):
     state, actions = mission.on_pose(PLAN, driving, 101.0, 3.9, 0.0)
     assert actions == () and state.share == pytest.approx(0.39)

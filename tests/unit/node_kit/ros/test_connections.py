@@ -50,6 +50,14 @@ class Publisher:
                 self.connections.append(self.server.accept()[0])
 
 
+def test_call_of_a_nodes_api_waits_for_a_thread(no_thread):
+    served = threading.Event()
+    server = SimpleNamespace(process_request_thread=lambda request, address: served.set())
+    left = no_thread(times=2)
+    shortages._serve_in_time(server, "request", "address")
+    assert served.wait(60.0) and not left
+
+
 @pytest.fixture
 def publisher():
     with contextlib.ExitStack() as stack:

@@ -165,3 +165,18 @@ def test_no_configuration_any_more_leads_back_to_the_base_if_its_variants_are_un
 
 def test_without_base_nothing_in_particular_is_desired():
     assert DesiredModel(None, read).follow([Grounding("f", "slow", "STABLE")]).system is None
+
+
+def test_variant_that_could_not_be_read_for_want_of_memory_is_read_when_it_can_be():
+    errors = [MemoryError()]
+
+    def read(name):
+        if name == "fast" and errors:
+            raise errors.pop()
+        return {"slow": SLOW, "fast": FAST}[name]
+
+    model = DesiredModel(BASE, read)
+    model.follow([Grounding("f", "slow", "STABLE")])
+    assert "MemoryError" in model.follow([Grounding("f", "fast", "STABLE")]).problem
+    desired = model.look_again()
+    assert (desired.problem, names(desired)) == ("", {"laser", "move_base", "fast_helper"})

@@ -107,6 +107,12 @@ def test_lack_of_sockets_says_nothing_of_the_node():
     assert due(state, 0.5, TIMING)[1] is Action.CONNECT
 
 
+def test_node_whose_answer_was_lost_with_its_socket_is_asked_anew():
+    state = on_no_socket(due(alive(), 1.0, TIMING)[0], 1.1, TIMING)
+    assert due_at(state, TIMING) == 1.6
+    assert due(state, 1.6, TIMING)[1] is Action.CONNECT
+
+
 def test_nothing_is_due_before_its_time():
     connecting, _ = due(Liveness(), 0.0, TIMING)
     waiting = alive(1.0)

@@ -142,3 +142,26 @@ def test_other_observer_is_refused_while_one_is_imported_and_loaded_afterwards(w
 def test_name_is_free_again_after_a_failure(world, host):
     assert [host.load("Fails"), host.load("Fails")] == [False, False]
     assert world.lines == ["it is broken"] * 2
+
+
+def test_observer_that_can_not_start_for_a_moment_is_started_later(world, host, failing, monkeypatch):
+    monkeypatch.setattr(module, "_FIRST_AGAIN", 0.01)
+    left = failing(rospy, "get_param", ConnectionResetError("reset by peer"), times=2)
+    host.begin(["Quick", "Fails"])
+    assert "observer Quick can't start: ConnectionResetError: reset by peer" in world.lines
+    wait_for(lambda: host.supervise() == 1, "it runs")
+    assert not left
+    assert world.lines.count("it is broken") == 1
+
+
+def test_observer_without_a_thread_leaves_no_subscription(no_thread, monkeypatch):
+    ended = []
+    runner = object.__new__(module._Runner)
+    monkeypatch.setattr(module._Runner, "_subscribe", lambda _: None)
+    monkeypatch.setattr(module._Runner, "stop", lambda runner: ended.append(runner))  # noqa: PLW0108, a method
+    no_thread()
+    observer = Observer("Quick")
+    observer.outputs = ()
+    with pytest.raises(RuntimeError, match="can't start new thread"):
+        runner.__init__(observer, None)
+    assert ended == [runner]

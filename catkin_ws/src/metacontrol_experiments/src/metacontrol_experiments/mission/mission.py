@@ -174,6 +174,8 @@ def on_goal_status(state: State, now_s: float, status: GoalStatus | None) -> Ste
         now_s: simulated time.
         status: the state of our goal in it, None where it does not list our goal.
     """
+    if status is GoalStatus.SUCCEEDED:  # its result may be missed, which is told only once
+        return on_goal_result(state, now_s, status, "")
     if state.over or status is None or not status.live:
         return state, ()
     return replace(state, seen_s=now_s, bad_end=None), ()

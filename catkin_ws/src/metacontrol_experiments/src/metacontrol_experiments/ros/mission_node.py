@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -19,6 +20,8 @@ from metacontrol_msgs.msg import ActiveConfiguration, Decision, MissionEvent
 from node_kit.io.forgiving_logs import forgive
 from node_kit.io.inbox import Inbox
 from node_kit.ros.connections import connect_to_all
+from node_kit.ros.handshakes import greet_apart
+from node_kit.ros.rosout_parameter import read_rosout_parameter
 
 from metacontrol_experiments.io.processes import wait_until
 from metacontrol_experiments.mission.clock import SteadyClock
@@ -26,7 +29,7 @@ from metacontrol_experiments.mission.readiness import Readiness
 from metacontrol_experiments.ros.startup import DECISION_TOPIC, StartError, Startup
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Iterator
 
     from metacontrol_bags.timeline import Report
 
@@ -71,7 +74,9 @@ class MissionNode(ABC, Generic[State]):
         self._startup.wait_for_master()
         connect_to_all()
         rospy.init_node("mission", disable_signals=True)
+        read_rosout_parameter()
         forgive()
+        greet_apart()
         self._events = rospy.Publisher("mission/event", MissionEvent, queue_size=10)
         self._goal = self._make_goal()
         self._subscribe("rosgraph_manipulator/active_configuration", ActiveConfiguration, self._on_configuration)
@@ -164,7 +169,8 @@ class MissionNode(ABC, Generic[State]):
             interrupted = isinstance(error, KeyboardInterrupt)
             reason = "interrupted" if interrupted else " ".join(f"{type(error).__name__}: {error}".split())
             self._give_up(self._now(), reason, interrupted=interrupted)
-            self._goal.cancel()
+            with _unless_shut_down():
+                self._goal.cancel()
             self._end()
             raise
         self._end()
@@ -188,6 +194,8 @@ class MissionNode(ABC, Generic[State]):
         clock, moved = rospy.get_time(), time.monotonic()
         while not self.is_over:
             self._inbox.drain(0.05)
+            if rospy.is_shutdown():
+                self._give_up(self._now(), "another node has taken the mission's name", interrupted=False)
             now = rospy.get_time()
             if now != clock:
                 clock, moved = now, time.monotonic()
@@ -216,7 +224,8 @@ class MissionNode(ABC, Generic[State]):
     def _publish_event(self, stamp: rospy.Time, kind: str, name: str, values: dict[str, str]) -> None:
         message = MissionEvent(kind=kind, name=name, values=[KeyValue(key, value) for key, value in values.items()])
         message.header.stamp = stamp
-        self._events.publish(message)
+        with _unless_shut_down():
+            self._events.publish(message)
         self._tell(Event(stamp.to_sec(), kind, name, values))
 
     def _tell(self, report: Report) -> None:
@@ -248,3 +257,13 @@ class MissionNode(ABC, Generic[State]):
             self._readiness.has_graph |= not isinstance(report, QualityReport)
             if not isinstance(report, CostReport):
                 self._tell(report)
+
+
+@contextmanager
+def _unless_shut_down() -> Iterator[None]:
+    """Leave out what can't be published because the node was shut down: another one may have taken its name."""
+    try:
+        yield
+    except rospy.ROSException:
+        if not rospy.is_shutdown():
+            raise

@@ -6,6 +6,7 @@ recorded: they are the answer to decisions, and must not overtake those of the r
 
 from __future__ import annotations
 
+import contextlib
 import queue
 from typing import TYPE_CHECKING, Any
 
@@ -65,9 +66,16 @@ def main() -> None:
             except queue.Empty:
                 continue
             if not is_first:
-                rospy.sleep(received + delay - rospy.Time.now())
+                with contextlib.suppress(rospy.ROSTimeMovedBackwardsException):  # the bag is played again
+                    rospy.sleep(_left(received, rospy.Time.now(), delay))
             is_first = False
             active.publish(message)
+
+
+def _left(received: rospy.Time, now: rospy.Time, delay: rospy.Duration) -> rospy.Duration:
+    """Return how much is left of a delay; nothing where the clock was set back since."""
+    left = received + delay - now
+    return left if left <= delay else rospy.Duration()
 
 
 def _is_kept(status: Any, observed: frozenset[str]) -> bool:

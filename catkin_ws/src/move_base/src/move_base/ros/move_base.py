@@ -6,6 +6,8 @@ import contextlib
 import functools
 import math
 import threading
+import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -40,6 +42,9 @@ if TYPE_CHECKING:
 
     from move_base.parameters.parameters import MoveBaseParameters, ObservationSource
     from move_base.parameters.reconfiguration import ServerDescription
+
+OFFER_AGAIN = 1.0
+"""Wall s until services and servers are offered that could not be."""
 
 WARN_PERIOD = 5.0
 """The same warning is repeated no sooner than this, s."""
@@ -125,11 +130,18 @@ class MoveBaseNode:
         """Offer what the first command does not need: services and dynamic_reconfigure."""
         from move_base.ros.reconfigure import offer
 
-        with contextlib.suppress(rospy.ROSException, OSError):  # the node ends while it starts
-            for name in ("~make_plan", f"~{self._parameters.global_planner}/make_plan"):
-                rospy.Service(name, GetPlan, self._on_make_plan)
-            rospy.Service("~clear_costmaps", Empty, self._on_clear_costmaps)
-            offer(servers(self._parameters), self._present_values, self._reconfigure)
+        names = ("~make_plan", f"~{self._parameters.global_planner}/make_plan")
+        offers = [partial(rospy.Service, name, GetPlan, self._on_make_plan) for name in names]
+        offers.append(partial(rospy.Service, "~clear_costmaps", Empty, self._on_clear_costmaps))
+        offers += [partial(offer, [one], self._present_values, self._reconfigure) for one in servers(self._parameters)]
+        while offers and not rospy.core.is_shutdown_requested():
+            try:
+                offers[0]()
+                del offers[0]
+            except Exception as error:  # the master is in trouble for a moment
+                if not rospy.core.is_shutdown_requested():
+                    rospy.logwarn("What move_base can be asked for is offered later: %s", error)
+                    time.sleep(OFFER_AGAIN)
 
     # -- parameters that change on the way -------------------------------------------------------------------------
 

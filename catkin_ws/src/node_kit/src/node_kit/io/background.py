@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from typing import Any
+
+_log = logging.getLogger(__name__)
+
+PAUSE = 0.1
+"""Wall s after an error that nobody foresaw, such as for want of memory."""
 
 
 class NoThreadError(OSError):
@@ -52,3 +60,19 @@ def in_background(work: Callable[[], Any], name: str) -> Future[Any]:
     except NoThreadError as error:
         future.set_exception(error)
     return future
+
+
+def again_and_again(step: Callable[[], object], lasts: Callable[[], bool]) -> None:
+    """Do a step as long as something lasts. An error that nobody foresaw is logged, and costs no more than that step.
+
+    Args:
+        step: what a thread does that must not end; it waits itself for what is to be done.
+        lasts: tells whether it is to go on.
+    """
+    while lasts():
+        try:
+            step()
+        except Exception:
+            with suppress(Exception):
+                _log.exception("thread %s goes on", threading.current_thread().name)
+            time.sleep(PAUSE)

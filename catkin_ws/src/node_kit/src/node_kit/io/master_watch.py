@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from node_kit.io.background import again_and_again
 from node_kit.io.xml_rpc import CallError, Client, GoneError, SilentError
 from node_kit.master import PATIENCE, Answer, Refusal, Silence, Standing, View
 
@@ -33,6 +34,7 @@ class MasterWatch:
         self._tell, self._on_loss = tell, on_loss
         self._hurry = threading.Event()
         self._news = threading.Condition()
+        self._view = View()
         self._answered_at = -math.inf  # when the last question that was answered had been put
         self.thread: threading.Thread | None = None
 
@@ -67,24 +69,26 @@ class MasterWatch:
         return self._answered_at > -math.inf
 
     def _run(self, ask: _Asker) -> None:
-        view = View()
-        while not view.lost:
-            self._hurry.clear()
-            asked = time.monotonic()
-            came = ask(view.timeout(asked, self.patience))
-            before, view = view, view.after(came, asked, time.monotonic(), self.patience)
-            if view.standing is Standing.THERE:
-                self._note(answered_at=asked)
-                self._beat()
-                self._hurry.wait(view.pause)
-                continue
-            is_new_silence = view.silent_since is not None and before.silent_since is None
-            if is_new_silence or (view.lost and view.standing is not Standing.MUTE):
-                self._tell(view)
-            if not view.lost:
-                time.sleep(view.pause)
+        again_and_again(lambda: self._look(ask), lambda: not self._view.lost)
         self._note(lost=True)
-        self._on_loss(view)
+        self._on_loss(self._view)
+
+    def _look(self, ask: _Asker) -> None:
+        self._hurry.clear()
+        asked = time.monotonic()
+        before = self._view
+        came = ask(before.timeout(asked, self.patience))
+        self._view = view = before.after(came, asked, time.monotonic(), self.patience)
+        if view.standing is Standing.THERE:
+            self._note(answered_at=asked)
+            self._beat()
+            self._hurry.wait(view.pause)
+            return
+        is_new_silence = view.silent_since is not None and before.silent_since is None
+        if is_new_silence or (view.lost and view.standing is not Standing.MUTE):
+            self._tell(view)
+        if not view.lost:
+            time.sleep(view.pause)
 
     def _beat(self) -> None:
         if self.heartbeat:

@@ -8,6 +8,7 @@ from typing import Any
 import rosgraph
 import rospy
 
+from node_kit.io.background import again_and_again
 from node_kit.io.xml_rpc import CallError, Client
 
 _AGAIN = 1.0
@@ -46,16 +47,18 @@ class KeptParameter:
 
     def _run(self) -> None:
         with Client(rosgraph.get_master_uri(), rospy.get_name()) as master:
-            while True:
-                with self._changed:
-                    self._changed.wait_for(lambda: self._set > self._written)
-                    number, value = self._set, self._value
-                try:
-                    master.call("setParam", self._name, value)
-                except CallError:
-                    with self._changed:
-                        self._changed.wait(_AGAIN)
-                    continue
-                with self._changed:
-                    self._written = number
-                    self._changed.notify_all()
+            again_and_again(lambda: self._write(master), lambda: True)
+
+    def _write(self, master: Client) -> None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._set > self._written)
+            number, value = self._set, self._value
+        try:
+            master.call("setParam", self._name, value)
+        except CallError:
+            with self._changed:
+                self._changed.wait(_AGAIN)
+            return
+        with self._changed:
+            self._written = number
+            self._changed.notify_all()

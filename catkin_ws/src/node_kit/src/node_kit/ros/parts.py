@@ -11,6 +11,7 @@ import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from node_kit.io.background import again_and_again
 from node_kit.io.inbox import Inbox
 from node_kit.io.xml_rpc import CallError, Client, DeniedError, GoneError
 from node_kit.parts import PERIOD, Answer, Parts, Sign
@@ -64,6 +65,8 @@ class PartsWatch:
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=5)
         rospy.Subscriber(TOPIC, DiagnosticStatus, self._on_sign, queue_size=50)
         rospy.on_shutdown(self._end)
+        self._given_at = self._asked_at = self._told_at = 0.0  # monotonic s
+        self._news: dict[str, str] = {}
         threading.Thread(target=self._run, name="watch parts", daemon=True).start()
 
     def _on_sign(self, status: DiagnosticStatus) -> None:
@@ -73,26 +76,26 @@ class PartsWatch:
         self._inbox.put(lambda: self._parts.hear(sign, time.monotonic()))
 
     def _run(self) -> None:
-        given = asked = told = 0.0
-        before: dict[str, str] = {}
-        while not rospy.is_shutdown():
-            self._inbox.do_next(wait_s=_LOOK)
-            self._inbox.drain()
-            now = time.monotonic()
-            if now - given >= PERIOD:
-                given = now
-                self._give()
-            if now - asked >= _LOOK:
-                asked = now
-                for sign in self._parts.doubtful(now):
-                    self._parts.note(sign.node, _ask(sign), time.monotonic())
-            self.head_start = self._parts.head_start()
-            news = self._parts.to_tell()
-            is_new = any(before.get(node) != why for node, why in news.items())
-            if news and (is_new or now - told >= _REPEAT):
-                told = now
-                self._tell(news, before)
-            before = news
+        again_and_again(self._look, lambda: not rospy.is_shutdown())
+
+    def _look(self) -> None:
+        self._inbox.do_next(wait_s=_LOOK)
+        self._inbox.drain()
+        now = time.monotonic()
+        if now - self._given_at >= PERIOD:
+            self._given_at = now
+            self._give()
+        if now - self._asked_at >= _LOOK:
+            self._asked_at = now
+            for sign in self._parts.doubtful(now):
+                self._parts.note(sign.node, _ask(sign), time.monotonic())
+        self.head_start = self._parts.head_start()
+        before, news = self._news, self._parts.to_tell()
+        is_new = any(before.get(node) != why for node, why in news.items())
+        if news and (is_new or now - self._told_at >= _REPEAT):
+            self._told_at = now
+            self._tell(news, before)
+        self._news = news
 
     def _tell(self, news: dict[str, str], before: dict[str, str]) -> None:
         """Tell on /diagnostics what is lost and what is there again, and in the log what is new of it."""

@@ -4,6 +4,8 @@ With rospy alone, such a moment leaves a node deaf for ever, while it works and 
 
 - The thread that accepts connections ends where it gets no descriptor: nobody is connected any more.
 - The thread that connects topics ends where it can't start another: publishers that come later are never heard.
+- The server of the node's API drops a call for which it gets no thread, such as the master's word of a new publisher,
+  which comes only once.
 - A subscriber gives up a connection for which it gets no descriptor, and takes one for made whose thread could not be
   started. Nobody connects again.
 
@@ -19,6 +21,7 @@ from types import SimpleNamespace
 from typing import Any, Callable
 
 import rospy
+from rosgraph.xmlrpc import ThreadingXMLRPCServer
 from rospy.impl import registration, tcpros_pubsub
 
 PAUSE = 0.1
@@ -73,6 +76,12 @@ def outlast_shortages() -> None:
     patient = SimpleNamespace(**{**vars(threading), "Thread": PatientThread})
     registration.threading = tcpros_pubsub.threading = patient
     tcpros_pubsub.robust_connect_subscriber = _connect_or_ask_again
+    ThreadingXMLRPCServer.process_request = _serve_in_time
+
+
+def _serve_in_time(server: Any, request: Any, address: Any) -> None:
+    """Serve a call in a thread of its own, as socketserver does."""
+    PatientThread(target=server.process_request_thread, args=(request, address), daemon=True).start()
 
 
 def _connect_or_ask_again(

@@ -102,8 +102,9 @@ class DesiredModel:
         try:
             active = [self._variant(g.configuration) for g in groundings if g.configuration]
             in_change = [self._variant(name) for g in groundings if g.state in _IN_CHANGE for name in self._names(g)]
-        except ModelError as error:
-            self.current = replace(self.current, excused=self.current.variant_nodes, problem=str(error))
+        except Exception as error:  # such as for want of memory
+            why = str(error) if isinstance(error, ModelError) else f"{type(error).__name__}: {error}"
+            self.current = replace(self.current, excused=self.current.variant_nodes, problem=why)
             return self.current
         self._stable |= {g.function: g.configuration for g in groundings if g.state == FunctionGrounding.STABLE}
         names = (g.configuration for g in groundings if g.configuration)

@@ -123,8 +123,8 @@ def on_broken(state: Liveness, error: int, now: float, timing: Timing) -> Livene
 
 
 def on_no_socket(state: Liveness, now: float, timing: Timing) -> Liveness:
-    """Return the state after this process could not make a socket, which says nothing about the node."""
-    return replace(state, connecting_since=None, next_at=now + timing.retry_period)
+    """Return the state after this process has no socket for its own reasons, which say nothing about the node."""
+    return replace(state, connecting_since=None, connected=False, asked_at=None, next_at=now + timing.retry_period)
 
 
 def on_connect_error(state: Liveness, error: int, now: float, timing: Timing) -> Liveness:

@@ -15,6 +15,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from node_kit.io.background import again_and_again
+
 from rosgraph_monitor.health import liveness
 from rosgraph_monitor.health.liveness import Action, Life, Liveness, Timing
 
@@ -74,6 +76,7 @@ class NodeConnections:
         self._addresses: dict[str, tuple[int, str] | None] = {}
         self._resolving: set[str] = set()
         self._closing = False
+        self._sweep_at = 0.0  # monotonic s
         self._targets: dict[Key, _Target] = {}
         self._thread = threading.Thread(target=self._run, name="liveness", daemon=True)
 
@@ -111,30 +114,29 @@ class NodeConnections:
     # All below runs in the watching thread.
 
     def _run(self) -> None:
-        sweep_at = 0.0
-        while True:
-            with self._lock:
-                if self._closing:
-                    break
-                wanted = self._wanted
-            self._retarget(wanted)
-            now = time.monotonic()
-            if now >= sweep_at:
-                sweep_at = now + _SWEEP
-                for target in list(self._targets.values()):
-                    if now >= target.due_at:
-                        self._guarded(target, self._step)
-            for key, events in self._selector.select(max(sweep_at - time.monotonic(), 0.0)):
-                if key.data is None:
-                    self._drain()
-                    sweep_at = 0.0
-                else:
-                    self._guarded(key.data, partial(self._handle, events=events))
+        again_and_again(self._look, lambda: not self._closing)
         for target in self._targets.values():
             self._drop(target)
         self._selector.close()
         self._waker.close()
         self._wakened.close()
+
+    def _look(self) -> None:
+        with self._lock:
+            wanted = self._wanted
+        self._retarget(wanted)
+        now = time.monotonic()
+        if now >= self._sweep_at:
+            self._sweep_at = now + _SWEEP
+            for target in list(self._targets.values()):
+                if now >= target.due_at:
+                    self._guarded(target, self._step)
+        for key, events in self._selector.select(max(self._sweep_at - time.monotonic(), 0.0)):
+            if key.data is None:
+                self._drain()
+                self._sweep_at = 0.0
+            else:
+                self._guarded(key.data, partial(self._handle, events=events))
 
     def _guarded(self, target: _Target, do: Callable[[_Target], None]) -> None:
         """Do something about a node; an error that nobody foresaw costs its connection, and no other node's."""

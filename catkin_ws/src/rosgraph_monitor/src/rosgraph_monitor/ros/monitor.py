@@ -106,9 +106,9 @@ class MonitorNode:
         self._updater.setHardwareID(self._diagnostics.robot)
         self._updater.add("look at the graph", self._tell_poll)
         self._observers = ObserverHost(self._diagnostics)
-        self._observers.follow(self._model.current.system)
-        for name in observers:
-            self._observers.load(name)
+        self._followed = self._model.current.system  # by observers and topics
+        self._observers.follow(self._followed)
+        self._observers.begin(observers)
         self._topics = TopicListener(self._grace)
         self._topic_states: dict[str, str] = {}
         self._follow_topics()
@@ -237,9 +237,10 @@ class MonitorNode:
             before, current = self._model.current, read()
             if current.problem and current.problem != before.problem:
                 rospy.logerr("desired model stays as it was: %s", current.problem)
-            if current.system != before.system:
+            if current.system != self._followed:
                 self._observers.follow(current.system)
                 self._follow_topics()
+                self._followed = current.system
 
     def _follow_topics(self) -> None:
         """Watch the topics for which the settings or the active model have expectations; settings take precedence."""

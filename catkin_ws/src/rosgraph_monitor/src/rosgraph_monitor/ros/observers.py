@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import rospy
@@ -16,13 +17,14 @@ from metacontrol_msgs.srv import (
     UnloadObserver,
     UnloadObserverResponse,
 )
+from node_kit.io.background import in_background
 
 from rosgraph_monitor.observer import ServiceObserver
 from rosgraph_monitor.observers import plugins
 from rosgraph_monitor.ros.topics import unpacked
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from diagnostic_msgs.msg import DiagnosticStatus
     from ros_model.language.metamodel import RosSystem
@@ -34,6 +36,8 @@ _LARGEST_MESSAGE = 1 << 24
 _WARNING_PERIOD = 10.0
 _INBOX = 100
 """Messages that wait for an observer's next evaluation; of more, the oldest are dropped."""
+_FIRST_AGAIN, _LONGEST_AGAIN = 2.0, 64.0
+"""Wall s until an observer that can't start is tried again: at first, and at most. Each wait is twice the last one."""
 _PATIENCE = 5.0
 _PATIENCE_PERIODS = 5.0
 """Wall s, and periods, that an evaluation may take before the observer counts as hung."""
@@ -54,12 +58,19 @@ class ObserverHost:
         self._lock = threading.Lock()
         self._loading: set[str] = set()
         self._turn = threading.Lock()
+        self._waits: dict[str, tuple[float, float]] = {}  # of what is to be started again: when, and after how long
         self._services = (
             rospy.Service("load_observer", LoadObserver, lambda r: LoadObserverResponse(self.load(r.name))),
             rospy.Service("unload_observer", UnloadObserver, lambda r: UnloadObserverResponse(self.unload(r.name))),
             rospy.Service("active_observers", ListObservers, lambda _: self._active()),
             rospy.Service("list_observers", ListObservers, lambda _: self._available()),
         )
+
+    def begin(self, names: Iterable[str]) -> None:
+        """Start observers. `supervise` tries those again that can't start, more and more rarely; not unknown ones."""
+        for name in names:
+            self._waits[name] = 0.0, _FIRST_AGAIN
+            self.load(name)
 
     def load(self, name: str) -> bool:
         """Start an observer. Return False, with a line that says why, if that fails or the observer runs already."""
@@ -72,18 +83,24 @@ class ObserverHost:
             observer = self._start(name)
         except plugins.PluginError as error:
             rospy.logerr("%s", error)
+            self._waits.pop(name, None)
             return False
         except (Exception, SystemExit) as error:  # a plug-in is somebody else's code
             rospy.logerr("observer %s can't start: %s: %s", name, type(error).__name__, error)
+            _, wait = self._waits.get(name, (0.0, 0.0))
+            if wait:
+                self._waits[name] = time.monotonic() + wait, min(2.0 * wait, _LONGEST_AGAIN)
             return False
         finally:
             with self._lock:
                 self._loading.discard(name)
+        self._waits.pop(name, None)
         rospy.loginfo("observer %s at %g Hz", name, observer.rate_hz)
         return True
 
     def unload(self, name: str) -> bool:
         """Stop an observer; False if there is none of that name."""
+        self._waits.pop(name, None)
         with self._lock:
             runner = self._runners.pop(name, None)
         if runner is None:
@@ -105,6 +122,9 @@ class ObserverHost:
         """Report observers that hang as stale, and return how many observers run. Call it regularly."""
         with self._lock:
             runners = tuple(self._runners.values())
+            due = [n for n, (at, _) in self._waits.copy().items() if time.monotonic() >= at and n not in self._loading]
+        for name in due:
+            in_background(partial(self.load, name), f"load {name}")
         for runner in runners:
             lasted = runner.hangs_for()
             if lasted:
@@ -166,7 +186,11 @@ class _Runner:
         if isinstance(observer, ServiceObserver):
             observer.client = rospy.ServiceProxy(*observer.service)
         self._subscribe()
-        threading.Thread(target=self._run, name=f"observer {observer.name}", daemon=True).start()
+        try:
+            threading.Thread(target=self._run, name=f"observer {observer.name}", daemon=True).start()
+        except RuntimeError:
+            self.stop()
+            raise
 
     def stop(self) -> None:
         """End the thread soon, and the subscriptions now."""

@@ -18,6 +18,7 @@ from metacontrol_msgs.msg import ActiveConfiguration
 from node_kit.io.xml_rpc import CallError
 from node_kit.ros.command import leaving_by_signals
 from node_kit.ros.connections import connect_to_all, latest
+from node_kit.ros.handshakes import greet_apart
 from node_kit.ros.lifetime import BAD_START, LONGEST_END, Lifetime
 from node_kit.ros.parts import TOPIC as SIGNS
 from node_kit.ros.parts import sign_of
@@ -57,6 +58,7 @@ def command(once: float | None) -> None:
     connect_to_all()
     with leaving_by_signals():
         rospy.init_node("rosgraph_watch", anonymous=True, disable_signals=True)
+    greet_apart()
     overview, lock = Overview(), threading.Lock()
     topic, robot = rospy.resolve_name(ownership.TOPIC), rospy.get_namespace()
 
