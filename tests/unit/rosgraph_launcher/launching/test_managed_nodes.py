@@ -428,3 +428,36 @@ def test_node_that_does_not_answer_under_its_contested_name_hangs(nodes):
 
 def test_node_whose_name_nobody_has_taken_does_not_hang(nodes):
     assert nodes.hanging(1000.0) == []
+
+
+def hang(nodes, after):
+    """Let /a be started again after it was ended, and hang; return what follows, and when."""
+    nodes.started("/a", after)
+    nodes.seen("/a", False, after + 1.0)
+    now = after + ANSWER_TIMEOUT + 0.1
+    assert nodes.hanging(now) == ["/a"]
+    nodes.stopped("/a")
+    return nodes.hung("/a", now).verdict, now
+
+
+def test_node_that_hangs_under_its_contested_name_again_and_again_is_given_up(nodes):
+    nodes.ended("/a", 0, 5.0, conflict="its name is taken by process 7 (x): end that process")
+    verdicts, now = [], 5.0
+    for _ in range(POLICY.intensity + 1):
+        verdict, now = hang(nodes, now + 0.5)
+        verdicts.append(verdict)
+    assert verdicts == [Verdict.RESTART] * POLICY.intensity + [Verdict.GIVE_UP]
+    assert nodes.report("f").state == FAILED
+    assert "3 times in a row are too many" in nodes.report("f").message
+
+
+def test_node_that_has_answered_since_begins_to_hang_anew(nodes):
+    nodes.ended("/a", 0, 5.0, conflict="its name is taken by process 7 (x): end that process")
+    now = 5.0
+    for _ in range(2 * POLICY.intensity):
+        verdict, now = hang(nodes, now + 0.5)
+        assert verdict is Verdict.RESTART
+        nodes.started("/a", now)
+        nodes.seen("/a", True, now + 1.0)
+        nodes.ended("/a", 0, now + 31.0, conflict="its name is taken by process 8 (x): end that process")
+        now += 62.0

@@ -29,6 +29,7 @@ class _Contest:
         hold: how long it must be held to be one's own, s.
         held_since: since when the launcher's own node answers under it; None: it does not.
         is_over: whether it has been held for so long.
+        hangs: how often in a row it was started and never answered under it.
     """
 
     conflict: str
@@ -36,6 +37,7 @@ class _Contest:
     hold: float
     held_since: float | None = None
     is_over: bool = False
+    hangs: int = 0
 
 
 class ContestedNames:
@@ -53,7 +55,7 @@ class ContestedNames:
         """Note that somebody else has taken a name, and who."""
         before = self._contests.get(name)
         hold = 2.0 * before.hold if before and now - before.taken_at <= MEMORY else HOLD
-        self._contests[name] = _Contest(conflict, now, hold)
+        self._contests[name] = _Contest(conflict, now, hold, hangs=before.hangs if before else 0)
 
     def conflict(self, name: str) -> str:
         """Return who took a contested name last, with the remedy; empty: it is not contested."""
@@ -66,7 +68,7 @@ class ContestedNames:
         if not is_own:
             self._contests[name] = replace(contest, held_since=None)
         elif contest.held_since is None:
-            self._contests[name] = replace(contest, held_since=now)
+            self._contests[name] = replace(contest, held_since=now, hangs=0)
         elif now - contest.held_since >= contest.hold:
             self._contests[name] = replace(contest, is_over=True)
 
@@ -74,6 +76,11 @@ class ContestedNames:
         """Tell whether the launcher's own node answered under a name when it was last looked at, or has it for good."""
         contest = self._contests.get(name)
         return contest is None or contest.is_over or contest.held_since is not None
+
+    def hung(self, name: str) -> int:
+        """Note that the launcher's own node has never answered under a contested name; return how often in a row."""
+        contest = self._contests[name] = replace(self._contests[name], hangs=self._contests[name].hangs + 1)
+        return contest.hangs
 
     def begin(self, name: str, conflict: str, now: float) -> None:
         """Note who had a name when a node was started under it; empty: nobody had."""

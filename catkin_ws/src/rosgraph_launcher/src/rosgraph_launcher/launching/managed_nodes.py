@@ -273,6 +273,17 @@ class ManagedNodes:
         """Decide what follows where a node can't be started again; it counts as one more death."""
         return self._count_death(name, f"node {name} can't be started again: {reason}", now)
 
+    def hung(self, name: str, now: float) -> Ending:
+        """Decide what follows where a node did not answer under its contested name, and was ended.
+
+        This takes longer than the period in which deaths are counted, so the times in a row are counted, too.
+        """
+        message = f"node {name} has not answered under its name within {ANSWER_TIMEOUT:g} s"
+        times = self._contested.hung(name)
+        if times > self._policy.intensity:
+            return self._give_up(self._needing(name), message, f"{times} times in a row are too many")
+        return self._count_death(name, message, now)
+
     def _count_death(self, name: str, message: str, now: float) -> Ending:
         """Count a death for each function of the node: a function may give up while another one goes on."""
         restarts, given_up = [], []

@@ -14,7 +14,6 @@ from node_kit.io.xml_rpc import CallError
 from rosgraph_launcher.description import NodeDescription
 from rosgraph_launcher.io.command_lines import CommandLineError
 from rosgraph_launcher.io.processes import StartError
-from rosgraph_launcher.launching.contested import ANSWER_TIMEOUT
 from rosgraph_launcher.launching.managed_nodes import ManagedNodes
 from rosgraph_launcher.launching.nodelets import unloading
 from rosgraph_launcher.launching.options import LauncherOptions
@@ -246,8 +245,7 @@ class Supervisor:
             self._nodes.seen(name, self._names.is_own(name, conflict), now)
         for name in self._nodes.hanging(now):
             self._end([name], patience=False)
-            reason = f"it has not answered under its name within {ANSWER_TIMEOUT:g} s"
-            self._follow(self._nodes.failed_to_restart(name, reason, now))
+            self._follow(self._nodes.hung(name, now))
         if self._nodes.recovered():
             self._report()
 
