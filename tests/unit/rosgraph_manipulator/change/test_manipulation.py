@@ -93,7 +93,17 @@ class Told(list):
         pass
 
 
-def manipulation(executor, running):
+class Keeper:
+    """Keeps the journal."""
+
+    def __init__(self):
+        self.journal = Journal()
+
+    def update(self, change):
+        self.journal = change(self.journal, 0.0)
+
+
+def manipulation(executor, running, keeper=None):
     told = Told()
     log = SimpleNamespace(info=lambda *_: None, warn=lambda *_: None, error=lambda *_: None)
     made = Manipulation(
@@ -102,7 +112,7 @@ def manipulation(executor, running):
         5.0,
         executor,
         told,
-        SimpleNamespace(update=lambda change: change(Journal(), 0.0)),
+        keeper or Keeper(),
         SimpleNamespace(now=lambda: executor.now, log=log, failures=(OSError,)),
         lambda runs: None,
     )
@@ -119,6 +129,15 @@ def test_change_that_breaks_off_half_way_is_undone(error):
     assert (outcome.result, outcome.running) == (Result.FAILED, A)
     assert str(error) in outcome.message
     assert told[-1] == ("a", FunctionGrounding.STABLE)
+
+
+@pytest.mark.parametrize(("running", "wanted", "undo"), [("a", "a", "restore"), ("", "", "release")])
+def test_request_that_was_taken_back_is_not_finished_by_the_next_manipulator(monkeypatch, running, wanted, undo):
+    executor, keeper, noted = Executor(change=CancelledError("taken back")), Keeper(), []
+    manipulator, _ = manipulation(executor, running, keeper)
+    monkeypatch.setattr(executor, undo, lambda _: noted.append(keeper.journal.wanted) or frozenset())
+    manipulator.carry_out(Order("f", "b"))
+    assert noted == [wanted]
 
 
 def test_change_that_can_not_begin_leaves_what_runs():

@@ -111,6 +111,7 @@ def deploy(
     watch: Stopwatch,
     remark: str = "",
     runs: bool = True,
+    undoing: Callable[[], object] = lambda: None,
 ) -> Outcome:
     """Carry out plans until one succeeds; where none does, restore the last good configuration.
 
@@ -124,6 +125,7 @@ def deploy(
         watch: measures the phases.
         remark: what the plans do besides, in words.
         runs: whether a complete configuration runs now.
+        undoing: is called before a request that was taken back is undone.
     """
     reasons: list[str] = []
     whole = runs
@@ -136,6 +138,7 @@ def deploy(
             reason = f"{wanted.name}: {error}"
             if whole or error.superseded:
                 return Outcome(Result.FAILED, last_good if whole else None, reason, cancelled=True)
+            undoing()
             return go_back(executor, wanted.function, last_good, reason, watch, cancelled=True)
         except DeploymentError as error:
             reasons.append(f"{plan.tactic}: {error}")

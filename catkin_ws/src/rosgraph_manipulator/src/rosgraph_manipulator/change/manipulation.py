@@ -223,7 +223,17 @@ class Manipulation:
         else:
             last_good, runs = deployments.fallback(wanted), deployments.running is not None
             try:
-                outcome = deploy(self._executor, wanted, plans, last_good, watch, found.remark, runs)
+                outcome = deploy(
+                    self._executor,
+                    wanted,
+                    plans,
+                    last_good,
+                    watch,
+                    found.remark,
+                    runs,
+                    # Nobody wants it any more: the next manipulator must not finish it.
+                    undoing=lambda: self._note(wanted=last_good.name if last_good else ""),
+                )
             except self._failures as error:
                 outcome = self._clear_away(wanted, f"{wanted.name}: {' '.join(str(error).split())}", watch)
         phases = durations(watch.phases, self._executor.launcher_phases, outcome.result is Result.OK)
