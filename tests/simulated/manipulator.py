@@ -32,6 +32,7 @@ from simulated.systems import System
 
 TACTICS = {"nothing": nothing, "parameters": parameters, "restart": restart, "replace": replace}
 LAUNCHER = "rosgraph_launcher"
+LOOK_PERIOD = 0.5  # s
 FIND = 10.0  # s, for a launcher to be found
 EPOCH = 1.7e9  # s, of the wall clock at the start
 ROSLAUNCH = "roslaunch"  # starts each manipulator
@@ -135,16 +136,17 @@ class ManipulatorPart:
         self.requests, self.serves = requests, True
         while True:
             self.busy = False
-            self._inbox.wait()
-            self.busy = True
-            self._inbox.do_next()
+            self._inbox.wait(LOOK_PERIOD)
+            if self._inbox:
+                self.busy = True
+                self._inbox.do_next()
+            else:
+                manipulation.look()
 
     def _beat(self, manipulation: Manipulation) -> None:
         while True:
             self.process.pause(0.5)
             manipulation.heartbeat()
-            if self.serves and self.launcher is None:  # else follow_launcher looks
-                self._inbox.put(manipulation.look)
 
     def wall(self) -> float:
         """Return the time of the wall clock, s since the epoch."""

@@ -28,6 +28,15 @@ class Around:
     def now(self):
         return 0.0
 
+    def news(self):
+        return nullcontext()
+
+    def drivers(self):
+        return set()
+
+    def halt(self):
+        pass
+
     def resolve(self, name):
         return name.replace("~", "/rosgraph_manipulator/")
 
@@ -97,6 +106,21 @@ def test_former_values_are_handed_over_although_the_master_was_silent_when_they_
     assert left.transition({}) == ({"/speed": 1}, [])
 
 
+def test_function_is_released_although_the_master_is_silent_and_its_parameters_are_restored_later(around):
+    execution = execution_of(around, Launchers(), all_up)
+    change(execution)
+    around.silent = True
+    assert execution.release("f") == frozenset()
+    execution.catch_up()
+    around.silent = False
+    assert around.server["/speed"] == 2
+    execution.catch_up()
+    assert around.server["/speed"] == 1
+    around.server["/speed"] = 3  # by somebody else
+    execution.catch_up()
+    assert around.server["/speed"] == 3
+
+
 # -- recovery
 
 
@@ -134,17 +158,11 @@ class LaunchFiles(Around):
     is_ending = False
     gone = ()
 
-    def news(self):
-        return nullcontext()
-
     def launch_file(self, configuration):
         if configuration.name in self.gone:
             raise DeploymentError(f"{configuration.launch_file}: no such file")
         name = f"/{configuration.name}"
         return LaunchFile(SystemDescription({name: NodeDescription(name, "/", "p", "x")}))
-
-    def drivers(self):
-        return set()
 
 
 LOOK = Configuration("look", "f_look", "look.launch")

@@ -72,6 +72,9 @@ class Executor:
     def clear(self, function):
         pass
 
+    def catch_up(self):
+        pass
+
     def take_deaths(self, function):
         return None
 

@@ -94,6 +94,7 @@ class Execution:
         self._servers_died: dict[str, bool] = {}  # by function: whether the kept action's server died
         self._follows = False  # whether the reports of the launcher that made the last change arrive
         self._recovers = False  # whether it waits for nodes that the launcher has started again
+        self._owes_restore = False  # whether former values of parameters could not be restored
         launchers.on_reports = self._follow
         if launchers.reports():
             self._follow()
@@ -247,10 +248,20 @@ class Execution:
                     self._around.log.warn(f"{function}: it is not known who drives the robot: {error}")
             self._call(function, "", None, tuple(leaving), ())
             self.system.released(function)
-            self._store_parameters(function, None)
+            try:
+                self._store_parameters(function, None)
+            except DeploymentError as error:  # the nodes have ended nevertheless
+                self._owes_restore = True
+                self._around.log.warn(f"{function}: former values of parameters are not restored yet: {error}")
         finally:
             self.stop_robot(function)
         return staying
+
+    def catch_up(self) -> None:
+        """Set the parameters that could not be set yet, because the master did not answer; call it now and then."""
+        if self._owes_restore:
+            with contextlib.suppress(DeploymentError):
+                self._store_parameters("", None)
 
     def forget_goal(self, function: str) -> None:
         """Drop the pending goal of a function that is needed no longer."""
@@ -383,6 +394,7 @@ class Execution:
             handover = {self._around.resolve("~overwritten"): self._overwritten.as_parameter()}
             clear = launch.clear if launch else ()
             self._around.set_parameters({**handover, **values}, delete=[*clear, *gone])
+            self._owes_restore = False
         except (CallError, OSError) as error:
             raise DeploymentError(" ".join(str(error).split())) from error
 

@@ -307,7 +307,8 @@ class Manipulation:
             self._follow_function(function, self._executor.report(function))
 
     def look(self) -> None:
-        """See whether the launcher has ended and does not come back, of which nobody reports; call it now and then."""
+        """See what nobody reports: whether the launcher has ended, and the master answers; call it now and then."""
+        self._executor.catch_up()
         for function in self._deployments:
             self._look_for_launcher(function)
 
