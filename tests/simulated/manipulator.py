@@ -348,10 +348,12 @@ class _Launchers:
         return []
 
     def unconnected(self, function: str) -> str:
+        return "" if self._is_connected() or not self._parts.get(function) else f"/{LAUNCHER}"
+
+    def _is_connected(self) -> bool:
         present = self._present()
         topic = self._part._topics["functions"]
-        connected = present is not None and topic.connected(self._part.process, present.process)
-        return "" if connected or not self._parts.get(function) else f"/{LAUNCHER}"
+        return present is not None and topic.connected(self._part.process, present.process)
 
     def main_has_ended(self, function: str) -> bool:
         return bool(self.unconnected(function))
@@ -361,6 +363,10 @@ class _Launchers:
 
     def adopt(self, function: str, nodes: Iterable[NodeDescription]) -> None:
         self._parts[function] = frozenset({LAUNCHER})
+        self.on_reports()
+
+    def expect_nothing(self, function: str) -> None:
+        self._parts[function] = frozenset()
         self.on_reports()
 
     def change(
@@ -381,7 +387,7 @@ class _Launchers:
         return _Changed(sum(numbers.values()), call.phases)
 
     def clear(self, function: str) -> list[str]:
-        if function not in self._parts:
+        if function not in self._parts or not self._is_connected():
             return []
         names = stale(self._of(function), self._parts[function])
         if names:

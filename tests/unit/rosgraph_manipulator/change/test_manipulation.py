@@ -29,6 +29,7 @@ class Executor:
 
     def __init__(self, compare=None, change=None, nodes=False):
         self.done, self._compare, self._change, self._nodes = [], compare, change, nodes
+        self.cleared = []
         self.system = SimpleNamespace(compare=self.compare, nodes=SimpleNamespace(adjustable=lambda _: None))
 
     def compare(self, wanted, restart):
@@ -70,7 +71,10 @@ class Executor:
         return self.launcher_gone
 
     def clear(self, function):
-        pass
+        self.cleared.append(function)
+
+    def expect_nothing(self, function):
+        self.done.append(f"nothing of {function} expected")
 
     def catch_up(self):
         pass
@@ -154,7 +158,7 @@ def test_change_that_can_not_begin_stops_what_is_left_where_nothing_whole_runs()
     executor = Executor(compare=DeploymentError("no such file"), nodes=True)
     manipulator, told = manipulation(executor, running="")
     outcome = manipulator.carry_out(Order("f", "b"))
-    assert executor.done == ["f released"]
+    assert executor.done == ["f released", "nothing of f expected"]
     assert (outcome.result, outcome.running) == (Result.GENERAL_ERROR, None)
     assert told[-1] == ("b", FunctionGrounding.FAILED)
 
@@ -174,14 +178,26 @@ def test_torn_function_that_can_not_be_stopped_has_failed(failing, failure, aske
     assert told[-1] == ("b", FunctionGrounding.FAILED)
     assert executor.halts == 1
     manipulator.make_whole("f")
-    assert executor.done == ["touched"]
+    assert executor.done == ["touched", "nothing of f expected"]
+
+
+def test_what_could_not_be_stopped_is_stopped_later(failing):
+    executor = Executor(change=DeploymentError("the launcher hangs"))
+    manipulator, told = manipulation(executor, running="a")
+    for undo in ("restore", "release"):
+        failing(executor, undo, DeploymentError("the launcher hangs"), times=1)
+    manipulator.carry_out(Order("f", "b"))
+    assert told[-1] == ("b", FunctionGrounding.FAILED)
+    assert executor.done == ["touched", "nothing of f expected"]
+    manipulator.look()
+    assert executor.cleared == ["f"]
 
 
 def test_change_that_can_not_begin_asks_the_launcher_nothing_where_it_has_no_nodes():
     executor = Executor(compare=DeploymentError("no such file"))
     manipulator, _ = manipulation(executor, running="")
     assert manipulator.carry_out(Order("f", "b")).result is Result.GENERAL_ERROR
-    assert executor.done == []
+    assert executor.done == ["nothing of f expected"]
 
 
 # -- the launcher has ended

@@ -203,6 +203,20 @@ def test_end_of_the_main_launcher_concerns_the_functions_of_which_it_has_a_part(
     assert not followed.main_has_ended("another")
 
 
+def test_what_runs_although_nothing_should_is_stopped_once_its_launcher_is_there(followed, around):
+    tell(followed, MAIN)
+    followed.adopt("f", [NODE])
+    assert followed.clear("f") == []
+    followed.expect_nothing("f")
+    assert followed.reports()["f"].nodes == ()
+    around.connected.discard(MAIN)
+    assert followed.clear("f") == []
+    around.connected.add(MAIN)
+    followed.clear("f")
+    ((name, request),) = around.requests
+    assert (name, request.configuration) == (MAIN, "")
+
+
 # -- no thread
 
 

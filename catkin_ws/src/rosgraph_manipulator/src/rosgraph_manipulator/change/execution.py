@@ -114,12 +114,16 @@ class Execution:
             self.system.deployed(configuration, launch)
             self._launchers.adopt(configuration.function, launch.system.nodes.values())
 
+    def expect_nothing(self, function: str) -> None:
+        """Note that nothing should run for a function, so that `clear` stops what could not be stopped."""
+        self._launchers.expect_nothing(function)
+
     def stop_rest(self, function: str) -> None:
         """Stop the nodes of a function that has failed on one host on all others, too."""
         self._launchers.stop_rest(function)
 
     def clear(self, function: str) -> None:
-        """Stop what runs for a function on hosts where it should not, because they were lost when it changed."""
+        """Stop what runs for a function on hosts where it should not: they were lost, or hung, when it changed."""
         for host in self._launchers.clear(function):
             self._around.log.warn(f"{function}: stopped what was left of it on host {host}")
 

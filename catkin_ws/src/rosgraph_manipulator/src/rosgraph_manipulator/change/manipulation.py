@@ -264,6 +264,7 @@ class Manipulation:
         if outcome.running:
             self._announcer.announce(outcome.running, FunctionGrounding.STABLE, outcome, phases)
         elif outcome.result is Result.GENERAL_ERROR:
+            self._executor.expect_nothing(wanted.function)
             self._executor.stop_robot(wanted.function)
             self._announcer.announce(wanted, FunctionGrounding.FAILED, outcome, phases)
         self._note(wanted="")
@@ -307,9 +308,10 @@ class Manipulation:
             self._follow_function(function, self._executor.report(function))
 
     def look(self) -> None:
-        """See what nobody reports: whether the launcher has ended, and the master answers; call it now and then."""
+        """See what nobody reports: whether the launcher has ended, or answers again; call it now and then."""
         self._executor.catch_up()
         for function in self._deployments:
+            self._executor.clear(function)
             self._look_for_launcher(function)
 
     def _look_for_launcher(self, function: str) -> None:

@@ -151,6 +151,9 @@ class Launchers(Protocol):
     def adopt(self, function: str, nodes: Iterable[NodeDescription]) -> None:
         """Note which nodes should run for a function although no change has started them."""
 
+    def expect_nothing(self, function: str) -> None:
+        """Note that nothing should run for a function although its nodes may not have been stopped."""
+
     def clear(self, function: str) -> list[str]:
         """Stop what runs for a function where it should not; return the hosts on which something did."""
 

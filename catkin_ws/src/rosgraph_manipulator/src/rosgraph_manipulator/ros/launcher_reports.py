@@ -148,6 +148,12 @@ class LauncherReports:
             self._parts[function] = frozenset(places)
         self.on_reports()
 
+    def expect_nothing(self, function: str) -> None:
+        """Note that nothing should run for a function although its nodes may not have been stopped."""
+        with self._lock:
+            self._parts[function] = frozenset()
+        self.on_reports()
+
     # -- where nodes are ------------------------------------------------------------------------------------------
 
     def is_here(self, node: NodeDescription) -> bool:

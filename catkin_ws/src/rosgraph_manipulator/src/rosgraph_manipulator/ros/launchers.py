@@ -140,10 +140,12 @@ class Launchers(LauncherReports):
 
     def clear(self, function: str) -> list[str]:
         """Stop what runs for a function where it should not; return the hosts on which something did."""
+        connected = self._connected()  # what one that has ended ran has ended, too
         with self._lock:
             if function not in self._parts:
                 return []  # nothing has been decided about it yet
-            reports = {name: report for name, report in self._of(function).items() if not self._known[name].lost}
+            told = self._of(function).items()
+            reports = {name: report for name, report in told if name in connected and not self._known[name].lost}
             names = stale(reports, self._parts[function])
             hosts = [self._known[name].place.host for name in names]
         self._release(function, names)
