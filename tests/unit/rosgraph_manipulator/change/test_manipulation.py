@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 from metacontrol_msgs.msg import FunctionGrounding
 from rosgraph_launcher.description import SystemDescription
-from rosgraph_launcher.launching.report import STABLE, LauncherReport
+from rosgraph_launcher.launching.report import RECOVERING, STABLE, LauncherReport
 from rosgraph_manipulator.change.deployment import CancelledError, DeploymentError, Result
 from rosgraph_manipulator.change.journal import Journal, Resumption
 from rosgraph_manipulator.change.manipulation import Manipulation
@@ -22,7 +22,7 @@ class Executor:
 
     launcher_phases: dict = {}
     losses = 0
-    launcher_gone = False
+    launcher_gone = taken_back = False
     halts = 0
     now = 0.0
     launched = LauncherReport("f", "a", state=STABLE)
@@ -56,7 +56,8 @@ class Executor:
         pass
 
     def begin(self, wanted, plan):
-        pass
+        if self.taken_back:
+            raise CancelledError("taken back")
 
     def wait_until_ready(self):
         pass
@@ -77,6 +78,12 @@ class Executor:
         self.done.append(f"nothing of {function} expected")
 
     def catch_up(self):
+        pass
+
+    def begin_recovery(self, report):
+        pass
+
+    def end_recovery(self, function):
         pass
 
     def take_deaths(self, function):
@@ -198,6 +205,22 @@ def test_change_that_can_not_begin_asks_the_launcher_nothing_where_it_has_no_nod
     manipulator, _ = manipulation(executor, running="")
     assert manipulator.carry_out(Order("f", "b")).result is Result.GENERAL_ERROR
     assert executor.done == ["nothing of f expected"]
+
+
+@pytest.mark.parametrize("compare", [DeploymentError("no such file"), None])
+def test_request_that_touches_nothing_does_not_end_a_recovery(compare):
+    executor = Executor(compare=compare)
+    executor.taken_back = True
+    manipulator, told = manipulation(executor, running="a")
+    stable, executor.launched = executor.launched, LauncherReport("f", "a", state=RECOVERING)
+    manipulator.follow_launcher()
+    manipulator.carry_out(Order("f", "b"))
+    assert told[-1] == ("a", FunctionGrounding.RECOVERING)
+    executor.launched = stable
+    manipulator.follow_launcher()
+    assert told[-1] == ("a", FunctionGrounding.STABLE)
+    manipulator.carry_out(Order("f", "b"))
+    assert told[-1] == ("a", FunctionGrounding.STABLE)
 
 
 # -- the launcher has ended

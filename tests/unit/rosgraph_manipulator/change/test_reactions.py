@@ -80,6 +80,14 @@ def test_death_during_the_probation_takes_the_change_back(now, reaction):
     assert deployed(A, B).react(report(B, RECOVERING), now) is reaction
 
 
+def test_request_that_touches_nothing_leaves_the_probation_and_the_wait_for_the_launcher():
+    deployments = deployed(A, B)
+    deployments.lacks_launcher(True, 0.0)
+    deployments.finished(A, deployments.refused(A, "no such file"), LATE)
+    assert deployments.previous == A
+    assert deployments.lacks_launcher(True, LATE)
+
+
 def test_first_configuration_has_no_probation():
     assert deployed(A).react(report(A, RECOVERING), 0.1) is Reaction.BEGIN_RECOVERY
 

@@ -68,6 +68,7 @@ class Outcome:
         message: why, in one line.
         tactic: name of the tactic that got there, `rollback`, or empty.
         cancelled: whether the request was cancelled.
+        untouched: whether `running` runs on as it did: it may be recovering, or without its launcher.
     """
 
     result: Result
@@ -75,6 +76,7 @@ class Outcome:
     message: str
     tactic: str = ""
     cancelled: bool = False
+    untouched: bool = False
 
 
 @dataclass
@@ -137,7 +139,7 @@ def deploy(
         except CancelledError as error:
             reason = f"{wanted.name}: {error}"
             if whole or error.superseded:
-                return Outcome(Result.FAILED, last_good if whole else None, reason, cancelled=True)
+                return Outcome(Result.FAILED, last_good if whole else None, reason, cancelled=True, untouched=whole)
             undoing()
             return go_back(executor, wanted.function, last_good, reason, watch, cancelled=True)
         except DeploymentError as error:
@@ -148,7 +150,7 @@ def deploy(
             return Outcome(Result.OK, wanted, words, plan.tactic)
     reason = f"{wanted.name}: {'; '.join(reasons) or 'no tactic has a plan'}"
     if last_good == wanted and not any(plan.touched for plan in plans):
-        return Outcome(Result.FAILED, last_good, f"{reason}; it runs on as it did")
+        return Outcome(Result.FAILED, last_good, f"{reason}; it runs on as it did", untouched=runs)
     return go_back(executor, wanted.function, last_good, reason, watch)
 
 

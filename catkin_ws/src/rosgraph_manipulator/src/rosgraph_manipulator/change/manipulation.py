@@ -260,9 +260,11 @@ class Manipulation:
 
     def _finish(self, wanted: Configuration, outcome: Outcome, phases: Mapping[str, float]) -> None:
         """Note how a change ended, and tell it."""
-        self._deployments[wanted.function].finished(wanted, outcome, self._around.now())
+        deployments = self._deployments[wanted.function]
+        deployments.finished(wanted, outcome, self._around.now())
         if outcome.running:
-            self._announcer.announce(outcome.running, FunctionGrounding.STABLE, outcome, phases)
+            state = FunctionGrounding.RECOVERING if deployments.recovers else FunctionGrounding.STABLE
+            self._announcer.announce(outcome.running, state, outcome, phases)
         elif outcome.result is Result.GENERAL_ERROR:
             self._executor.expect_nothing(wanted.function)
             self._executor.stop_robot(wanted.function)

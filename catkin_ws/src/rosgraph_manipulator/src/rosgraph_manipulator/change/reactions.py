@@ -66,6 +66,11 @@ class DeployedConfigurations:
         return self._running
 
     @property
+    def recovers(self) -> bool:
+        """Whether the launcher starts nodes of the running configuration again, or has ended itself."""
+        return self._recovering
+
+    @property
     def last_good(self) -> Configuration | None:
         """The last configuration that came up; None: there is none to go back to."""
         return self._last_good
@@ -92,10 +97,13 @@ class DeployedConfigurations:
         """Return the outcome of a request that failed before anything was touched."""
         if self._running is None:
             return Outcome(Result.GENERAL_ERROR, None, f"{wanted.name}: {reason}")
-        return Outcome(Result.FAILED, self._running, f"{wanted.name}: {reason}; {self._running.name} runs on")
+        message = f"{wanted.name}: {reason}; {self._running.name} runs on"
+        return Outcome(Result.FAILED, self._running, message, untouched=True)
 
     def finished(self, wanted: Configuration, outcome: Outcome, now: float) -> None:
         """Note how a change to a configuration ended."""
+        if outcome.untouched:
+            return
         self._running, self._waiting, self._recovering = outcome.running, None, False
         self._launcher_is_there()
         self._torn = wanted if outcome.running is None and outcome.result is not Result.GENERAL_ERROR else None
