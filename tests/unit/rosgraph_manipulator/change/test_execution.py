@@ -74,11 +74,11 @@ def execution(around):
     )
 
 
-def execution_of(around, launchers, make_names, *more):
+def execution_of(around, launchers, make_names, *more, goals=None):
     """Return what carries out changes to FAST and other configurations."""
     return Execution(
         ManipulatorOptions({configuration.name: configuration for configuration in (FAST, *more)}),
-        {},
+        goals or {},
         OverwrittenParameters(),
         ready_timeout=1.0,
         settle_time=0.0,
@@ -195,3 +195,34 @@ def test_function_recovers_although_its_launch_file_can_not_be_read_just_then(is
     execution.end_recovery("f")
     with pytest.raises(DeploymentError, match="no such file"):
         change(execution)  # by what the file says now
+
+
+class Goal:
+    """A kept goal whose server is /fast."""
+
+    status_topic = "/fast/status"
+    is_between_servers, server_is_new, stops = False, True, 0
+
+    def server_stops(self, leaving=(), died=False, is_back=False):
+        self.is_between_servers, self.stops = True, self.stops + 1
+
+    def server_started(self):
+        self.is_between_servers = False
+
+    def deliver(self):
+        return True
+
+
+@pytest.mark.parametrize("first", ["/fast", "/other"])
+def test_goal_is_handed_over_whichever_node_of_a_recovery_was_its_server(first):
+    around, launchers, goal = LaunchFiles({}), Launchers(), Goal()
+    around.publishers = lambda topic: {"/fast"}
+    execution = execution_of(around, launchers, all_up, goals={"f": goal})
+    change(execution)
+    runs = launchers.reported["f"]
+    second = "/other" if first == "/fast" else "/fast"
+    execution.begin_recovery(replace(runs, state=RECOVERING, dead=(first,)))
+    execution.begin_recovery(replace(runs, state=RECOVERING, dead=(second,)), goes_on=True)
+    assert (goal.stops, goal.is_between_servers) == (1, True)
+    execution.end_recovery("f")
+    assert not goal.is_between_servers

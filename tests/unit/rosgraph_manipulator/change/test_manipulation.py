@@ -80,8 +80,8 @@ class Executor:
     def catch_up(self):
         pass
 
-    def begin_recovery(self, report):
-        pass
+    def begin_recovery(self, report, goes_on=False):
+        self.done.append(("recovers", *report.dead, goes_on))
 
     def end_recovery(self, function):
         pass
@@ -221,6 +221,16 @@ def test_request_that_touches_nothing_does_not_end_a_recovery(compare):
     assert told[-1] == ("a", FunctionGrounding.STABLE)
     manipulator.carry_out(Order("f", "b"))
     assert told[-1] == ("a", FunctionGrounding.STABLE)
+
+
+def test_death_during_a_recovery_is_dealt_with_and_announced_once():
+    executor = Executor()
+    manipulator, told = manipulation(executor, running="a")
+    for dead in (("/n",), ("/n", "/m")):
+        executor.launched = LauncherReport("f", "a", state=RECOVERING, dead=dead)
+        manipulator.follow_launcher()
+    assert executor.done == [("recovers", "/n", False), ("recovers", "/m", True)]
+    assert told == [("a", FunctionGrounding.RECOVERING)]
 
 
 # -- the launcher has ended

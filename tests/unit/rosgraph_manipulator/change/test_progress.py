@@ -129,6 +129,12 @@ def test_deaths_that_are_over_by_now_are_told_once(progress):
     assert progress.take_deaths("g") is None
 
 
+def test_death_that_is_over_while_another_node_is_dead_is_told(progress):
+    progress.take(reports(RECOVERING, dead=("/a", "/b")))
+    progress.take(reports(RECOVERING, dead=("/b",)))
+    assert progress.take_deaths("f") == report(RECOVERING, dead=("/a", "/b"))
+
+
 @pytest.mark.parametrize("later", [report(RECOVERING, dead=("/a",)), report(STABLE, change=2), report(FAILED)])
 def test_deaths_that_the_last_report_tells_or_an_earlier_change_had_are_not_told(progress, later):
     progress.take(reports(RECOVERING, dead=("/a",)))

@@ -17,8 +17,8 @@ def deployed(*configurations, now=0.0):
     return deployments
 
 
-def report(configuration, state):
-    return LauncherReport("f", configuration.name if configuration else "", state=state)
+def report(configuration, state, *dead):
+    return LauncherReport("f", configuration.name if configuration else "", state=state, dead=dead)
 
 
 def test_configuration_that_ran_is_restored_when_the_next_one_does_not_come_up():
@@ -103,6 +103,16 @@ def test_recovery_ends_once_all_nodes_run_again():
     assert deployments.react(report(A, STABLE), 1.0) is Reaction.END_RECOVERY
     deployments.end_recovery()
     assert deployments.react(report(A, STABLE), 1.0) is Reaction.NONE
+
+
+def test_node_that_dies_while_another_one_recovers_is_told_once_for_each_death():
+    deployments = deployed(A)
+    assert deployments.react(report(A, RECOVERING, "/n"), 1.0) is Reaction.BEGIN_RECOVERY
+    deployments.begin_recovery()
+    dead = [("/n",), ("/n", "/m"), ("/n", "/m"), ("/n",), ("/n", "/m"), ()]
+    told = [deployments.react(report(A, RECOVERING, *nodes), 1.0) is Reaction.GO_ON_RECOVERING for nodes in dead]
+    assert told == [False, True, False, False, True, False]
+    assert deployments.react(report(A, STABLE), 1.0) is Reaction.END_RECOVERY
 
 
 def test_failed_configuration_is_not_restored_but_a_lost_one_is():

@@ -287,11 +287,15 @@ class Execution:
         """Return a report of nodes that have died and run again since the last call; None: there are none."""
         return self._progress.take_deaths(function)
 
-    def begin_recovery(self, report: LauncherReport) -> None:
+    def begin_recovery(self, report: LauncherReport, goes_on: bool = False) -> None:
         """Note that nodes of a function have died, and that the launcher will start them again, or has done so.
 
         Their parameters are put back first, because somebody may have set others, such as the launch file of a robot
         that was started again.
+
+        Args:
+            report: tells which nodes.
+            goes_on: whether a recovery has begun already, and these nodes have died since.
         """
         function = report.function
         wanted = self.system.parameters_of(function, report.dead)
@@ -311,8 +315,9 @@ class Execution:
         except CallError as error:
             self._around.log.warn(str(error))
             servers = set()
-        self._servers_died[function] = bool(servers & set(report.dead))
-        if self._servers_died[function]:
+        died = bool(servers & set(report.dead))
+        self._servers_died[function] = died or (goes_on and self._servers_died.get(function, False))
+        if died:
             now = self._progress.report(function)
             goal.server_stops(died=True, is_back=now is not None and not servers & set(now.dead))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Protocol
 
@@ -327,7 +328,7 @@ class Manipulation:
 
     def _follow_function(self, function: str, report: LauncherReport | None) -> None:
         deployments = self._deployments[function]
-        running, previous = deployments.running, deployments.previous
+        running, previous, dead = deployments.running, deployments.previous, deployments.dead
         reaction = deployments.react(report, self._around.now())
         if reaction is Reaction.RETURN and deployments.waiting:
             self._log.warn(f"{deployments.waiting.name}: deploying it again, because its hosts are back")
@@ -349,6 +350,9 @@ class Manipulation:
             self._deploy_unasked(previous)
         elif reaction is Reaction.BEGIN_RECOVERY:
             self._begin_recovery(running, report)
+        elif reaction is Reaction.GO_ON_RECOVERING:
+            others = tuple(node for node in report.dead if node not in dead)
+            self._executor.begin_recovery(replace(report, dead=others), goes_on=True)
         elif reaction is Reaction.END_RECOVERY:
             self._end_recovery(running)
 

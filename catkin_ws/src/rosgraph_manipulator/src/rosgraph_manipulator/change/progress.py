@@ -126,13 +126,15 @@ class ChangeProgress:
         return True
 
     def take_deaths(self, function: str) -> LauncherReport | None:
-        """Return a report of nodes that have died and run again since the last call; None: there are none.
+        """Return a report of nodes that have died since the last call, if some of them run again; else None.
 
         A node may be dead for a shorter time than the last reaction took.
         """
         unseen, report = self._unseen.pop(function, None), self.report(function)
-        is_over = unseen and report and report.state == STABLE and report.change == unseen.change
-        return unseen if is_over else None
+        if unseen is None or report is None or report.change != unseen.change:
+            return None
+        runs_again = report.state == RECOVERING and not set(report.dead).issuperset(unseen.dead)
+        return unseen if runs_again or report.state == STABLE else None
 
     def is_reported(self, change: int) -> bool:
         """Tell whether the launcher has reported the end of a change of the function that changes."""

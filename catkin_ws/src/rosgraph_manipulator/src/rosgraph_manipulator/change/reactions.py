@@ -24,6 +24,7 @@ class Reaction(enum.Enum):
     DEPLOY_AGAIN = "deploy again"  # the launcher runs something else: another launcher has started
     GO_BACK = "go back"  # a node died soon after the change: restore what ran before
     BEGIN_RECOVERY = "begin recovery"  # a node died, and the launcher starts it again
+    GO_ON_RECOVERING = "go on recovering"  # meanwhile, other nodes have died
     END_RECOVERY = "end recovery"  # the launcher has started all dead nodes again
     GIVE_UP = "give up"  # the launcher has stopped the configuration
     RETURN = "return"  # the hosts are back whose loss has stopped the configuration: deploy it again
@@ -44,6 +45,7 @@ class DeployedConfigurations:
         self._previous: Configuration | None = None  # what the running one has replaced
         self._waiting: Configuration | None = None
         self._recovering = False
+        self._dead: frozenset[str] = frozenset()  # the dead nodes of the last report
         self._launcher_ended: float | None = None  # when the launcher was seen to have ended, while it has
         self._told_of_launcher = False
         self._torn: Configuration | None = None
@@ -69,6 +71,11 @@ class DeployedConfigurations:
     def recovers(self) -> bool:
         """Whether the launcher starts nodes of the running configuration again, or has ended itself."""
         return self._recovering
+
+    @property
+    def dead(self) -> frozenset[str]:
+        """The nodes that were dead by the last report."""
+        return self._dead
 
     @property
     def last_good(self) -> Configuration | None:
@@ -134,9 +141,11 @@ class DeployedConfigurations:
         self._launcher_ended, self._told_of_launcher = None, False
 
     def react(self, report: LauncherReport | None, now: float) -> Reaction:
-        """Return what to do about a report of the launcher; None: it has made none yet."""
+        """Note the dead nodes of a report of the launcher, and return what to do; None: it has made none yet."""
         if report is None or report.state == CHANGING:
             return Reaction.NONE
+        others_died = not self._dead.issuperset(report.dead)
+        self._dead = frozenset(report.dead)
         if self._running is None:
             return Reaction.RETURN if self._waiting and report.state != FAILED else Reaction.NONE
         if report.configuration != self._running.name:
@@ -147,7 +156,11 @@ class DeployedConfigurations:
             on_probation = self._previous is not None and now - self._deployed_at < self._probation
             return Reaction.GO_BACK if on_probation else Reaction.BEGIN_RECOVERY
         recovers = self._recovering and not self._told_of_launcher  # else the report is of the one that has ended
-        return Reaction.END_RECOVERY if report.state == STABLE and recovers else Reaction.NONE
+        if report.state == STABLE:
+            reaction = Reaction.END_RECOVERY
+        else:
+            reaction = Reaction.GO_ON_RECOVERING if others_died else Reaction.NONE
+        return reaction if recovers else Reaction.NONE
 
     def lost(self) -> None:
         """Note that the running configuration runs no more, though it was the last good one."""
