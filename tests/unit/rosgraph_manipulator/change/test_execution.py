@@ -226,3 +226,23 @@ def test_goal_is_handed_over_whichever_node_of_a_recovery_was_its_server(first):
     assert (goal.stops, goal.is_between_servers) == (1, True)
     execution.end_recovery("f")
     assert not goal.is_between_servers
+
+
+def test_parameters_of_a_died_node_are_put_back_once_the_master_answers():
+    around, launchers = LaunchFiles({}), Launchers()
+    around.launch_file = lambda configuration: LaunchFile(
+        SystemDescription({"/fast": NodeDescription("/fast", "/", "p", "x", parameters={"speed": 2})})
+    )
+    execution = execution_of(around, launchers, all_up)
+    change(execution)
+    around.server["/fast/speed"] = 1
+    around.silent = True
+    execution.begin_recovery(replace(launchers.reported["f"], state=RECOVERING, dead=("/fast",)))
+    execution.catch_up()
+    assert around.server["/fast/speed"] == 1
+    around.silent = False
+    execution.catch_up()
+    assert around.server["/fast/speed"] == 2
+    around.server["/fast/speed"] = 3  # set for the node that runs
+    execution.catch_up()
+    assert around.server["/fast/speed"] == 3

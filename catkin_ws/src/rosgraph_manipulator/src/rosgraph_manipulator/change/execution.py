@@ -95,6 +95,7 @@ class Execution:
         self._follows = False  # whether the reports of the launcher that made the last change arrive
         self._recovers = False  # whether it waits for nodes that the launcher has started again
         self._owes_restore = False  # whether former values of parameters could not be restored
+        self._owes_values: dict[str, frozenset[str]] = {}  # by function: died nodes whose parameters are not put back
         launchers.on_reports = self._follow
         if launchers.reports():
             self._follow()
@@ -266,6 +267,9 @@ class Execution:
         if self._owes_restore:
             with contextlib.suppress(DeploymentError):
                 self._store_parameters("", None)
+        for function, nodes in list(self._owes_values.items()):
+            with contextlib.suppress(CallError):
+                self._put_back(function, nodes)
 
     def forget_goal(self, function: str) -> None:
         """Drop the pending goal of a function that is needed no longer."""
@@ -298,15 +302,10 @@ class Execution:
             goes_on: whether a recovery has begun already, and these nodes have died since.
         """
         function = report.function
-        wanted = self.system.parameters_of(function, report.dead)
         try:
-            live = self._around.parameters(wanted)
-            lost = {name: v for name, v in wanted.items() if name not in live or not same_value(live[name], v)}
-            if lost:
-                self._around.set_parameters(lost)
-                self._around.log.warn(f"{function}: put back, because nodes start again: {', '.join(sorted(lost))}")
+            self._put_back(function, self._owes_values.get(function, frozenset()).union(report.dead))
         except CallError as error:
-            self._around.log.warn(f"parameters are not put back: {error}")
+            self._around.log.warn(f"{function}: parameters are not put back yet: {error}")
         goal = self._goals.get(function)
         if goal is None:
             return
@@ -406,6 +405,21 @@ class Execution:
             self._owes_restore = False
         except (CallError, OSError) as error:
             raise DeploymentError(" ".join(str(error).split())) from error
+
+    def _put_back(self, function: str, nodes: frozenset[str]) -> None:
+        """Set those parameters of nodes that somebody has changed.
+
+        Raises:
+            CallError: the master does not answer; `catch_up` tries again.
+        """
+        self._owes_values[function] = nodes
+        wanted = self.system.parameters_of(function, nodes)
+        live = self._around.parameters(wanted)
+        lost = {name: v for name, v in wanted.items() if name not in live or not same_value(live[name], v)}
+        if lost:
+            self._around.set_parameters(lost)
+            self._around.log.warn(f"{function}: put back, because nodes start again: {', '.join(sorted(lost))}")
+        del self._owes_values[function]
 
     def _call(
         self,
