@@ -161,14 +161,16 @@ class ManipulatorPart:
 class _JournalKeeper:
     def __init__(self, part: ManipulatorPart, journal: Journal) -> None:
         self._part, self._journal = part, journal
+        self._is_behind = False
 
     def update(self, change: Callable[[Journal, float], Journal]) -> None:
         self._part.process.check()
         journal = change(self._journal, self._part.wall())
-        if journal is not self._journal:
-            self._journal = journal
+        if journal is not self._journal or self._is_behind:
+            self._journal, self._is_behind = journal, True
             with contextlib.suppress(CallError):
                 self._part.host.set({"/rosgraph_manipulator/journal": journal.as_parameter()})
+                self._is_behind = False
 
 
 class _Announcer:

@@ -64,17 +64,19 @@ class JournalParameter:
     def __init__(self, journal: Journal) -> None:
         """Begin with a journal that nobody needs to read."""
         self._journal = journal
+        self._is_behind = False  # whether the parameter could not be set
         self._lock = threading.Lock()
 
     def update(self, change: Callable[[Journal, float], Journal]) -> None:
-        """Publish what a function returns for the journal and the present time, where it differs."""
+        """Publish what a function returns for the journal and the present time, where the parameter differs."""
         with self._lock:
             journal = change(self._journal, time.time())
-            if journal is self._journal:
+            if journal is self._journal and not self._is_behind:
                 return
-            self._journal = journal
-            with contextlib.suppress(CallError):  # without a master there is nobody to read it
+            self._journal, self._is_behind = journal, True
+            with contextlib.suppress(CallError):  # the next heartbeat tries again
                 set_parameters({rospy.resolve_name("~journal"): journal.as_parameter()})
+                self._is_behind = False
 
 
 class Manipulator:
