@@ -352,6 +352,18 @@ def test_manipulator_that_stays_busy_is_waited_for_only_so_long(core):
     assert core.step(1.0 + Settings().busy_limit)
 
 
+def test_first_deployment_that_vanishes_while_it_is_made_keeps_nothing_busy(knowledge_base, counting):
+    core = Mape(knowledge_base, counting, [OBJECTIVE], Settings(start_grace=0.0))
+    (decision,) = core.step(0.0)
+    core.observe_active(1.0, "f_move", decision.to_configuration, "RECONFIGURING")
+    core.observe_active(3.0, "f_move", "", "")
+    core.report(3.1, decision.id, False, "lost", blame=False)
+    (again,) = core.step(10.0)
+    assert again.state == DECIDED
+    core.observe_active(50.0, "f_move", decision.to_configuration, "RECONFIGURING")
+    assert core.view.running["o_move"].busy_since == 50.0
+
+
 def test_failed_configuration_is_replaced(core):
     core.observe_active(1.0, "f_move", "scan_slow", "FAILED")
     (decision,) = core.step(1.0)

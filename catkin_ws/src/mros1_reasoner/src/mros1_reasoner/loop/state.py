@@ -182,9 +182,10 @@ class State(View):
         self.active.pop(function, None)
         self.released.pop(function, None)
         for name, running in self.running.items():
-            if self.objectives[name].function == function and running.design is not None:
-                self.levels.forget(name)
-                self.wanted.setdefault(name, running.design)  # what it requires is still needed
+            if self.objectives[name].function == function and (running.design is not None or running.state):
+                if running.design is not None:
+                    self.levels.forget(name)
+                    self.wanted.setdefault(name, running.design)  # what it requires is still needed
                 self._run(name, design=None, state="", busy_since=None, binding_error=False, task_failure=None)
                 self._run(name, drifts={})
                 # It may be about to come back: a manipulator starts anew.
