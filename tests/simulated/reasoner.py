@@ -239,8 +239,7 @@ class ReasonerPart:
         for fact in remembered(self._host.parameters.get("/reasoner/remembered")):
             self._take(fact)
         carry_out(self._asked.commands, lambda command: self._announce(self._applied(command)))
-        if forgotten := self._host.held - self.core.view.locked:
-            raise BrokenError(f"a reasoner has forgotten that an operator has locked {', '.join(sorted(forgotten))}")
+        self._check_locks()
         heartbeat = self.kernel.now
         while True:
             now = self.kernel.now
@@ -252,12 +251,17 @@ class ReasonerPart:
             self._take(Step(is_heartbeat))
             view = self.core.view
             if self._asked.settle(view.locked, {*view.objectives, *view.foreseen()}):
-                self._host.held &= view.locked
                 self._keep_asked()
+            self._check_locks()
             self._host.parameters["/reasoner/remembered"] = to_remember(view, {})
             self._requests.release(self.core.released)
             until = min(heartbeat, self._next_look())
             self._inbox.wait(max(0.0, until - self.kernel.now))
+
+    def _check_locks(self) -> None:
+        """Tell that a lock is lost: no operator has taken it back, and no objective is asked for no longer."""
+        if forgotten := self._host.held - self.core.view.locked:
+            raise BrokenError(f"a reasoner has forgotten that an operator has locked {', '.join(sorted(forgotten))}")
 
     def _next_look(self) -> float:
         ros_now, request = self._host.ros_time(), self._requests.next_look

@@ -478,3 +478,48 @@ def test_locked_requirement_is_not_released_by_a_change_above(one_arm):
     assert one_arm.run(seconds=1.0) == [("o_F2", "", FAILED)]
     one_arm.core.operator.unlock("o_F2")
     assert one_arm.run(seconds=1.0) == [("o_build", "FD2", EXECUTED)]
+
+
+@pytest.mark.parametrize("gone", [("F0",), ("F0", "F1", "F2")])
+def test_what_a_vanished_root_has_required_runs_on_under_a_lock(one_arm, gone):
+    one_arm.core.operator.lock("")
+    for function in gone:
+        one_arm.core.observe_active(one_arm.now, function, "", "")
+    one_arm.run(seconds=20.0)
+    assert one_arm.core.released == ()
+    assert one_arm.core.view.locked == {"o_build", "o_F1", "o_F2"}
+
+
+def test_what_a_root_requires_runs_on_while_the_root_is_waited_for_at_the_start(load, pellet):
+    knowledge_base = load(model())
+    pellet.load(knowledge_base.ontology)
+    core = Mape(knowledge_base, pellet, [PICK_AND_PLACE], Settings(start_grace=15.0))
+    for function, design in (("F0", "FD1"), ("F1", "FD1.1"), ("F2", "FD2.1")):
+        core.observe_active(1.0, function, design, "STABLE")
+    core.step(1.0)
+    core.observe_active(2.0, "F0", "", "")
+    assert core.step(2.0) == core.step(2.5) == []
+    assert core.released == ()
+
+
+def test_change_of_a_root_does_not_release_a_locked_requirement(one_arm):
+    one_arm.core.operator.lock("o_F2")
+    one_arm.core.observe_task(one_arm.now, "o_build", True)
+    assert one_arm.run(seconds=1.0) == [("o_build", "", FAILED)]
+    assert one_arm.core.released == ()
+    one_arm.core.operator.unlock("o_F2")
+    assert one_arm.run(seconds=1.0) == [("o_build", "FD2", EXECUTED)]
+
+
+def test_lock_stays_when_somebody_else_takes_what_it_locks_away(one_arm):
+    one_arm.core.operator.lock("o_F2")
+    one_arm.core.observe_active(one_arm.now, "F0", "FD2", "STABLE")
+    one_arm.run(seconds=1.0)
+    assert "o_F2" not in one_arm.core.objectives
+    assert one_arm.core.view.locked == {"o_F2"}
+
+
+def test_locks_end_with_the_objective_that_is_asked_for_no_longer(one_arm):
+    one_arm.core.operator.lock("")
+    one_arm.core.operator.remove_objective("o_build")
+    assert not one_arm.core.view.locked

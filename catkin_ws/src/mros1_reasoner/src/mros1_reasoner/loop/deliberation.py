@@ -225,10 +225,14 @@ class Deliberation:
             causes = [replace(c, rules=f"{c.rules}, {climbed.get(c.trigger.split(':')[0], 'S6a')}") for c in causes]
         steps = self._missing(level, outcome, timing.now)
         objective, first = steps[0]
-        if self._state.locked & {name, *(o for o, _ in steps)}:
+        designs = {o: plan.choice for o, plan in steps if plan.choice}
+        releases = self._state.objectives.keys() - self._state.needed(
+            {**self._state.deployments(), **self._state.wanted, **designs}
+        )
+        if self._state.locked & {name, *(o for o, _ in steps), *releases}:
             reason = f"locked by the operator; {outcome.choice} would be taken: {outcome.reason}"
             return self._refuse(name, replace(outcome, reason=reason), causes, timing, self._wall() - began)
-        self._state.want({o: plan.choice for o, plan in steps if plan.choice}, name, causes)
+        self._state.want(designs, name, causes)
         if any(self._state.waits(o, timing.now) for o, _ in steps if o in self._state.running):
             return None
         early = next((step for step in steps if self._state.retries_later(step[0], step[1].choice, timing.now)), None)
@@ -252,9 +256,6 @@ class Deliberation:
         if running and running.brief and self._state.why_failed(objective, first.choice):
             words += f"; {lasting.words(running, self._state.why_failed(objective, first.choice))}"
         self._state.match_requirements()
-        releases = set(self._state.objectives) - set(
-            self._state.needed({**self._state.deployments(), **self._state.wanted})
-        )
         decision = self._decision(objective, causes, first, timing, words, self._wall() - began)
         if not self._state.settings.dry_run:
             self._state.note_blame(timing.now, name, causes, is_better=not self._is_rebinding(name, outcome))
@@ -262,7 +263,7 @@ class Deliberation:
             decision,
             state=ADVISED if self._state.settings.dry_run else DECIDED,
             to_configuration=first.choice or "",
-            releases=tuple(sorted(releases)) if objective == level else (),
+            releases=tuple(sorted(releases & self._state.objectives.keys())) if objective == level else (),
         )
 
     def _refuse(

@@ -84,6 +84,7 @@ class Running:
         replaced: the design in whose place the deployed one was requested.
         brief: deployments in a row that did not last.
         retry_from: a design that has failed is not tried again before.
+        vanished: the design that ran until nothing did; empty: one runs, or another one was wanted since.
         ending: how the design has ended soon after it was deployed; empty: it has not.
         degraded: whether the design was taken although it does not keep every limit.
         refusal: the last refusal, so that it is told once.
@@ -112,6 +113,7 @@ class Running:
     replaced: str | None = None
     brief: int = 0
     retry_from: float = -math.inf
+    vanished: str = ""
     ending: str = ""
     degraded: bool = False
     refusal: tuple[object, ...] = ()

@@ -186,6 +186,7 @@ class State(View):
                 if running.design is not None:
                     self.levels.forget(name)
                     self.wanted.setdefault(name, running.design)  # what it requires is still needed
+                    self._run(name, vanished=running.design)
                 self._run(name, design=None, state="", busy_since=None, binding_error=False, task_failure=None)
                 self._run(name, drifts={})
                 # It may be about to come back: a manipulator starts anew.
@@ -241,7 +242,7 @@ class State(View):
         self._run(name, way=() if self.wanted.get(name, design) == design else running.way)
         is_makeshift = self._makeshifts.pop(name, None) == design
         self._run(name, design=design, degraded=is_makeshift, binding_error=False, task_failure=None, refusal=())
-        self._run(name, replaced=None, ending="", ruled_since=None)
+        self._run(name, replaced=None, ending="", ruled_since=None, vanished="")
         self._run(name, deployed_at=now, failed_nodes=(), drifts={}, drifts_from=now + self.settings.restart_grace)
         if self.wanted.get(name) == design:
             del self.wanted[name]
@@ -256,12 +257,14 @@ class State(View):
         self.reconsider()
 
     def ask_no_longer(self, name: str) -> None:
-        """Remove a root objective, and the objectives that only it required."""
+        """Remove a root objective, and the objectives that only it required, with their locks."""
+        before = set(self.objectives)
         del self.roots[name]
         self.error_log = {key: entry for key, entry in self.error_log.items() if key[1] != name}
         self.retries = {key: entry for key, entry in self.retries.items() if key[1] != name}
         self._drop(name)
         self.match_requirements()
+        self.locked -= {name, *(before - self.objectives.keys())}
         self.reconsider()
 
     def ask_anew(self, objective: Objective) -> None:
@@ -329,7 +332,7 @@ class State(View):
             self._take_active(objective.name, *active, now=-math.inf)
 
     def _drop(self, name: str) -> None:
-        """Forget an objective and everything that is known of it."""
+        """Forget an objective and everything that is known of it; a lock stays where a design may require it again."""
         if self.proposal and self.proposal.objective == name:
             self.proposal = None
         self.wanted.pop(name, None)
@@ -337,7 +340,7 @@ class State(View):
         del self.objectives[name], self.running[name]
         if design is not None and function not in {objective.function for objective in self.objectives.values()}:
             self.released[function] = None
-        self.locked.discard(name)
+        self.locked -= {name} - self.foreseen().keys()
         self.levels.drop(name)
 
     # Steps and analyses
@@ -447,11 +450,14 @@ class State(View):
     def rest(self, name: str) -> None:
         """Forget refusals and wanted designs of an objective, because it needs no adaptation."""
         self._run(name, refusal=(), way=())
-        self.wanted.pop(name, None)
+        self._want_no_longer(name)
 
     def want(self, designs: Mapping[str, str], name: str, causes: Iterable[Cause]) -> None:
         """Want designs for objectives until they are deployed; that of one objective for these causes."""
         self.wanted.update(designs)
+        for other, design in designs.items():
+            if other in self.running and design != self.running[other].vanished:
+                self._run(other, vanished="")
         causes = tuple(causes)
         if all(map(is_chance, causes)) and not self.settings.dry_run:
             self._run(name, way=causes)
@@ -464,11 +470,16 @@ class State(View):
 
     def refuse(self, name: str, outcome: tuple[object, ...]) -> bool:
         """Keep the outcome of a deliberation that refuses to adapt; return whether it is a new one."""
-        self.wanted.pop(name, None)
+        self._want_no_longer(name)
         is_news = self.is_news(name, outcome)
         if is_news:
             self._run(name, degraded=True)
         return is_news
+
+    def _want_no_longer(self, name: str) -> None:
+        """Forget the design that is wanted for an objective, unless it has run and vanished: its parts run on."""
+        if self.wanted.get(name) != self.running[name].vanished:
+            self.wanted.pop(name, None)
 
     def use_chances(self, name: str) -> None:
         """Forget the chances of an objective: they have been considered."""
