@@ -30,6 +30,7 @@ from mros1_reasoner.loop.entries import (
     Step,
     TaskFact,
     Unlock,
+    UnneededFact,
 )
 from mros1_reasoner.loop.entry_text import kind_of, read_entry, values_of
 from mros1_reasoner.loop.journal import Journal, apply, brought
@@ -54,6 +55,7 @@ WRITTEN = [  # as bags have them
         LeftFact("o_move", "scan_slow", "safety", 1.5, 0.0, "scan", True),
     ),
     ("failed", ("laser",), FailedFact("laser")),
+    ("unneeded", ("f_grip",), UnneededFact("f_grip")),
     ("step", ("0",), Step(heartbeat=False)),
     ("result", ("x-1", "0", "gone", "1"), Result("x-1", False, "gone", True)),
     ("pause", (), Pause()),

@@ -16,10 +16,13 @@ from mros1_reasoner.loop.entries import (
     LeftFact,
     LevelFact,
     Lock,
+    Released,
+    RemoveObjective,
     Result,
     SetNfr,
     Step,
     Unlock,
+    UnneededFact,
 )
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
@@ -155,6 +158,40 @@ def test_what_has_failed_is_not_forgotten_by_who_dies_before_it_hears_of_it():
     assert to_remember(robot.core.view, {})["failed"] == ["front_laser"]
 
 
+@pytest.mark.parametrize("deaths", [0, 1, 2])
+def test_what_nothing_needed_when_a_reasoner_died_is_released(deaths):
+    station = Line("station")
+    station.deploy(f_assemble="screw", f_grasp="grasp_fine", f_look="look_left")
+    station.take(RemoveObjective(next(iter(station.core.roots))))
+    station.take(Step(False))
+    unneeded = station.core.released
+    assert unneeded == ("f_assemble", "f_grasp", "f_look")
+    station.objectives = ()
+    for _ in range(deaths):
+        station.die()
+    assert station.core.released == unneeded
+    station.live(20.0)
+    assert station.core.released == unneeded
+    station.take(Released("f_look"))
+    assert station.core.released == ("f_assemble", "f_grasp")
+
+
+def test_what_was_to_be_released_and_is_needed_again_stays():
+    station = Line("station")
+    station.runs = {"f_look": "look_left"}
+    station.take(UnneededFact("f_look"))
+    station.deploy(f_assemble="screw", f_grasp="grasp_fine")
+    assert station.core.released == ()
+
+
+def test_what_was_released_before_a_reasoner_died_may_run_again_later():
+    station = Line("station")
+    station.take(UnneededFact("f_look"))
+    station.deploy(f_assemble="screw", f_grasp="grasp_fine")
+    station.live(20.0)
+    assert to_remember(station.core.view, {})["unneeded"] == []
+
+
 @pytest.mark.parametrize("dies", [False, True])
 @pytest.mark.parametrize("name", ["", "o_look"])
 def test_locked_objectives_that_designs_require_keep_their_designs(dies, name):
@@ -194,7 +231,7 @@ def test_objective_that_no_design_may_require_is_refused():
         3,
         "left",
         [],
-        {"failed": 3, "left": "x"},
+        {"failed": 3, "left": "x", "unneeded": [3]},
         {"left": [3, [], ["o"], ["o", "d", "q", "much"]]},
         {"goals": [3, ["o"], ["o", 3]]},
     ],

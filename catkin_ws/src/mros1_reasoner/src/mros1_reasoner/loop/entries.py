@@ -126,7 +126,17 @@ class FailedFact:
     component: str
 
 
-Fact = LevelFact | StaleFact | ComponentFact | DriftFact | BindingFact | TaskFact | ActiveFact | LeftFact | FailedFact
+@dataclass(frozen=True, slots=True)
+class UnneededFact:
+    """Nothing needed a function any longer when a reasoner died, which had not released it yet."""
+
+    function: str
+
+
+BeforeFact = LeftFact | FailedFact | UnneededFact
+"""What a reasoner that has died tells the one that takes its place."""
+
+Fact = LevelFact | StaleFact | ComponentFact | DriftFact | BindingFact | TaskFact | ActiveFact | BeforeFact
 
 # What an operator asks for
 
@@ -289,4 +299,6 @@ def subject(fact: Fact) -> tuple[str, ...]:
             found = ("left", fact.objective, fact.quality)
         case FailedFact():
             found = ("failed", fact.component)
+        case UnneededFact():
+            found = ("unneeded", fact.function)
     return found

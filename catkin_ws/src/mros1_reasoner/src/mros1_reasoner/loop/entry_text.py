@@ -11,6 +11,7 @@
 | active | function, configuration (empty: nothing runs), state |
 | left | objective, what ran, quality, factor and difference of levels, group of designs, whether limits were not kept |
 | failed | component that did not work when the reasoner before this one died |
+| unneeded | function that the reasoner before this one was to release when it died |
 | step | whether it is a heartbeat |
 | result | decision, whether it is carried out, message, whether the configuration is to blame |
 | pause, resume | |
@@ -45,6 +46,7 @@ _KINDS: Mapping[str, type[entries.Content]] = {
     "active": entries.ActiveFact,
     "left": entries.LeftFact,
     "failed": entries.FailedFact,
+    "unneeded": entries.UnneededFact,
     "step": entries.Step,
     "result": entries.Result,
     "pause": entries.Pause,

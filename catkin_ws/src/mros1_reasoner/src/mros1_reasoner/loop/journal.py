@@ -12,14 +12,7 @@ from mros1_reasoner.loop import entries
 from mros1_reasoner.loop.entries import Entry
 from mros1_reasoner.loop.mape import Mape
 
-_LASTING = (
-    entries.ActiveFact
-    | entries.ComponentFact
-    | entries.BindingFact
-    | entries.TaskFact
-    | entries.LeftFact
-    | entries.FailedFact
-)
+_LASTING = entries.ActiveFact | entries.ComponentFact | entries.BindingFact | entries.TaskFact | entries.BeforeFact
 _COMMANDS = (
     entries.Pause
     | entries.Resume
@@ -116,7 +109,7 @@ def _observe(core: Mape, now: float, fact: entries.Fact) -> None:
             core.observe_task(now, _objective(core, fact.name), fact.failed, fact.stamp, fact.message)
         case entries.ActiveFact():
             core.observe_active(now, fact.function, fact.configuration, fact.state)
-        case entries.LeftFact() | entries.FailedFact():
+        case entries.LeftFact() | entries.FailedFact() | entries.UnneededFact():
             core.observe_before(fact)
 
 

@@ -19,7 +19,7 @@ from mros1_reasoner.knowledge.model import Analysis, Facts, Objective
 from mros1_reasoner.knowledge.reasoner import Reasoner
 from mros1_reasoner.loop.commands import Operator
 from mros1_reasoner.loop.deliberation import Deliberation, Timing
-from mros1_reasoner.loop.entries import FailedFact, LeftFact
+from mros1_reasoner.loop.entries import BeforeFact, FailedFact, UnneededFact
 from mros1_reasoner.loop.fulfilment import Fulfilment, fulfilment
 from mros1_reasoner.loop.loop_time import LoopTime
 from mros1_reasoner.loop.readable_state import MapeError, View
@@ -267,8 +267,8 @@ class Mape:
             raise MapeError(f"running configuration {configuration!r} is no FunctionDesign of {function} in the model")
         self._state.note_active(now, function, configuration, state)
 
-    def observe_before(self, fact: LeftFact | FailedFact) -> None:
-        """Take in what a reasoner that has died had left, or knew to have failed.
+    def observe_before(self, fact: BeforeFact) -> None:
+        """Take in what a reasoner that has died had left, knew to have failed, or was to release.
 
         Raises:
             MapeError: the quality or the component is unknown.
@@ -277,6 +277,8 @@ class Mape:
             if fact.component not in self._kb.components:
                 raise MapeError(f"component {fact.component}, which did not work, is not in the model: left out")
             self._state.note_failed_before(fact.component)
+        elif isinstance(fact, UnneededFact):
+            self._state.note_unneeded(fact.function)
         elif fact.quality and fact.quality not in self._kb.qualities:
             raise MapeError(f"a design was left for the quality {fact.quality!r}, which is not in the model: left out")
         else:

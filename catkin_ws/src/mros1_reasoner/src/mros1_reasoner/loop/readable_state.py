@@ -147,6 +147,7 @@ class View:
         active: configuration and state of each function, as the manipulator says.
         wanted: by objective, the design that waits for what it requires.
         released: functions that nothing needs any longer although they run, in the order in which to release them.
+        unneeded: functions that a reasoner before this one was to release, in that order; not all need run.
         components: last status of components.
         failed_before: components that did not work when a reasoner before this one died, and are not heard of yet.
         levels: observed levels.
@@ -177,6 +178,7 @@ class View:
     active: Mapping[str, tuple[str, str]]
     wanted: Mapping[str, str]
     released: Collection[str]
+    unneeded: Collection[str]
     components: Mapping[str, Component]
     failed_before: Set[str]
     levels: Levels

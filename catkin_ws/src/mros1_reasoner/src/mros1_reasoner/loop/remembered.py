@@ -1,7 +1,8 @@
-"""What a reasoner leaves for the one that takes its place, which can't see it again: what failed, and what was left.
+"""What a reasoner leaves for the one that takes its place, which can't see it again.
 
-Without it, the return of a component, or the end of what made a design violate a limit, would be no news to a reasoner
-that was started in between, and the robot would stay with the lesser design.
+That is what failed, what was left, and what is to be released. Without it, the return of a component, or the end of
+what made a design violate a limit, would be no news to a reasoner that was started in between, and the robot would stay
+with the lesser design. What nothing needs would run for ever.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mros1_reasoner.knowledge import vocabulary as v
-from mros1_reasoner.loop.entries import FailedFact, LeftFact
+from mros1_reasoner.loop.entries import BeforeFact, FailedFact, LeftFact, UnneededFact
 from mros1_reasoner.loop.entry_text import kind_of, read_entry, values_of
 from mros1_reasoner.loop.readable_state import View
 
@@ -28,16 +29,16 @@ def to_remember(view: View, goals: Mapping[str, str]) -> dict[str, Any]:
     return {
         "failed": sorted(failed | view.failed_before),
         "left": [list(values_of(fact)) for fact in _left(view)],
+        "unneeded": list({**dict.fromkeys(view.unneeded), **dict.fromkeys(view.released)}),
         "goals": [list(pair) for pair in sorted(goals.items())],
     }
 
 
-def remembered(value: object) -> list[FailedFact | LeftFact]:
+def remembered(value: object) -> list[BeforeFact]:
     """Return the facts that a parameter has; what can't be read is left out."""
     known = value if isinstance(value, Mapping) else {}
-    facts: list[FailedFact | LeftFact] = [
-        FailedFact(name) for name in _list(known.get("failed")) if isinstance(name, str)
-    ]
+    facts: list[BeforeFact] = [FailedFact(name) for name in _list(known.get("failed")) if isinstance(name, str)]
+    facts += [UnneededFact(name) for name in _list(known.get("unneeded")) if isinstance(name, str)]
     for values in _list(known.get("left")):
         try:
             content = read_entry(0.0, _LEFT, [str(part) for part in _list(values)]).content

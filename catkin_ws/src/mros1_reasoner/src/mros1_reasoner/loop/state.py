@@ -54,6 +54,7 @@ class State(View):
         self.active: dict[str, tuple[str, str]] = {}
         self.wanted: dict[str, str] = {}
         self.released: dict[str, None] = {}
+        self.unneeded: dict[str, None] = {}
         self.components: dict[str, Component] = {
             c: Component(status, 0.0) for c, status in knowledge_base.component_statuses.items()
         }
@@ -180,7 +181,7 @@ class State(View):
     def note_inactive(self, now: float, function: str) -> None:
         """Note that nothing runs for a function any more, as the manipulator reports it."""
         self.active.pop(function, None)
-        self.released.pop(function, None)
+        self._keep(function)
         for name, running in self.running.items():
             if self.objectives[name].function == function and (running.design is not None or running.state):
                 if running.design is not None:
@@ -203,6 +204,9 @@ class State(View):
         self.active[function] = configuration, state
         for name in [o.name for o in self.objectives.values() if o.function == function]:
             self._take_active(name, configuration, state, now)
+        pursued = {objective.function for objective in self.objectives.values()}
+        unneeded = [other for other in self.unneeded if other in self.active and other not in pursued]
+        self.released = {**dict.fromkeys(unneeded), **self.released}
 
     def _take_active(self, name: str, configuration: str, state: str, now: float) -> None:
         running = self.running[name]
@@ -324,7 +328,7 @@ class State(View):
 
     def _add(self, objective: Objective) -> None:
         """Add an objective; what runs for its function already runs for it."""
-        self.released.pop(objective.function, None)
+        self._keep(objective.function)
         self.objectives[objective.name] = objective
         self.running[objective.name] = Running()
         active = self.active.get(objective.function)
@@ -346,9 +350,11 @@ class State(View):
     # Steps and analyses
 
     def begin_step(self, now: float) -> None:
-        """Note the time of the first step."""
+        """Note the time of the first step; what runs must be known after a while, with all that is to be released."""
         if self.started is None:
             self.started = now
+        if self.active and self.has_waited(now):
+            self.unneeded = {}
 
     def forget_expired(self, now: float) -> None:
         """Drop what has expired from the error log, and drifted parameters that are reported no more."""
@@ -542,6 +548,10 @@ class State(View):
             if (running := self.running.get(fact.objective)) and running.design == fact.design:
                 self._run(fact.objective, degraded=True)
 
+    def note_unneeded(self, function: str) -> None:
+        """Note that a reasoner before this one was to release a function."""
+        self.unneeded[function] = None
+
     def was_at_fault(self, design: str, objective: str) -> bool:
         """Return whether a design has violated limits of its own making, and has not kept them for long since."""
         return (design, objective) in self._at_fault
@@ -624,8 +634,13 @@ class State(View):
     def note_released(self, function: str) -> None:
         """Note that a function has been released."""
         if function in self.released:
-            del self.released[function]
+            self._keep(function)
             self.active.pop(function, None)
+
+    def _keep(self, function: str) -> None:
+        """Have a function released no longer."""
+        self.released.pop(function, None)
+        self.unneeded.pop(function, None)
 
     def _end_of(self, name: str, now: float, how: str = "ended") -> None:
         """Note that the deployed design of an objective has ended."""
