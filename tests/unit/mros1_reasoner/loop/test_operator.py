@@ -105,6 +105,26 @@ def test_rejected_design_is_not_proposed_again_at_once(make):
     assert third.to_configuration == "camera_slow"
 
 
+def test_rejected_design_is_not_proposed_again_at_once_where_no_other_is_left(make):
+    core = make(approval=True)
+    core.observe_component(1.0, "laser", "FALSE")
+    designs = []
+    for now in (1.0, 2.0, 3.0):
+        (proposal,) = core.step(now)
+        designs.append(proposal.to_configuration)
+        core.operator.reject(proposal.id, now)
+    assert designs == ["camera_slow", "camera_slower", "camera_fast"]
+    (refusal,) = core.step(4.0)
+    assert (refusal.state, refusal.to_configuration) == (FAILED, "")
+    assert "the operator has rejected camera_fast and camera_slow and camera_slower" in refusal.explanation
+    now, forgotten = 4.0, 61.0
+    while (due := core.due(now)) and due < forgotten:
+        assert core.step(due) == []
+        now = due
+    (again,) = core.step(due)
+    assert (due, again.state, again.to_configuration) == (forgotten, PROPOSED, "camera_slow")
+
+
 def test_proposal_is_withdrawn_when_its_cause_is_gone(make):
     core = make(approval=True)
     (proposal,) = fail(core, 1.0, "laser")

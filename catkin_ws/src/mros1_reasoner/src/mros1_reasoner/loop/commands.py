@@ -64,7 +64,7 @@ class Operator:
         return self._time.told(decision)
 
     def reject(self, decision_id: str, now: float) -> Decision:
-        """Reject the proposed decision; its design is not proposed again until the error log forgets it.
+        """Reject the proposed decision; its design is not proposed again for `error_log_expiry`.
 
         Returns:
             The decision, FAILED, to publish.
@@ -77,7 +77,7 @@ class Operator:
         if decision.repair:
             self._state.repairs.refuse(now, decision.repair)
         else:
-            self._state.note_in_vain(now, decision.to_configuration, decision.objective, words)
+            self._state.note_rejection(now, decision.to_configuration, decision.objective, words)
         self._state.propose(None)
         self._state.reconsider()
         told = replace(decision, state=FAILED, explanation=f"{decision.explanation}; {words}", stamp_executed=now)

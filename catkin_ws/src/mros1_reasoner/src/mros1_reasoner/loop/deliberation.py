@@ -450,6 +450,7 @@ class Deliberation:
                 for (design, tried_for), (expiry, reason) in self._state.error_log.items()
                 if tried_for == name
             },
+            rejected={design for design, rejected_for in self._state.rejections if rejected_for == name},
             current=None if running.is_broken or (running.failed_nodes and is_tried) else running.design,
             desired=self._state.settings.desired if running.design is None else "",
             observed=self._state.levels.high(now, name),
@@ -465,7 +466,8 @@ class Deliberation:
             same = plan(
                 objective, [self._state.kb.designs[running.design or ""]], situation, self._utility, self._distance
             )
-            return replace(same, degraded=False, is_retry=False, reason=f"{running.design} is deployed again")
+            again = replace(same, degraded=False, is_retry=False, reason=f"{running.design} is deployed again")
+            return again if same.choice else same
         if other := self._with_other_bindings(name, objective, designs, situation):
             return other
         if self._state.settings.only_last_limit:

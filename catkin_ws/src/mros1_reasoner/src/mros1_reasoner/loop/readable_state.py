@@ -155,6 +155,7 @@ class View:
         repairs: what is known of the repairs of components.
         change_duration: how long a change takes, by the last ones, s.
         error_log: until when a design is not tried again for an objective, and why.
+        rejections: until when a design is not proposed again for an objective, because an operator has rejected it.
         history: the last decisions that have been carried out or have failed.
         retries: from when on a design that failed may replace a working one of an objective, and why it failed.
         locked: objectives that keep their configuration; some may come into being later.
@@ -185,6 +186,7 @@ class View:
     surroundings: Surroundings
     repairs: Repairs
     error_log: Mapping[tuple[str, str], tuple[float, str]]
+    rejections: Mapping[tuple[str, str], float]
     history: Sequence[Past]
     retries: Mapping[tuple[str, str], tuple[float, str]]
     locked: Set[str]
@@ -360,6 +362,7 @@ class View:
             self.has_waited(now),
             self.repairs.what_counts(now),
             frozenset(self.error_log),
+            frozenset(self.rejections),
         )
 
     def scale(self, quality: str, limit: float | None = None) -> Scale:
@@ -462,4 +465,5 @@ class View:
             if self.failed_nodes_of(running.design):
                 times.append(running.deployed_at + self.settings.restart_grace)
         times += [moment for entries in (self.error_log, self.retries) for moment, _ in entries.values()]
+        times += self.rejections.values()
         return min((moment for moment in times if now < moment < math.inf), default=None)

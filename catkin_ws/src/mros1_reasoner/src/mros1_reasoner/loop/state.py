@@ -75,6 +75,7 @@ class State(View):
         self.repairs = Repairs(knowledge_base.repairs, settings)
         self._durations: deque[float] = deque(maxlen=_CHANGES)
         self.error_log: dict[tuple[str, str], tuple[float, str]] = {}
+        self.rejections: dict[tuple[str, str], float] = {}
         self.history: deque[Past] = deque(maxlen=_HISTORY)
         self.retries: dict[tuple[str, str], tuple[float, str]] = {}
         self._failures: dict[tuple[str, str], int] = {}  # in a row, by design and objective
@@ -247,6 +248,7 @@ class State(View):
         is_makeshift = self._makeshifts.pop(name, None) == design
         self._run(name, design=design, degraded=is_makeshift, binding_error=False, task_failure=None, refusal=())
         self._run(name, replaced=None, ending="", ruled_since=None, vanished="")
+        self.rejections.pop((design, name), None)
         self._run(name, deployed_at=now, failed_nodes=(), drifts={}, drifts_from=now + self.settings.restart_grace)
         if self.wanted.get(name) == design:
             del self.wanted[name]
@@ -266,6 +268,7 @@ class State(View):
         del self.roots[name]
         self.error_log = {key: entry for key, entry in self.error_log.items() if key[1] != name}
         self.retries = {key: entry for key, entry in self.retries.items() if key[1] != name}
+        self.rejections = {key: expiry for key, expiry in self.rejections.items() if key[1] != name}
         self._drop(name)
         self.match_requirements()
         self.locked -= {name, *(before - self.objectives.keys())}
@@ -357,8 +360,9 @@ class State(View):
             self.unneeded = {}
 
     def forget_expired(self, now: float) -> None:
-        """Drop what has expired from the error log, and drifted parameters that are reported no more."""
+        """Drop old failures and rejections, and drifted parameters that are reported no more."""
         self.error_log = {key: entry for key, entry in self.error_log.items() if entry[0] > now}
+        self.rejections = {key: expiry for key, expiry in self.rejections.items() if expiry > now}
         for name, running in self.running.items():
             self.running[name] = drifts.judged(running, self.settings, now)
 
@@ -505,6 +509,11 @@ class State(View):
             self._at_fault.add(key)
             expiry = self.retries[key][0]  # no other design's violation is a reason to try it sooner
         self.error_log[key] = expiry, reason
+
+    def note_rejection(self, now: float, design: str, objective: str, words: str) -> None:
+        """Note that an operator does not want a design for an objective now."""
+        self.note_in_vain(now, design, objective, words)
+        self.rejections[design, objective] = now + self.settings.error_log_expiry
 
     def forgive(self, name: str, reasons: Collection[str] = (VIOLATED,)) -> None:
         """Let designs of an objective be tried again that did not keep a limit: its cause is gone, or the limit is."""

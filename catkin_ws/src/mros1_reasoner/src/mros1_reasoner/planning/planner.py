@@ -53,6 +53,7 @@ class Situation:
         unfulfilled: functions that a design requires and that no design can be deployed for, by the design's name.
         strained: the same for functions that are provided, but not as they should be.
         tried: why a design failed a short while ago, by its name.
+        rejected: designs that an operator does not want for a while; of these, none is tried again sooner.
         current: name of the deployed design.
         desired: name of the design that is taken first, if it keeps every limit, or if no design does.
         observed: levels that were observed with the deployed design; they replace its expected levels.
@@ -72,6 +73,7 @@ class Situation:
     unfulfilled: Mapping[str, Collection[str]] = field(default_factory=dict)
     strained: Mapping[str, Collection[str]] = field(default_factory=dict)
     tried: Mapping[str, str] = field(default_factory=dict)
+    rejected: Collection[str] = ()
     current: str | None = None
     desired: str = ""
     observed: Mapping[str, float] = field(default_factory=dict)
@@ -104,7 +106,7 @@ def plan(
     are as useful within it, those count that keep the nearest limit best, then all limits; then components and utility
     decide. The desired design comes before all of these. When no design keeps every limit, the desired one is taken,
     else the least violating one; the deployed design stays unless another one is worth the change. When all have
-    failed, they are tried again.
+    failed, they are tried again, but for those that an operator has rejected.
     """
     running = next((design for design in designs if design.name == situation.current), None)
     candidates = [_judge(objective, design, situation, utility) for design in designs]
@@ -120,7 +122,8 @@ def plan(
         return judged.violation, *by_use(judged)
 
     fit = sorted((c for c in candidates if not c.refused_because), key=lambda c: (not c.relieves, *by_use(c)))
-    deployable = [c for c in candidates if situation.can_deploy(c.design.name)]
+    accepted = (c for c in candidates if c.design.name not in situation.rejected)
+    deployable = [c for c in accepted if situation.can_deploy(c.design.name)]
     kept: list[_Judged] = []
     wanted = next((c for c in candidates if c.design.name == situation.desired), None)
     fresh = [c for c in deployable if c.design.name not in situation.tried or c.design.name == situation.current]
@@ -370,4 +373,7 @@ def _nothing(designs: Collection[Design], situation: Situation) -> str:
     unsuited = sorted({words for name in names for words in situation.unsuited.get(name, ())})
     causes = [f"without {without}"] if without else []
     causes += [f"where {' and '.join(unsuited)}"] if unsuited else []
-    return f"no design can be deployed {' or '.join(causes)}" if causes else "no design is known"
+    rejected = sorted(name for name in names if name in situation.rejected)
+    said = f"no design can be deployed {' or '.join(causes)}" if causes else ""
+    said = said or ("no other design is left" if rejected else "no design is known")
+    return f"{said}; the operator has rejected {' and '.join(rejected)}" if rejected else said
