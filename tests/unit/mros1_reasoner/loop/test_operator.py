@@ -135,6 +135,19 @@ def test_proposal_is_withdrawn_when_its_cause_is_gone(make):
     assert core.proposal is None
 
 
+def test_proposal_is_withdrawn_when_its_objective_goes(make):
+    core = make(approval=True)
+    (proposal,) = fail(core, 1.0, "laser")
+    core.operator.remove_objective("o_move")
+    for answer in (core.operator.approve, core.operator.reject):
+        with pytest.raises(MapeError, match="does not wait for approval"):
+            answer(proposal.id, 2.0)
+    (withdrawn,) = core.step(2.0)
+    assert (withdrawn.id, withdrawn.state) == (proposal.id, FAILED)
+    assert "withdrawn" in withdrawn.explanation
+    assert core.proposal is None
+
+
 def test_proposal_gives_way_to_a_better_one(make):
     core = make(approval=True)
     (proposal,) = fail(core, 1.0, "laser")

@@ -185,7 +185,8 @@ class Operator:
 
     def _proposed(self, decision_id: str) -> Decision:
         proposal = self._state.proposal
-        if proposal is None or proposal.id != decision_id:
+        is_gone = proposal is not None and proposal.objective not in self._state.objectives
+        if proposal is None or proposal.id != decision_id or is_gone:
             raise MapeError(f"decision {decision_id} does not wait for approval")
         return proposal
 

@@ -340,8 +340,6 @@ class State(View):
 
     def _drop(self, name: str) -> None:
         """Forget an objective and everything that is known of it; a lock stays where a design may require it again."""
-        if self.proposal and self.proposal.objective == name:
-            self.proposal = None
         self.wanted.pop(name, None)
         function, design = self.objectives[name].function, self.running[name].design
         del self.objectives[name], self.running[name]
