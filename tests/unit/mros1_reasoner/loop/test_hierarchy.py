@@ -523,3 +523,14 @@ def test_locks_end_with_the_objective_that_is_asked_for_no_longer(one_arm):
     one_arm.core.operator.lock("")
     one_arm.core.operator.remove_objective("o_build")
     assert not one_arm.core.view.locked
+
+
+def test_limit_of_a_requirement_holds_when_it_goes_and_comes_back(one_arm):
+    one_arm.core.operator.set_nfr("o_F2", "error", 0.3)
+    assert one_arm.core.objectives["o_F2"].limits == {"error": 0.3}
+    one_arm.core.observe_active(one_arm.now, "F0", "FD2", "STABLE")
+    one_arm.run(seconds=1.0)
+    assert "o_F2" not in one_arm.core.objectives
+    one_arm.core.observe_active(one_arm.now, "F0", "FD1", "STABLE")
+    one_arm.run(seconds=1.0)
+    assert one_arm.core.objectives["o_F2"].limits == {"error": 0.3}

@@ -284,13 +284,13 @@ class State(View):
 
     def set_limit(self, name: str, quality: str, limit: float, why: str) -> None:
         """Give an objective another limit of a quality, which may make another design the better one."""
-        if name not in self.objectives:  # it has it when a design requires it
-            function = self.foreseen()[name]
+        function = self.foreseen().get(name)
+        if function is not None and name not in self.roots:  # it has it whenever a design requires it
             reserve = self.in_reserve.get(function) or Objective(name, function, when_required=True)
             self.in_reserve[function] = replace(reserve, limits={**reserve.limits, quality: limit})
-            return
-        before = self.objectives[name]
-        self.replace_limits(replace(before, limits={**before.limits, quality: limit}), why)
+        if name in self.objectives:
+            before = self.objectives[name]
+            self.replace_limits(replace(before, limits={**before.limits, quality: limit}), why)
 
     def replace_limits(self, objective: Objective, why: str) -> None:
         """Give an objective other limits, which may make another design the better one.
