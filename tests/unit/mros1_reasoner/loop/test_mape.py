@@ -387,6 +387,40 @@ def test_change_by_somebody_else_is_taken_over(core):
     assert core.facts.groundings == {"o_move": "camera_slow"}
 
 
+@pytest.mark.parametrize("is_late", [False, True])
+def test_change_that_is_taken_back_is_not_believed_for_an_answer_that_comes_late(core, is_late):
+    (decision,) = fail(core, 1.0, "laser")
+    assert decision.to_configuration == "camera_slow"
+    core.observe_active(2.0, "f_move", "scan_slow", "RECONFIGURING")
+    core.observe_active(3.0, "f_move", "camera_slow", "STABLE")
+    if not is_late:
+        core.report(3.0, decision.id, True)
+    core.observe_active(3.1, "f_move", "scan_slow", "RECONFIGURING")
+    core.observe_active(3.2, "f_move", "scan_slow", "STABLE")
+    if is_late:
+        core.report(3.3, decision.id, True)
+    running = core.view.running["o_move"]
+    assert (running.design, running.state) == ("scan_slow", "STABLE")
+    assert core.view.active["f_move"] == ("scan_slow", "STABLE")
+    assert "was taken back" in core.view.why_failed("o_move", "camera_slow")
+
+
+def test_function_that_vanishes_runs_no_more_for_an_answer_that_comes_late(core):
+    (decision,) = fail(core, 1.0, "laser")
+    core.observe_active(3.0, "f_move", "camera_slow", "STABLE")
+    core.observe_active(3.1, "f_move", "", "")
+    core.report(3.3, decision.id, True)
+    assert core.view.running["o_move"].design is None
+    assert not core.active
+
+
+def test_answer_is_believed_that_comes_before_the_state(core):
+    (decision,) = fail(core, 1.0, "laser")
+    core.observe_active(2.0, "f_move", "scan_slow", "STABLE")
+    core.report(2.1, decision.id, True)
+    assert core.view.running["o_move"].design == "camera_slow"
+
+
 def test_objectives_are_served_one_after_the_other(knowledge_base, counting):
     objectives = [OBJECTIVE, Objective("o_other", "f_move", {"energy": 0.35})]
     core = Mape(knowledge_base, counting, objectives, Settings())

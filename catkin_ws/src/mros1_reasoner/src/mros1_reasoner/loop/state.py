@@ -87,6 +87,7 @@ class State(View):
         self.proposal: Decision | None = None
         self.pending: Decision | None = None
         self.pending_since = 0.0
+        self._has_arrived = False  # the manipulator has told of what is pending that it runs
         self.started: float | None = None
         self.has_analysed = False
         self.facts = Facts()
@@ -211,6 +212,9 @@ class State(View):
 
     def _take_active(self, name: str, configuration: str, state: str, now: float) -> None:
         running = self.running[name]
+        asked = self.pending if self.pending and self.pending.objective == name else None
+        if asked and configuration == asked.to_configuration and state == FunctionGrounding.STABLE:
+            self._has_arrived |= running.design != configuration or running.state in BUSY
         if state in BUSY:
             self._run(name, busy_since=running.busy_since if running.state in BUSY else now, drifts={})
         elif running.state in BUSY:
@@ -224,8 +228,7 @@ class State(View):
                 self._end_of(name, now)
         # While it reconfigures, it may be the old or the new one.
         is_another = state != FunctionGrounding.RECONFIGURING and running.design != configuration
-        is_asked_for = self.pending is not None and self.pending.objective == name
-        if is_another and not is_asked_for and lasting.is_taken_back(running, configuration, self.settings, now):
+        if is_another and not asked and lasting.is_taken_back(running, configuration, self.settings, now):
             self._end_of(name, now, "was taken back")
             self.note_in_vain(now, running.design or "", name, self.running[name].ending)
         self._run(name, state=state)
@@ -573,7 +576,7 @@ class State(View):
         if decision.repair:
             self.repairs.begin(now, decision, wall)
         else:
-            self.pending, self.pending_since = decision, wall
+            self.pending, self.pending_since, self._has_arrived = decision, wall, False
         self.reconsider()
 
     def end_repairs(self, now: float) -> list[tuple[UnderWay, str]]:
@@ -596,7 +599,9 @@ class State(View):
         restarts = () if lasting.has_lasted(before, self.settings, now) else before.restarts
         self._deploy(name, design, now)
         self._run(name, replaced=decision.from_configuration if decision.from_configuration != design else None)
-        self.active[self.objectives[name].function] = design, FunctionGrounding.STABLE
+        function = self.objectives[name].function
+        told = self.active.get(function)
+        self.active[function] = design, FunctionGrounding.STABLE
         self._run(name, calm_until=now + self.settings.cool_down, attempts=0, degraded=decision.degraded)
         if before.failed_nodes and before.design == design:
             self._run(name, restarts=(*restarts, now), degraded=decision.degraded or before.degraded)
@@ -607,6 +612,10 @@ class State(View):
             self._run(name, degraded=True)
         for node in self.failed_nodes_of(design):
             self.components[node] = Component(v.WORKS, now)
+        if self._has_arrived and told:  # what the manipulator has told since is newer than its answer
+            self.note_active(now, function, *told)
+        elif self._has_arrived:
+            self.note_inactive(now, function)
 
     @property
     def change_duration(self) -> float:
