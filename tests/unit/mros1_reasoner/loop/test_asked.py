@@ -108,6 +108,22 @@ def test_lock_and_limit_wait_for_an_objective_that_a_task_asks_for_anew():
     assert asked.commands == (Pause(),)
 
 
+def test_limit_holds_again_once_a_task_has_asked_anew_for_its_objective():
+    limit, newer = SetNfr("o_water", "flow", 3.0), SetNfr("o_water", "flow", 4.0)
+    asked = Asked([Pause(), Lock("o_water"), limit, SetNfr("o_light", "flow", 3.0)])
+    assert asked.asked_anew("o_water") == [limit]
+    assert asked.asked_anew("o_water") == []
+    assert limit in asked.commands
+    assert not asked.wait_no_longer()
+    assert asked.asked_anew("o_light") == [], "a task that asks later asks for something else"
+    asked = Asked([limit])
+    asked.heed(newer)
+    assert asked.asked_anew("o_water") == [], "the operator's newer one holds already, or came after the task"
+    asked = Asked([limit])
+    assert asked.put_off(limit, ["o_light"])
+    assert asked.asked_anew("o_water") == [], "it waits for its objective anyway"
+
+
 def test_what_waits_in_vain_is_forgotten():
     asked = Asked([Pause(), Lock("o_water")])
     assert asked.put_off(Lock("o_water"), [])

@@ -9,6 +9,7 @@ from mros1_reasoner.loop import journal
 from mros1_reasoner.loop.asked import Asked, carry_out
 from mros1_reasoner.loop.entries import (
     ActiveFact,
+    Command,
     ComponentFact,
     Content,
     Entry,
@@ -16,6 +17,7 @@ from mros1_reasoner.loop.entries import (
     LeftFact,
     LevelFact,
     Lock,
+    Pursue,
     Released,
     RemoveObjective,
     Result,
@@ -24,6 +26,7 @@ from mros1_reasoner.loop.entries import (
     Unlock,
     UnneededFact,
 )
+from mros1_reasoner.loop.goals import Goals, Wish
 from mros1_reasoner.loop.mape import Mape
 from mros1_reasoner.loop.readable_state import MapeError
 from mros1_reasoner.loop.remembered import remembered, remembered_goals, to_remember
@@ -156,6 +159,24 @@ def test_what_has_failed_is_not_forgotten_by_who_dies_before_it_hears_of_it():
     robot.take(ComponentFact("front_laser", "FALSE", 0.0, "dead"))
     robot.die()
     assert to_remember(robot.core.view, {})["failed"] == ["front_laser"]
+
+
+def test_limit_of_an_operator_holds_when_a_task_asks_anew_for_an_objective_of_the_model():
+    robot = Line("d2", safety=0.6)
+    robot.ask(SetNfr("o_navigate", "safety", 0.3))
+    robot.die()
+
+    def command(command: Command) -> None:
+        robot.take(command)
+        if isinstance(command, Pursue):
+            assert carry_out(robot.asked.asked_anew(command.name), robot.take) == []
+
+    goals = Goals(robot.core, command)
+    wish = Wish("f_navigate", limits=(("safety", 0.5),))
+    goals.ask("first", wish)
+    assert robot.core.objectives["o_navigate"].limits == {"safety": 0.3}
+    goals.ask("second", wish)
+    assert robot.core.objectives["o_navigate"].limits == {"safety": 0.5}
 
 
 @pytest.mark.parametrize("deaths", [0, 1, 2])

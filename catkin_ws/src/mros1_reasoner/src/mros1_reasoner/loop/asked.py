@@ -20,8 +20,10 @@ class Asked:
         """Begin with the commands that hold already."""
         self._commands: list[Command] = []
         self._early: list[Command] = []  # of these, what is for objectives that are still to come
+        self._again: list[Command] = []  # of these, limits that a task replaces which asks anew for their objective
         for command in commands:
             self.heed(command)
+        self._again += [command for command in self._commands if isinstance(command, entries.SetNfr)]
 
     @property
     def commands(self) -> tuple[Command, ...]:
@@ -40,6 +42,7 @@ class Asked:
             return
         self._commands = [before for before in self._commands if not _replaces(command, before)]
         self._early = [before for before in self._early if not _replaces(command, before)]
+        self._again = [before for before in self._again if not _replaces(command, before)]
         if isinstance(command, entries.Lock | entries.SetNfr) and not command.objective and objectives:
             self._commands += [replace(command, objective=name) for name in objectives]
         elif not isinstance(command, entries.Resume | entries.Unlock):
@@ -73,6 +76,7 @@ class Asked:
         """
         waits = isinstance(command, entries.Lock | entries.SetNfr) and command.objective not in ("", *objectives)
         self._early += [command] if waits else []
+        self._again = [c for c in self._again if not (waits and c == command)]
         return waits
 
     def due(self, objectives: Collection[str]) -> list[Command]:
@@ -81,9 +85,15 @@ class Asked:
         self._early = [c for c in self._early if c not in found]
         return found
 
+    def asked_anew(self, objective: str) -> list[Command]:
+        """Return, once, the limits of an objective for which a task has asked anew, with limits of its own."""
+        found = [c for c in self._again if getattr(c, "objective", "") == objective]
+        self._again = [c for c in self._again if c not in found]
+        return found
+
     def wait_no_longer(self) -> bool:
         """Forget what waits for objectives; return whether anything did."""
-        early, self._early = self._early, []
+        early, self._early, self._again = self._early, [], []
         self._commands = [command for command in self._commands if command not in early]
         return bool(early)
 

@@ -112,7 +112,7 @@ class ReasonerNode:
         self._asked = Asked.from_parameter(parameters.asked)
         self._kept_asked, self._kept_memory = KeptParameter("~asked"), KeptParameter("~remembered")
         self._memory: dict[str, Any] = {}
-        self._goals_asked = Goals(self.core, lambda command: self.command(command, lasts=False))
+        self._goals_asked = Goals(self.core, self._command_of_task)
         self._tasks = ObjectiveAction(self._goals_asked, self._inbox.put, self._log.tell)
         for objective in objectives:
             self._log.tell_objective(objective)
@@ -197,6 +197,12 @@ class ReasonerNode:
         for command, error in carry_out(commands, partial(self.command, lasts=False)):
             if not self._asked.put_off(command, self.core.objectives):
                 self._log.warn(kind_of(command), f"asked of the reasoner before, left out: {error}")
+
+    def _command_of_task(self, command: entries.Command) -> None:
+        """Carry out a command of a task's goal, which ends with its server."""
+        self.command(command, lasts=False)
+        if isinstance(command, entries.Pursue):
+            self._carry_out_again(self._asked.asked_anew(command.name))
 
     def _leave(self) -> None:
         """Keep what a reasoner that takes this one's place has to know."""
