@@ -179,6 +179,21 @@ def test_limit_of_an_operator_holds_when_a_task_asks_anew_for_an_objective_of_th
     assert robot.core.objectives["o_navigate"].limits == {"safety": 0.5}
 
 
+@pytest.mark.parametrize(
+    "left",
+    [
+        LeftFact("o_navigate", "f1_v2_r1", degraded=True),
+        LeftFact("o_navigate", "f1_v2_r1", "safety", 1.5, 0.0, "f1", True),
+        LeftFact("o_later", "f1_v2_r1", degraded=True),
+        LeftFact("o_later", "", "safety", 1.5, 0.0, "f1"),
+    ],
+)
+def test_what_was_left_is_not_forgotten_by_who_dies_before_the_design_or_the_objective_is_there(left):
+    robot = Line("d2")
+    robot.take(left)
+    assert remembered(to_remember(robot.core.view, {})) == [left]
+
+
 @pytest.mark.parametrize("deaths", [0, 1, 2])
 def test_what_nothing_needed_when_a_reasoner_died_is_released(deaths):
     station = Line("station")

@@ -254,6 +254,10 @@ class Levels:
         """Return for which qualities designs of an objective were left, with what `restore` takes."""
         return {key[1]: (blame.strain, blame.group) for key, blame in self._blames.items() if key[0] == objective}
 
+    def with_blames(self) -> list[str]:
+        """Return the objectives of which designs were left because of a quality; some may come into being later."""
+        return list(dict.fromkeys(objective for objective, _ in self._blames))
+
     def acquit(self, objective: str) -> None:
         """Forget what designs of an objective were left for."""
         self._blames = {key: blame for key, blame in self._blames.items() if key[0] != objective}

@@ -158,6 +158,7 @@ class View:
         rejections: until when a design is not proposed again for an objective, because an operator has rejected it.
         history: the last decisions that have been carried out or have failed.
         retries: from when on a design that failed may replace a working one of an objective, and why it failed.
+        makeshifts: designs that did not keep every limit for a reasoner before this one, until one is deployed.
         locked: objectives that keep their configuration; some may come into being later.
         paused: whether nothing is decided.
         proposal: decision that waits for approval.
@@ -189,6 +190,7 @@ class View:
     rejections: Mapping[tuple[str, str], float]
     history: Sequence[Past]
     retries: Mapping[tuple[str, str], tuple[float, str]]
+    makeshifts: Mapping[str, str]
     locked: Set[str]
     paused: bool
     proposal: Decision | None

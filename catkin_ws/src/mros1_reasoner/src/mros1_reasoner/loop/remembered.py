@@ -13,7 +13,7 @@ from typing import Any
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.loop.entries import BeforeFact, FailedFact, LeftFact, UnneededFact
 from mros1_reasoner.loop.entry_text import kind_of, read_entry, values_of
-from mros1_reasoner.loop.readable_state import View
+from mros1_reasoner.loop.readable_state import Running, View
 
 _LEFT = kind_of(LeftFact("", "", ""))
 
@@ -58,14 +58,17 @@ def remembered_goals(value: object) -> dict[str, str]:
 
 def _left(view: View) -> list[LeftFact]:
     found = []
-    for name, running in view.running.items():
-        design = running.design or ""
+    for name in {**view.running, **view.makeshifts, **dict.fromkeys(view.levels.with_blames())}:
+        running = view.running.get(name, Running())
+        waits = running.design is None and name in view.makeshifts
+        design = view.makeshifts[name] if waits else running.design or ""
+        degraded = running.degraded or waits
         blames = view.levels.blames(name)
         found += [
-            LeftFact(name, design, quality, strain.factor, strain.difference, group, running.degraded)
+            LeftFact(name, design, quality, strain.factor, strain.difference, group, degraded)
             for quality, (strain, group) in blames.items()
         ]
-        if running.degraded and not blames:
+        if degraded and not blames:
             found.append(LeftFact(name, design, degraded=True))
     return found
 

@@ -81,7 +81,7 @@ class State(View):
         self._failures: dict[tuple[str, str], int] = {}  # in a row, by design and objective
         self._at_fault: set[tuple[str, str]] = set()  # these failures were violations of their own making
         self.failed_before: set[str] = set()
-        self._makeshifts: dict[str, str] = {}  # designs that did not keep every limit for a reasoner before
+        self.makeshifts: dict[str, str] = {}
         self.locked: set[str] = set()
         self.paused = False
         self.proposal: Decision | None = None
@@ -248,7 +248,7 @@ class State(View):
                 self._failures.pop((running.design or "", name), None)
                 self._at_fault.discard((running.design or "", name))
         self._run(name, way=() if self.wanted.get(name, design) == design else running.way)
-        is_makeshift = self._makeshifts.pop(name, None) == design
+        is_makeshift = self.makeshifts.pop(name, None) == design
         self._run(name, design=design, degraded=is_makeshift, binding_error=False, task_failure=None, refusal=())
         self._run(name, replaced=None, ending="", ruled_since=None, vanished="")
         self.rejections.pop((design, name), None)
@@ -554,7 +554,7 @@ class State(View):
             strain = Correction(fact.factor, fact.difference)
             self.levels.restore((fact.objective, fact.quality), strain, fact.group)
         if fact.degraded:
-            self._makeshifts[fact.objective] = fact.design
+            self.makeshifts[fact.objective] = fact.design
             if (running := self.running.get(fact.objective)) and running.design == fact.design:
                 self._run(fact.objective, degraded=True)
 
