@@ -534,3 +534,16 @@ def test_limit_of_a_requirement_holds_when_it_goes_and_comes_back(one_arm):
     one_arm.core.observe_active(one_arm.now, "F0", "FD1", "STABLE")
     one_arm.run(seconds=1.0)
     assert one_arm.core.objectives["o_F2"].limits == {"error": 0.3}
+
+
+@pytest.mark.parametrize("state", ["RECONFIGURING", "RECOVERING"])
+def test_objective_waits_for_what_its_function_does_when_it_comes_into_being(make, state):
+    robot = make()
+    robot.now = 100.0
+    for function, design, how in (("F0", "FD1", "STABLE"), ("F1", "FD1.1", "STABLE"), ("F2", "FD2.1", state)):
+        robot.core.observe_active(90.0, function, design, how)
+    robot.run()
+    view, running = robot.core.view, robot.core.view.running["o_F2"]
+    assert view.is_busy(running, 149.0) and not view.is_busy(running, 151.0)
+    robot.core.observe_active(101.0, "F2", "FD2.1", "STABLE")
+    assert not view.is_busy(view.running["o_F2"], 101.0)

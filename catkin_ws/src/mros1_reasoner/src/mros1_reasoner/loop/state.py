@@ -52,6 +52,7 @@ class State(View):
         self.roots: dict[str, None] = dict.fromkeys(self.objectives)
         self.running: dict[str, Running] = {objective: Running() for objective in self.objectives}
         self.active: dict[str, tuple[str, str]] = {}
+        self._busy_since: dict[str, float] = {}  # of functions whose state is a busy one
         self.wanted: dict[str, str] = {}
         self.released: dict[str, None] = {}
         self.unneeded: dict[str, None] = {}
@@ -203,6 +204,8 @@ class State(View):
 
     def note_active(self, now: float, function: str, configuration: str, state: str) -> None:
         """Note what runs for a function, as the manipulator reports it."""
+        if state in BUSY and self.active.get(function, ("", ""))[1] not in BUSY:
+            self._busy_since[function] = now
         self.active[function] = configuration, state
         for name in [o.name for o in self.objectives.values() if o.function == function]:
             self._take_active(name, configuration, state, now)
@@ -340,6 +343,8 @@ class State(View):
         active = self.active.get(objective.function)
         if active:
             self._take_active(objective.name, *active, now=-math.inf)
+            if active[1] in BUSY:
+                self._run(objective.name, busy_since=self._busy_since[objective.function])
 
     def _drop(self, name: str) -> None:
         """Forget an objective and everything that is known of it; a lock stays where a design may require it again."""
