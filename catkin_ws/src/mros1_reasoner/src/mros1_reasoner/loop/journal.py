@@ -53,6 +53,11 @@ def apply(core: Mape, entry: Entry) -> list[Decision]:
     return []
 
 
+def is_pursued(core: Mape, name: str) -> bool:
+    """Return whether a name is that of an objective, or of its function."""
+    return any(name in (objective.name, objective.function) for objective in core.objectives.values())
+
+
 def brought(now: float, decisions: Sequence[Decision]) -> list[Entry]:
     """Return the entries about the decisions that an entry led to."""
     return [
@@ -141,4 +146,4 @@ def _carry_out(core: Mape, now: float, command: entries.Command) -> list[Decisio
 
 def _objective(core: Mape, name: str) -> str:
     """Return the name of an objective or a function unchanged; empty for others, such as an observer's name."""
-    return name if any(name in (o.name, o.function) for o in core.objectives.values()) else ""
+    return name if is_pursued(core, name) else ""

@@ -254,7 +254,15 @@ class ReasonerNode:
         """Note the state of the newest goal of an objective's action, if it has changed."""
         failed = self._task_goals.take(objective, statuses)
         if failed is not None:
-            self._inbox.put(lambda: self._take(TaskFact(objective, failed, message=f"a goal of {action} was aborted")))
+            self._inbox.put(lambda: self._take_task(objective, action, failed))
+
+    def _take_task(self, objective: str, action: str, failed: bool) -> None:
+        """Take in whether a goal of an action has failed; it is that of no other objective, if its own one is gone."""
+        message = f"a goal of {action} was aborted"
+        if journal.is_pursued(self.core, objective):
+            self._take(TaskFact(objective, failed, message=message))
+        elif failed:
+            self._log.warn("task", f"{message}, but {objective} is not asked for: left out")
 
     def _take(self, content: entries.Content) -> bool:
         """Apply an input and announce what follows; log what is wrong if the input does not fit."""
