@@ -141,3 +141,12 @@ def test_function_whose_change_was_given_up_for_nothing_has_failed_where_it_can_
         Fault(33.961, Kind.MASTER_SILENT, "", 1.449),
     )
     holds(History(50016143, "station", faults, Policy.REPLACE))
+
+
+def test_lock_of_an_objective_that_is_still_to_come_outlasts_one_of_all_and_the_reasoner():
+    faults = (
+        Fault(4.471, Kind.LOCK, "o_look", 17.619),
+        Fault(6.17, Kind.LOCK, "", 12.211),
+        Fault(7.081, Kind.KILL_PART, "reasoner"),
+    )
+    holds(History(60014042, "station", faults, Policy.WAIT))

@@ -42,6 +42,9 @@ def test_later_commands_replace_what_they_take_back(given, holds):
     ("given", "holds"),
     [
         ([Lock()], [Lock("o_water"), Lock("o_light")]),
+        ([Lock("o_later"), Lock()], [Lock("o_later"), Lock("o_water"), Lock("o_light")]),
+        ([Lock("o_light"), Lock()], [Lock("o_water"), Lock("o_light")]),
+        ([Lock("o_later"), Lock(), Unlock()], []),
         ([Lock(), Unlock("o_water")], [Lock("o_light")]),
         ([FLOW], [SetNfr("o_water", "flow", 1.0), SetNfr("o_light", "flow", 1.0)]),
         ([Lock(), Unlock()], []),

@@ -40,13 +40,15 @@ class Asked:
         """
         if isinstance(command, entries.Approve | entries.Reject):
             return
-        self._commands = [before for before in self._commands if not _replaces(command, before)]
-        self._early = [before for before in self._early if not _replaces(command, before)]
-        self._again = [before for before in self._again if not _replaces(command, before)]
+        heeded = [command]
         if isinstance(command, entries.Lock | entries.SetNfr) and not command.objective and objectives:
-            self._commands += [replace(command, objective=name) for name in objectives]
-        elif not isinstance(command, entries.Resume | entries.Unlock):
-            self._commands.append(command)
+            heeded = [replace(command, objective=name) for name in objectives]
+        for one in heeded:
+            self._commands = [before for before in self._commands if not _replaces(one, before)]
+            self._early = [before for before in self._early if not _replaces(one, before)]
+            self._again = [before for before in self._again if not _replaces(one, before)]
+        if not isinstance(command, entries.Resume | entries.Unlock):
+            self._commands += heeded
 
     def settle(self, locked: Collection[str], objectives: Collection[str]) -> bool:
         """Forget the locks and limits of objectives that went; return whether there were any.
