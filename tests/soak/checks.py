@@ -36,11 +36,6 @@ LIFE_S = 25.0
 _STOPS = (Kind.KILL, Kind.FREEZE_FOR_GOOD, Kind.INTERRUPT, Kind.KILL_TWO)
 """After these a process does its work no more, unless somebody starts it again."""
 _ENDS = (*_STOPS, Kind.USURP, Kind.KILL_IN_CHANGE, Kind.KILL_STARTING)
-_RESTARTS = (Kind.KILL, Kind.INTERRUPT, Kind.KILL_TWO, Kind.USURP, Kind.KILL_IN_CHANGE, Kind.KILL_STARTING)
-"""After these a part is started again."""
-
-KEPT = ("asked", "journal", "kept_goals", "overwritten", "remembered")
-"""Parameters that parts write themselves, for their successors. roslaunch sets the others, once."""
 
 STABLE, RECONFIGURING, RECOVERING, FAILED = "STABLE", "RECONFIGURING", "RECOVERING", "FAILED"
 MANIPULATOR, LAUNCHER = "rosgraph_manipulator", "rosgraph_launcher"
@@ -75,9 +70,8 @@ def agrees(mission: Mission, observed: Observed) -> Iterator[str]:
     """What is told agrees with the processes within 2 s, while the manipulator works and nothing is under way."""
     since: float | None = None
     began = observed.event("MISSION_START")
-    lost = {part: t for t, part in _without_input(mission, observed)}.get(MANIPULATOR, math.inf)
     for sample in observed.samples:
-        told = observed.told_at(sample.t) if sample.t < lost else None
+        told = observed.told_at(sample.t)
         if began is None or sample.t < began.t or told is None or not _disagrees(told, sample):
             since = None
             continue
@@ -220,24 +214,7 @@ def excuse_of(mission: Mission, observed: Observed) -> str:
         return "no sensor is left"
     if "robot_state_publisher" in dead:
         return "the frames of the robot are gone"
-    unable = ", ".join(part for _, part in _without_input(mission, observed))
-    unable = unable and f"parameters were changed of what was started again after that: {unable}"
-    return unable or _hangs_when_needed(mission, observed)
-
-
-def _without_input(mission: Mission, observed: Observed) -> Iterator[tuple[float, str]]:
-    """Give the parts that were started again after parameters of theirs had been changed, and when."""
-    struck = [(strike, mission.faults[strike.index]) for strike in observed.struck()]
-    for rewritten, fault in struck:
-        if fault.kind is not Kind.PARAMETERS:
-            continue
-        part, _, name = rewritten.note.removeprefix("/").partition("/")
-        if part not in PARTS or name.startswith(KEPT):
-            continue
-        for strike, other in struck:
-            if strike.t > rewritten.t and other.kind in _RESTARTS and part in other.targets:
-                yield strike.t, part
-                break
+    return _hangs_when_needed(mission, observed)
 
 
 def _hangs_when_needed(mission: Mission, observed: Observed) -> str:

@@ -236,32 +236,6 @@ def test_nobody_changes_what_a_stopped_part_would_have_to_change(target, after, 
     assert excuse_of(plan(hang, lost), observed) == ""
 
 
-@pytest.mark.parametrize(
-    ("note", "target", "after", "is_excused"),
-    [
-        ("/rosgraph_manipulator/configurations deleted", "rosgraph_manipulator", 5.0, True),
-        ("/rosgraph_manipulator/configurations deleted", "rosgraph_manipulator", -5.0, False),
-        ("/rosgraph_manipulator/configurations deleted", "rosgraph_launcher", 5.0, False),
-        ("/rosgraph_manipulator/journal deleted", "rosgraph_manipulator", 5.0, False),
-        ("/move_base/max_vel_x: 0.3 to 0.9", "move_base", 5.0, False),
-    ],
-)
-def test_part_that_is_started_again_needs_its_parameters(note, target, after, is_excused):
-    observed = calm()
-    rewritten, killed = Fault(Kind.PARAMETERS, 30.0, (), "deleted"), Fault(Kind.KILL_TWO, 30.0 + after, (target,))
-    observed.strikes = [Strike(30.0, 0, False, note), Strike(30.0 + after, 1, False, "")]
-    assert bool(excuse_of(plan(rewritten, killed), observed)) == is_excused
-
-
-def test_manipulator_that_may_be_unable_to_begin_tells_nothing():
-    observed = gone(calm(), 20, 30)
-    faults = Fault(Kind.PARAMETERS, 10.0, (), "deleted"), Fault(Kind.KILL, 12.0, ("rosgraph_manipulator",))
-    observed.strikes = [Strike(12.0, 1, False, "")]
-    assert names(observed, *faults) == {"what is told agrees with the processes"}
-    observed.strikes.append(Strike(10.0, 0, False, "/rosgraph_manipulator/configurations deleted"))
-    assert names(observed, *faults) == set()
-
-
 def test_nodes_of_all_variants_need_what_the_base_sets():
     observed = calm()
     fault = Fault(Kind.PARAMETERS, 10.0, (), "huge")
