@@ -262,7 +262,7 @@ class World:
         self._later(value, lambda: self._unlock(target))
 
     def _unlock(self, target: str) -> None:
-        self._insist(entries.Unlock(target), lambda: target in self.host.held or bool(self.host.held and not target))
+        self._insist(entries.Unlock(target), lambda: bool(self.host.held & {target} if target else self.host.held))
 
     def _pause(self, target: str, value: float) -> None:
         self._command(entries.Pause())
