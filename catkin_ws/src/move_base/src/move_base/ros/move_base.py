@@ -130,9 +130,12 @@ class MoveBaseNode:
         """Offer what the first command does not need: services and dynamic_reconfigure."""
         from move_base.ros.reconfigure import offer
 
-        names = ("~make_plan", f"~{self._parameters.global_planner}/make_plan")
-        offers = [partial(rospy.Service, name, GetPlan, self._on_make_plan) for name in names]
-        offers.append(partial(rospy.Service, "~clear_costmaps", Empty, self._on_clear_costmaps))
+        planner = self._parameters.global_planner
+        offers = [
+            lambda: rospy.Service("~make_plan", GetPlan, self._on_make_plan),
+            lambda: rospy.Service(f"~{planner}/make_plan", GetPlan, self._on_make_plan),
+            lambda: rospy.Service("~clear_costmaps", Empty, self._on_clear_costmaps),
+        ]
         offers += [partial(offer, [one], self._present_values, self._reconfigure) for one in servers(self._parameters)]
         while offers and not rospy.core.is_shutdown_requested():
             try:
