@@ -163,7 +163,7 @@ class Striker:
         """Rewrite a parameter of one of our nodes."""
         master = self._master()
         names = sorted(master.call("getParamNames"))
-        names = [name for name in names if name.split("/")[1] in (*PARTS, NODE)]
+        names = [name for name in names if name.split("/")[1] in (*PARTS, NODE, "node_kit")]
         if fault.how == "drift":
             names = [name for name in names if name.startswith(f"/{NODE}/")]
         name = names[min(len(names) - 1, int(fault.pick * len(names)))]

@@ -121,7 +121,12 @@ def test_what_every_node_has_is_left_out_and_said_so():
         [["/clock", ["/talker"]], ["/rosout", ["/rosout"]]],
         [["/talker/get_loggers", ["/talker"]], ["/talker/reset", ["/talker"]]],
         [["/chatter", "std_msgs/String"]],
-        {"run_id": "x", "roslaunch": {"uris": {"host": "u"}}, "use_sim_time": True},
+        {
+            "run_id": "x",
+            "roslaunch": {"uris": {"host": "u"}},
+            "node_kit": {"began_with": {"r": "x"}},
+            "use_sim_time": True,
+        },
     )
     models = extracted(snapshot)
     assert ports(models.system, "talker") == {

@@ -10,6 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 from helpers.waiting import DEADLINE_S, wait_for
+from node_kit.io.supervisor import owner_id
 from rosgraph_launcher.io import processes
 from rosgraph_launcher.io.processes import MARK, OWNER, Command, StartError
 
@@ -270,7 +271,7 @@ def test_process_names_its_owner(command, begin):
 
     wait_for(is_read, "it runs")
     assert environment[MARK]
-    assert environment[OWNER] == processes.owner_id(os.getpid())
+    assert environment[OWNER] == owner_id(os.getpid())
     process.close()
 
 

@@ -20,7 +20,7 @@ _METACONTROL_PARAMETERS = frozenset(
 
 REMARK = (
     "Left out, because every node has it: publishing /rosout, listening to /clock, the services ~get_loggers and "
-    "~set_logger_level; the node /rosout; the parameters of roslaunch."
+    "~set_logger_level; the node /rosout; the parameters of roslaunch, and those with what nodes began with."
 )
 
 _TOPICS = {
@@ -30,7 +30,8 @@ _TOPICS = {
     (PortKind.SUBSCRIBER, "/clock"),
 }
 _SERVICES = ("get_loggers", "set_logger_level")
-_ROSLAUNCH = ("roslaunch/", "run_id", "rosversion", "rosdistro")
+_GROUPS = ("roslaunch/", "node_kit/")
+_ROSLAUNCH = ("run_id", "rosversion", "rosdistro")
 
 
 class Interface(Protocol):
@@ -70,5 +71,5 @@ def is_metacontrol_parameter(name: str) -> bool:
 
 
 def is_roslaunch_parameter(name: str) -> bool:
-    """Return whether roslaunch sets a global parameter (its name without the leading slash) for its own purposes."""
-    return name.startswith(_ROSLAUNCH[0]) or name in _ROSLAUNCH[1:]
+    """Return whether roslaunch or node_kit sets a global parameter (its name without the leading slash) for itself."""
+    return name.startswith(_GROUPS) or name in _ROSLAUNCH

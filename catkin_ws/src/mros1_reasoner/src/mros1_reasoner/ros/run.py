@@ -34,7 +34,7 @@ def run(early: Popen[bytes] | None) -> None:
         early: Pellet's process, if it has been started already.
     """
     with Lifetime("reasoner", ParameterError, KnowledgeBaseError, ReasonerError, ModelError) as life:
-        life.start()
+        life.start(writes=("asked", "remembered"))
         log_core()
         parameters = Parameters(rospy.get_param(rospy.get_name(), None) or {})
         for line in parameters.strangers:
@@ -52,6 +52,7 @@ def run(early: Popen[bytes] | None) -> None:
         from mros1_reasoner.ros.reasoner import ReasonerNode
 
         node = ReasonerNode(parameters, knowledge_base, objectives, reasoner)
+        life.begun()
         watch_parts("reasoner")
         node.run()
 

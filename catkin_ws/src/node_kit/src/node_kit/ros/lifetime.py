@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from types import TracebackType
 from typing import NoReturn
 
@@ -25,6 +25,7 @@ from node_kit.io.xml_rpc import CallError
 from node_kit.master import View
 from node_kit.ros.connections import connect_to_all
 from node_kit.ros.handshakes import greet_apart
+from node_kit.ros.last_start import LastStart
 from node_kit.ros.quick_start import quick_start
 from node_kit.ros.rosout_parameter import read_rosout_parameter
 
@@ -33,7 +34,8 @@ BAD_START = 2
 
 STAYS = "NODE_KIT_STAYS"
 """Environment variable, to be set beside `respawn="true"`: a node whose input can't be used says so, and ends after
-`TRIES_AGAIN`. Its start would fail again every second otherwise; the input may be mended, or be wrong for a moment."""
+`TRIES_AGAIN`. Its start would fail again every second otherwise; the input may be mended, or be wrong for a moment.
+Where its parameters have changed since it began last, it sets them again instead, and ends at once."""
 
 TRIES_AGAIN = 30.0
 """Wall s after which such a node ends, so that it is started again."""
@@ -82,6 +84,7 @@ class Lifetime:
         self._cut_off_at = math.inf  # monotonic s
         self._cut_off_sooner = threading.Condition()
         self._status = 0
+        self._last_start: LastStart | None = None
         self._shutting_down: int | None = None  # the thread in which rospy shuts down
         # Begun now, because there may be no thread to be had when the node is to end.
         threading.Thread(target=self._cut_off_in_time, name="cut off", daemon=True).start()
@@ -93,11 +96,13 @@ class Lifetime:
         rospy.on_shutdown(self._on_shutdown)
         return self
 
-    def start(self, anonymous: bool = False) -> None:
+    def start(self, anonymous: bool = False, writes: Collection[str] = (), reads: Collection[str] = ()) -> None:
         """Become a node, and watch the master from now on.
 
         Args:
             anonymous: whether the node's name gets an addition that makes it unique.
+            writes: the node's private parameters that it sets itself.
+            reads: parameters that it reads beside its private ones.
         """
         print_safely()
         try:
@@ -110,10 +115,18 @@ class Lifetime:
             read_rosout_parameter()
             forgive()
             greet_apart()
+            if self._stays:
+                with contextlib.suppress(CallError):  # the node can do without
+                    self._last_start = LastStart(writes, reads)
         except (CallError, OSError, rospy.ROSInitException) as error:
             raise _StartError(str(error)) from error
         self._name = rospy.get_name()
         rospy.core.add_shutdown_hook(self._after_goodbye)  # comes after rospy's own, in their order
+
+    def begun(self) -> None:
+        """Keep the parameters with which the node has begun, for the process that roslaunch starts in its place."""
+        if self._last_start is not None:
+            self._last_start.keep()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -127,13 +140,25 @@ class Lifetime:
             self.end("the master is lost")
         if isinstance(error, (*self._refusals, _StartError)):
             self.say(" ".join(str(error).split()))
-            if self._stays and not isinstance(error, _StartError):  # a master that was in trouble may be well again
+            # A master that was in trouble may be well again.
+            if self._stays and not isinstance(error, _StartError) and not self._restore():
                 self.say(f"mend that; it tries again in {TRIES_AGAIN:g} s")
                 time.sleep(TRIES_AGAIN)
             self.end("it can't start", BAD_START)
         with contextlib.suppress(OSError, ValueError):  # nobody reads any more
             traceback.print_exception(kind, error, trace)
         self.end("it has failed", 1)
+
+    def _restore(self) -> bool:
+        """Set parameters as they were when the node began last; return whether any was another one."""
+        try:
+            names = self._last_start.restore() if self._last_start is not None else []
+        except CallError as error:
+            self.say(str(error))
+            return False
+        if names:
+            self.say(f"it begins again with what it had at its last start: {', '.join(names)}")
+        return bool(names)
 
     @property
     def is_ending(self) -> bool:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from node_kit.io.supervisor import owner_id
 from node_kit.io.xml_rpc import CallError, SilentError
 
 from rosgraph_launcher.io import processes
@@ -40,7 +41,7 @@ class NodeProcesses:
         """
         self._options = options
         self._log = log
-        self._id = processes.owner_id(os.getpid())
+        self._id = owner_id(os.getpid())
         self._running: dict[str, Process] = {}
         self._commands: dict[str, Command] = {}  # by which each node was begun last
         self._hanging: set[str] = set()  # nodes that do not answer the request to end

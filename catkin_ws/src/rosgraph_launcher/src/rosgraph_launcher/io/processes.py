@@ -11,7 +11,6 @@ Three things keep a dying owner from leaving processes behind:
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import re
 import select
@@ -26,6 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
+from node_kit.io.supervisor import owner_id
 
 from rosgraph_launcher.io.pidfds import open_pidfd
 from rosgraph_launcher.io.warm_start.sitecustomize import SETTING
@@ -33,7 +33,6 @@ from rosgraph_launcher.io.warm_start.sitecustomize import SETTING
 MARK = "MROS_LAUNCHER"
 """Environment variable of every process that a launcher starts; its value names the launcher and its master."""
 
-_START = 19  # of the fields in /proc/PID/stat after the command's name
 
 OWNER = "MROS_LAUNCHER_OWNER"
 """Environment variable beside it; its value names the process of the launcher, see `owner_id`."""
@@ -269,19 +268,6 @@ def close_all(processes: Sequence[Process]) -> list[Process]:
     for process in processes:
         process.close_descriptors()
     return [process for process in processes if process.status is None]
-
-
-@functools.lru_cache(maxsize=1)
-def owner_id(pid: int) -> str:
-    """Return what names a process among all that were started since the host was: its id and its start.
-
-    The start is in ticks since boot, as in proc(5). That of psutil changes when the wall clock is set.
-
-    Raises:
-        OSError: it has ended.
-    """
-    fields = Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()
-    return f"{pid}@{fields[_START]}"
 
 
 def kill_marked(mark: str, owner: str = "") -> list[tuple[int, float]]:

@@ -196,9 +196,10 @@ def main() -> None:
     with Lifetime("rosgraph_launcher", ParameterError, SecretError, StartError) as life:
         check_host()
         read_secret()
-        life.start()
+        life.start(writes=("addresses",))
         options = read_options()
         rospy.set_param("~addresses", addresses(str(rospy.get_param("~host", ""))))
         node = LauncherNode(options, life)
+        life.begun()
         watch_parts("launcher")
         node.spin()

@@ -12,6 +12,7 @@ from typing import Any
 import rospy
 from node_kit.io.inbox import Inbox
 from node_kit.io.master_watch import MasterWatch
+from node_kit.io.supervisor import find_supervisor
 from node_kit.io.xml_rpc import CallError
 from node_kit.parameters import ParameterError, ParameterTree
 from node_kit.plugins import PluginError
@@ -27,7 +28,6 @@ from rosgraph_manipulator.change.tactics import Tactic, load_tactics
 from rosgraph_manipulator.configuration.configurations import KEYS, ConfigurationError, ManipulatorOptions
 from rosgraph_manipulator.io.configuration_file import options_from, read_file
 from rosgraph_manipulator.io.master import set_parameters
-from rosgraph_manipulator.io.supervisor import find_supervisor
 from rosgraph_manipulator.ros.announcer import Announcer
 from rosgraph_manipulator.ros.goal import PendingGoal
 from rosgraph_manipulator.ros.launchers import Launchers
@@ -200,12 +200,14 @@ def read_parameters(arguments: list[str]) -> dict[str, Any]:
 def main() -> None:
     """Run the node; exit status 2 when its configuration cannot be used."""
     with Lifetime("rosgraph_manipulator", ConfigurationError, ParameterError, PluginError) as life:
-        life.start()
-        options = options_from(read_parameters(rospy.myargv()[1:]))
+        arguments = rospy.myargv()[1:]
+        life.start(writes=("journal", "overwritten"), reads=() if arguments else KEYS)
+        options = options_from(read_parameters(arguments))
         for configuration in (*options.configurations.values(), *options.drivers.values()):
             if configuration.problem:
                 rospy.logwarn("%s is refused when it is requested: %s", configuration.name, configuration.problem)
         initial = options.one_per_function(rospy.get_param("~initial_configuration", ""), "~initial_configuration")
         manipulator = Manipulator(options, load_tactics(), initial)
+        life.begun()
         watch_parts("manipulator")
         manipulator.run(life.watch)

@@ -271,6 +271,7 @@ def command(load: tuple[str, ...], more: tuple[str, ...]) -> None:
             rospy.logwarn("%s", line)
         life.watch.patience = parameters_node.number("master_patience", PATIENCE)
         node = MonitorNode((*load, *more))
+        life.begun()
         node.run(watch_parts("monitor"))
 
 

@@ -3,9 +3,9 @@
 import subprocess
 import sys
 
-from rosgraph_manipulator.io.supervisor import find_supervisor
+from node_kit.io.supervisor import find_supervisor
 
-FIND = "import sys; from rosgraph_manipulator.io.supervisor import find_supervisor; print(find_supervisor(sys.argv))"
+FIND = "import sys; from node_kit.io.supervisor import find_supervisor; print(find_supervisor(sys.argv))"
 
 
 def found_by_a_child(*arguments):
