@@ -40,7 +40,7 @@ class LastStart:
         names = [own, *map(rospy.resolve_name, reads), self._parameter]
         with Client(rosgraph.get_master_uri(), own) as master:
             answers = master.call_all([("getParam", name) for name in names])
-        values = {name: value for name, (is_set, value) in zip(names, answers, strict=True) if is_set}
+        values = {name: value for name, (is_set, value) in zip(names, answers) if is_set}
         self._kept_text = values.pop(self._parameter, None)
         private = values.pop(own, {})
         self._present = {**_texts({own: private} if not isinstance(private, dict) else {}), **_texts(values)}
