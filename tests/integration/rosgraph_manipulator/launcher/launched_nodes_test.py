@@ -32,7 +32,7 @@ OF_THE_CALLER = {"_", "SHLVL", "PWD", "OLDPWD", "ROS_LOG_FILENAME", MARK, OWNER}
 """Variables that tell of who starts a node: the shell script rosrun starts the launcher."""
 TAKEN_BACK = {"PYTHONPATH", SETTING}
 """Variables that a prepared process takes back before its script begins; from outside, the former ones are seen."""
-OF_OTHERS = re.compile(r"/(run_id|ros(distro|version)|(roslaunch|rosgraph_\w+|launched_records)/.*)")
+OF_OTHERS = re.compile(r"/(run_id|ros(distro|version)|(roslaunch|node_kit|rosgraph_\w+|launched_records)/.*)")
 LATE = {"/counted", "/cpp/manager/bond", "/greeting", "/passed", "/slow", "/tf", "/tf_static", "/tools/chosen"}
 """Topics that their nodes publish some time after their start."""
 
