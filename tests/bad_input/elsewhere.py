@@ -42,6 +42,7 @@ FILES: dict[str, str] = {
     "mros1_reasoner/ros/journal.py": "copies the text of files that were read before",
     "node_kit/io/input_files.py": _CALLED,
     "node_kit/io/output_files.py": _OUTPUT,
+    "node_kit/io/supervisor.py": _OWN,
     "node_kit/io/xml_rpc.py": "reads answers of the master and of nodes, which test_xml_rpc.py makes up",
     "node_kit/plugins.py": "reads manifests of installed packages",
     "node_kit/ros/resumed_goal.py": "gives rospy what decode_parameter, which is tried, returns",

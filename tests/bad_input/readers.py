@@ -47,6 +47,7 @@ from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.loop.asked import Asked
 from mros1_reasoner.replay.recording import RecordingError
 from node_kit.io.input_files import InputFileError, read_text, read_yaml
+from node_kit.last_start import kept_of
 from node_kit.parameters import ParameterError
 from node_kit.takeover import TakeoverError, decode_parameter
 from pybullet_simulator.io.map_file import MapError, read_map
@@ -596,6 +597,11 @@ READERS: tuple[Reader, ...] = (
         "a goal taken over", (), "yaml", "bad.yaml",
         _texts("type: move_base_msgs/MoveBaseActionGoal\ndata: AAAA\n"), (TakeoverError, InputFileError),
         _resumed, 0.2, names_file=False,
+    ),
+    Reader(
+        "what a node began with", ("node_kit/last_start.py", "node_kit/ros/last_start.py"), "json", "bad.json",
+        _texts('["7@100", {"/mixer/rate": "10.0", "/mixer/valves": "[1, {}]"}]'), (InputFileError,),
+        lambda path: kept_of(read_text(path), "7@100"), 0.2,
     ),
     Reader(
         "a request of the page", ("metacontrol_dashboard/io/server.py",), "json", "bad.json",

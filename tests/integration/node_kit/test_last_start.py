@@ -73,10 +73,9 @@ class Ferry:
     def _has_begun(self, part, pid):
         """Tell whether the process of a part gives signs of life, as a part does when it has begun."""
         with contextlib.suppress(CallError):
-            publishers = dict(self.master.call("getSystemState")[0])
             uri = self.master.call("lookupNode", f"/ferry/{part}")
-            with Client(uri, "/test") as node:
-                return node.pid() == pid and f"/ferry/{part}" in publishers.get(f"/ferry/{TOPIC}", ())
+            with Client(uri, "/test") as node:  # the master still has what the killed one had published
+                return node.pid() == pid and f"/ferry/{TOPIC}" in dict(node.call("getPublications"))
         return False
 
 

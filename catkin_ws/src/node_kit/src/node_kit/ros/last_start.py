@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Collection, Mapping
-from typing import Any
+from collections.abc import Collection
 
 import rosgraph
 import rospy
 
 from node_kit.io.supervisor import find_supervisor
 from node_kit.io.xml_rpc import Client
+from node_kit.last_start import json_texts, kept_of, to_restore
 from node_kit.ros.kept_parameter import KeptParameter
 
 GROUP = "/node_kit/began_with"
@@ -43,9 +43,11 @@ class LastStart:
         values = {name: value for name, (is_set, value) in zip(names, answers) if is_set}
         self._kept_text = values.pop(self._parameter, None)
         private = values.pop(own, {})
-        self._present = {**_texts({own: private} if not isinstance(private, dict) else {}), **_texts(values)}
         if isinstance(private, dict):
-            self._present |= _texts({f"{own}/{key}": value for key, value in private.items() if key not in writes})
+            values.update({f"{own}/{key}": value for key, value in private.items() if key not in writes})
+        else:
+            values[own] = private
+        self._present = json_texts(values)
 
     def keep(self) -> None:
         """Keep what was found, because the node has begun with it. The master is not waited for."""
@@ -73,36 +75,3 @@ class LastStart:
                 else:
                     master.call("deleteParam", name)
         return names
-
-
-def kept_of(text: Any, supervisor: str) -> dict[str, str] | None:
-    """Return the parameters, name -> value as JSON, that a process of the same supervisor has kept; None: none has.
-
-    Args:
-        text: the value of the parameter in which they are kept; whatever it is.
-        supervisor: of this process; empty: it has none, and nothing is kept.
-    """
-    try:
-        by, kept = json.loads(text)
-        for value in kept.values():
-            json.loads(value)
-    except (AttributeError, RecursionError, TypeError, ValueError):
-        return None
-    return dict(kept) if supervisor and by == supervisor else None
-
-
-def to_restore(kept: Mapping[str, str], present: Mapping[str, str]) -> list[str]:
-    """Return which parameters are to be set or deleted, by what was kept and by what is found now."""
-    missing = sorted(kept.keys() - present.keys())
-    return missing or sorted(name for name in {*kept, *present} if kept.get(name) != present.get(name))
-
-
-def _texts(values: Mapping[str, Any]) -> dict[str, str]:
-    """Return values as JSON; without those that JSON can't tell, such as dates."""
-    texts = {}
-    for name, value in values.items():
-        try:
-            texts[name] = json.dumps(value, sort_keys=True)
-        except (TypeError, ValueError, RecursionError):
-            continue
-    return texts

@@ -23,6 +23,7 @@ from node_kit.io.master_watch import MasterWatch
 from node_kit.io.printable_logs import print_safely
 from node_kit.io.xml_rpc import CallError
 from node_kit.master import View
+from node_kit.one_line import one_line
 from node_kit.ros.connections import connect_to_all
 from node_kit.ros.handshakes import greet_apart
 from node_kit.ros.last_start import LastStart
@@ -153,11 +154,11 @@ class Lifetime:
         """Set parameters as they were when the node began last; return whether any was another one."""
         try:
             names = self._last_start.restore() if self._last_start is not None else []
-        except CallError as error:
-            self.say(str(error))
+        except (CallError, RecursionError) as error:  # nobody answers, or somebody has garbled what was kept
+            self.say(one_line(str(error)))
             return False
         if names:
-            self.say(f"it begins again with what it had at its last start: {', '.join(names)}")
+            self.say(one_line(f"it begins again with what it had at its last start: {', '.join(names)}"))
         return bool(names)
 
     @property

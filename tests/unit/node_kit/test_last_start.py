@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from node_kit.ros.last_start import kept_of, to_restore
+from node_kit.last_start import kept_of, to_restore
 
 KEPT = {"/mixer/rate": "10.0", "/mixer/valves": "[1, 2]"}
 
