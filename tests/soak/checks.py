@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from statistics import median
 
 from soak.observed import Observed, Pose, Sample, Told, Usage
-from soak.plan import DRIVERS, NO_VARIANT_SETS_IT, NODE, PARTS, RECORDER, Fault, Kind, Mission
+from soak.plan import DRIVERS, NODE, PARTS, RECORDER, Fault, Kind, Mission
 
 SPEEDS = {"v1": 0.3, "v2": 0.5, "v3": 0.75}
 """m/s, of variants.csv."""
@@ -206,8 +206,6 @@ def excuse_of(mission: Mission, observed: Observed) -> str:
         if fault.kind.ends_mission or fault.targets == (RECORDER,):
             return str(fault)
         if fault.kind is Kind.DATA and any(name in strike.note for name in _AUTHORITIES):
-            return f"{fault}: {strike.note}"
-        if fault.kind is Kind.PARAMETERS and strike.note.endswith(NO_VARIANT_SETS_IT):
             return f"{fault}: {strike.note}"
     dead = {role for strike in observed.struck() for role in _lost_for_good(mission.faults[strike.index])}
     if dead.issuperset(DRIVER_OF.values()):

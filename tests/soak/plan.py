@@ -24,8 +24,6 @@ SPOILED = ("nan", "infinite", "wrong frame", "wrong size", "empty", "future", "p
 """How data are wrong."""
 FILES = ("launch/variants", "models/d2.owl", "config", "models/variants")
 FILES_HOW = ("deleted", "truncated", "changed")
-NO_VARIANT_SETS_IT = ", which no variant sets"
-"""Ends what is said of a rewritten parameter that the base's launch file sets once, for the nodes of all variants."""
 
 
 class Kind(enum.Enum):

@@ -15,13 +15,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlparse
-from xml.etree import ElementTree
 
 import psutil
 from node_kit.io.xml_rpc import CallError, Client
 
 from soak.observed import Told
-from soak.plan import NO_VARIANT_SETS_IT, NODE, PARTS, Fault, Kind
+from soak.plan import NODE, PARTS, Fault, Kind
 from soak.process_table import ProcessTable
 
 Undo = Callable[[], None]
@@ -170,23 +169,13 @@ class Striker:
         if fault.how == "deleted":
             name = "/".join(name.split("/")[:3])
             master.call("deleteParam", name)
-            gone = {one for one in names if f"{one}/".startswith(f"{name}/")}
-            return f"{name} deleted{self._whose(gone)}", None
+            return f"{name} deleted", None
         former = master.call("getParam", name)
         value: Any = {"wrong type": "nonsense", "huge": "x" * 1_000_000}.get(fault.how)
         if value is None:
             value = former * 1.5 + 1.0 if isinstance(former, int | float) and not isinstance(former, bool) else "other"
         master.call("setParam", name, value)
-        return f"{name}: {str(former)[:30]} to {str(value)[:30]}{self._whose({name})}", None
-
-    def _whose(self, names: set[str]) -> str:
-        """Return what is to be said of parameters of a variant's nodes: whether the variants set all of them."""
-        files = (self.place.original / "launch/variants").glob("*.launch")
-        variants = [ElementTree.parse(path) for path in files]  # noqa: S314, our own
-        nodes = [node for variant in variants for node in variant.iter("node")]
-        own = {f"/{node.get('name')}/{param.get('name')}" for node in nodes for param in node.iter("param")}
-        others = {name for name in names if name.startswith(f"/{NODE}/")} - own
-        return NO_VARIANT_SETS_IT if others else ""
+        return f"{name}: {str(former)[:30]} to {str(value)[:30]}", None
 
     def stranger(self, fault: Fault) -> tuple[str, Undo | None]:
         """Have a stranger do it: a process of its own."""

@@ -411,6 +411,42 @@ def test_arguments_of_nodes_reach_the_launch_files(run, models, tmp_path):
     assert (node.name, node.args) == ("nav", '--frame odom --name "left arm" <&>')
 
 
+def test_parameter_files_are_loaded_by_the_launch_files_and_variants_take_precedence(run, models, tmp_path):
+    file = "package://metacontrol_sim/config/move_base.yaml"
+    folder = models({"a": {"speed": 1}}, parameter_files={"nav": file})
+    assert run("check", folder)[0] == 0
+    assert run("generate", "all", folder, "-o", tmp_path)[0] == 0
+    loaded = launch_files.read(tmp_path / "launch/variants/a.launch").params
+    assert {name: loaded[f"/nav/{name}"].value for name in ("speed", "global_costmap/resolution")} == {
+        "speed": 1,
+        "global_costmap/resolution": 0.05,
+    }
+
+
+@pytest.mark.parametrize(
+    ("files", "message"),
+    [
+        (
+            {"guard": "package://metacontrol_sim/config/move_base.yaml"},
+            "parameter_files.guard: no variant starts such",
+        ),
+        (
+            {"nav": "package://metacontrol_sim/config/moves.yaml"},
+            "parameter_files.nav: the package 'metacontrol_sim'",
+        ),
+        (
+            {"nav": "config/move_base.yaml"},
+            "parameter_files.nav: is 'config/move_base.yaml', must be a file of",
+        ),
+        ({"nav": "package://metacontrol_sim/../x.yaml"}, "must be a file of a package, package://PACKAGE/FILE"),
+        ({"nav": "package://metacontrol_sim/$(env HOME)"}, "must be a file of a package, package://PACKAGE/FILE"),
+    ],
+)
+def test_parameter_files_that_can_not_be_loaded_are_refused(run, models, files, message):
+    status, out, _ = run("check", models({"a": {"speed": 1}}, parameter_files=files))
+    assert (status, message in out) == (1, True), out
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

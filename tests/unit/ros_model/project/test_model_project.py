@@ -422,7 +422,7 @@ def test_every_problem_of_the_settings_is_told_at_its_place(tmp_path):
         "1:1: package: is 'robot models', must be a name of letters, digits, '_' and '-'",
         "3:1: colour: unknown key, allowed here: package, base, variants, functions, quality_attributes, utility, "
         "objectives, components, topics, environment, roles, spares, observers, reasoner, manipulator, arguments, "
-        "requires",
+        "parameter_files, requires",
         "4:28: variants.table: is \"['a']\", must be the name of a CSV or YAML file",
         "6:12: functions.f_move.designs: is 'some', must be 'all' or a list of variants",
         "7:22: quality_attributes.safety: the key 15 must be text: put it in quotes",

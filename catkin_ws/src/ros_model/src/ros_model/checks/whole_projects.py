@@ -14,6 +14,7 @@ from ros_model.findings import WARNING, Finding
 from ros_model.generators.launch_parameters import harmless
 from ros_model.language.metamodel import compose
 from ros_model.language.packages import SpecKind
+from ros_model.project.project import package_file
 from ros_model.project.repairs import REPAIR
 from ros_model.project.schema_check import dotted
 
@@ -49,6 +50,7 @@ def check_project(project: Project, library: Library, sources: Library | None = 
     yield from without_nodes(project)
     yield from needless_words(project)
     yield from wrong_arguments(project)
+    yield from wrong_parameter_files(project, library)
     yield from wrong_launch_files(project, library)
     yield from unknown_observed_types(project, library)
     yield from exported_findings(project)
@@ -83,6 +85,19 @@ def wrong_arguments(project: Project) -> Iterator[Finding]:
             harmless(text, where)
         except ModelError as error:
             yield Finding(f"arguments.{name}: {error.message}", where, "substitution")
+
+
+def wrong_parameter_files(project: Project, library: Library) -> Iterator[Finding]:
+    """Yield files of parameters for a node that no variant starts, and those that are not there."""
+    started = {component.graph_name for variant in project.variants for component in variant.components}
+    for name, text in project.settings.get("parameter_files", {}).items():
+        where = project.source.at("parameter_files", name)
+        if started.isdisjoint(project.nodes.get(name, ())):
+            yield Finding(f"parameter_files.{name}: no variant starts such a node: correct the name", where, "settings")
+        package, file = package_file(text)
+        own = project.folder.parent if package == project.package else None
+        if missing := library.installed.missing_file(package, file, own):
+            yield Finding(f"parameter_files.{name}: {missing.message}", where, "settings", missing.severity)
 
 
 def wrong_launch_files(project: Project, library: Library) -> Iterator[Finding]:

@@ -45,11 +45,7 @@ def generate(project: Project, output: Path) -> list[Path]:
     Raises:
         ModelError: a model can't be launched, or a file can't be written.
     """
-    kept = remappings_of(project.base.header)
-    texts = {
-        variant.name: launch_file(variant, compose(project.base, variant), project.library, project.arguments, kept)
-        for variant in project.variants
-    }
+    texts = {variant.name: launch_file_of(project, variant) for variant in project.variants}
     if project.packages_folder:
         return variant_packages.write(project, texts)
     folder = output / "launch" / "variants"
@@ -58,12 +54,24 @@ def generate(project: Project, output: Path) -> list[Path]:
     )
 
 
+def launch_file_of(project: Project, variant: RosSystem) -> str:
+    """Return the text of the launch file that starts a variant of a project.
+
+    Raises:
+        ModelError: as for `launch_file`.
+    """
+    kept = remappings_of(project.base.header)
+    whole = compose(project.base, variant)
+    return launch_file(variant, whole, project.library, project.arguments, kept, project.parameter_files)
+
+
 def launch_file(
     system: RosSystem,
     whole: RosSystem | None = None,
     library: Library | None = None,
     arguments: Mapping[str, tuple[str, Position]] | None = None,
     kept: Mapping[str, Remappings] | None = None,
+    parameter_files: Mapping[str, str] | None = None,
 ) -> str:
     """Return the text of a launch file that starts a system's components.
 
@@ -73,6 +81,7 @@ def launch_file(
         library: the models that declare the parameters' types; without one, a value's own type counts.
         arguments: what nodes are started with, by their graph names, and where that is written.
         kept: remappings that belong to no port, by graph name, where the header of `system` has none for the node.
+        parameter_files: files of nodes' parameters, by graph name; those of the models take precedence.
 
     Raises:
         ModelError: a component names no executable, a name is not fit for ROS, or a text holds `$(`, which roslaunch
@@ -90,6 +99,8 @@ def launch_file(
         node = _node(component, whole or system, library, remappings.get(component.graph_name, ()))
         if component.graph_name in (arguments or {}):
             node.set("args", harmless(*(arguments or {})[component.graph_name]))
+        if file := (parameter_files or {}).get(component.graph_name):
+            node.insert(0, ET.Element("rosparam", {"command": "load", "file": file}))
         launch.append(node)
     ET.indent(launch, "  ")
     return ET.tostring(launch, encoding="unicode") + "\n"

@@ -23,6 +23,12 @@ if TYPE_CHECKING:
 DIRECTIONS = ("lower_is_better", "higher_is_better")
 
 
+def package_file(text: str) -> tuple[str, str]:
+    """Return package and file of `package://PACKAGE/FILE`."""
+    package, _, file = text.removeprefix("package://").partition("/")
+    return package, file
+
+
 @dataclass(frozen=True)
 class Project:
     """A base system, its variants and what metacontrol.yaml says about them.
@@ -129,6 +135,15 @@ class Project:
         return {
             node: (text, self.source.at("arguments", name))
             for name, text in given.items()
+            for node in self.nodes.get(name, ())
+        }
+
+    @property
+    def parameter_files(self) -> dict[str, str]:
+        """Files of nodes' parameters, by their names in the graph, as a launch file names them."""
+        return {
+            node: "$(find {})/{}".format(*package_file(text))
+            for name, text in self.settings.get("parameter_files", {}).items()
             for node in self.nodes.get(name, ())
         }
 

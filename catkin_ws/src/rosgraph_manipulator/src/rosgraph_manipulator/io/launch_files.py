@@ -20,8 +20,10 @@ import roslaunch.xmlloader
 from node_kit.io.input_files import InputFileError, read_bytes
 from node_kit.one_line import OneLineError
 from ros_model.errors import ModelError
-from ros_model.generators.launch import launch_file
+from ros_model.generators.launch import launch_file, launch_file_of
 from ros_model.io.models import read_system
+from ros_model.io.project import load_project
+from ros_model.project.settings import FILE_NAME
 from rosgraph_launcher.description import NodeDescription, SystemDescription
 from rosgraph_launcher.io.command_lines import EXPLAINED, reason
 
@@ -77,15 +79,25 @@ def read_configuration(configuration: Configuration) -> LaunchFile:
 
 
 def read_model(path: Path) -> LaunchFile:
-    """Read a `.rossystem` model as the launch file that is generated from it.
+    """Read a `.rossystem` model as the launch file that is generated from it, by its project where it has one.
 
     Raises:
         LaunchFileError: the model can't be read, or its launch file can't be used.
     """
     with _refusing(str(path)):
         config = roslaunch.config.ROSLaunchConfig()
-        _Loader().load_string(launch_file(read_system(path)), config, verbose=False)
+        _Loader().load_string(_generated(path), config, verbose=False)
         return _checked(path, config)
+
+
+def _generated(path: Path) -> str:
+    """Return the text of the launch file that is generated from a model."""
+    system = read_system(path)
+    folder = next((folder for folder in path.resolve().parents[:2] if (folder / FILE_NAME).is_file()), None)
+    project = load_project(folder) if folder else None
+    if project is None or system.name not in {variant.name for variant in project.variants}:
+        return launch_file(system)
+    return launch_file_of(project, system)
 
 
 _EXPLAINED = (
