@@ -34,3 +34,8 @@ def test_last_complaint_is_told_without_its_stamp():
     text = "[ INFO] [17.5]: up\n\x1b[31m[ERROR] [17.5, 3.2]: disk full\x1b[0m\n[ INFO] [17.6]: Closing 'a.bag'.\n"
     assert last_complaint_in(text) == "disk full"
     assert last_complaint_in("[ INFO] [17.5]: up") == ""
+
+
+def test_what_was_seen_comes_before_what_is_an_error_and_after_what_tells_that_all_ends():
+    assert cause_in("OSError: no space", "ROS master x is gone") == "ROS master x is gone"
+    assert cause_in("REQUIRED process [world-2] has died!", "ROS master x is gone").startswith("REQUIRED")

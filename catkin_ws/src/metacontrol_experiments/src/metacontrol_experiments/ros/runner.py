@@ -12,6 +12,7 @@ from node_kit.io.x_display import DisplayError, held_display
 from roslib.packages import find_node
 from rospkg import ResourceNotFound
 
+from metacontrol_experiments.io.end_of_system import EndOfSystem
 from metacontrol_experiments.io.processes import (
     ProcessTree,
     RunError,
@@ -21,7 +22,6 @@ from metacontrol_experiments.io.processes import (
     signals_as_interrupts,
 )
 from metacontrol_experiments.io.recorder import Recorder
-from metacontrol_experiments.mission.console import cause_in
 from metacontrol_experiments.mission.settings import BAG_NAME, RESULTS
 
 if TYPE_CHECKING:
@@ -116,12 +116,12 @@ def _run(settings: Settings, display: Display, make: Make[Node], tree: ProcessTr
     display.say(f"starting the system on port {port}, its console is {console}")
     launch = tree.start(settings.launch_command(port), console)
     recorder = Recorder(tree, bag, settings.output / "log" / "recorder.log", display.say)
+    end = EndOfSystem(console, os.environ["ROS_MASTER_URI"])
     is_driving = False
 
     def check() -> None:
         if launch.poll() is not None:
-            said = console.read_text(encoding="utf-8", errors="replace")
-            raise StartError(f"roslaunch has ended: {cause_in(said)}")
+            raise StartError(f"roslaunch has ended: {end.cause()}")
         if not is_driving and recorder.ended:
             raise StartError(f"the recorder has ended: {recorder.ended}")
         recorder.watch()
@@ -130,6 +130,7 @@ def _run(settings: Settings, display: Display, make: Make[Node], tree: ProcessTr
     try:
         node = make(tree, display, check)
         node.start_up()
+        end.watch()
         recorder.start(_record_command(bag, settings.topics))
         node.wait_recorded(RECORDER, settings.topics)
         for name in RESULTS:  # of an earlier run

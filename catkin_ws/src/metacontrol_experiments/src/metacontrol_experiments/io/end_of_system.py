@@ -1,0 +1,40 @@
+"""Why the system of a mission has ended: by its console, or by what is seen of its master."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from node_kit.io.master_watch import MasterWatch
+from node_kit.master import View
+
+from metacontrol_experiments.mission.console import cause_in, is_ending
+
+
+class EndOfSystem:
+    """Watches the master beside the console, to which nodes can't write that it is gone while the disk is full."""
+
+    def __init__(self, console: Path, uri: str) -> None:
+        """Prepare.
+
+        Args:
+            console: the file with what roslaunch and its nodes write.
+            uri: address of the master.
+        """
+        self._console, self._uri = console, uri
+        self._seen = ""
+        self._watch = MasterWatch(lambda _: None, self._on_loss)
+
+    def watch(self) -> None:
+        """Begin to watch the master, which is there."""
+        self._watch.start(self._uri)
+
+    def cause(self) -> str:
+        """Return why all has ended, in one line."""
+        return cause_in(self._said(), self._seen)
+
+    def _on_loss(self, view: View) -> None:
+        if not is_ending(self._said()):  # roslaunch takes its master with it
+            self._seen = view.text(self._uri, "").partition(": ")[0]
+
+    def _said(self) -> str:
+        return self._console.read_text(encoding="utf-8", errors="replace")
