@@ -3,10 +3,13 @@
 import asyncio
 import base64
 import json
+import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import aiohttp
@@ -34,7 +37,11 @@ class Browser:
         if self._dark:
             flags.append("--blink-settings=preferredColorScheme=0")
         self._process = subprocess.Popen(
-            [program, *flags, "about:blank"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            [program, *flags, "about:blank"],
+            env={**os.environ, "TMPDIR": self._folder},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
         )
         self._loop = asyncio.new_event_loop()
         self._run(self._connect())
@@ -49,6 +56,8 @@ class Browser:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        with suppress(ProcessLookupError):  # its children, which may still write into the folder
+            os.killpg(self._process.pid, signal.SIGKILL)
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def open(self, url):

@@ -6,7 +6,8 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -14,9 +15,11 @@ from helpers.soaking import FOLDER, Arguments, code, hours, whole
 from soak.command import own_network
 from soak.driving import OWN
 
-from lasting.figures import Run, broken, read, report
+from lasting.figures import Run, broken, progress, read, report
 
 REPORT = "report.md"
+SHOWN_S = 10.0
+"""Wall s between two lines of progress."""
 _GRACE_S = 150.0
 """Wall s for a system that was interrupted."""
 
@@ -34,7 +37,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     folder.mkdir(parents=True, exist_ok=True)
     runs = [read(path) for path in _paths(folder)]
     left = options.hours - sum(run.lasted for run in runs) / 3600.0
-    interrupted = left > 0.0 and drive(options.seed, len(runs), folder, left)
+
+    def show() -> None:
+        runs = [read(path) for path in _paths(folder)]
+        click.echo(f"\r{progress(runs, options.hours)}", nl=False, err=True)
+
+    interrupted = left > 0.0 and drive(options.seed, len(runs), folder, left, show)
     runs = [read(path) for path in _paths(folder)]
     told = report(runs, tree, options.seed)
     (folder / REPORT).write_text(told)
@@ -44,15 +52,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 130 if interrupted else int(any(broken(run) for run in runs))
 
 
-def drive(seed: int, run: int, folder: Path, hours: float) -> bool:
-    """Have a system live; return whether somebody interrupted it."""
+def drive(seed: int, run: int, folder: Path, hours: float, show: Callable[[], None]) -> bool:
+    """Have a system live, and show meanwhile how far it is; return whether somebody interrupted it."""
     words = [sys.executable, "-m", "lasting.driving", str(seed), str(run), str(folder), str(hours)]
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _interrupt)
     process = subprocess.Popen([*OWN, *own_network(), *words], stdin=subprocess.DEVNULL, start_new_session=True)
     try:
-        process.wait()
+        while process.poll() is None:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(SHOWN_S)
+            show()
+        click.echo(err=True)
     except KeyboardInterrupt:
+        click.echo(err=True)
         process.send_signal(signal.SIGINT)
         try:
             process.wait(_GRACE_S)

@@ -151,6 +151,14 @@ def broken(run: Run) -> list[str]:
     return found
 
 
+def progress(runs: Sequence[Run], hours: float) -> str:
+    """Return how far the runs are, in one line."""
+    lasted = sum(run.lasted for run in runs) / 3600.0
+    recoveries = [one for run in runs for one in run.recoveries]
+    bad = sum(one.seconds is None for one in recoveries)
+    return f"{lasted:.2f} of {hours:g} h, {len(recoveries):,} faults, {bad} after which not all was well again"
+
+
 def report(runs: Sequence[Run], tree: str, seed: int) -> str:
     """Return the figures as a page in Markdown."""
     hours = sum(run.lasted for run in runs) / 3600.0

@@ -137,12 +137,26 @@ def test_package_xml_with_an_odd_format_is_refused(tmp_path):
         read_package(tmp_path)
 
 
+_ROUNDS = "foreach(a 1 2 3 4 5 6 7 8 9)\n" * 12
+_WORDS = "set(w 1;2;3;4;5;6;7;8)\n" + "set(w ${w};${w})\n" * 10
+
+
 @pytest.mark.parametrize(
     "text",
-    ["foreach(a 1 2 3 4 5 6 7 8 9)\n" * 12 + "set(x y)\n", "foreach(a 1 2)\nset(b c)\n" * 8000],
-    ids=["many rounds", "many loops"],
+    [
+        f"{_ROUNDS}set(x y)\n",
+        "foreach(a 1 2)\nset(b c)\n" * 8000,
+        "foreach(a RANGE 9999)\nendforeach()\n" * 9000,
+        f"{_WORDS}{_ROUNDS}add_library(b ${{w}} ${{w}})\n",
+        f"set(w {'x' * 9000})\n{_ROUNDS}list(APPEND b ${{w}})\n",
+        f"{_ROUNDS}file(GLOB b {'*.c ' * 100})\n",
+        f"{_WORDS}{_ROUNDS}cmake_parse_arguments(b ${{w}} ${{w}} ${{w}} ${{w}})\n",
+        "function(f)\nforeach(a ${ARGN})\nf(${ARGN} ${ARGN})\nendforeach()\nendfunction()\nf(1 2 3)\n",
+        "#[[\n" * 30_000,
+    ],
+    ids=["rounds", "loops", "empty loops", "words", "appended", "globs", "keywords", "calls", "comments"],
 )
-def test_nested_loops_of_cmake_end_in_time(tmp_path, text):
+def test_text_of_cmake_that_asks_for_much_work_is_read_in_time(tmp_path, text):
     begin = time.process_time()
     assert len(list(commands(text, tmp_path))) < 20_000
     assert time.process_time() - begin < 5.0

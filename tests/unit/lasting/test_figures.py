@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 from lasting.faults import TARGETS, fault
-from lasting.figures import End, Goal, Reading, Recovery, Run, broken, changes, line, read, report
+from lasting.figures import End, Goal, Reading, Recovery, Run, broken, changes, line, progress, read, report
 from soak.plan import PARTS, Kind
 
 
@@ -48,6 +48,12 @@ def test_fault_after_which_all_is_not_well_is_broken():
         "left",
         "not well again after USURP (move_base)",
     ]
+
+
+def test_progress_is_that_of_all_runs():
+    lives = [run(life("reasoner", 1, lambda t: 60.0), recoveries=[Recovery(5.0, "KILL", "", 1.5)])] * 2
+    lives.append(Run(recoveries=[Recovery(9.0, "USURP", "", None)], end=End(1600.0, [])))
+    assert progress(lives, 8.0) == "1.00 of 8 h, 3 faults, 1 after which not all was well again"
 
 
 def test_report_has_what_was_written(tmp_path):

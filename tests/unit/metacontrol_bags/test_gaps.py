@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from metacontrol_bags.gaps import holes_in_words
+from metacontrol_bags.bag import Salvaged
+from metacontrol_bags.gaps import holes_in_words, nothing_of_a_mission
 from metacontrol_bags.metrics import summarise
 from metacontrol_bags.record import Event, MissionRecord
 
@@ -37,3 +38,8 @@ def test_holes_are_told_in_one_line():
     (line,) = holes_in_words(mission(*every(0.05, 100.98, 104.5)))
     assert "0.0 to 1.0 s of the mission" in line
     assert holes_in_words(mission(*every(0.05, 99.0, 104.5))) == ()
+
+
+def test_topics_of_a_bag_without_a_mission_are_told_in_marks_that_can_be_printed():
+    said = nothing_of_a_mission(Salvaged(mission(), frozenset({"/scan\x1b[2J"}), ()))
+    assert "only /scan\\x1b[2J: record" in said

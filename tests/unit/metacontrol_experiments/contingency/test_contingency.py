@@ -96,6 +96,8 @@ def test_yaml_timeline_is_read(tmp_path):
         ("contingencies: [7]", r"contingencies\[0\]: is 7"),
         ("contingencies: [{at: {time: 1}}]", r"contingencies\[0\]: needs one kind beside `at`, has none"),
         ("contingencies: [{kill: a, power: 1}]", "has kill, power"),
+        ("contingencies: [{true: 1}]", r"contingencies\[0\]: no kind 'True'; there are kill"),
+        ("contingencies: [{true: 1, kill: a}]", "has True, kill"),
         ("contingencies: [{kill: 3}]", "kill: is 3; give a component"),
         ("contingencies: [{at: 3, kill: a}]", "at is 3"),
         ("contingencies: [{at: {time: 1, share: 1}, kill: a}]", "give one of share"),

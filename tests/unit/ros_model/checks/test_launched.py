@@ -76,3 +76,12 @@ def test_launch_file_that_cannot_be_read_is_told_in_one_line(run, tmp_path, text
     assert (status, told.count("\n")) == (2, 1)
     assert str(path) in told
     assert words in told
+
+
+def test_node_without_a_name_is_named_by_its_program(run, tmp_path):
+    path = tmp_path / "arm.launch"
+    path.write_text('<launch><node name="" pkg="move_base" type="move_base"/></launch>')
+    for command in ("check", "extract"):
+        status, told, warned = run(command, path)
+        assert status != 0
+        assert f"{path}: a node of move_base/move_base has no name: give it one" in told + warned

@@ -75,6 +75,7 @@ def test_two_readings_of_anonymous_names_are_the_same(tmp_path):
         (f'<include file="/no/such.launch"/>{NODE}/>', "no/such.launch"),
         (f'{NODE}/><param name="x" value="$(arg nowhere)"/>', "nowhere"),
         (f"{NODE}/>{NODE}/>", "multiple nodes named"),
+        ('<node name="" pkg="move_base" type="move_base"/>', "a node of move_base/move_base has no name: give it one"),
     ],
 )
 def test_files_that_cannot_be_used_are_refused_in_one_line(tmp_path, body, words):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rosbags.serde import SerdeError
 from rosbags.typesys import TypesysError
 
+from metacontrol_bags.printable import printable
 from metacontrol_bags.typestore import types_of
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def decode(
             take(connection, stamp, decoder(data))
         except _ERRORS:
             reason = decoder if isinstance(decoder, str) else f"do not fit as {connection.type}"
-            lost[f"messages on {connection.topic} {reason}"] += 1
+            lost[printable(f"messages on {connection.topic} {reason}")] += 1
     return tuple(f"{count} {what}" for what, count in lost.items())
 
 

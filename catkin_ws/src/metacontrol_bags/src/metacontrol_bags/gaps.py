@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from metacontrol_bags.printable import printable
 from metacontrol_bags.words import MissionEvent
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def nothing_of_a_mission(found: Salvaged) -> str:
     if not found.topics:
         lost = f" ({'; '.join(found.problems)})" if found.problems else ""
         return f"holds no messages{lost}: record again"
-    topics = sorted(found.topics)
+    topics = [printable(topic) for topic in sorted(found.topics)]
     more = f" and {len(topics) - _NAMED} more" if len(topics) > _NAMED else ""
     lost = f" ({'; '.join(found.problems)})" if found.problems else ""
     return (

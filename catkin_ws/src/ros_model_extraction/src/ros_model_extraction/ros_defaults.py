@@ -70,6 +70,6 @@ def is_metacontrol_parameter(name: str) -> bool:
     return name in _METACONTROL_PARAMETERS
 
 
-def is_roslaunch_parameter(name: str) -> bool:
+def is_bookkeeping_parameter(name: str) -> bool:
     """Return whether roslaunch or node_kit sets a global parameter (its name without the leading slash) for itself."""
     return name.startswith(_GROUPS) or name in _ROSLAUNCH

@@ -125,11 +125,11 @@ def node_of(target: str, components: Mapping[str, str]) -> str:
 def _entry(entry: Any, where: str) -> Contingency:
     if not isinstance(entry, dict):
         raise ContingencyError(f"{where}: is {entry!r}; give for instance {{at: {{share: 0.6}}, kill: front_laser}}")
-    kinds = [str(key) for key in entry if key != "at"]
+    kinds = [key for key in entry if key != "at"]
     if len(kinds) != 1:
-        raise ContingencyError(f"{where}: needs one kind beside `at`, has {', '.join(kinds) or 'none'}")
+        raise ContingencyError(f"{where}: needs one kind beside `at`, has {', '.join(map(str, kinds)) or 'none'}")
     when = _moment(entry["at"], where) if "at" in entry else None
-    return make(kinds[0], entry[kinds[0]], when, where)
+    return make(str(kinds[0]), entry[kinds[0]], when, where)
 
 
 def _moment(value: Any, where: str) -> Moment:

@@ -20,7 +20,7 @@ def read_launch_file(path: Path) -> LaunchFile:
     """Return what a launch file starts; its arguments have their defaults. It runs nothing.
 
     Raises:
-        ModelError: it can't be read, or roslaunch refuses it; says what roslaunch says.
+        ModelError: it can't be read, or roslaunch refuses it; says what roslaunch says. Or a node has no name.
     """
     text = read_text(path)
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
@@ -55,7 +55,7 @@ def load(path: Path, arguments: Sequence[str] = (), *, runs_programs: bool = Fal
             NotRun as their value.
 
     Raises:
-        ModelError: roslaunch refuses the file; says what it says.
+        ModelError: roslaunch refuses the file; says what it says. Or a node has no name.
     """
     import roslaunch.config
     import roslaunch.core
@@ -74,6 +74,9 @@ def load(path: Path, arguments: Sequence[str] = (), *, runs_programs: bool = Fal
         raise ModelError(f"{path}: roslaunch can't read it: {type(error).__name__}: {error}") from error
     if config.config_errors:
         raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(config.config_errors[0]).split())}")
+    for node in config.nodes:
+        if not node.name:  # roslaunch makes one up at each start
+            raise ModelError(f"{path}: a node of {node.package}/{node.type} has no name: give it one")
     return config
 
 

@@ -109,7 +109,7 @@ def read_launch_file(path: Path, arguments: Sequence[str] = (), *, runs_programs
         lines += _beside(node, instance.ends)
     for name, (manager, ends) in managed.items():
         lines += _with_nodelet(instances, name, manager, ends)
-    unowned = [(key, value) for key, value in share_out(tree, instances) if not plumbing.is_roslaunch_parameter(key)]
+    unowned = [(key, value) for key, value in share_out(tree, instances) if not plumbing.is_bookkeeping_parameter(key)]
     given = f" with {' '.join(arguments)}" if arguments else ""
     title = [
         f"The system that {path.name}{given} starts. Written by rosmodel extract.",

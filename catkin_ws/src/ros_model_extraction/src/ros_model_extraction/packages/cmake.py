@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 _TOKEN = re.compile(
-    r"""\#\[(?P<comment_marks>=*)\[.*?\](?P=comment_marks)\] | \#[^\n]*
-      | \[(?P<marks>=*)\[(?P<bracket>.*?)\](?P=marks)\]
-      | "(?P<quoted>(?:[^"\\]|\\.)*)" | (?P<open>\() | (?P<close>\)) | (?P<bare>(?:[^\s()"\#\\]|\\.)+)""",
+    r"""\#[^\n]* | "(?P<quoted>(?:[^"\\]|\\.)*)" | (?P<open>\() | (?P<close>\)) | (?P<bare>(?:[^\s()"\#\\]|\\.)+)""",
     re.DOTALL | re.VERBOSE,
 )
+_BRACKET = re.compile(r"#?\[(=*)\[")
 _VARIABLE = re.compile(r"\$\{([A-Za-z0-9_./+-]+)\}")
 _MAX_WORDS = 10_000
 _MAX_LENGTH = 100_000
+_MAX_TOTAL = 1_000_000
+"""Characters of all words of a command."""
 _MAX_DEPTH = 3
 """Variables within variables' names, `${${PROJECT_NAME}_SOURCES}`; values are expanded when they are set."""
-_MAX_COMMANDS = 10_000
+_MAX_EFFORT = 10_000
+"""Of all commands of a file: see `_effort`."""
 _MAX_CALLS = 32
 _BLOCKS = ("foreach", "function", "macro", "if", "while")
 _TESTING = ("CATKIN_ENABLE_TESTING", "BUILD_TESTING")
@@ -56,7 +59,7 @@ def commands(text: str, folder: Path, read: Callable[[Path], str] | None = None)
     yield from _Run(folder, read).run(_lines(text), folder)
 
 
-def sections(arguments: Sequence[str], keywords: Sequence[str]) -> dict[str, list[str]]:
+def sections(arguments: Sequence[str], keywords: Collection[str]) -> dict[str, list[str]]:
     """Return the arguments after each keyword; those before the first under ""."""
     found: dict[str, list[str]] = {"": []}
     current = ""
@@ -81,7 +84,7 @@ class _Run:
         self._read = read
         self._variables = {f"{name}_SOURCE_DIR": str(folder) for name in ("CMAKE", "PROJECT")}
         self._functions: dict[str, tuple[bool, list[str], list[_Line]]] = {}
-        self._left = _MAX_COMMANDS
+        self._left = _MAX_EFFORT
         self._added: set[Path] = set()
 
     def run(self, lines: Sequence[_Line], folder: Path, call: int = 0, depth: int = 0) -> Iterator[Command]:
@@ -96,14 +99,15 @@ class _Run:
         at = 0
         while at < len(lines) and self._left > 0 and depth <= _MAX_CALLS:
             name, words, line, span = lines[at]
-            self._left -= 1
             self._variables["CMAKE_CURRENT_SOURCE_DIR"] = str(folder)
             end = min(at + span, len(lines))
             inner = lines[at + 1 : end]
             arguments = tuple(_expanded(words, self._variables))
+            self._left -= _effort(name, arguments)
             at = end + 1
             if name == "foreach" and arguments:
-                yield from self._loop(arguments, inner, folder, call, depth)
+                if inner and depth < _MAX_CALLS:
+                    yield from self._loop(arguments, inner, folder, call, depth)
             elif name in ("function", "macro") and arguments:
                 self._functions[arguments[0].lower()] = (name == "macro", list(arguments[1:]), list(inner))
             elif name in _BLOCKS:
@@ -124,6 +128,8 @@ class _Run:
     ) -> Iterator[Command]:
         variable, before = arguments[0], self._variables.get(arguments[0])
         for item in self._items(arguments[1:]):
+            if self._left <= 0:
+                break
             self._variables[variable] = item
             yield from self.run(inner, folder, call, depth + 1)
         self._restore({variable: before})
@@ -139,8 +145,8 @@ class _Run:
         if words[:1] != ("IN",):
             return list(words)
         parts = sections(words[1:], ("LISTS", "ITEMS"))
-        listed = [item for name in parts.get("LISTS", ()) for item in self._variables.get(name, "").split(";") if item]
-        return [*listed, *parts.get("ITEMS", ())]
+        listed = (item for name in parts.get("LISTS", ()) for item in self._variables.get(name, "").split(";") if item)
+        return [*islice(listed, _MAX_WORDS), *parts.get("ITEMS", ())]
 
     def _call(self, name: str, arguments: tuple[str, ...], folder: Path, call: int, depth: int) -> Iterator[Command]:
         is_macro, parameters, body = self._functions[name]
@@ -157,6 +163,7 @@ class _Run:
             yield from self.run(body, folder, call, depth + 1)
             self._restore(before)
             return
+        self._left -= len(self._variables) // 1000
         outer, self._variables = self._variables, self._variables | given | {_OUTER: ""}
         yield from self.run(body, folder, call, depth + 1)
         inner, self._variables = self._variables, outer
@@ -179,6 +186,13 @@ class _Run:
             else:
                 self._variables[key] = value
 
+    def _append(self, variable: str, values: Sequence[str]) -> None:
+        """Append to a list; leave it as it is where it would be too long."""
+        before = [self._variables[variable]] if self._variables.get(variable) else []
+        appended = ";".join([*before, *values])
+        if len(appended) <= _MAX_LENGTH:
+            self._variables[variable] = appended
+
     def _assign(self, name: str, arguments: Sequence[str], folder: Path) -> None:
         """Set the variables that a command sets."""
         variables = self._variables
@@ -186,7 +200,7 @@ class _Run:
             case "set", (variable, *values):
                 kept = values[: values.index("CACHE")] if "CACHE" in values else values
                 if kept[-1:] == ["PARENT_SCOPE"] and _OUTER in variables:
-                    variables[_OUTER] += f";{variable}"
+                    self._append(_OUTER, [variable])
                     variables[f"{_OUTER}{variable}"] = ";".join(kept[:-1])
                 else:
                     variables[variable] = ";".join(value for value in kept if value != "PARENT_SCOPE")
@@ -195,16 +209,16 @@ class _Run:
             case "qt4_wrap_cpp" | "qt5_wrap_cpp" | "qt4_add_resources" | "qt5_add_resources", (variable, *_):
                 variables[variable] = ""  # files that it makes
             case "list", ("APPEND", variable, *values):
-                before = [variables[variable]] if variables.get(variable) else []
-                variables[variable] = ";".join([*before, *values])
+                self._append(variable, values)
             case "project", (project, *_):
                 variables["PROJECT_NAME"] = project
             case "file", ("GLOB" | "GLOB_RECURSE" as kind, variable, *patterns):
                 variables[variable] = ";".join(_glob(patterns, folder, recurse=kind == "GLOB_RECURSE"))
             case "cmake_parse_arguments", (prefix, options, single, several, *rest) if rest[:1] != ["PARSE_ARGV"]:
-                keywords = [*options.split(";"), *single.split(";"), *several.split(";")]
-                for keyword, values in sections(rest, [word for word in keywords if word]).items():
-                    is_option = keyword in options.split(";")
+                flags = frozenset(options.split(";"))
+                keywords = flags | {*single.split(";"), *several.split(";")}
+                for keyword, values in sections(rest, keywords - {""}).items():
+                    is_option = keyword in flags
                     variables[f"{prefix}_{keyword or 'UNPARSED_ARGUMENTS'}"] = "TRUE" if is_option else ";".join(values)
 
 
@@ -242,10 +256,9 @@ def _raw(text: str) -> Iterator[tuple[str, list[tuple[str, bool]], int]]:
     name, depth, start = "", 0, 1
     words: list[tuple[str, bool]] = []
     line, at = 1, 0
-    for match in _TOKEN.finditer(text):
-        line += text.count("\n", at, match.start())
-        at = match.start()
-        kind = match.lastgroup
+    for kind, word, start_of_token in _tokens(text):
+        line += text.count("\n", at, start_of_token)
+        at = start_of_token
         if kind == "open":
             depth += 1
         elif kind == "close":
@@ -254,13 +267,39 @@ def _raw(text: str) -> Iterator[tuple[str, list[tuple[str, bool]], int]]:
                 yield name.lower(), words, start
                 name, words = "", []
         elif kind == "bare" and depth == 0:
-            name, words, start = match["bare"], [], line
+            name, words, start = word, [], line
         elif kind in ("bare", "quoted", "bracket") and depth:
-            words.append((match[kind], kind != "bare"))
+            words.append((word, kind != "bare"))
+
+
+def _tokens(text: str) -> Iterator[tuple[str, str, int]]:
+    """Yield (kind, word, place) of each token: bare, quoted, bracket, open or close. Comments are left out."""
+    unclosed: set[str] = set()  # closing brackets that are nowhere in the rest of the text
+    at = 0
+    while match := _TOKEN.search(text, at):
+        bracket = _BRACKET.match(text, match.start())
+        closing = f"]{bracket[1]}]" if bracket else ""
+        if bracket and closing not in unclosed:
+            end = text.find(closing, bracket.end())
+            if end >= 0:
+                if not bracket[0].startswith("#"):
+                    yield "bracket", text[bracket.end() : end], match.start()
+                at = end + len(closing)
+                continue
+            unclosed.add(closing)
+        if match.lastgroup:
+            yield match.lastgroup, match[match.lastgroup], match.start()
+        at = match.end()
+
+
+def _effort(name: str, arguments: Sequence[str]) -> int:
+    """Return how much a command costs: a glob for each of its patterns, any command for many words or a long text."""
+    patterns = len(arguments) if name == "file" else 0
+    return 1 + patterns + len(arguments) // 100 + sum(map(len, arguments)) // 10_000
 
 
 def _expanded(words: Sequence[tuple[str, bool]], variables: dict[str, str]) -> Iterator[str]:
-    count = 0
+    count = length = 0
     for word, is_quoted in words:
         text = word
         for _ in range(_MAX_DEPTH):
@@ -270,7 +309,8 @@ def _expanded(words: Sequence[tuple[str, bool]], variables: dict[str, str]) -> I
             text = replaced
         for part in [text] if is_quoted else text.split(";"):
             count += 1
-            if count > _MAX_WORDS:
+            length += len(part)
+            if count > _MAX_WORDS or length > _MAX_TOTAL:
                 return
             if part or is_quoted:
                 yield part

@@ -147,7 +147,7 @@ def models_of(
 
 def _is_robots(parameter: str, gone: Sequence[str]) -> bool:
     """Return whether a parameter is neither roslaunch's, nor of the meta-controller, nor of a node that is left out."""
-    if plumbing.is_roslaunch_parameter(parameter) or plumbing.is_metacontrol_parameter(parameter):
+    if plumbing.is_bookkeeping_parameter(parameter) or plumbing.is_metacontrol_parameter(parameter):
         return False
     return not any(f"/{parameter}".startswith(f"{node}/") for node in gone)
 

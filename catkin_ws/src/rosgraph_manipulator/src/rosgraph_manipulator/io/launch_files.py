@@ -215,6 +215,8 @@ def _checked(path: str | Path, config: Any) -> LaunchFile:
     if config.config_errors:
         raise LaunchFileError(f"{path}: {' '.join(str(config.config_errors[0]).split())}")
     for node in config.nodes:
+        if not node.name:  # roslaunch makes one up at each start
+            raise LaunchFileError(f"{path}: a node of {node.package}/{node.type} has no name: give it one")
         name = node.machine_name or ""
         if name not in config.machines:
             remedy = f'add <machine name="{name}" address="HOST"/>, or correct the name'
