@@ -47,7 +47,7 @@ from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.loop.asked import Asked
 from mros1_reasoner.replay.recording import RecordingError
 from node_kit.io.input_files import InputFileError, read_text, read_yaml
-from node_kit.last_start import kept_of
+from node_kit.last_start import Kept, kept_of, missing, remedy
 from node_kit.parameters import ParameterError
 from node_kit.takeover import TakeoverError, decode_parameter
 from pybullet_simulator.io.map_file import MapError, read_map
@@ -495,6 +495,15 @@ def _own_ontologies() -> dict[Path, Any]:
 # -- the table ---------------------------------------------------------------------------------------------------------
 
 
+def _last_start(path: Path) -> None:
+    by, present = "/mixer of 7@100", {"/mixer/rate": '"x"', "/mixer/valves": "3"}
+    kept = kept_of(read_text(path), by)
+    missing(kept, present)
+    found = remedy(kept, present, by)
+    for value in filter(None, found.wanted.values()):
+        json.loads(value)
+
+
 def _resumed(path: Path) -> object:
     return decode_parameter(read_yaml(path), "move_base_msgs/MoveBaseActionGoal")
 
@@ -600,8 +609,9 @@ READERS: tuple[Reader, ...] = (
     ),
     Reader(
         "what a node began with", ("node_kit/last_start.py", "node_kit/ros/last_start.py"), "json", "bad.json",
-        _texts('["7@100", {"/mixer/rate": "10.0", "/mixer/valves": "[1, {}]"}]'), (InputFileError,),
-        lambda path: kept_of(read_text(path), "7@100"), 0.2,
+        _texts(Kept("/mixer of 7@100", {"/mixer/rate": "10.0", "/mixer/valves": "[1, {}]"}, {"/mixer/rate": '"x"'},
+                    ("/mixer/rate",)).to_text()),
+        (InputFileError,), _last_start, 0.2,
     ),
     Reader(
         "a request of the page", ("metacontrol_dashboard/io/server.py",), "json", "bad.json",

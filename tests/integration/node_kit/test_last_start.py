@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import shutil
 import signal
 import subprocess
 from pathlib import Path
@@ -37,8 +38,8 @@ PARTS = ("rosgraph_monitor", "rosgraph_manipulator", "rosgraph_launcher", "reaso
 class Ferry:
     """A meta-controller that roslaunch has started, and its master."""
 
-    def __init__(self, master, roslaunch, console):
-        self.master, self.roslaunch, self._console = master, roslaunch, console
+    def __init__(self, master, roslaunch, console, folder):
+        self.master, self.roslaunch, self._console, self.folder = master, roslaunch, console, folder
 
     def get(self, name):
         """Return a parameter; None: it is not set."""
@@ -88,7 +89,8 @@ def _words(process):
 @pytest.fixture(scope="module")
 def ferry(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ferry")
-    (folder / "ferry.launch").write_text(LAUNCH.format(folder=folder, model=MODEL))
+    shutil.copy(MODEL, folder)
+    (folder / "ferry.launch").write_text(LAUNCH.format(folder=folder, model=folder / MODEL.name))
     (folder / "monitor.yaml").write_text("rate: 5.0\n")
     (folder / "manipulator.yaml").write_text(f"probation: 2.0\nconfigurations:\n  slow: {{launch: {SERVER}}}\n")
     with reserved_port() as port, Client(f"http://localhost:{port}", "/test") as master:
@@ -98,7 +100,7 @@ def ferry(tmp_path_factory):
         with console.open("wb") as output:
             roslaunch = subprocess.Popen(words, env={**os.environ, **own}, stdout=output, stderr=output)
         try:
-            found = Ferry(master, roslaunch, console)
+            found = Ferry(master, roslaunch, console, folder)
             for part in PARTS:
                 wait_for(lambda part=part: found.process(part), f"{part} begins")
             yield found
@@ -117,6 +119,7 @@ def ferry(tmp_path_factory):
         ("rosgraph_manipulator", "", None),
         ("rosgraph_launcher", "restart_period", "long"),  # it was not set before
         ("rosgraph_monitor", "rate", "fast"),
+        ("rosgraph_monitor", "", None),  # it could begin without
         ("reasoner", "model_file", None),
         ("reasoner", "model_file", "/no/such.owl"),
     ],
@@ -129,7 +132,9 @@ def test_part_begins_with_what_it_had_at_its_last_start(ferry, part, key, value)
     else:
         ferry.master.call("setParam", name, value)
     lines = ferry.restarted(part)
-    assert [line for line in lines if "it begins again with what it had at its last start: /ferry/" in line], lines
+    begins_again = "it begins again with what it had at its last start: /ferry/"
+    is_set_again = "what was deleted since its last start is set again: /ferry/"
+    assert [line for line in lines if (begins_again if key and value else is_set_again) in line], lines
     assert not [line for line in lines if "tries again in" in line]
     if key:
         assert ferry.get(name) == before
@@ -143,3 +148,21 @@ def test_what_somebody_has_set_and_can_be_used_holds(ferry):
     ferry.master.call("deleteParam", "/ferry/rosgraph_manipulator/configurations")
     ferry.restarted("rosgraph_manipulator")
     assert ferry.get("/ferry/rosgraph_manipulator/probation") == 3.0  # it is what the last one began with
+
+
+def test_what_somebody_has_set_holds_also_where_a_file_is_to_blame(ferry):
+    ferry.master.call("setParam", "/ferry/reasoner/cool_down", 1.5)
+    model = ferry.folder / MODEL.name
+    model.rename(model.with_suffix(".away"))
+    said = len(ferry.said("reasoner"))
+    ferry.process("reasoner").kill()
+    wait_for(
+        lambda: [line for line in ferry.said("reasoner")[said:] if "tries again in" in line],
+        lambda: f"it waits: {ferry.said('reasoner')[said:]}",
+    )
+    lines = ferry.said("reasoner")[said:]
+    assert [line for line in lines if "it has what it found before: /ferry/reasoner/cool_down" in line], lines
+    assert ferry.get("/ferry/reasoner/cool_down") == 1.5
+    model.with_suffix(".away").rename(model)
+    assert ferry.restarted("reasoner") == []
+    assert ferry.get("/ferry/reasoner/cool_down") == 1.5

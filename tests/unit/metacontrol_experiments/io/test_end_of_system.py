@@ -8,6 +8,7 @@ import pytest
 from helpers.ports import QUIET_HOST
 from helpers.waiting import wait_for
 from metacontrol_experiments.io.end_of_system import EndOfSystem
+from node_kit.master import Standing, View
 
 
 class Server(SimpleXMLRPCServer):
@@ -22,8 +23,8 @@ class Server(SimpleXMLRPCServer):
 
 
 @contextmanager
-def lost_master(console):
-    """Give the address of a master that has gone after the system was watched, and what watches it."""
+def watched_master(console):
+    """Give the address of a master, what watches it, and a function that ends it."""
     server = Server()
     uri = f"http://{QUIET_HOST}:{server.server_address[1]}"
     thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
@@ -31,12 +32,17 @@ def lost_master(console):
     end = EndOfSystem(console, uri)
     end.watch()
     wait_for(lambda: server.calls, "the master is asked")
-    server.shutdown()
-    thread.join()
-    server.server_close()
-    wait_for(lambda: end._watch.lost, "the watch finds it gone")
-    end._watch.thread.join()
-    yield uri, end
+
+    def lose():
+        server.shutdown()
+        thread.join()
+        server.server_close()
+        wait_for(lambda: end._watch.lost, "the watch finds it gone")
+        end._watch.thread.join()
+
+    yield uri, end, lose
+    if not end._watch.lost:
+        lose()
 
 
 @pytest.mark.parametrize(
@@ -50,5 +56,33 @@ def lost_master(console):
 def test_lost_master_is_the_cause_where_the_console_has_none(tmp_path, said, is_told):
     console = tmp_path / "console.log"
     console.write_text(said)
-    with lost_master(console) as (uri, end):
+    with watched_master(console) as (uri, end, lose):
+        lose()
         assert (end.cause() == f"ROS master {uri} is gone") == is_told
+
+
+def test_master_that_answers_again_is_no_cause(tmp_path):
+    console = tmp_path / "console.log"
+    console.write_text("error: no display\n")
+    with watched_master(console) as (_, end, _):
+        first = end._watch
+        mute = View(Standing.MUTE, 7, "garbage: nothing that can be read", silent_since=1.0)
+        end._watch.heartbeat = None
+        end._on_loss(mute)
+        assert end._watch is not first
+        wait_for(lambda: end.cause() == "error: no display", "it has answered again")
+
+
+def test_master_that_stays_mute_is_told_with_the_whole_reason(tmp_path):
+    console = tmp_path / "console.log"
+    console.write_text("error: no display\n")
+    end = EndOfSystem(console, f"http://{QUIET_HOST}:1")
+    end._on_loss(View(Standing.MUTE, 7, "garbage: nothing that can be read"))
+    wait_for(lambda: end._watch.lost, "nobody is there any more")
+    assert end.cause() == f"ROS master http://{QUIET_HOST}:1 does not answer (garbage: nothing that can be read)"
+
+
+def test_lost_master_is_told_where_the_console_can_not_be_read(tmp_path):
+    with watched_master(tmp_path / "no.log") as (uri, end, lose):
+        lose()
+        assert end.cause() == f"ROS master {uri} is gone"

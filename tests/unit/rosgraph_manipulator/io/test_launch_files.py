@@ -220,3 +220,28 @@ def test_model_and_its_launch_file_are_the_same_configuration():
 def test_parameters_to_clear_are_kept(tmp_path):
     launch = read_launch_file(write(tmp_path, f'<group ns="old" clear_params="true"/>{NODE}/>'))
     assert launch.clear == ("/old/",)
+
+
+@pytest.mark.parametrize("spoilt", ["a: [1", "[1, 2]", "1: 2", "", b"a: \xff", None], ids=repr)
+def test_file_of_parameters_that_can_not_be_used_counts_as_it_was(tmp_path, spoilt):
+    """Many variants may load one file."""
+    file = tmp_path / "tank.yaml"
+    file.write_text("depth: 3\nvalves: {open: [1, 2]}\n")
+    path = write(tmp_path, f'{NODE}><rosparam file="{file}"/><param name="depth" value="4"/></node>')
+    known = {}
+    whole = read_launch_file(path, parameter_files=known)
+    if spoilt is None:
+        file.unlink()
+    else:
+        file.write_bytes(spoilt if isinstance(spoilt, bytes) else spoilt.encode())
+    if spoilt != "":
+        with pytest.raises(LaunchFileError):
+            read_launch_file(path)
+    launch = read_launch_file(path, parameter_files=known)
+    assert launch.system == whole.system
+    assert [f"{file} can't be used, so its values are those of before: correct it (" in one for one in launch.remarks] == [
+        True
+    ]
+    assert "\n" not in launch.remarks[0]
+    file.write_text("depth: 3\nvalves: {open: [1]}\n")
+    assert read_launch_file(path, parameter_files=known).system.nodes["/n"].parameters["valves/open"] == [1]

@@ -1,11 +1,12 @@
 """Which nodes launchers are told to be ready for."""
 
 import pytest
+import rospy
 from node_kit.io.background import NoThreadError
 from rosgraph_launcher.description import NodeDescription, SystemDescription
+from rosgraph_manipulator.change.deployment import DeploymentError
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions, Repair
-from rosgraph_manipulator.io import launch_files
-from rosgraph_manipulator.io.launch_files import LaunchFile, LaunchFileError
+from rosgraph_manipulator.io.launch_files import LaunchFile
 from rosgraph_manipulator.ros.standby import Standby
 
 
@@ -25,20 +26,20 @@ def launchers():
 
 
 @pytest.fixture
-def standby(monkeypatch, launchers):
+def standby(launchers):
     """Two variants of one node, a function whose launch file is broken, and a driver."""
 
-    def read(path, _args):
+    def read(configuration):
+        path = configuration.launch_file
         if path == "broken":
-            raise LaunchFileError("broken: no such file")
+            raise DeploymentError("broken: no such file")
         name = {"slow": "/nav", "fast": "/nav"}.get(path, f"/{path}")
         node = NodeDescription(name, "/", "p", "x", parameters={"speed": path})
         return LaunchFile(SystemDescription({name: node}))
 
-    monkeypatch.setattr(launch_files, "read_launch_file", read)
     configurations = {name: Configuration(name, f"f_{name}", name) for name in ("slow", "broken", "fast")}
     repairs = {"eye": Repair("eye", driver=Configuration("repair_of_eye", "repair_of_eye", "eye"))}
-    return Standby(ManipulatorOptions(configurations, repairs=repairs), launchers)
+    return Standby(ManipulatorOptions(configurations, repairs=repairs), launchers, read)
 
 
 def look(standby, times=10):
@@ -67,7 +68,8 @@ def test_launchers_are_told_again_after_each_change(standby, launchers):
     assert len(launchers.told) == 2
 
 
-def test_launchers_that_can_not_be_told_now_are_told_at_the_next_look(standby, launchers):
+def test_launchers_that_can_not_be_told_now_are_told_at_the_next_look(standby, launchers, monkeypatch):
+    monkeypatch.setattr(rospy.rostime, "_rostime_initialized", True)
     launchers.error = NoThreadError(RuntimeError("can't start new thread"))
     look(standby)
     launchers.error = None

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 from node_kit.io.master_watch import MasterWatch
-from node_kit.master import View
+from node_kit.master import Standing, View
+from node_kit.one_line import one_line
 
 from metacontrol_experiments.mission.console import cause_in, is_ending
 
@@ -25,16 +27,27 @@ class EndOfSystem:
         self._watch = MasterWatch(lambda _: None, self._on_loss)
 
     def watch(self) -> None:
-        """Begin to watch the master, which is there."""
-        self._watch.start(self._uri)
+        """Begin to watch the master, which is there; where there is no thread to be had, the console alone tells."""
+        self._watch.heartbeat = self._on_answer
+        with suppress(RuntimeError):
+            self._watch.start(self._uri)
 
     def cause(self) -> str:
         """Return why all has ended, in one line."""
         return cause_in(self._said(), self._seen)
 
     def _on_loss(self, view: View) -> None:
-        if not is_ending(self._said()):  # roslaunch takes its master with it
-            self._seen = view.text(self._uri, "").partition(": ")[0]
+        if view.pid is not None and not is_ending(self._said()):  # roslaunch takes its master with it
+            self._seen = one_line(view.text(self._uri, "").removesuffix(": "))
+        if view.standing is Standing.MUTE:  # it may answer again
+            self._watch = MasterWatch(lambda _: None, self._on_loss)
+            self.watch()
+
+    def _on_answer(self) -> None:
+        self._seen = ""
 
     def _said(self) -> str:
-        return self._console.read_text(encoding="utf-8", errors="replace")
+        try:
+            return self._console.read_text(encoding="utf-8", errors="replace")
+        except OSError:  # no descriptor left
+            return ""

@@ -36,10 +36,14 @@ BAD_START = 2
 STAYS = "NODE_KIT_STAYS"
 """Environment variable, to be set beside `respawn="true"`: a node whose input can't be used says so, and ends after
 `TRIES_AGAIN`. Its start would fail again every second otherwise; the input may be mended, or be wrong for a moment.
-Where its parameters have changed since it began last, it sets them again instead, and ends at once."""
+What has been deleted of its parameters since it began last is set again before it begins; where others have changed, it
+sets them again, and ends at once."""
 
 TRIES_AGAIN = 30.0
 """Wall s after which such a node ends, so that it is started again."""
+
+_CHANGES = 1.0
+"""Wall s after which it ends, where its parameters have just changed."""
 
 LONGEST_END = 3.0
 """Wall s for a node to end; then its process is cut off, because rospy calls the master without a deadline."""
@@ -113,21 +117,23 @@ class Lifetime:
             connect_to_all()
             with quick_start():
                 rospy.init_node(self._name, anonymous=anonymous, disable_signals=True)
+            self._name = rospy.get_name()
             read_rosout_parameter()
             forgive()
             greet_apart()
             if self._stays:
-                with contextlib.suppress(CallError):  # the node can do without
+                with contextlib.suppress(CallError, RecursionError):  # the node can do without
                     self._last_start = LastStart(writes, reads)
+                    self._tell_names("what was deleted since its last start is set again", self._last_start.complete())
         except (CallError, OSError, rospy.ROSInitException) as error:
             raise _StartError(str(error)) from error
-        self._name = rospy.get_name()
         rospy.core.add_shutdown_hook(self._after_goodbye)  # comes after rospy's own, in their order
 
     def begun(self) -> None:
         """Keep the parameters with which the node has begun, for the process that roslaunch starts in its place."""
         if self._last_start is not None:
-            self._last_start.keep()
+            with contextlib.suppress(RuntimeError):  # there is no thread to be had
+                self._last_start.keep()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -142,7 +148,7 @@ class Lifetime:
         if isinstance(error, (*self._refusals, _StartError)):
             self.say(" ".join(str(error).split()))
             # A master that was in trouble may be well again.
-            if self._stays and not isinstance(error, _StartError) and not self._restore():
+            if self._stays and not isinstance(error, _StartError) and not self._mends():
                 self.say(f"mend that; it tries again in {TRIES_AGAIN:g} s")
                 time.sleep(TRIES_AGAIN)
             self.end("it can't start", BAD_START)
@@ -150,16 +156,24 @@ class Lifetime:
             traceback.print_exception(kind, error, trace)
         self.end("it has failed", 1)
 
-    def _restore(self) -> bool:
-        """Set parameters as they were when the node began last; return whether any was another one."""
+    def _mends(self) -> bool:
+        """Set parameters so that the node may begin; return whether it is started again at once."""
         try:
-            names = self._last_start.restore() if self._last_start is not None else []
+            names, again = self._last_start.mend() if self._last_start is not None else ([], False)
         except (CallError, RecursionError) as error:  # nobody answers, or somebody has garbled what was kept
             self.say(one_line(str(error)))
             return False
+        if names or not again:
+            what = "begins again with what it had at its last start" if again else "has what it found before"
+            self._tell_names(f"it {what}", names)
+        else:
+            self.say("its parameters have just changed: it begins again")
+            time.sleep(_CHANGES)
+        return again
+
+    def _tell_names(self, what: str, names: Collection[str]) -> None:
         if names:
-            self.say(one_line(f"it begins again with what it had at its last start: {', '.join(names)}"))
-        return bool(names)
+            self.say(one_line(f"{what}: {', '.join(names)}"))
 
     @property
     def is_ending(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from xml.dom import expatbuilder
@@ -52,20 +52,36 @@ class LaunchFile:
     remarks: tuple[str, ...] = ()
 
 
-def read_launch_file(path: str | Path, args: Sequence[str] = ()) -> LaunchFile:
-    """Read a launch file with its arguments (`NAME:=VALUE`).
+def read_launch_file(
+    path: str | Path, args: Sequence[str] = (), parameter_files: dict[str, str] | None = None
+) -> LaunchFile:
+    """Read a launch file.
+
+    Args:
+        path: of the file.
+        args: its arguments, `NAME:=VALUE`.
+        parameter_files: texts of the files of parameters that launch files load, by path, as they were when they could
+            be used last; they stand in for one that can't be used now, and are brought up to date.
 
     Raises:
         LaunchFileError: the file is missing or malformed, or starts no node.
     """
     with _refusing(str(path)):
         config = roslaunch.config.ROSLaunchConfig()
-        _Loader().load(str(path), config, argv=list(args), verbose=False)
-        return _checked(path, config)
+        loader = _Loader()
+        if parameter_files is not None:
+            loader.parameter_files = parameter_files
+        loader.load(str(path), config, argv=list(args), verbose=False)
+        launch = _checked(path, config)
+        return replace(launch, remarks=(*launch.remarks, *loader.remarks))
 
 
-def read_configuration(configuration: Configuration) -> LaunchFile:
+def read_configuration(configuration: Configuration, parameter_files: dict[str, str]) -> LaunchFile:
     """Read the launch file of a configuration.
+
+    Args:
+        configuration: it.
+        parameter_files: as of `read_launch_file`.
 
     Raises:
         DeploymentError: it can't be read.
@@ -73,7 +89,7 @@ def read_configuration(configuration: Configuration) -> LaunchFile:
     if configuration.problem:
         raise DeploymentError(configuration.problem)
     try:
-        return read_launch_file(configuration.launch_file, configuration.args)
+        return read_launch_file(configuration.launch_file, configuration.args, parameter_files)
     except LaunchFileError as error:
         raise DeploymentError(str(error)) from error
 
@@ -159,6 +175,37 @@ class _Loader(roslaunch.xmlloader.XmlLoader):
     """roslaunch's reader, without XML entities and with stable anonymous names."""
 
     ignore_unset_args = False
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.parameter_files: dict[str, str] = {}
+        self.remarks: list[str] = []
+
+    def load_rosparam(
+        self, context: Any, ros_config: Any, cmd: str, param: str, file_: str | None, text: str, **rest: Any
+    ) -> None:
+        """Take in what a `<rosparam>` says. Of a file that can't be used now, it is what the file had before.
+
+        Many launch files may load the same file. None of them could be used without it.
+        """
+        load = super().load_rosparam
+        before = self.parameter_files.get(file_ or "")
+        if cmd != "load" or not file_:
+            load(context, ros_config, cmd, param, file_, text, **rest)
+            return
+        try:
+            load(context, ros_config, cmd, param, file_, text, **rest)
+            content = Path(file_).read_text(encoding="utf-8")
+            if before and not content.strip():
+                raise ValueError("it is empty")
+        except (AttributeError, OSError, TypeError, ValueError) as error:
+            if before is None:
+                raise
+            load(context, ros_config, cmd, param, None, before, **rest)
+            why = _shortened(str(error))
+            self.remarks.append(f"{file_} can't be used, so its values are those of before: correct it ({why})")
+        else:
+            self.parameter_files[file_] = content
 
     @property
     def root_context(self) -> Any:

@@ -132,7 +132,7 @@ class Manipulator:
             options, Policy(policy), self._inbox, self._manipulation.carry_out, self._manipulation.make_whole
         )
         self._executor.check = self._requests.check
-        self._standby = Standby(options, launchers)
+        self._standby = Standby(options, launchers, around.launch_file)
         repair_timeout = parameters.number("repair_timeout", 15.0, low=0.1)
         self._repairs = RepairServer(options, self._inbox, self._executor, repair_timeout)
 
@@ -201,7 +201,7 @@ def main() -> None:
     """Run the node; exit status 2 when its configuration cannot be used."""
     with Lifetime("rosgraph_manipulator", ConfigurationError, ParameterError, PluginError) as life:
         arguments = rospy.myargv()[1:]
-        life.start(writes=("journal", "overwritten"), reads=() if arguments else KEYS)
+        life.start(writes=("journal", "kept_goals", "overwritten"), reads=() if arguments else KEYS)
         options = options_from(read_parameters(arguments))
         for configuration in (*options.configurations.values(), *options.drivers.values()):
             if configuration.problem:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import rospy
@@ -9,8 +10,8 @@ from node_kit.io.background import NoThreadError
 from rosgraph_launcher.description import NodeDescription
 
 from rosgraph_manipulator.change.deployment import DeploymentError
-from rosgraph_manipulator.configuration.configurations import ManipulatorOptions
-from rosgraph_manipulator.io.launch_files import read_configuration
+from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
+from rosgraph_manipulator.io.launch_files import LaunchFile
 from rosgraph_manipulator.ros.launcher_reports import WARN_PERIOD
 from rosgraph_manipulator.ros.launchers import Launchers
 
@@ -18,13 +19,17 @@ from rosgraph_manipulator.ros.launchers import Launchers
 class Standby:
     """Reads the launch files while there is nothing else to do, one at a time."""
 
-    def __init__(self, options: ManipulatorOptions, launchers: Launchers) -> None:
+    def __init__(
+        self, options: ManipulatorOptions, launchers: Launchers, read: Callable[[Configuration], LaunchFile]
+    ) -> None:
         """Begin without knowing any node.
 
         Args:
             options: has the configurations, and the drivers of repairs.
             launchers: those of all hosts.
+            read: reads a launch file; raises DeploymentError where it can't be read.
         """
+        self._launch_file = read
         self._unread = [*options.configurations.values(), *options.drivers.values()]
         self._launchers = launchers
         self._nodes: dict[str, NodeDescription] = {}
@@ -48,7 +53,7 @@ class Standby:
 
     def _read(self) -> None:
         try:
-            system = read_configuration(self._unread.pop(0)).system
+            system = self._launch_file(self._unread.pop(0)).system
         except DeploymentError:
             return  # whoever requests it will be told
         for node in system.nodes.values():

@@ -59,6 +59,7 @@ class RosSurroundings:
         self.log = RosLog()
         self._news = threading.Condition()
         self._cmd_vel = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+        self._parameter_files: dict[str, str] = {}
 
     @property
     def is_ending(self) -> bool:
@@ -161,7 +162,7 @@ class RosSurroundings:
         Raises:
             DeploymentError: it can't be read.
         """
-        return read_configuration(configuration)
+        return read_configuration(configuration, self._parameter_files)
 
     def why_not_started(self, node: NodeDescription) -> str:
         """Return why a node of this host can't be started, such as an executable that is missing; empty: it can."""
