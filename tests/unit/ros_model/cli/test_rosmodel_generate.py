@@ -447,6 +447,19 @@ def test_parameter_files_that_can_not_be_loaded_are_refused(run, models, files, 
     assert (status, message in out) == (1, True), out
 
 
+@pytest.mark.parametrize("content", [b"[1, 2]", b"a: [1", b"hello", b"a:\t1\n\tb: 2", b"1: 2", b"a: \xff"])
+def test_parameter_file_that_roslaunch_can_not_load_is_refused(run, models, tmp_path, content):
+    folder = models({"a": {"speed": 1}}, parameter_files={"nav": "package://robot/config/nav.yaml"})
+    (folder.parent / "config").mkdir()
+    file = folder.parent / "config" / "nav.yaml"
+    file.write_text("limits: {speed: 0.5}\nrate: !degrees 5\n")
+    assert run("check", folder)[0] == 0
+    file.write_bytes(content)
+    status, out, _ = run("check", folder)
+    assert status == 1
+    assert f"error: parameter_files.nav: {file}" in out and "make it a mapping NAME: VALUE" in out, out
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -239,9 +239,7 @@ def test_file_of_parameters_that_can_not_be_used_counts_as_it_was(tmp_path, spoi
             read_launch_file(path)
     launch = read_launch_file(path, parameter_files=known)
     assert launch.system == whole.system
-    assert [f"{file} can't be used, so its values are those of before: correct it (" in one for one in launch.remarks] == [
-        True
-    ]
-    assert "\n" not in launch.remarks[0]
+    (remark,) = launch.remarks
+    assert f"{file} can't be used, so its values are those of before: correct it (" in remark and "\n" not in remark
     file.write_text("depth: 3\nvalves: {open: [1]}\n")
     assert read_launch_file(path, parameter_files=known).system.nodes["/n"].parameters["valves/open"] == [1]

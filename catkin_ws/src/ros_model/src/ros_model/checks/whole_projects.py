@@ -88,7 +88,7 @@ def wrong_arguments(project: Project) -> Iterator[Finding]:
 
 
 def wrong_parameter_files(project: Project, library: Library) -> Iterator[Finding]:
-    """Yield files of parameters for a node that no variant starts, and those that are not there."""
+    """Yield files of parameters for a node that no variant starts, and those that can't be loaded."""
     started = {component.graph_name for variant in project.variants for component in variant.components}
     for name, text in project.settings.get("parameter_files", {}).items():
         where = project.source.at("parameter_files", name)
@@ -96,8 +96,8 @@ def wrong_parameter_files(project: Project, library: Library) -> Iterator[Findin
             yield Finding(f"parameter_files.{name}: no variant starts such a node: correct the name", where, "settings")
         package, file = package_file(text)
         own = project.folder.parent if package == project.package else None
-        if missing := library.installed.missing_file(package, file, own):
-            yield Finding(f"parameter_files.{name}: {missing.message}", where, "settings", missing.severity)
+        if wrong := library.installed.wrong_parameter_file(package, file, own):
+            yield Finding(f"parameter_files.{name}: {wrong.message}", where, "settings", wrong.severity)
 
 
 def wrong_launch_files(project: Project, library: Library) -> Iterator[Finding]:

@@ -14,9 +14,10 @@ from ros_model.errors import ModelError
 from ros_model.generators import write_files
 from ros_model.language.remappings import with_header
 from ros_model.language.system_writer import write_system
+from ros_model.project.project import package_file
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from catkin_pkg.package import Package
 
@@ -61,7 +62,7 @@ def write(project: Project, launch_files: Mapping[str, str]) -> list[Path]:
                 variant.position,
             )
         folder = root / name
-        texts[folder / "package.xml"] = _manifest(variant, about)
+        texts[folder / "package.xml"] = _manifest(variant, about, _packages_of_parameters(project, variant))
         texts[folder / "CMakeLists.txt"] = _CMAKE.format(header=_HEADER, name=name)
         texts[folder / f"{name}.rossystem"] = write_system(with_header(variant, _HEADER, project.base))
         texts[folder / "launch" / f"{name}.launch"] = launch_files[name]
@@ -79,7 +80,16 @@ def _about(project: Project) -> Package | None:
     return None
 
 
-def _manifest(variant: RosSystem, about: Package | None) -> str:
+def _packages_of_parameters(project: Project, variant: RosSystem) -> set[str]:
+    """Return the packages that have the files of parameters which a variant's launch file loads."""
+    started = {component.graph_name for component in variant.components}
+    files = project.settings.get("parameter_files", {})
+    loaded = (text for name, text in files.items() if not started.isdisjoint(project.nodes.get(name, ())))
+    return {package_file(text)[0] for text in loaded}
+
+
+def _manifest(variant: RosSystem, about: Package | None, loaded: Collection[str]) -> str:
+    """Return the text of a package.xml; `loaded`: the packages whose files of parameters the launch file loads."""
     package = ET.Element("package", {"format": "2"})
     package.append(ET.Comment(f" {_HEADER} "))
     ET.SubElement(package, "name").text = variant.name
@@ -93,7 +103,8 @@ def _manifest(variant: RosSystem, about: Package | None) -> str:
         ET.SubElement(package, "license").text = str(licence)
     ET.SubElement(package, "buildtool_depend").text = "catkin"
     executables = (component.executable for component in variant.components)
-    for name in sorted({"roslaunch", *(executable.package for executable in executables if executable)}):
+    started = {executable.package for executable in executables if executable}
+    for name in sorted({"roslaunch", *started, *loaded}):
         ET.SubElement(package, "exec_depend").text = name
     ET.indent(package, "  ")
     return '<?xml version="1.0"?>\n' + ET.tostring(package, encoding="unicode") + "\n"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import rospkg
 
 from ros_model.findings import WARNING
+from ros_model.io.launch_files import wrong_parameters
 from ros_model.language.library import Unknown, action_of
 from ros_model.language.metamodel import EXTENSIONS_OF_SCRIPTS
 from ros_model.language.packages import EXTENSIONS, PARTS, MessageField, Spec, SpecKind
@@ -95,6 +96,15 @@ class InstalledPackages:
             text = f"the package '{package}' is not on this machine, so {name} can't be looked for"
             return Unknown(f"{text}: source the workspace that holds it", WARNING)
         return Unknown(f"the package '{package}' has no file {name} in {folders[0]}: add it, or correct the name")
+
+
+    def wrong_parameter_file(self, package: str, name: str, own: Path | None = None) -> Unknown | None:
+        """Return why a file of a package can't be loaded as the parameters of a node; None where it can."""
+        if missing := self.missing_file(package, name, own):
+            return missing
+        files = (folder / name for folder in (own, _folder(package)) if folder)
+        why = wrong_parameters(next(file for file in files if file.is_file()))
+        return Unknown(f"{why}: make it a mapping NAME: VALUE") if why else None
 
 
 def _missing_executable(package: str, name: str) -> Unknown | None:

@@ -80,6 +80,22 @@ def load(path: Path, arguments: Sequence[str] = (), *, runs_programs: bool = Fal
     return config
 
 
+def wrong_parameters(path: Path) -> str:
+    """Return why roslaunch can't load a file of a node's parameters, in one line; empty: it can."""
+    import roslaunch.config
+    import roslaunch.loader
+
+    try:
+        read_text(path)
+        loader, context = roslaunch.loader.Loader(), roslaunch.loader.LoaderContext("/node", str(path))
+        loader.load_rosparam(context, roslaunch.config.ROSLaunchConfig(), "load", "", str(path), "", verbose=False)
+    except ModelError as error:
+        return str(error)
+    except Exception as error:  # whatever keys and values make of it
+        return f"{path}: roslaunch can't load it: {type(error).__name__}: {' '.join(str(error).split())[:300]}"
+    return ""
+
+
 def _without_programs(param_value: Callable[..., Any]) -> Callable[..., Any]:
     """Return roslaunch's reader of a parameter's value, which runs no program."""
 

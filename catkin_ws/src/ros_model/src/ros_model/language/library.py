@@ -64,6 +64,9 @@ class Installed(Protocol):
             own: the folder, if it is known; the installed package is looked at, too.
         """
 
+    def wrong_parameter_file(self, package: str, name: str, own: Path | None = None) -> Unknown | None:
+        """Return why a file of a package can't be loaded as the parameters of a node; None where it can."""
+
 
 class NothingInstalled:
     """Stands for a host without a single package."""
@@ -84,6 +87,9 @@ class NothingInstalled:
         """Return None: nothing is known of executables."""
 
     def missing_file(self, package: str, name: str, own: Path | None = None) -> None:
+        """Return None: nothing is known of files."""
+
+    def wrong_parameter_file(self, package: str, name: str, own: Path | None = None) -> None:
         """Return None: nothing is known of files."""
 
 
