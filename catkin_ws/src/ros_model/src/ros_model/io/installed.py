@@ -97,7 +97,6 @@ class InstalledPackages:
             return Unknown(f"{text}: source the workspace that holds it", WARNING)
         return Unknown(f"the package '{package}' has no file {name} in {folders[0]}: add it, or correct the name")
 
-
     def wrong_parameter_file(self, package: str, name: str, own: Path | None = None) -> Unknown | None:
         """Return why a file of a package can't be loaded as the parameters of a node; None where it can."""
         if missing := self.missing_file(package, name, own):
