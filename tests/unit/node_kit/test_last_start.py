@@ -96,8 +96,8 @@ GOOD = json.loads(Kept(BY, KEPT).to_text())
     "text",
     [
         *(None, 3, "", "{", "[]", "{}", "[" * 100_000),
-        *(json.dumps({**GOOD, "values": values}) for values in (5, {"/a": "{"}, {"/a": 5}, {"a": "5"})),
-        *(json.dumps({**GOOD, "found": values}) for values in (5, {"/a": "{"})),
+        *(json.dumps({**GOOD, "values": values}) for values in (0, [], {"/a": "{"}, {"/a": 5}, {"a": "5"})),
+        *(json.dumps({**GOOD, "found": values}) for values in ("", {"/a": "{"})),
         *(json.dumps({**GOOD, "names": values}) for values in (5, [5])),
     ],
 )

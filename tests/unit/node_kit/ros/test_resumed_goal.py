@@ -1,10 +1,12 @@
-"""A goal to take over stays where it is until a server has it: a server that dies while it starts loses nothing."""
+"""A goal to take over stays where it is until it ends: a server that dies before loses nothing."""
 
 import base64
 import io
 import threading
 
 import pytest
+from actionlib_msgs.msg import GoalID, GoalStatus
+from helpers.waiting import DEADLINE_S, wait_for
 from move_base_msgs.msg import MoveBaseActionGoal
 from node_kit.ros import resumed_goal
 from node_kit.ros.resumed_goal import start_with, take_resumed_goal
@@ -26,6 +28,9 @@ class Server:
     def internal_goal_callback(self, goal):
         self.told.append(f"has {goal.goal_id.id}, {len(self.parameters)} parameters")
 
+    def publish_result(self, status, result):
+        self.told.append(f"result {result} of {status.goal_id.id}")
+
     def publish_status(self):
         self.told.append("status")
 
@@ -46,14 +51,34 @@ def stored(goal_id):
     return {"type": goal._type, "data": base64.b64encode(buffer.getvalue()).decode()}
 
 
-def test_goal_is_there_for_the_next_server_until_one_has_started(parameters):
+def taken():
+    return take_resumed_goal("move_base", MoveBaseActionGoal)
+
+
+def test_goal_is_there_for_the_next_server_until_it_has_ended(parameters):
     parameters[NAME] = stored("g1")
-    assert take_resumed_goal("move_base", MoveBaseActionGoal).goal_id.id == "g1"
-    goal = take_resumed_goal("move_base", MoveBaseActionGoal)  # the first server was killed
+    start_with(Server(parameters), taken())  # this server is killed
     server = Server(parameters)
-    start_with(server, goal)
-    assert server.told == ["initialized", "has g1, 0 parameters", "status"]
-    assert take_resumed_goal("move_base", MoveBaseActionGoal) is None
+    start_with(server, taken())
+    assert server.told == ["initialized", "has g1, 1 parameters", "status"]
+    server.publish_result(GoalStatus(goal_id=GoalID(id="g0")), "late")
+    server.publish_result(GoalStatus(goal_id=GoalID(id="g1")), "reached")
+    assert server.told[3:] == ["result late of g0", "result reached of g1"]
+    wait_for(lambda: not parameters, "the parameter is deleted")
+    assert taken() is None
+
+
+@pytest.mark.parametrize("other", [stored("g2"), "nonsense"])
+def test_what_is_stored_meanwhile_stays(parameters, monkeypatch, other):
+    parameters[NAME] = stored("g1")
+    server, read = Server(parameters), threading.Event()
+    start_with(server, taken())
+    parameters[NAME] = other
+    monkeypatch.setattr(resumed_goal.rospy, "get_param", lambda name: read.set() or parameters[name])
+    server.publish_result(GoalStatus(goal_id=GoalID(id="g1")), "preempted")
+    assert read.wait(DEADLINE_S)
+    wait_for(lambda: not [t for t in threading.enumerate() if t.name.endswith("(_delete_goal)")], "it has looked")
+    assert parameters == {NAME: other}
 
 
 def test_what_is_no_goal_is_deleted_at_once(parameters):

@@ -59,8 +59,8 @@ def kept_of(text: Any, by: str) -> Kept | None:
     try:
         content = json.loads(text)
         kept = Kept(content["by"], content["values"], content["found"], tuple(content["names"]), content["in_vain"])
-        for values in filter(None, (kept.values, kept.found)):
-            for name, value in values.items():
+        for values in (kept.values, kept.found):
+            for name, value in () if values is None else values.items():
                 if value != NO_JSON:
                     json.loads(value)
                 if not isinstance(name, str) or not name.startswith("/"):

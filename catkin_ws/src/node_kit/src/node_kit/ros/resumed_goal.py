@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import threading
 from typing import Any
 
 import genpy
@@ -14,8 +15,7 @@ from node_kit.takeover import TakeoverError, decode_parameter
 def take_resumed_goal(action: str, goal_class: Any) -> Any:
     """Return the goal to take over, from the parameter `ACTION/resume_goal`.
 
-    `start_with` deletes the parameter, which is meant for one start only. Until then it stays: a server that is killed
-    while it starts has taken over nothing, and the next one does.
+    The parameter stays until the goal ends: where the server is killed before, the next one goes on with the goal.
 
     Args:
         action: name of the action.
@@ -24,7 +24,7 @@ def take_resumed_goal(action: str, goal_class: Any) -> Any:
     Returns:
         The action goal; None where there is none, or one that can't be used, which the log tells.
     """
-    name = rospy.resolve_name(f"{action}/resume_goal")
+    name = _parameter(action)
     try:
         value = rospy.get_param(name)
     except KeyError:
@@ -51,9 +51,34 @@ def start_with(server: Any, goal: Any) -> None:
         server.initialize()
         server.started = True
         if goal is not None:
-            _delete(rospy.resolve_name(f"{server.ns}/resume_goal"))  # before it can do harm again
+            _delete_at_its_end(server, goal)
             server.internal_goal_callback(goal)
         server.publish_status()
+
+
+def _delete_at_its_end(server: Any, goal: Any) -> None:
+    """Have the parameter deleted when a server publishes the goal's result."""
+    publish = server.publish_result
+
+    def publish_result(status: Any, result: Any) -> None:
+        publish(status, result)
+        if status.goal_id.id == goal.goal_id.id:
+            with contextlib.suppress(RuntimeError):  # there is no thread to be had
+                threading.Thread(target=_delete_goal, args=(_parameter(server.ns), goal), daemon=True).start()
+
+    server.publish_result = publish_result
+
+
+def _delete_goal(name: str, goal: Any) -> None:
+    """Delete the parameter if it has this goal, and no later one."""
+    with contextlib.suppress(KeyError, TakeoverError, genpy.DeserializationError, rospy.ROSException, OSError):
+        kept = type(goal)().deserialize(decode_parameter(rospy.get_param(name), goal._type))
+        if kept.goal_id.id == goal.goal_id.id:
+            rospy.delete_param(name)
+
+
+def _parameter(action: str) -> str:
+    return str(rospy.resolve_name(f"{action}/resume_goal"))
 
 
 def _delete(name: str) -> None:

@@ -1,8 +1,8 @@
 """Keeps the pending goal of an action while its server is replaced; the decisions are in `goal_keeper`.
 
 As long as the goal is pending, it is stored in the parameter `ACTION/resume_goal`. A server that knows the parameter
-deletes it and continues the goal before it publishes its first status; then the goal is stored again, since that server
-may die, too. `~kept_goals` has the same goal for a manipulator that is started again: the former one may have died
+continues the goal before it publishes its first status. Where it deletes the parameter, the goal is stored again, since
+that server may die, too. `~kept_goals` has the same goal for a manipulator that is started again: the former one may have died
 just after a server took the goal.
 """
 
