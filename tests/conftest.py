@@ -19,6 +19,8 @@ settings.load_profile("any machine")
 _ORDER = ("system", "integration", "unit")
 """Whole missions begin first, one after the other on the first worker: several at once would be too much for 2 cores.
 The others take tests from the end of what is left, so that no worker is left with a mission."""
+_WITHOUT_MISSIONS = ("test_installed.py", "test_models_of_d2.py", "test_pyramid.py", "test_report.py")
+"""Tests of the system that the other workers may take, too: they start no mission on ROS."""
 
 
 def pytest_collection_modifyitems(items):
@@ -28,4 +30,6 @@ def pytest_collection_modifyitems(items):
 
 def _place(item):
     folder = item.path.relative_to(HERE).parts[0]
+    if item.path.name in _WITHOUT_MISSIONS:
+        folder = "integration"
     return _ORDER.index(folder) if folder in _ORDER else len(_ORDER)

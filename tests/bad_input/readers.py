@@ -574,8 +574,9 @@ READERS: tuple[Reader, ...] = (
         _texts(_MSG), _MODEL, _package, 0.06,
     ),
     Reader(
-        "a launch file to extract", ("ros_model_extraction/io/launch_files.py", "ros_model/io/launch_files.py"), "xml",
-        "bad.launch", _LAUNCHED, _MODEL, read_launch_file, 0.06,
+        "a launch file to extract",
+        ("ros_model_extraction/io/launch_files.py", "ros_model/io/launch_files.py", "ros_model/io/launch_loader.py"),
+        "xml", "bad.launch", _LAUNCHED, _MODEL, read_launch_file, 0.06,
     ),
     Reader(
         "a launch file to deploy", ("rosgraph_manipulator/io/launch_files.py",), "xml", "bad.launch",

@@ -18,7 +18,7 @@ from pyarrow import parquet
 if TYPE_CHECKING:
     from pathlib import Path
 
-SEEDS = 3
+SEEDS = 2
 LIMIT_S = 500.0
 ROUTES = "short: {start: [-8, -8, 0.78], goal: [-3, -4.2, 0]}\n"
 CAMPAIGN = f"""

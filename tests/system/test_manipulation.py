@@ -1,4 +1,4 @@
-"""Whole missions of D1 with the real command: each scenario once."""
+"""Whole missions of D1 with the real command: the scenario in which most goes wrong, and the one without a way out."""
 
 import json
 import subprocess
@@ -8,30 +8,30 @@ from metacontrol_experiments.pyramid.record import read_pyramid
 
 SEEDS = (3, 4, 5)
 LIMIT_S = 1100.0
+KINDS = {3: {"light", "obstacle", "component", "release"}, 4: {"obstacle"}}
+"""What must have happened, by scenario."""
 
 
-@pytest.fixture(scope="module")
-def mission(tmp_path_factory):
-    """Drive a scenario once; return its result and its folder.
+@pytest.fixture
+def mission(tmp_path):
+    """Drive a scenario; return its result and its folder.
 
     On a busy machine, an obstacle may come when the arm has passed. It strikes again then, so late that the pyramid may
-    stand before all of the scenario has happened: such a mission is driven again.
+    stand before all of the scenario has happened: another seed is driven then.
     """
-    driven = {}
 
     def drive(scenario):
-        for seed in SEEDS if scenario not in driven else ():
-            output = tmp_path_factory.mktemp(f"scenario{scenario}")
+        for seed in SEEDS:
+            output = tmp_path / str(seed)
             words = ["--mission", "manipulation", "--scenario", scenario, "--seed", seed, "--output", output]
             command = ["metacontrol", "run", *map(str, words)]
             result = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
             console = (output / "log" / "console.log").read_text(errors="replace")
             assert result.returncode == 0, f"{result.stdout}{result.stderr}\n{console}"
-            driven[scenario] = json.loads((output / "summary.json").read_text()), output
-            names = [strike["name"] for strike in driven[scenario][0]["strikes"]]
-            if not any(names.count(name) > 1 for name in names if name.startswith("obstacle")):
+            summary = json.loads((output / "summary.json").read_text())
+            if {strike["name"].partition(":")[0] for strike in summary["strikes"]} == KINDS[scenario]:
                 break
-        return driven[scenario]
+        return summary, output
 
     return drive
 
@@ -40,32 +40,25 @@ def changes(summary):
     return [(change["from"], change["to"]) for change in summary["reconfigurations"]]
 
 
-def test_tags_are_found_again_in_the_dark_and_in_the_light_and_the_node_runs_on(mission):
-    summary, _ = mission(1)
+def test_an_arm_the_light_and_a_driver_fail_and_come_back_and_the_pyramid_stands(mission):
+    summary, output = mission(3)
     assert (summary["success"], summary["placed"], summary["placed_lost"]) == (True, 6, 0)
-    first, second = changes(summary)
-    assert first == second[::-1] and set(first) == {"fd2_1", "fd2_2"}
-    assert all(strike["recover_s"] is not None for strike in summary["strikes"])
-
-
-def test_the_other_arm_goes_on_with_the_base_when_one_meets_an_obstacle(mission):
-    summary, output = mission(2)
-    assert (summary["success"], summary["placed"]) == (True, 6)
-    assert changes(summary)[:3] == [("", "fd2_1"), ("", "fd1_1"), ("fd2", "fd1_right")]
+    strikes = {strike["name"]: strike for strike in summary["strikes"]}  # of several alike, the last
+    stopped = next(name.partition(":")[2] for name in strikes if name.startswith("release"))
+    other = {"left": "right", "right": "left"}[stopped]
+    made = changes(summary)
+    assert ("fd2", f"fd1_{other}") in made and ("", "fd1_1") in made  # the other arm goes on, with the base
+    assert ("fd2_2", "fd2_1") in made  # its setting for the dark, and that for the light
+    assert made[-1] == (f"fd1_{other}", "fd2")
+    late = [name for name, strike in strikes.items() if strike["recover_s"] is None]
+    assert not [name for name in late if name.startswith(("obstacle", "component", "release"))]
+    last = read_pyramid(output / "mission.bag").groundings[-1]
+    assert [report.function for report in last if report.configuration] == ["f_pick_place"]  # the others are released
     assert (output / "mission.png").stat().st_size > 100_000
     again = subprocess.run(
         ["metacontrol", "summary", str(output / "mission.bag")], capture_output=True, text=True, check=True
     )
     assert json.loads(again.stdout) == summary
-
-
-def test_both_arms_go_on_when_the_stopped_one_is_free_again_and_a_dead_driver_is_repaired(mission):
-    summary, output = mission(3)
-    assert (summary["success"], summary["placed"]) == (True, 6)
-    assert [strike["name"].partition(":")[0] for strike in summary["strikes"]].count("release") == 1
-    assert changes(summary)[-1][1] == "fd2"
-    last = read_pyramid(output / "mission.bag").groundings[-1]
-    assert [report.function for report in last if report.configuration] == ["f_pick_place"]  # the others are released
 
 
 def test_the_robot_stops_and_says_why_when_no_arm_works(mission):

@@ -162,6 +162,12 @@ def test_text_of_cmake_that_asks_for_much_work_is_read_in_time(tmp_path, text):
     assert time.process_time() - begin < 5.0
 
 
+@pytest.mark.parametrize("pattern", [".", "./", "a/" * 3000, "**a", "*" * 50_000])
+def test_glob_of_cmake_that_pathlib_can_not_use_finds_nothing(tmp_path, pattern):
+    (command, _) = commands(f"file(GLOB files {pattern})\nadd_library(x ${{files}})\n", tmp_path)
+    assert command.name == "file"
+
+
 def test_class_that_a_file_declares_and_makes_again_and_again_is_read_in_time(tmp_path):
     lines = (
         "#include <ros/ros.h>",

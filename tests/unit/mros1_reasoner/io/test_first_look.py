@@ -25,4 +25,6 @@ def test_launch_files_tell_what_they_begin_with(tmp_path):
     )
     (tmp_path / "launch" / "plain.launch").write_text("<launch/>")
     (tmp_path / "launch" / "broken.launch").write_text("<launch>")
+    for name in ("nope", "utf-7", "idna"):
+        (tmp_path / "launch" / f"{name}.launch").write_text(f'<?xml version="1.0" encoding="{name}"?><launch/>')
     assert list(_initial(tmp_path)) == [("launch/barn.launch", "slow")]

@@ -96,6 +96,34 @@ def test_coloured_and_transparent_images_are_read(make):
     assert rasterise(read_world(make(image, "hall.png", mode="scale"))).cells[0].tolist() == [100, -1, 0]
 
 
+@pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
+@pytest.mark.parametrize(("depth", "channels"), [(np.uint8, 1), (np.uint8, 3), (np.uint8, 4), (np.uint16, 4)])
+def test_a_large_image_is_read_as_its_parts_are(make, mode, depth, channels):
+    part = np.random.default_rng(0).integers(0, np.iinfo(depth).max + 1, (30, 30, channels)).astype(depth)
+    part[::2, :, -1] = np.iinfo(depth).max
+    cells = [
+        rasterise(read_world(make(image, "hall.png", mode=mode))).cells for image in (part, np.tile(part, (10, 10, 1)))
+    ]
+    np.testing.assert_array_equal(np.tile(cells[0], (10, 10)), cells[1])
+
+
+def test_a_colour_is_the_mean_of_its_channels(make):
+    image = np.random.default_rng(0).integers(0, 200, (30, 30, 3)).astype(np.uint8)
+    mean = image.astype(np.float32).mean(axis=2)[::-1]
+    cells = rasterise(read_world(make(image, "hall.png", mode="raw"))).cells
+    np.testing.assert_array_equal(cells, np.where(mean <= OCCUPIED, mean, UNKNOWN).astype(np.int8))
+
+
+@pytest.mark.parametrize("shape", [(4500, 4500), (1, 40_001)])
+@pytest.mark.parametrize("extension", [".pgm", ".png", ".bmp", ".jpg"])
+def test_a_large_image_is_refused_by_its_header(make, extension, shape):
+    path = make()
+    image = bytes(cv2.imencode(extension, np.zeros(shape, dtype=np.uint8))[1])
+    (path.parent / "hall.pgm").write_bytes(image[:2000])
+    with pytest.raises(WorldError, match=r"hall\.pgm has \d+ x \d+ pixels \(limits: 20,000,000, 40,000 along an edge"):
+        read_world(path)
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -120,6 +148,11 @@ def test_bad_map_is_refused_in_one_line(make, changes, said):
     with pytest.raises(WorldError, match=said) as caught:
         read_world(make(**changes))
     assert "hall.yaml" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_map_of_specks_is_refused(make):
+    with pytest.raises(WorldError, match=r"hall\.yaml: image: .* more than 50,000 rectangles; clear the map of specks"):
+        read_world(make((np.indices((400, 400)).sum(axis=0) % 2 * WHITE).astype(np.uint8)))
 
 
 @settings(deadline=None)

@@ -56,6 +56,11 @@ def test_planar_robot_hangs_on_two_slides_and_a_turn():
         ("<robot", "is not XML"),
         ("<robot name='a'/>", "has no link base_link"),
         ("<!DOCTYPE robot [<!ENTITY a 'b'>]><robot name='a'><link name='base_link'/></robot>", "document type"),
+        (
+            "<robot><link name='base_link'/>" + "<a>" * 1000 + "</a>" * 1000 + "</robot>",
+            "more than 100 elements within",
+        ),
+        ("<robot><link name='base_link'/>" + "<link/>" * 150_000 + "</robot>", "bytes are too many"),
     ],
 )
 def test_bad_urdf_is_refused(tmp_path, text, said):

@@ -1,5 +1,6 @@
 import itertools
 import math
+import time
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pybullet_simulator.io.world_file import read_world
 from pybullet_simulator.world.grid import FREE, OCCUPIED, UNKNOWN
+from pybullet_simulator.world.walking import Walker
 from pybullet_simulator.world.world import Box, World, WorldError, rasterise
 
 WORLDS = Path(__file__).parents[4] / "catkin_ws/src/metacontrol_sim/worlds"
 FLOOR = "floor: {x: [-5, 5], y: [-5, 5]}\n"
+LARGE_FLOOR = "floor: {x: [0, 200], y: [0, 200]}\n"
 RACK = "racks: [{name: rack, position: [2, 0], size: [0.05, 1], height: 1}]\n"
 
 
@@ -50,6 +53,22 @@ def gap(one, other):
         (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 1]], speed: 0}]", "'a': speed: is 0; give more"),
         (FLOOR + RACK + "people: [{name: a, waypoints: [[0, 0], [4, 0]]}]", "'a': the way leads into 'rack'"),
         (FLOOR + "people: [{name: a, waypoints: [[0, 0], [1, 1]], age: 7}]", "'a': unknown key age"),
+        (FLOOR + f"boxes: [{'0, ' * 501}]", "boxes: more than 500 boxes"),
+        (FLOOR + f"people: [{'0, ' * 101}]", "people: are 101; give at most 100"),
+        (
+            FLOOR + f"people: [{{name: a, waypoints: [{'[0, 0], ' * 501}]}}]",
+            "'a': waypoints: are 501 on 0 m; give at most",
+        ),
+        (
+            LARGE_FLOOR + f"people: [{{name: a, waypoints: [{'[0, 0], [200, 0], ' * 26}]}}]",
+            "'a': waypoints: are 52 on 10200 m; give at most",
+        ),
+        (
+            LARGE_FLOOR
+            + f"people: [{{name: a, waypoints: &w [{'[0, 0], [200, 0], ' * 20}]}}, {{name: b, waypoints: *w}}]",
+            "people: their ways are longer than 10000 m in all",
+        ),
+        (FLOOR + "#" * 80_000, "bytes are too many"),
     ],
 )
 def test_bad_world_is_refused_with_file_and_entry(tmp_path, text, message):
@@ -107,8 +126,8 @@ def test_map_marks_boxes_floor_and_outside(tmp_path):
         st.builds(
             lambda x, y, length, width, yaw: Box("a", "box", x, y, length, width, 1.0, yaw),
             *[st.floats(-4.0, 4.0)] * 2,
-            *[st.sampled_from([0.001, 0.05, 0.3, 2.0, 9.0])] * 2,
-            st.sampled_from([0.0, 0.4, math.pi / 2, 9.0]) | st.floats(-4.0, 4.0),
+            *[st.sampled_from([0.001, 0.05, 0.3, 2.0, 9.0, 1e300])] * 2,
+            st.sampled_from([0.0, 1e-17, 0.4, math.pi / 2, 9.0]) | st.floats(-4.0, 4.0),
         ),
         max_size=4,
     ),
@@ -122,6 +141,36 @@ def test_map_marks_the_cells_that_any_box_touches(boxes, resolution):
     for box in boxes:
         touched |= box.distance(x, y) < resolution / 2.0 - 1e-6
     np.testing.assert_array_equal(grid.cells == OCCUPIED, touched)
+
+
+def test_many_boxes_as_large_as_the_floor_are_drawn_at_once():
+    boxes = tuple(Box("a", "box", 100.0, 100.0, 200.0, 200.0, 1.0, yaw) for yaw in range(100))
+    began = time.process_time()
+    rasterise(World("hall", 0.0, 200.0, 0.0, 200.0, boxes))
+    assert time.process_time() - began < 5.0
+
+
+@given(
+    st.lists(
+        st.builds(
+            lambda x, y, length, width, yaw: Box("a", "box", x, y, length, width, 1.0, yaw),
+            *[st.floats(0.0, 60.0)] * 2,
+            *[st.sampled_from([0.001, 0.3, 9.0])] * 2,
+            st.floats(-4.0, 4.0),
+        ),
+        max_size=8,
+    ),
+    st.lists(st.tuples(*[st.floats(0.0, 60.0)] * 2), min_size=2, max_size=4).filter(
+        lambda points: len(set(points)) > 1
+    ),
+)
+def test_a_way_is_blocked_where_a_box_is_nearest_to_it(boxes, waypoints):
+    world, walker = World("hall", 0.0, 60.0, 0.0, 60.0, tuple(boxes)), Walker("a", tuple(waypoints))
+    places = walker.places(0.25)
+    walked = np.linspace(0.0, walker.length, len(places))
+    np.testing.assert_allclose(places, [walker.place(length) for length in walked], atol=1e-6)
+    blocked = (place for place in places.tolist() if world.nearest(*place)[1] < 0.25)
+    assert world.first_within(0.25, places) == next(map(tuple, blocked), None)
 
 
 def test_factory_has_four_narrow_aisles_and_else_wide_ways():

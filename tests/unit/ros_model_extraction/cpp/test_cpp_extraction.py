@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
@@ -639,6 +640,33 @@ def defaults(node: NodeSource) -> list[tuple[str, object]]:
 def test_default_that_a_constant_holds_is_known(node, code, expected):
     result = node(code, before="#define LIMIT 2.5\nconst double kRate = 10.0;")
     assert defaults(result) == [("~p", expected)]
+
+
+@pytest.mark.parametrize("number", ["1" * 5000, f"0x{'f' * 5000}"])
+@pytest.mark.parametrize("value", ["{}", "LIMIT"])
+def test_number_that_no_type_holds_is_not_known(node, number, value):
+    code = f'double a; pnh.param("p", a, {value.format(number)});'
+    assert defaults(node(code, before=f"#define LIMIT {number}")) == [("~p", None)]
+
+
+def test_member_of_a_member_without_end_is_not_known(node):
+    result = node(f'double a; pnh.param("p", a, {"b." * 5000}c);')
+    assert defaults(result) == [("~p", None)]
+
+
+@pytest.mark.parametrize(
+    ("before", "code"),
+    [
+        (f'const char* kText = "{"a" * 200_000}";', ""),
+        (f"#define LIMIT {'1' * 100_000}!", 'double a; pnh.param("p", a, LIMIT);'),
+        ("", f'nh.advertise<std_msgs::String>("{"{" * 200_000}", 1);'),
+    ],
+    ids=["letters", "digits", "braces"],
+)
+def test_long_runs_of_one_character_cost_little(node, before, code):
+    start = time.process_time()
+    node(code, before=before).declared()
+    assert time.process_time() - start < 5
 
 
 def test_default_that_another_parameter_fills_is_its_default(node):

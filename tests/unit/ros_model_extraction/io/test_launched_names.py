@@ -116,3 +116,23 @@ def test_nodelet_without_a_manager_has_its_interfaces_itself(started):
 def test_nodelet_of_a_manager_that_is_started_elsewhere_is_told(started):
     header = started(manager="/elsewhere/host").system.header
     assert "the interfaces of the nodelet /hall/damper: its manager /elsewhere/host has them" in header
+
+
+@pytest.mark.parametrize(
+    ("args", "content", "kept", "said"),
+    [
+        ("_a/b:=1", '<param name="a" value="5"/>', {"a/b": 1}, "/n/a, which /n/a/b replaces"),
+        ("_a:=1", '<param name="a/b" value="5"/>', {"a": 1}, "/n/a/b, which /n/a replaces"),
+        ("_a:=1 _a/b/c:=2", "", {"a/b/c": 2}, "/n/a, which /n/a/b/c replaces"),
+        ("_a:='{b: 1}'", "<rosparam>a: {b: 2, c: 3}</rosparam>", {"a/b": 1}, "/n/a/c, which /n/a replaces"),
+        ("_a:=1", '<param name="a" value="5"/>', {"a": 1}, ""),
+    ],
+)
+def test_parameter_that_another_one_replaces_is_said(tmp_path, args, content, kept, said):
+    path = tmp_path / "a.launch"
+    path.write_text(f'<launch><node name="n" pkg="nowhere" type="t" args="{args}">{content}</node></launch>')
+    system = read_launch_file(path).system
+    assert {parameter.key: parameter.value for parameter in system.component("n").parameters} == kept
+    assert [line for line in system.header.splitlines() if "replaces" in line] == [
+        f"Left out: the parameter {said}: no name has both a value and others below it" for _ in filter(None, [said])
+    ]

@@ -254,6 +254,16 @@ def test_bad_manifest_is_one_line_and_other_packages_are_read(tmp_path, capsys, 
     assert (tmp_path / "out" / "good.ros").exists()
 
 
+def test_manifest_with_more_dependencies_than_people_write_is_refused(tmp_path):
+    path = make_package(tmp_path) / "package.xml"
+    many = "".join(f"<exec_depend>p{number}</exec_depend>" for number in range(501))
+    path.write_text(path.read_text().replace("</package>", f"{many}</package>"))
+    with pytest.raises(
+        ModelError, match=r"package\.xml:1:1: 501 dependencies are too many \(at most 500\): leave"
+    ):
+        read_package(tmp_path)
+
+
 def test_folder_without_packages_and_missing_paths_are_refused(tmp_path, capsys):
     (tmp_path / "circle").symlink_to(tmp_path)
     assert run("extract", tmp_path) == 2
@@ -442,10 +452,10 @@ def test_launch_file_gives_components_wiring_and_parameters(launched, tmp_path, 
         ("<include file='/nonexistent.launch'/>", (), "roslaunch refuses it"),
         ("<node", (), "roslaunch refuses it"),
         ("", ("a",), "no NAME:=VALUE"),
-        ("\0", (), "binary"),
+        ("\0", (), "not well-formed XML"),
         ("<param name='a' type='int' value='x'/>", (), "roslaunch refuses it"),
         ("<rosparam>a: [</rosparam>", (), "roslaunch"),
-        ("<!DOCTYPE a>", (), "no DOCTYPE"),
+        ("<!DOCTYPE a>", (), "not well-formed XML"),
         ("<include file='$(dirname)/system.launch'/>", (), "roslaunch"),
     ],
 )
@@ -548,6 +558,9 @@ DESCRIBED = """
     """
 
 
+BAD_ENCODINGS = ["nope", "hex", "utf-7", "shift_jis", "idna"]
+
+
 def make_nodelets(folder: Path, described: str = DESCRIBED) -> Path:
     make_package(folder, cmake="project(demo)\nadd_library(${PROJECT_NAME}_nodelets src/nodelets.cpp)\n")
     manifest = (folder / "package.xml").read_text()
@@ -579,6 +592,21 @@ def test_model_says_how_a_nodelet_is_started(tmp_path):
 @pytest.mark.parametrize("described", ["<library", "<!DOCTYPE a><library/>", "<other/>"])
 def test_descriptions_of_nodelets_that_pluginlib_refuses_have_none(tmp_path, described):
     assert extract_package(make_nodelets(tmp_path, described)).package.artifacts == ()
+
+
+@pytest.mark.parametrize(
+    ("described", "said"),
+    [
+        ("<a>\n </b>", "nodelets.xml:2:4: not read: mismatched tag: line 2, column 3: save it"),
+        ("<!DOCTYPE a>", "nodelets.xml:1:1: not read: a description of plug-ins has no DOCTYPE"),
+        ("<library>\n\0", "nodelets.xml:2:1: not read: it is no text but binary"),
+        *((f"<?xml version='1.0' encoding='{name}'?><a>\xe4</a>", "nodelets.xml:1:") for name in BAD_ENCODINGS),
+    ],
+)
+def test_description_of_nodelets_that_can_not_be_read_is_said(tmp_path, described, said):
+    extracted = extract_package(make_nodelets(tmp_path, described))
+    (remark,) = extracted.unread
+    assert str(remark).startswith(said) and str(remark) in extracted.model().header
 
 
 def test_nodelets_that_are_not_there_are_said(tmp_path):

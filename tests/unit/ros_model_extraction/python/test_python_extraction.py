@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from ros_model.language.metamodel import PortKind
+from ros_model.language.metamodel import PortKind, Position
 from ros_model_extraction.io.python_modules import Library
-from ros_model_extraction.node_facts import NodeSource, SourceError
+from ros_model_extraction.node_facts import FoundParameter, NodeSource, SourceError
 from ros_model_extraction.packages.package_source import ExtractedPackage, extract_package
 from ros_model_extraction.python.node_reader import read_python_node
 
@@ -539,6 +540,35 @@ def test_value_that_grows_without_bound_is_not_known(node, code):
     assert not port.is_resolved
     assert len(port.name) < 100_000
     assert result.parameters[0].default is None
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        *("'%d' % 1e999", "'%c' % -1", "'%c' % 99999999", "'{:c}'.format(-1)"),
+        *("int(1e999)", f"float(1{'0' * 400})", f"len(range(1{'0' * 400}))", "str(b'a', 'nope')"),
+        *("'a'.split('')", "os.path.join()", f"str(0x{'f' * 5000})", f"f'{{0x{'f' * 5000}}}'"),
+        *("{[]: 1}", "{{}: 1}", "{(1, []): 2}", "{print: 1}"),
+    ],
+)
+def test_expression_that_fails_is_not_known(node, value):
+    result = node(f"import os\nrospy.get_param('~p', {value})\nrospy.Publisher({value}, String)\n")
+    (port,) = result.ports
+    assert not port.is_resolved
+    assert [(parameter.name, parameter.default) for parameter in result.parameters] == [("~p", None)]
+
+
+@pytest.mark.parametrize("value", [10**400, "9" * 400, 1e999])
+def test_default_without_notation_is_left_out_of_the_declaration(value):
+    default = int(value) if isinstance(value, str) else value
+    parameters = tuple(FoundParameter(f"~{kind or 'p'}", default, Position(), kind) for kind in ("", "Double"))
+    assert [parameter.value for parameter in NodeSource("n", (), parameters).declared().parameters] == [None, None]
+
+
+def test_import_of_many_parts_costs_little(package):
+    start = time.process_time()
+    package(f"import rospy\nimport {'.'.join('a' * 10_000)}\nrospy.init_node('a')\n")
+    assert time.process_time() - start < 5
 
 
 def test_model_says_what_could_not_be_resolved(package):

@@ -273,6 +273,40 @@ def test_list_with_bytes_keeps_its_types():
     assert ([element.kind for element in kind.elements], value) == (["Integer", "Base64"], [1, "aGk="])
 
 
+def nested(depth, around, inside=1):
+    for _ in range(depth):
+        inside = around(inside)
+    return inside
+
+
+@pytest.mark.parametrize(
+    ("around", "deepest"), [(lambda inside: [inside], 64), (lambda inside: {"a": inside}, 32)], ids=["lists", "structs"]
+)
+def test_value_may_be_nested_as_deep_as_the_language_reads(around, deepest):
+    extracted(graph([["/x", ["/a"]]], parameters={"p": nested(deepest - 1, around, [1])}))
+    for depth in (deepest + 1, 100_000):
+        with pytest.raises(UnwritableValueError, match="nested deeper than 64 levels"):
+            typed(nested(depth, around))
+
+
+@pytest.mark.parametrize("value", [10**400, -(10**400), [[10**5000]]])
+def test_number_that_the_language_can_not_hold_is_left_out_and_said(value):
+    models = extracted(graph([["/x", ["/a"]]], parameters={"a": {"p": value}, "q": value}))
+    assert [parameter.value for parameter in models.system.component("a").parameters] == [None]
+    assert models.system.parameters == ()
+    for name in ("/a/p", "/q"):
+        assert f"Left out: the value of the parameter {name}: it is too large for a double." in models.system.header
+
+
+def test_namespaces_within_each_other_without_end_are_one_value():
+    circle = {}
+    circle["a"] = circle
+    ((name, value),) = leaves(circle)
+    assert len(name.split("/")) > 100
+    with pytest.raises(UnwritableValueError):
+        typed(value)
+
+
 def test_none_and_empty_structs_have_no_notation():
     for raw in (None, {}, [None], object()):
         with pytest.raises(UnwritableValueError):

@@ -1,11 +1,17 @@
 """Reading launch files through roslaunch."""
 
 import pytest
+from ros_model.errors import ModelError
 from ros_model.io.files import resolve
+from ros_model.io.launch_files import load
 from rosgraph_manipulator.configuration.difference import compare
 from rosgraph_manipulator.io.launch_files import LaunchFileError, read_launch_file, read_model
 
 NODE = '<node name="n" pkg="move_base" type="move_base"'
+
+
+def short(value):
+    return repr(value)[:12]
 
 
 def write(folder, body):
@@ -191,7 +197,7 @@ def test_whatever_roslaunch_raises_refuses_the_file_in_one_line(tmp_path, monkey
     monkeypatch.setattr("roslaunch.xmlloader.XmlLoader._node_tag", fail)
     with pytest.raises(LaunchFileError) as error:
         read_launch_file(path)
-    assert str(error.value).startswith(f"{path}: {type(failure).__name__}: ")
+    assert str(error.value).startswith(f"{path}: roslaunch can't read <launch>: {type(failure).__name__}: ")
     assert str(error.value).endswith(": correct the launch file")
     assert "\n" not in str(error.value)
 
@@ -208,6 +214,33 @@ def test_entities_are_refused(tmp_path):
         read_launch_file(path)
 
 
+@pytest.mark.parametrize(
+    "body",
+    [
+        "<rosparam>a: &amp;a [*a]</rosparam>",
+        '<param name="p" textfile="/dev/zero"/>',
+        '<param name="p" command=""/>',
+        '<node name="a.b" pkg="move_base" type="move_base"/>',
+        "<rosparam>1: 2</rosparam>",
+    ],
+)
+def test_what_check_refuses_is_refused_in_the_same_words(tmp_path, body):
+    path = write(tmp_path, f"{NODE}/>{body}")
+    with pytest.raises(ModelError) as checked:
+        load(path)
+    with pytest.raises(LaunchFileError) as error:
+        read_launch_file(path)
+    assert str(error.value) == str(checked.value)
+
+
+def test_parameter_that_is_no_number_does_not_differ_from_itself(tmp_path):
+    path = write(tmp_path, f"{NODE}><rosparam>{{a: .nan, b: [.nan]}}</rosparam></node><rosparam>c: .nan</rosparam>")
+    difference = compare(read_launch_file(path).system, read_launch_file(path).system)
+    assert not difference.touches_nodes and not difference.shared
+    path.write_text(path.read_text().replace("[.nan]", "[1.0]"))
+    assert list(compare(difference.running, read_launch_file(path).system).parameters["/n"]) == ["b"]
+
+
 def test_model_and_its_launch_file_are_the_same_configuration():
     name = "f2_v2_r2"
     model = read_model(resolve(f"package://metacontrol_sim/models/variants/{name}.rossystem"))
@@ -222,7 +255,9 @@ def test_parameters_to_clear_are_kept(tmp_path):
     assert launch.clear == ("/old/",)
 
 
-@pytest.mark.parametrize("spoilt", ["a: [1", "[1, 2]", "1: 2", "", b"a: \xff", None], ids=repr)
+@pytest.mark.parametrize(
+    "spoilt", ["a: [1", "[1, 2]", "1: 2", "a: &a [*a]", "a: [" + "1," * 300_000 + "]", "", b"a: \xff", None], ids=short
+)
 def test_file_of_parameters_that_can_not_be_used_counts_as_it_was(tmp_path, spoilt):
     """Many variants may load one file."""
     file = tmp_path / "tank.yaml"

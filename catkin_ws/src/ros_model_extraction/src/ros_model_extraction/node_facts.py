@@ -12,8 +12,8 @@ from ros_model.language.packages import Node, ParameterDeclaration, PortDeclarat
 
 from ros_model_extraction.values import UnwritableValueError, typed
 
-_HOLES = re.compile(r"\{.*\}")
-"""From the first expression in braces to the last one."""
+_HOLES = re.compile(r"^([^{]*)\{.*\}")
+"""Up to the first expression in braces, and from there to the last one."""
 
 
 class SourceError(Exception):
@@ -116,7 +116,7 @@ class NodeSource:
         ports: dict[tuple[PortKind, str], PortDeclaration] = {}
         for port in self.ports:
             # What one line makes, with several names that are not known, is one interface.
-            name = port.name if port.is_resolved else f"{_HOLES.sub('{}', port.name)}:{port.position.column}"
+            name = port.name if port.is_resolved else f"{_without_holes(port.name)}:{port.position.column}"
             known = ports.get((port.kind, name))
             if known is None or (port.type and not known.type):
                 shown = known.name if known else port.name
@@ -124,7 +124,7 @@ class NodeSource:
         parameters: dict[str, ParameterDeclaration] = {}
         for parameter in self.parameters:
             name = private_name(parameter.name)
-            key = f"{_HOLES.sub('{}', name)}:{parameter.position.column}" if "{" in name else name  # as for ports
+            key = f"{_without_holes(name)}:{parameter.position.column}" if "{" in name else name  # as for ports
             before = parameters.get(key)
             declared = _declared(replace(parameter, name=before.name if before else name))
             if before is None or (before.value is None and (declared.value is not None or before.type is None)):
@@ -162,6 +162,11 @@ def private_name(name: str) -> str:
     return name if name.startswith(("/", "{")) else f"/{name}"
 
 
+def _without_holes(name: str) -> str:
+    """Return a name with `{}` for all from its first expression to its last one."""
+    return _HOLES.sub(r"\1{}", name)
+
+
 def unresolved(name: str, position: Position) -> str:
     """Return a name with expressions in braces, and its place: unlike any other in its node."""
     return f"{name}@{position.file}:{position.line}"
@@ -179,11 +184,11 @@ def _declared(parameter: FoundParameter) -> ParameterDeclaration:
     declared = ParameterType(parameter.kind) if parameter.kind else None
     if default is None:
         return ParameterDeclaration(name, declared, position=position)
-    if parameter.kind == "Double" and type(default) is int:
-        default = float(default)
     try:
         kind, value = typed(default)
     except UnwritableValueError:
         return ParameterDeclaration(name, declared, position=position)
+    if parameter.kind == "Double" and type(value) is int:
+        kind, value = ParameterType("Double"), float(value)
     is_by_value = not parameter.kind and has_integer(kind)
     return ParameterDeclaration(name, kind, value, position=position, is_by_value=is_by_value)

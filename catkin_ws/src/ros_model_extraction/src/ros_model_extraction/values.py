@@ -5,22 +5,27 @@ from __future__ import annotations
 import base64
 import datetime
 import math
+import sys
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from ros_model.language.builder import MAX_NESTING
 from ros_model.language.metamodel import ParameterType, Value
+
+_MAX_NAMESPACES = 200
+"""Levels of namespaces; what is below them counts as one value, for Python can't recurse without end."""
 
 
 class UnwritableValueError(ValueError):
     """A value has no notation in the languages; the message says why."""
 
 
-def leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def leaves(tree: Mapping[str, Any], prefix: str = "", depth: int = 0) -> Iterator[tuple[str, Any]]:
     """Yield (name, value) of all parameters of a tree, names joined by slashes; empty namespaces hold none."""
     for key, value in sorted(tree.items(), key=lambda item: str(item[0])):
         name = f"{prefix}/{key}" if prefix else str(key)
-        if isinstance(value, Mapping):
-            yield from leaves(value, name)
+        if isinstance(value, Mapping) and depth < _MAX_NAMESPACES:
+            yield from leaves(value, name, depth + 1)
         else:
             yield name, value
 
@@ -31,8 +36,15 @@ def typed(raw: Any) -> tuple[ParameterType, Value]:
     Raises:
         UnwritableValueError: the value, or one inside it, has no notation.
     """
+    return _typed(raw, MAX_NESTING)
+
+
+def _typed(raw: Any, left: int) -> tuple[ParameterType, Value]:
+    """Return type and value, which may have so many braces within each other."""
     match raw:
         case bool() | int() | str():
+            if isinstance(raw, int) and abs(raw) > sys.float_info.max:
+                raise UnwritableValueError("it is too large for a double")
             return ParameterType(_PRIMITIVES[type(raw)]), raw
         case float():
             if not math.isfinite(raw):
@@ -43,12 +55,20 @@ def typed(raw: Any) -> tuple[ParameterType, Value]:
         case datetime.date() | object(value=str()):  # the latter is a DateTime of xmlrpc.client
             return ParameterType("Date"), str(raw)
         case list() | tuple():
-            return _list([typed(item) for item in raw])
+            left = _without(left, 1)
+            return _list([_typed(item, left) for item in raw])
         case dict() if raw:
-            members = {str(name): typed(item) for name, item in raw.items()}
+            left = _without(left, 2)  # one around all members, one around each
+            members = {str(name): _typed(item, left) for name, item in raw.items()}
             declared = tuple((name, kind) for name, (kind, _) in members.items())
             return ParameterType("Struct", members=declared), {name: value for name, (_, value) in members.items()}
     raise UnwritableValueError("a value of no kind that the language has" if raw is not None else "it has no value")
+
+
+def _without(left: int, braces: int) -> int:
+    if left < braces:
+        raise UnwritableValueError(f"it is nested deeper than {MAX_NESTING} levels")
+    return left - braces
 
 
 _PRIMITIVES = {bool: "Boolean", int: "Integer", str: "String"}

@@ -152,7 +152,7 @@ def _text(path: Path) -> str:
 def _initial(folder: Path) -> Iterator[tuple[str, str]]:
     """Yield each launch file of a package that names configurations to begin with, and what it names."""
     for path in sorted(folder.glob("launch/*.launch")):
-        with contextlib.suppress(OSError, ElementTree.ParseError):  # the launch itself will say so
+        with contextlib.suppress(OSError, ElementTree.ParseError, LookupError, ValueError):  # the launch will say so
             for element in ElementTree.parse(path).getroot().iter("arg"):  # noqa: S314 - the project's own file
                 named = element.get("default") or element.get("value") or ""
                 if element.get("name") == _INITIAL and named and "$(" not in named:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 from node_kit.io.input_files import InputFileError, read_bytes
 from node_kit.one_line import OneLineError
+from PIL.BmpImagePlugin import BmpImageFile
+from PIL.JpegImagePlugin import JpegImageFile
+from PIL.PngImagePlugin import PngImageFile
+from PIL.PpmImagePlugin import PpmImageFile
 
 from pybullet_simulator.world.grid import FREE, OCCUPIED, UNKNOWN, Grid
 
@@ -20,9 +26,18 @@ if TYPE_CHECKING:
 MODES = ("trinary", "scale", "raw")
 MAX_EXTENT = 2000.0
 """m; a larger map has its resolution in another unit."""
-MAX_CELLS = 100_000_000
+MAX_CELLS = 20_000_000
+"""Maps of buildings have up to 4,000 x 4,000 cells; this many take most of 1 s and 500 MB."""
+MAX_SIDE = 40_000
+"""Cells along an edge: MAX_EXTENT at 0.05 m. Walls are sought row by row."""
 MAX_IMAGE_SIZE = 8 * MAX_CELLS
 """Bytes of the largest image: four channels of 16 bits a cell."""
+
+_READERS = (PngImageFile, PpmImageFile, BmpImageFile, JpegImageFile)
+_HEADER_SIZE = 1_000_000
+"""Bytes in which an image has to tell its size; Pillow reads comments byte by byte."""
+_PIXELS_AT_ONCE = 65_536
+"""That are made cells of: as numbers of 4 bytes, all pixels would take many times their memory."""
 
 
 class MapError(OneLineError, ValueError):
@@ -54,14 +69,19 @@ def read_map(content: dict[str, Any], path: Path) -> Grid:
     if mode not in MODES:
         raise MapError(f"{path}: mode: is {mode!r}; give one of {', '.join(MODES)}")
     image = _image(content.get("image"), path)
-    if max(image.shape[:2]) * resolution > MAX_EXTENT or image.shape[0] * image.shape[1] > MAX_CELLS:
+    if max(image.shape[:2]) * resolution > MAX_EXTENT:
         raise MapError(
             f"{path}: resolution: {resolution:g} makes {image.shape[1]} x {image.shape[0]} pixels too large "
-            f"(limits: {MAX_EXTENT:g} m, {MAX_CELLS:,} cells); is it in m per cell?"
+            f"(limit: {MAX_EXTENT:g} m); is it in m per cell?"
         )
-    shades, opaque = _shades(image, mode)
-    cells = _cells(255.0 - shades if negate else shades, opaque, mode, free, occupied)
-    return Grid(np.ascontiguousarray(cells[::-1]), resolution, x, y, yaw)  # an image's first row is its top
+    pixels = image.reshape(1, -1, *image.shape[2:])
+    cells = np.empty(pixels.shape[1], dtype=np.int8)
+    for begin in range(0, len(cells), _PIXELS_AT_ONCE):
+        part = slice(begin, begin + _PIXELS_AT_ONCE)
+        shades, opaque = _shades(pixels[:, part], mode)
+        cells[part] = _cells(255.0 - shades if negate else shades, opaque, mode, free, occupied)[0]
+    rows = cells.reshape(image.shape[:2])[::-1]  # an image's first row is its top
+    return Grid(np.ascontiguousarray(rows), resolution, x, y, yaw)
 
 
 def _cells(
@@ -90,7 +110,11 @@ def _shades(image: NDArray[Any], mode: str) -> tuple[NDArray[np.float32], NDArra
         opaque = pixels[:, :, -1] >= 255.0
         if mode != "trinary":  # in that mode map_server counts transparency as a colour
             pixels = pixels[:, :, :-1]
-    return pixels.mean(axis=2), opaque
+    channels = pixels.shape[2]
+    total = pixels[:, :, 0].copy()
+    for channel in range(1, channels):  # takes half the time of `mean`
+        total += pixels[:, :, channel]
+    return total / channels, opaque
 
 
 def _image(name: Any, path: Path) -> NDArray[Any]:
@@ -98,16 +122,30 @@ def _image(name: Any, path: Path) -> NDArray[Any]:
         raise MapError(f"{path}: image: is {name!r}; give the name of an image file")
     file = path.parent / name
     try:
-        data = np.frombuffer(read_bytes(file, MAX_IMAGE_SIZE), dtype=np.uint8)
+        data = read_bytes(file, MAX_IMAGE_SIZE)
     except InputFileError as error:
         raise MapError(f"{path}: image: {error}") from error
+    size = _size(data)
+    if size and (size[0] * size[1] > MAX_CELLS or max(size) > MAX_SIDE):
+        raise MapError(
+            f"{path}: image: {file} has {size[0]} x {size[1]} pixels "
+            f"(limits: {MAX_CELLS:,}, {MAX_SIDE:,} along an edge); crop it, or give a coarser one"
+        )
     try:
-        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED) if size else None
     except cv2.error:
         image = None
-    if image is None or image.dtype not in (np.uint8, np.uint16):
-        raise MapError(f"{path}: image: {file} is no image that can be read; give a PGM or PNG file")
+    if image is None or image.dtype not in (np.uint8, np.uint16) or image.shape[1::-1] != size:
+        raise MapError(f"{path}: image: {file} is no image that can be read; give a PGM, PNG, BMP or JPEG file")
     return image
+
+
+def _size(data: bytes) -> tuple[int, int] | None:
+    """Return width and height as an image's header tells them, None where it is none that is known."""
+    for reader in _READERS:
+        with suppress(Exception):  # whatever Pillow raises, it is no image of this kind
+            return reader(io.BytesIO(data[:_HEADER_SIZE])).size
+    return None
 
 
 def _origin(value: Any, path: Path) -> tuple[float, float, float]:

@@ -17,6 +17,11 @@ ROOT = "base_link"
 JOINTS = ("slide_x", "slide_y", "turn")
 """Joints from the map to the robot's root, in the order in which they follow each other."""
 
+MAX_SIZE = 500_000
+"""Bytes of the largest URDF: 50 times that of this package; a megabyte of empty links takes more than 1 s."""
+MAX_DEPTH = 100
+"""Elements within each other: a URDF has 5, extensions some more; ElementTree writes them by recursion."""
+
 _FAR = "1e9"
 _SLIDE_MASS = "1"
 _LOOKS_MASS = "0.001"  # kg; to a link without inertia PyBullet gives 1 kg
@@ -42,7 +47,7 @@ def planar_urdf(path: Path) -> str:
     """Return a URDF with two sliding joints and a turning one between the map and the robot's root.
 
     Raises:
-        RobotFileError: the file cannot be read, is no URDF with the link base_link, or declares entities.
+        RobotFileError: as `read_robot`.
     """
     robot = read_robot(path)
     put_on_planar_joints(robot)
@@ -53,17 +58,20 @@ def read_robot(path: Path) -> ET.Element:
     """Return the URDF of a robot whose root is base_link.
 
     Raises:
-        RobotFileError: the file cannot be read, is no URDF with the link base_link, or declares entities.
+        RobotFileError: the file cannot be read, is too large or nested too deep, is no URDF with the link base_link,
+            or declares entities.
     """
     try:
-        text = read_text(path)
+        text = read_text(path, MAX_SIZE)
         if "<!DOCTYPE" in text:
             raise RobotFileError(f"{path}: declares a document type; a URDF needs none")
-        robot = ET.fromstring(text)  # noqa: S314 (entities are refused above)
+        robot = ET.fromstring(text, ET.XMLParser(target=_ShallowBuilder()))  # noqa: S314 (entities are refused above)
     except InputFileError as error:
         raise RobotFileError(str(error)) from error
     except ET.ParseError as error:
         raise RobotFileError(f"{path}: is not XML: {error}") from error
+    except RecursionError as error:
+        raise RobotFileError(f"{path}: more than {MAX_DEPTH} elements within each other; correct the URDF") from error
     if ROOT not in {link.get("name") for link in robot.iter("link")}:
         raise RobotFileError(f"{path}: has no link {ROOT}")
     return robot
@@ -75,6 +83,26 @@ def put_on_planar_joints(robot: ET.Element) -> None:
         if link.find("inertial") is None:
             link.append(_inertial(_LOOKS_MASS, "1e-6"))
     robot.extend(_slides())
+
+
+class _ShallowBuilder(ET.TreeBuilder):
+    """Builds elements; raises RecursionError where they are nested too deep."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._depth = 0
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> ET.Element:
+        """Begin an element."""
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise RecursionError
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> ET.Element:
+        """End an element."""
+        self._depth -= 1
+        return super().end(tag)
 
 
 def _slides() -> Iterator[ET.Element]:

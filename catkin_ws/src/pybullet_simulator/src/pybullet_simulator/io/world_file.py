@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from node_kit.io.input_files import InputFileError, read_yaml
+from node_kit.io.input_files import InputFileError, read_bytes, read_yaml
 
 from pybullet_simulator.io.map_file import MapError, read_map
-from pybullet_simulator.world.walking import SPEED, Walker
-from pybullet_simulator.world.world import KINDS, Box, World, WorldError, extrude, way_problem
+from pybullet_simulator.world.grid import GridError
+from pybullet_simulator.world.walking import MAX_PEOPLE, MAX_WAY, SPEED, Walker
+from pybullet_simulator.world.world import KINDS, MAX_BOXES, Box, World, WorldError, extrude, way_problem
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+MAX_SIZE = 80_000
+"""Bytes of the largest file: those of MAX_BOXES boxes and more; YAML of twice the size can take 2 s."""
 
 
 def read_world(path: Path) -> World:
@@ -22,6 +26,7 @@ def read_world(path: Path) -> World:
         WorldError: the file is missing, not YAML, or one of its entries is wrong; names the file and the entry.
     """
     try:
+        read_bytes(path, MAX_SIZE)
         content = read_yaml(path)
     except InputFileError as error:
         raise WorldError(str(error)) from error
@@ -34,6 +39,8 @@ def read_world(path: Path) -> World:
             return extrude(read_map(content, path), path.stem)
         except MapError as error:
             raise WorldError(str(error)) from error
+        except GridError as error:
+            raise WorldError(f"{path}: image: {error}") from error
     known = {"name", "floor", "people", *KINDS}
     for key in content:
         if key not in known:
@@ -44,10 +51,14 @@ def read_world(path: Path) -> World:
         entries = content.get(section) or []
         if not isinstance(entries, list):
             raise WorldError(f"{path}: {section}: must be a list of boxes")
+        if len(boxes) + len(entries) > MAX_BOXES:
+            raise WorldError(f"{path}: {section}: more than {MAX_BOXES} boxes in all; leave some out, or use a map")
         boxes.extend(_box(entry, kind, f"{path}: {section}[{index}]") for index, entry in enumerate(entries))
     people = content.get("people") or []
     if not isinstance(people, list):
         raise WorldError(f"{path}: people: must be a list of people")
+    if len(people) > MAX_PEOPLE:
+        raise WorldError(f"{path}: people: are {len(people)}; give at most {MAX_PEOPLE}")
     walkers = tuple(_walker(entry, f"{path}: people[{index}]") for index, entry in enumerate(people))
     world = World(str(content.get("name", path.stem)), x_min, x_max, y_min, y_max, tuple(boxes), walkers)
     _check(world, path)
@@ -108,9 +119,13 @@ def _check(world: World, path: Path) -> None:
         if name in seen:
             raise WorldError(f"{path}: {name!r}: the name stands twice; rename one of them")
         seen.add(name)
+    way = 0.0
     for walker in world.walkers:
         if problem := way_problem(world, walker):
             raise WorldError(f"{path}: {walker.name!r}: {problem}")
+        way += walker.length
+        if way > MAX_WAY:
+            raise WorldError(f"{path}: people: their ways are longer than {MAX_WAY:g} m in all; leave some out")
     for box in world.boxes:
         if box.kind != "wall" and not world.contains(box.x, box.y):
             raise WorldError(f"{path}: {box.name!r}: position ({box.x}, {box.y}) is off the floor")

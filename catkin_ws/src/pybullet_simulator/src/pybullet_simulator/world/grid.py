@@ -7,12 +7,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from node_kit.one_line import OneLineError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 """Cell values of nav_msgs/OccupancyGrid."""
+MAX_RECTANGLES = 50_000
+"""That cover a grid: several times those of an untidy building; each takes some microseconds to find."""
+
+
+class GridError(OneLineError, ValueError):
+    """A grid that needs too many rectangles."""
 
 
 @dataclass(frozen=True)
@@ -68,15 +75,20 @@ def cover(occupied: NDArray[np.bool_]) -> NDArray[np.int64]:
 
     Returns:
         (n, 4): first row, first column, rows, columns.
+
+    Raises:
+        GridError: it takes more than MAX_RECTANGLES.
     """
     along_rows, along_columns = _sweep(occupied), _sweep(occupied.T)
-    if len(along_rows) <= len(along_columns):
-        return along_rows
-    return along_columns[:, (1, 0, 3, 2)]
+    if along_columns is not None and (along_rows is None or len(along_columns) < len(along_rows)):
+        return along_columns[:, (1, 0, 3, 2)]
+    if along_rows is None:
+        raise GridError(f"the occupied cells need more than {MAX_RECTANGLES:,} rectangles; clear the map of specks")
+    return along_rows
 
 
-def _sweep(occupied: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the rectangles of `cover` that grow from runs along the rows."""
+def _sweep(occupied: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+    """Return the rectangles of `cover` that grow from runs along the rows, None where they are too many."""
     rows, columns = occupied.shape
     depth = np.zeros((rows + 1, columns), dtype=np.int32)  # occupied cells in a column from a cell on
     for row in range(rows - 1, -1, -1):
@@ -87,6 +99,8 @@ def _sweep(occupied: NDArray[np.bool_]) -> NDArray[np.int64]:
     for row in range(rows):
         # What a rectangle from above covers is gone here; what is left below it reaches as deep as `depth` says.
         edges = np.flatnonzero(np.diff(left[row]))
+        if len(found) + edges.size // 2 > MAX_RECTANGLES:
+            return None
         for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             height = int(depth[row, begin:end].min())
             left[row : row + height, begin + 1 : end + 1] = 0

@@ -103,7 +103,7 @@ class InstalledPackages:
             return missing
         files = (folder / name for folder in (own, _folder(package)) if folder)
         why = wrong_parameters(next(file for file in files if file.is_file()))
-        return Unknown(f"{why}: make it a mapping NAME: VALUE") if why else None
+        return Unknown(why) if why else None
 
 
 def _missing_executable(package: str, name: str) -> Unknown | None:

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import rospkg
-
 from ros_model.checks.launched import LaunchedNode, LaunchFile
 from ros_model.errors import ModelError
-from ros_model.io.files import read_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
 
@@ -20,11 +17,8 @@ def read_launch_file(path: Path) -> LaunchFile:
     """Return what a launch file starts; its arguments have their defaults. It runs nothing.
 
     Raises:
-        ModelError: it can't be read, or roslaunch refuses it; says what roslaunch says. Or a node has no name.
+        ModelError: as `load`.
     """
-    text = read_text(path)
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ModelError(f"{path}: a launch file has no DOCTYPE and no entities: remove them")
     config = load(path)
     nodes = [
         LaunchedNode(f"{node.namespace}{node.name}", node.package, node.type, node.machine_name or "")
@@ -55,28 +49,20 @@ def load(path: Path, arguments: Sequence[str] = (), *, runs_programs: bool = Fal
             NotRun as their value.
 
     Raises:
-        ModelError: roslaunch refuses the file; says what it says. Or a node has no name.
+        ModelError: roslaunch refuses the file; says what it says. Or it holds what no reader of this project takes.
     """
     import roslaunch.config
-    import roslaunch.core
-    import roslaunch.xmlloader
 
+    from ros_model.io.launch_loader import EXPLAINED, LaunchLoader, check_configuration, in_one_line
+
+    config = roslaunch.config.ROSLaunchConfig()  # without what a roscore has: that runs two programs
+    loader = LaunchLoader(None if runs_programs else NotRun)
     try:
-        config = roslaunch.config.ROSLaunchConfig()  # without what a roscore has: that runs two programs
-        loader = roslaunch.xmlloader.XmlLoader()
-        if not runs_programs:
-            loader.param_value = _without_programs(loader.param_value)
-        loader.ignore_unset_args = False
         loader.load(str(path), config, argv=list(arguments), verbose=False)
-    except (roslaunch.core.RLException, roslaunch.xmlloader.XmlParseException, rospkg.ResourceNotFound) as error:
-        raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(error).split())}") from error
-    except Exception as error:  # whatever `$(eval ...)`, an encoding or the file's size makes of it
-        raise ModelError(f"{path}: roslaunch can't read it: {type(error).__name__}: {error}") from error
-    if config.config_errors:
-        raise ModelError(f"{path}: roslaunch refuses it: {' '.join(str(config.config_errors[0]).split())}")
-    for node in config.nodes:
-        if not node.name:  # roslaunch makes one up at each start
-            raise ModelError(f"{path}: a node of {node.package}/{node.type} has no name: give it one")
+    except EXPLAINED as error:
+        text = in_one_line(str(error)).removeprefix(f"{path}: ")
+        raise ModelError(f"{path}: roslaunch refuses it: {text}") from error
+    check_configuration(path, config)
     return config
 
 
@@ -85,22 +71,13 @@ def wrong_parameters(path: Path) -> str:
     import roslaunch.config
     import roslaunch.loader
 
+    from ros_model.io.launch_loader import LaunchContentError, LaunchLoader
+
+    context, config = roslaunch.loader.LoaderContext("/", str(path)), roslaunch.config.ROSLaunchConfig()
     try:
-        read_text(path)
-        loader, context = roslaunch.loader.Loader(), roslaunch.loader.LoaderContext("/node", str(path))
-        loader.load_rosparam(context, roslaunch.config.ROSLaunchConfig(), "load", "", str(path), "", verbose=False)
-    except ModelError as error:
-        return str(error)
+        LaunchLoader().load_rosparam(context, config, "load", "", str(path), "", verbose=False)
+    except LaunchContentError as error:
+        return error.problem
     except Exception as error:  # whatever keys and values make of it
         return f"{path}: roslaunch can't load it: {type(error).__name__}: {' '.join(str(error).split())[:300]}"
     return ""
-
-
-def _without_programs(param_value: Callable[..., Any]) -> Callable[..., Any]:
-    """Return roslaunch's reader of a parameter's value, which runs no program."""
-
-    def value_of(verbose: bool, name: str, kind: str, *ways: str | None) -> Any:
-        *_, command = ways  # value, textfile, binfile, command: one of them is given
-        return param_value(verbose, name, kind, *ways) if command is None else NotRun(command)
-
-    return value_of

@@ -22,6 +22,8 @@ _LIMITS = {
     "std::numeric_limits<int>::max": "INT_MAX",
 }
 _NUMBER = re.compile(r"-?(?:0[xX][0-9a-fA-F]+|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
+_MAX_NUMBER = 400
+"""Characters of a number: the smallest double has 326 of them, and Python takes no integer of more than 4,300."""
 _MATHEMATICS = {
     "M_PI": math.pi,
     "M_PI_2": math.pi / 2,
@@ -154,7 +156,7 @@ def _number(shown: str) -> int | float | None:
     plain = shown.strip().strip("()").replace("'", "")
     if not plain.lower().startswith("0x"):
         plain = plain.rstrip("fFlLuU")
-    if not _NUMBER.fullmatch(plain):
+    if len(plain) > _MAX_NUMBER or not _NUMBER.fullmatch(plain):
         return None
     if plain.lower().startswith(("0x", "-0x")):
         return int(plain, 16)

@@ -175,7 +175,7 @@ class Program:
         if place.owner and (found := self._index.members.get((place.owner, plain), [])):
             return found
         outer, _, inner = plain.replace("->", ".").rpartition(".")
-        if outer and inner.isidentifier():  # a member of an object
+        if outer and inner.isidentifier() and outer.count(".") < MAX_DEPTH:  # a member of an object
             kinds = {class_name(self.alias(one.type, one.place)) for one in self.declared(outer, place)}
             return [one for kind in sorted(kinds) for one in self._index.members.get((kind, inner), [])]
         return self._index.globals.get(plain.rpartition("::")[2], [])

@@ -17,7 +17,7 @@ from ros_model_extraction.cpp.syntax import child_of, class_name, function_name,
 
 _WORDS = ("identifier", "field_identifier", "type_identifier", "namespace_identifier")
 _CLASSES = ("class_specifier", "struct_specifier")
-_NAMED_IN_TEXT = re.compile(r"[A-Za-z_]\w*(?:(?:::|/)[A-Za-z_]\w*)+")
+_NAMED_IN_TEXT = re.compile(r"(?<!\w)[A-Za-z_]\w*(?:(?:::|/)[A-Za-z_]\w*)+")
 _EXPORT = "PLUGINLIB_"
 
 

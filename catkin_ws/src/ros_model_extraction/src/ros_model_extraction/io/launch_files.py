@@ -20,12 +20,12 @@ from ros_model.language.remappings import remark_lines
 
 from ros_model_extraction import ros_defaults as plumbing
 from ros_model_extraction.io.python_modules import Library
-from ros_model_extraction.io.source_files import read_xml
 from ros_model_extraction.names import as_seen_from, node_name, split_name
 from ros_model_extraction.node_facts import NodeSource, SourceError
 from ros_model_extraction.packages.catkin_package import CatkinPackage, read_package
 from ros_model_extraction.packages.package_source import named, read_executable
 from ros_model_extraction.running.graph import End, Instance, Models, assemble, label_of, share_out
+from ros_model_extraction.values import leaves
 
 _SPECIAL = "__"
 
@@ -77,16 +77,19 @@ def read_launch_file(path: Path, arguments: Sequence[str] = (), *, runs_programs
     nodes, parameters = load(path, arguments, runs_programs)
     not_run = {name: value.command for name, value in parameters.items() if isinstance(value, NotRun)}
     parameters = {name: value for name, value in parameters.items() if name not in not_run}
-    tree = _tree(parameters)
+    private = [(f"{node.name}/{name}", value) for node in nodes for name, value in node.private.items()]
+    tree: dict[str, Any] = {}
     sources = _Sources()
     instances = {}
     lines = [
         f"Left out: the parameter {name}, which a program gives that was not run: {command}"
         for name, command in sorted(not_run.items())
     ]
-    for node in nodes:
-        for name, value in node.private.items():
-            _put(tree, f"{node.name}/{name}", value)
+    lines += [
+        f"Left out: the parameter {gone}, which {name} replaces: no name has both a value and others below it"
+        for name, value in [*sorted(parameters.items()), *private]
+        for gone in _put(tree, name, value)
+    ]
     names = [node.name for node in nodes]
     managed: dict[str, tuple[str, list[End]]] = {}
     for node in nodes:
@@ -139,7 +142,6 @@ def load(path: Path, arguments: Sequence[str], runs_programs: bool) -> tuple[lis
     Raises:
         ModelError: roslaunch refuses the file.
     """
-    read_xml(path, "a launch file")
     for argument in arguments:
         if ":=" not in argument:
             raise ModelError(f"argument {argument!r} is not NAME:=VALUE")
@@ -257,20 +259,22 @@ def _remapped(kind: PortKind, name: str, remaps: Mapping[str, str]) -> str:
     return remaps.get(name, name)
 
 
-def _tree(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    tree: dict[str, Any] = {}
-    for name, value in sorted(parameters.items()):
-        _put(tree, name, value)
-    return tree
-
-
-def _put(tree: dict[str, Any], name: str, value: Any) -> None:
+def _put(tree: dict[str, Any], name: str, value: Any) -> list[str]:
+    """Set a parameter, and return the names of those that it replaces, which are above or below it."""
     *namespaces, last = name.strip("/").split("/")
-    for part in namespaces:
-        inner = tree.get(part)
-        tree[part] = inner if isinstance(inner, dict) else {}
-        tree = tree[part]
+    replaced = []
+    for count, part in enumerate(namespaces, 1):
+        inner = tree.get(part, {})
+        if not isinstance(inner, dict):
+            replaced.append(f"/{'/'.join(namespaces[:count])}")
+            inner = {}
+        tree[part] = inner
+        tree = inner
+    full = f"/{'/'.join([*namespaces, last])}"
+    now = {below for below, _ in leaves({full: value})}
+    replaced += [below for below, _ in leaves({full: tree.get(last, {})}) if below not in now]
     tree[last] = value
+    return replaced
 
 
 def _lookup(tree: Any, name: str) -> Any:

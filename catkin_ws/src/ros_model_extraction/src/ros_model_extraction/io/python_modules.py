@@ -19,6 +19,9 @@ from ros_model_extraction.python.modules import Module
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+_MAX_PARTS = 50
+"""Parts of a module's name, `a.b.c`; published ones have some five, and each part is looked up, with all before it."""
+
 
 class Library:
     """Finds modules in the source of packages, and reads each once."""
@@ -54,7 +57,7 @@ class Library:
         """Return a module by its full name; None for one that has no source here, or can't be read (a remark says)."""
         if name not in self._modules:
             self._modules[name] = None
-            path = self._find(name) if name else None
+            path = self._find(name) if name and name.count(".") < _MAX_PARTS else None
             if path:
                 try:
                     self._modules[name] = self._read(path, name, path.name == "__init__.py")

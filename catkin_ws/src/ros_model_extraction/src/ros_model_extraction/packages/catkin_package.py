@@ -25,6 +25,9 @@ _IGNORED_FOLDERS = {"build", "devel", "install", "node_modules", "__pycache__"}
 _NOT_SEARCHED = {"test", "tests", "cfg"}
 _NO_SCRIPTS = {".cfg", ".pyc", ".so"}
 _SOURCES = {".cpp", ".cc", ".cxx", ".c", ".C"}
+_MAX_DEPENDENCIES = 500
+"""Of a package.xml: catkin_pkg compares each with all others, and 3,000 take it 7 s."""
+_DEPENDENCY = re.compile(rb"<\w*depend\b")
 _PYTHON = re.compile(rb"#!.*\bpython[0-9.]*\b|#!.*@PYTHON")
 _INSTALL_WORDS = ("PROGRAMS", "FILES", "TARGETS", "DIRECTORY", "DESTINATION", "RUNTIME", "PATTERN", "OPTIONAL")
 _LIBRARY_WORDS = ("STATIC", "SHARED", "MODULE", "OBJECT", "EXCLUDE_FROM_ALL", "WIN32", "ALIAS", "INTERFACE")
@@ -103,6 +106,9 @@ def read_package(folder: Path) -> CatkinPackage:
     """
     manifest = folder / MANIFEST
     data = read_xml(manifest, f"a {MANIFEST}")
+    if (count := len(_DEPENDENCY.findall(data))) > _MAX_DEPENDENCIES:
+        problem = f"{count} dependencies are too many (at most {_MAX_DEPENDENCIES}): leave out what is not needed"
+        raise ModelError(problem, Position(str(manifest), 1, 1))
     try:
         package = parse_package_string(data.decode("utf-8"), str(manifest))
     except UnicodeDecodeError as error:
@@ -187,8 +193,13 @@ class _Executables:
         if not path.is_relative_to(self._folder) or not os.path.isfile(path):
             self.remarks.append(Remark(Position(MANIFEST, 1, 1), f"not read: {described}, which describes nodelets"))
             return set()
+        try:
+            nodelets = nodelets_of(path, described)
+        except SourceError as error:
+            self.remarks.append(error.remark)
+            return set()
         used = set()
-        for found in nodelets_of(path, described):
+        for found in nodelets:
             names = [name for name in self._libraries if self._outputs.get(name, name) == found.library]
             every = list(dict.fromkeys(library for name in names for library in (name, *self._reachable(name))))
             sources = tuple(dict.fromkeys(source for library in every for source in self._libraries[library]))

@@ -332,11 +332,11 @@ def _glob(patterns: Sequence[str], folder: Path, *, recurse: bool) -> list[str]:
     found = []
     for pattern in patterns:
         relative = pattern.removeprefix(f"{folder}/")
-        if relative.startswith("/") or ".." in relative or "${" in relative or not relative:
+        if relative.startswith("/") or ".." in relative or "${" in relative or not Path(relative).parts:
             continue
         try:
             matches = folder.rglob(relative) if recurse else folder.glob(relative)
             found += sorted(str(path) for path in matches)[:_MAX_WORDS]
-        except (ValueError, NotImplementedError, OSError):
+        except (ValueError, NotImplementedError, RecursionError, OSError):
             continue
     return found

@@ -29,6 +29,7 @@ _CONVERSIONS: dict[str, Any] = {"str": str, "int": int, "float": float, "bool": 
 _MAX_RANGE = 64
 _MAX_WORK = 1_000_000  # characters of a text times those of what is put into it
 _WIDE = re.compile(r"%[^%a-zA-Z]*(?:\d{4}|\*)|\{[^{}:]*:[^{}]*(?:\d{4}|\{)")  # fields of a width over 999, or any
+_JOINS = {"os.path.join", "posixpath.join", "rosgraph.names.ns_join"}
 _SAME_ITEMS = {"list", "tuple", "set", "frozenset", "iter", "reversed", "sorted"}
 _SAME_NAME = {"resolve_name", "remap_name", "canonicalize_name"}
 _TEXT_METHODS = {
@@ -59,14 +60,14 @@ def plain(value: Value | None) -> Any:
     """Return a Value as plain Python has it.
 
     Raises:
-        ValueError: a part of it is not known.
+        ValueError: a part of it is not known, or no plain value.
     """
     match value:
         case Const(raw):
             return raw
         case Items(values):
             return [plain(item) for item in values]
-        case Table(items):
+        case Table(items) if all(isinstance(key, Const) for key, _ in items):
             return {plain(key): plain(item) for key, item in items}
     raise ValueError("not known")
 
@@ -90,7 +91,7 @@ def call_function(name: str, arguments: Sequence[Value]) -> Value | None:
         return first
     if package == "builtins":
         return _builtin(function, arguments)
-    if name in ("os.path.join", "posixpath.join", "rosgraph.names.ns_join") and all(map(_is_text, arguments)):
+    if name in _JOINS and arguments and all(map(_is_text, arguments)):
         return Const(posixpath.join(*(argument.value for argument in arguments if isinstance(argument, Const))))
     if function in _MESSAGES and isinstance(first, Const):
         message_package, _, message = str(first.value).partition("/")
@@ -154,7 +155,7 @@ def _converted(function: str, arguments: Sequence[Value]) -> Value | None:
             numbers = range(*constants)
             return Items(tuple(map(Const, numbers))) if len(numbers) <= _MAX_RANGE else None
         return Const(_CONVERSIONS[function](*constants))
-    except (ValueError, TypeError):
+    except (ArithmeticError, LookupError, ValueError, TypeError):  # a lookup: of an encoding
         return None
 
 
@@ -174,14 +175,14 @@ def _text_method(text: str, method: str, arguments: Sequence[Value]) -> Value | 
             return None
         separated = [part for item in known for part in (Text((text,)), item)][1:]
         return joined(separated)
-    if method == "split" and len(arguments) <= 1 and all(map(_is_text, arguments)):
+    if method == "split" and len(arguments) <= 1 and all(map(_is_text, arguments)) and Const("") not in arguments:
         separators = [argument.value for argument in arguments if isinstance(argument, Const)]
         return Items(tuple(map(Const, text.split(*separators))))
     if method not in _TEXT_METHODS or not all(isinstance(argument, Const) for argument in arguments):
         return None
     try:
         return Const(getattr(text, method)(*(a.value for a in arguments if isinstance(a, Const))))
-    except (TypeError, ValueError, LookupError, AttributeError):
+    except (ArithmeticError, TypeError, ValueError, LookupError, AttributeError):
         return None
 
 

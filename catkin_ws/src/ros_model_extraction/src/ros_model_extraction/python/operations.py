@@ -24,7 +24,7 @@ def operated(node: ast.BinOp, left: Value, right: Value) -> Value:
             try:
                 raw = plain(right)
                 return Const(pattern % (tuple(raw) if isinstance(raw, list) else raw))
-            except (ValueError, TypeError):
+            except (ArithmeticError, ValueError, TypeError):
                 return Unknown(node)
         case _, Const(one), Const(two) if is_number(one) and is_number(two):
             return _number(node, one, two)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -195,12 +196,12 @@ def text_of(value: Value) -> Text | None:
 
 
 def weight(value: Value) -> int:
-    """Return how large a value is: characters and elements of it, and of what it holds."""
+    """Return how large a value is: characters and elements of it, and of what it holds; no model has huge numbers."""
     match value:
         case Const(str() | bytes() as text):
             return len(text)
         case Const(int(number)) if number.bit_length() > _MAX_BITS:
-            return number.bit_length()
+            return number.bit_length() if number.bit_length() <= sys.float_info.max_exp else sys.maxsize
         case Text(parts):
             return sum(len(part) if isinstance(part, str) else 1 for part in parts)
         case Items(values):

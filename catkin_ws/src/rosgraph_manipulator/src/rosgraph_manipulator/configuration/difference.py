@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -98,14 +99,18 @@ def _changed(running: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[str,
 
 
 def same_value(one: Any, other: Any) -> bool:
-    """Tell whether two values of a parameter are the same: 1 and 1.0 are, 1 and true are not."""
+    """Tell whether two values of a parameter are the same: 1 and 1.0 are, and .nan and .nan; 1 and true are not."""
     if isinstance(one, bool) != isinstance(other, bool):
         return False
     if isinstance(one, dict) and isinstance(other, dict):
         return one.keys() == other.keys() and all(same_value(one[key], other[key]) for key in one)
     if isinstance(one, (list, tuple)) and isinstance(other, (list, tuple)):
         return len(one) == len(other) and all(map(same_value, one, other))
-    return bool(one == other)
+    return bool(one == other) or (_is_nan(one) and _is_nan(other))
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)
 
 
 def read_by_nodes(system: SystemDescription) -> dict[str, Any]:

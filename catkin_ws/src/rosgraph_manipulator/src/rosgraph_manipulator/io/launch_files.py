@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-from xml.dom import expatbuilder
 
 import rosgraph
 import rosgraph.names
@@ -16,11 +14,16 @@ import roslaunch.config
 import roslaunch.core
 import roslaunch.loader
 import roslaunch.substitution_args
-import roslaunch.xmlloader
-from node_kit.io.input_files import InputFileError, read_bytes
 from node_kit.one_line import OneLineError
 from ros_model.errors import ModelError
 from ros_model.generators.launch import launch_file, launch_file_of
+from ros_model.io.launch_loader import (
+    LaunchContentError,
+    LaunchLoader,
+    check_configuration,
+    in_one_line,
+    shortened,
+)
 from ros_model.io.models import read_system
 from ros_model.io.project import load_project
 from ros_model.project.settings import FILE_NAME
@@ -123,10 +126,8 @@ _EXPLAINED = (
     roslaunch.substitution_args.SubstitutionException,
 )
 """Errors whose message says what is wrong. Any other one is named by its class, too."""
-
-_XML = re.compile(r"\.? (?:\w+ )?xml is (<[^>]*>).*", re.IGNORECASE)
-"""How roslaunch ends a message: with an element and all that is in it."""
-_SHOWN = 100  # characters of an element or expression in a message
+_OF_A_TEXT = "string"
+"""What roslaunch has for the name of a file where it reads a text."""
 
 
 @contextmanager
@@ -143,7 +144,10 @@ def _refusing(what: str) -> Iterator[None]:
     except (Exception, SystemExit) as error:
         if known := _known(error):
             raise known from error
-        text = _XML.sub(lambda element: f", in {_shortened(element[1])}", reason(error, _EXPLAINED))
+        if isinstance(error, LaunchContentError):
+            file = what if error.file == _OF_A_TEXT else error.file
+            raise LaunchFileError(f"{file}: {error.problem}") from error
+        text = in_one_line(reason(error, _EXPLAINED))
         raise LaunchFileError(f"{what}: {text.removeprefix(f'{what}: ')}") from error
 
 
@@ -152,13 +156,6 @@ def _known(error: BaseException | None) -> LaunchFileError | None:
     while error is not None and not isinstance(error, LaunchFileError):
         error = error.__context__
     return error
-
-
-def _shortened(text: str) -> str:
-    """Return a text in one line, without its middle where it is long."""
-    line = " ".join(text.split())
-    half = _SHOWN // 2
-    return line if len(line) <= _SHOWN else f"{line[:half]} ... {line[-half:]}"
 
 
 class _StableNames(dict[str, str]):
@@ -171,10 +168,8 @@ class _StableNames(dict[str, str]):
         return f"{key}_launched"
 
 
-class _Loader(roslaunch.xmlloader.XmlLoader):
-    """roslaunch's reader, without XML entities and with stable anonymous names."""
-
-    ignore_unset_args = False
+class _Loader(LaunchLoader):
+    """The reader of all launch files, with stable anonymous names, and files of parameters as they were."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -182,7 +177,15 @@ class _Loader(roslaunch.xmlloader.XmlLoader):
         self.remarks: list[str] = []
 
     def load_rosparam(
-        self, context: Any, ros_config: Any, cmd: str, param: str, file_: str | None, text: str, **rest: Any
+        self,
+        context: Any,
+        ros_config: Any,
+        cmd: str,
+        param: str,
+        file_: str | None,
+        text: str,
+        verbose: bool = True,
+        subst_function: Callable[[str], str] | None = None,
     ) -> None:
         """Take in what a `<rosparam>` says. Of a file that can't be used now, it is what the file had before.
 
@@ -191,18 +194,18 @@ class _Loader(roslaunch.xmlloader.XmlLoader):
         load = super().load_rosparam
         before = self.parameter_files.get(file_ or "")
         if cmd != "load" or not file_:
-            load(context, ros_config, cmd, param, file_, text, **rest)
+            load(context, ros_config, cmd, param, file_, text, verbose, subst_function)
             return
         try:
-            load(context, ros_config, cmd, param, file_, text, **rest)
+            load(context, ros_config, cmd, param, file_, text, verbose, subst_function)
             content = Path(file_).read_text(encoding="utf-8")
             if before and not content.strip():
                 raise ValueError("it is empty")
-        except (AttributeError, OSError, TypeError, ValueError) as error:
+        except (LaunchContentError, AttributeError, OSError, TypeError, ValueError) as error:
             if before is None:
                 raise
-            load(context, ros_config, cmd, param, None, before, **rest)
-            why = _shortened(str(error))
+            load(context, ros_config, cmd, param, None, before, verbose, subst_function)
+            why = shortened(getattr(error, "problem", str(error)))
             self.remarks.append(f"{file_} can't be used, so its values are those of before: correct it ({why})")
         else:
             self.parameter_files[file_] = content
@@ -229,41 +232,13 @@ class _Loader(roslaunch.xmlloader.XmlLoader):
         except (*_EXPLAINED, RecursionError):  # the latter comes of a file that includes itself
             raise
         except (Exception, SystemExit) as error:
-            what = f"'{_shortened(args)}' fails: {type(error).__name__}: {' '.join(str(error).split())}"
+            what = f"'{shortened(args)}' fails: {type(error).__name__}: {' '.join(str(error).split())}"
             raise LaunchFileError(f"{context.filename}: {what}: correct the expression") from error
-
-    def _parse_launch(self, filename: str, verbose: bool) -> Any:  # noqa: ARG002
-        try:
-            content = read_bytes(filename)
-        except InputFileError as error:
-            raise roslaunch.xmlloader.XmlParseException(str(error)) from error
-        try:
-            document = _Builder().parseString(content)
-        except (roslaunch.xmlloader.XmlParseException, RecursionError):
-            raise
-        except Exception as error:  # also of the codec that an unknown encoding has no match for
-            raise roslaunch.xmlloader.XmlParseException(
-                f"{filename}: not well-formed XML: {error}: correct it, and save it as UTF-8"
-            ) from error
-        roots = document.getElementsByTagName("launch")
-        if len(roots) != 1:
-            raise roslaunch.xmlloader.XmlParseException(f"{filename}: must have one root element <launch>")
-        return roots[0]
-
-
-class _Builder(expatbuilder.ExpatBuilderNS):
-    """minidom's builder, which refuses XML entities while it parses: they are declared in a document type."""
-
-    def start_doctype_decl_handler(self, *_: object) -> None:
-        raise roslaunch.xmlloader.XmlParseException("a document type declaration is not allowed: remove it")
 
 
 def _checked(path: str | Path, config: Any) -> LaunchFile:
-    if config.config_errors:
-        raise LaunchFileError(f"{path}: {' '.join(str(config.config_errors[0]).split())}")
+    check_configuration(path, config)
     for node in config.nodes:
-        if not node.name:  # roslaunch makes one up at each start
-            raise LaunchFileError(f"{path}: a node of {node.package}/{node.type} has no name: give it one")
         name = node.machine_name or ""
         if name not in config.machines:
             remedy = f'add <machine name="{name}" address="HOST"/>, or correct the name'

@@ -2,8 +2,8 @@
 
 As long as the goal is pending, it is stored in the parameter `ACTION/resume_goal`. A server that knows the parameter
 continues the goal before it publishes its first status. Where it deletes the parameter, the goal is stored again, since
-that server may die, too. `~kept_goals` has the same goal for a manipulator that is started again: the former one may have died
-just after a server took the goal.
+that server may die, too. `~kept_goals` has the same goal for a manipulator that is started again: the former one may
+have died just after a server took the goal.
 """
 
 from __future__ import annotations

@@ -1,0 +1,330 @@
+"""roslaunch's reader of launch files, which refuses what no reader of this project takes. It imports roslaunch."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from typing import TYPE_CHECKING, Any
+from xml.dom import expatbuilder
+
+import roslaunch.core
+import roslaunch.loader
+import roslaunch.substitution_args
+import roslaunch.xmlloader
+import rospkg
+import yaml
+from node_kit.io.input_files import InputFileError, read_bytes, read_text
+from node_kit.yaml_text import MAX_VALUES, YamlError
+from rosgraph.names import ns_join
+
+from ros_model.errors import ModelError
+from ros_model.language.builder import MAX_NESTING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+MAX_YAML = 500_000
+"""Bytes of the largest text of parameters; PyYAML takes 3 s for them. Files of parameters have some thousand."""
+EXPLAINED = (roslaunch.core.RLException, roslaunch.substitution_args.SubstitutionException, rospkg.ResourceNotFound)
+"""Errors of roslaunch whose message says what is wrong."""
+
+_XML = re.compile(r"\.? (?:\w+ )?xml is (<[^>]*>).*", re.IGNORECASE)
+"""How roslaunch ends a message: with an element and all that is in it."""
+_SHOWN = 100  # characters of an element or expression in a message
+_TEXT_KEYS = ("tag:yaml.org,2002:str", "tag:yaml.org,2002:merge")
+
+
+class LaunchContentError(ModelError):
+    """A launch file holds what can't be used.
+
+    Args:
+        file: the one that holds it: the file that is read, or one that it includes; `string` for a text.
+        problem: what is wrong, and what to do.
+    """
+
+    def __init__(self, file: object, problem: str) -> None:
+        super().__init__(f"{file}: {in_one_line(problem)}")
+        self.file = str(file)
+        self.problem = in_one_line(problem)
+
+
+class LaunchLoader(roslaunch.xmlloader.XmlLoader):
+    """roslaunch's reader, without XML entities, and with limits for what parameters hold.
+
+    Args:
+        instead_of_programs: makes the value of a parameter of the command that would give it; None: the commands run.
+    """
+
+    ignore_unset_args = False
+
+    def __init__(self, instead_of_programs: Callable[[str], Any] | None = None) -> None:
+        super().__init__()
+        self._instead_of_programs = instead_of_programs
+        self._at: tuple[Any, Any] | None = None
+
+    def load(self, filename: str, ros_config: Any, **options: Any) -> None:
+        """Read a launch file into a configuration.
+
+        Raises:
+            LaunchContentError: it can't be used; or an error of EXPLAINED.
+        """
+        try:
+            super().load(filename, ros_config, **options)
+        except (LaunchContentError, *EXPLAINED):
+            raise
+        except (Exception, SystemExit) as error:  # whatever `$(eval ...)`, names and values make of it
+            file, element = self._place(filename)
+            text = f"{type(error).__name__}: {str(error) or 'no reason given'}"
+            raise LaunchContentError(
+                file, f"roslaunch can't read {element}: {text}: correct the launch file"
+            ) from error
+
+    def opt_attrs(self, tag: Any, context: Any, attrs: Any) -> Any:
+        """Return attributes of an element, and note that it is being read: roslaunch asks so for each."""
+        self._at = context, tag
+        return super().opt_attrs(tag, context, attrs)
+
+    def param_value(
+        self,
+        verbose: bool,
+        name: str,
+        ptype: str,
+        value: str | None,
+        textfile: str | None,
+        binfile: str | None,
+        command: str | None,
+    ) -> Any:
+        """Return the value of a `<param>`."""
+        for file in (textfile, binfile):
+            if file is not None:
+                self._reading(read_bytes, file)
+        if command is not None:
+            self._check_command(command)
+            if self._instead_of_programs is not None:
+                return self._instead_of_programs(command)
+        is_yaml = ptype == "yaml"
+        given = super().param_value(verbose, name, "str" if is_yaml else ptype, value, textfile, binfile, command)
+        return self._parsed(given, name, textfile) if is_yaml and isinstance(given, str) else given
+
+    def load_rosparam(
+        self,
+        context: Any,
+        ros_config: Any,
+        cmd: str,
+        param: str,
+        file_: str | None,
+        text: str,
+        verbose: bool = True,
+        subst_function: Callable[[str], str] | None = None,
+    ) -> None:
+        """Take in what a `<rosparam>` says."""
+        if cmd != "load":
+            super().load_rosparam(context, ros_config, cmd, param, file_, text, verbose=verbose)
+            return
+        import rosparam  # noqa: F401 - teaches PyYAML angles and binary data, as in roslaunch only from here on
+
+        if file_ is not None:
+            text = self._reading(read_text, file_, MAX_YAML)
+        if subst_function is not None:
+            text = subst_function(text)
+        name = ns_join(context.ns, param) if param else context.ns
+        values = self._parsed(text, name, file_)
+        if values is None:
+            values = {}
+        if not param and not isinstance(values, dict):
+            raise self._refusal(f"{file_ or 'its text'} is no mapping: make it a mapping NAME: VALUE, or give 'param'")
+        self.add_param(ros_config, name, values, verbose=verbose)
+
+    def _parse_launch(self, filename: str, verbose: bool) -> Any:  # noqa: ARG002
+        try:
+            content = read_bytes(filename)
+        except InputFileError as error:
+            raise roslaunch.xmlloader.XmlParseException(str(error)) from error
+        try:
+            document = _Builder().parseString(content)
+        except RecursionError:
+            raise
+        except _DocumentTypeError as error:
+            problem = "no DOCTYPE is allowed (a document type declaration may define entities): remove it"
+            raise LaunchContentError(filename, problem) from error
+        except Exception as error:  # also of the codec that an unknown encoding has no match for
+            raise roslaunch.xmlloader.XmlParseException(
+                f"{filename}: not well-formed XML: {error}: correct it, and save it as UTF-8"
+            ) from error
+        roots = document.getElementsByTagName("launch")
+        if len(roots) != 1:
+            raise roslaunch.xmlloader.XmlParseException(f"{filename}: must have one root element <launch>")
+        return roots[0]
+
+    def _check_command(self, command: str) -> None:
+        try:
+            words = shlex.split(command)
+        except ValueError as error:
+            raise self._refusal(f"its command: {error}: close the quotation, or take it out") from error
+        if not words or not words[0]:
+            raise self._refusal("its command is empty: name a program, or take the parameter out")
+
+    def _reading(self, read: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return read(*arguments)
+        except InputFileError as error:
+            remedy = "" if ":" in error.problem else ": give a smaller one"  # only that of the size has none
+            raise self._refusal(f"{error}{remedy}") from error
+
+    def _parsed(self, text: str, name: str, file: str | None) -> Any:
+        """Return what a YAML text says, as roslaunch reads it.
+
+        Args:
+            text: it.
+            name: of the parameter that has its value.
+            file: the one that holds it; None: the launch file.
+        """
+        try:
+            return _parse(text, name)
+        except YamlError as error:
+            line, column = error.place
+            where = f"{file}:{line}:{column}" if file else f"line {line} of its YAML"
+            raise self._refusal(f"{where}: {error.problem}") from error
+
+    def _refusal(self, problem: str) -> LaunchContentError:
+        """Return the error of what is being read."""
+        file, element = self._place("")
+        return LaunchContentError(file, f"{element}: {problem}" if file else problem)
+
+    def _place(self, filename: str) -> tuple[str, str]:
+        """Return the file and the element that is being read."""
+        if self._at is None:
+            return filename, "it"
+        context, tag = self._at
+        given = "".join(f' {name}="{value}"' for name, value in tag.attributes.items())
+        return getattr(context, "filename", filename), shortened(f"<{tag.tagName}{given}>")
+
+
+class _DocumentTypeError(Exception):
+    """An XML file declares a document type."""
+
+
+class _Builder(expatbuilder.ExpatBuilderNS):
+    """minidom's builder, which refuses XML entities while it parses: they are declared in a document type."""
+
+    def start_doctype_decl_handler(self, *_: object) -> None:
+        raise _DocumentTypeError
+
+
+def check_configuration(file: object, config: Any) -> None:
+    """Check what roslaunch has made of a launch file.
+
+    Raises:
+        LaunchContentError: roslaunch warns of something, a node has no name, or its parameters hold too much.
+    """
+    if config.config_errors:
+        text = str(config.config_errors[0]).removeprefix("WARN: ").removeprefix(f"[{file}] ")
+        raise LaunchContentError(file, f"roslaunch warns of it, so it is not taken: {in_one_line(text)}: correct it")
+    for node in config.nodes:
+        if not node.name:  # roslaunch makes one up at each start
+            raise LaunchContentError(file, f"a node of {node.package}/{node.type} has no name: give it one")
+    left = MAX_VALUES  # a private parameter before nodes is that of each
+    for name, parameter in config.params.items():
+        left -= _size(parameter.value, left)
+        if left < 0:
+            raise LaunchContentError(
+                file, f"its parameters up to {name} hold more than {MAX_VALUES} values: take some out"
+            )
+
+
+def in_one_line(text: str) -> str:
+    """Return a message in one line; of an element that it shows, only the start."""
+    line = " ".join(text.split())
+    return _XML.sub(lambda element: f", in {shortened(element[1])}", line)
+
+
+def shortened(text: str) -> str:
+    """Return a text in one line, without its middle where it is long."""
+    line = " ".join(text.split())
+    half = _SHOWN // 2
+    return line if len(line) <= _SHOWN else f"{line[:half]} ... {line[-half:]}"
+
+
+def _size(value: Any, most: int) -> int:
+    """Return how many values a value holds, or that they are more than the most."""
+    count, rest = 0, [value]
+    while rest and count <= most:
+        item = rest.pop()
+        count += 1
+        rest += item.values() if isinstance(item, dict) else item if isinstance(item, (list, tuple, set)) else ()
+    return count
+
+
+def _parse(text: str, name: str) -> Any:
+    """Return what a YAML text says, by PyYAML's safe loader, which roslaunch uses.
+
+    Raises:
+        YamlError: it is no YAML, is too large, is nested or expanded too far, or has a key that is no text.
+    """
+    if len(text) > MAX_YAML:
+        raise YamlError(f"{len(text)} characters are too many (at most {MAX_YAML}): make it smaller")
+    try:
+        loader = yaml.SafeLoader(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        _Measure().of(node, name)
+        return loader.construct_document(node)
+    except YamlError:
+        raise
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+        what = getattr(error, "problem", None) or getattr(error, "reason", None) or "is no YAML"
+        raise YamlError(f"parameter {name}: roslaunch can't read it: {what}: correct the YAML", place) from error
+    except Exception as error:  # whatever PyYAML's constructors make of dates, numbers and angles
+        what = "nested too deep" if isinstance(error, RecursionError) else f"{type(error).__name__}: {error}"
+        raise YamlError(f"parameter {name}: roslaunch can't read it: {what}: correct the YAML") from error
+
+
+class _Measure:
+    """Measures how much YAML nodes hold, aliases counted as often as they stand."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[int, int] | None] = {}  # by the node's id; None while it is measured
+
+    def of(self, node: yaml.Node, name: str) -> tuple[int, int]:
+        """Return the number of values of a node and all in it, and how deep they are nested.
+
+        Raises:
+            YamlError: there are too many, or a key is no text; names the parameter.
+        """
+        if id(node) in self._known:
+            known = self._known[id(node)]
+            if known is None:
+                raise _wrong(node, name, "an alias stands within what it repeats: take it out")
+            return known
+        self._known[id(node)] = None
+        values, depth = 1, 0
+        for inner, item in _inner(node, name):
+            more, deeper = self.of(item, inner)
+            values, depth = values + more, max(depth, deeper)
+            if values > MAX_VALUES:
+                raise _wrong(item, inner, f"there are more than {MAX_VALUES} values: correct the aliases")
+        if depth >= MAX_NESTING:
+            raise _wrong(node, name, f"values are nested deeper than {MAX_NESTING} levels: correct them")
+        self._known[id(node)] = values, depth + 1
+        return values, depth + 1
+
+
+def _inner(node: yaml.Node, name: str) -> Iterator[tuple[str, yaml.Node]]:
+    """Yield what is in a node, each with the name of its parameter."""
+    if isinstance(node, yaml.SequenceNode):
+        yield from ((name, item) for item in node.value)
+    elif isinstance(node, yaml.MappingNode):
+        for key, item in node.value:
+            if key.tag not in _TEXT_KEYS:
+                shown = f"key {key.value}" if isinstance(key, yaml.ScalarNode) else "a key"
+                kind = key.tag.rpartition(":")[2]
+                raise _wrong(key, name, f"{shown} is no text, but of the type {kind}: put it in quotes")
+            yield ns_join(name, key.value), item
+
+
+def _wrong(node: yaml.Node, name: str, problem: str) -> YamlError:
+    mark = node.start_mark
+    return YamlError(f"parameter {name}: {problem}", (mark.line + 1, mark.column + 1))
