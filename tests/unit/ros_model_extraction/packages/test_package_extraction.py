@@ -258,9 +258,7 @@ def test_manifest_with_more_dependencies_than_people_write_is_refused(tmp_path):
     path = make_package(tmp_path) / "package.xml"
     many = "".join(f"<exec_depend>p{number}</exec_depend>" for number in range(501))
     path.write_text(path.read_text().replace("</package>", f"{many}</package>"))
-    with pytest.raises(
-        ModelError, match=r"package\.xml:1:1: 501 dependencies are too many \(at most 500\): leave"
-    ):
+    with pytest.raises(ModelError, match=r"package\.xml:1:1: 501 dependencies are too many \(at most 500\): leave"):
         read_package(tmp_path)
 
 
