@@ -284,6 +284,8 @@ class _Reading:
             connection = bag.add(header, read_data(stream))
             if self._wanted(connection):
                 self._chosen.add(connection.id)
+            else:  # a damaged record may have the number of a wanted one
+                self._chosen.discard(connection.id)
         elif kind == _MESSAGE:
             number, stamp = UINT32.unpack(header[b"conn"])[0], time_of(header[b"time"])
             data = None
