@@ -6,7 +6,8 @@ import subprocess
 import pytest
 from metacontrol_experiments.pyramid.record import read_pyramid
 
-SEEDS = (3, 4, 5)
+SEEDS = {3: (4, 5, 3), 4: (3, 4, 5)}
+"""By scenario; the obstacle of seed 3 often comes when the arm has passed."""
 LIMIT_S = 1100.0
 KINDS = {3: {"light", "obstacle", "component", "release"}, 4: {"obstacle"}}
 """What must have happened, by scenario."""
@@ -21,7 +22,7 @@ def mission(tmp_path):
     """
 
     def drive(scenario):
-        for seed in SEEDS:
+        for seed in SEEDS[scenario]:
             output = tmp_path / str(seed)
             words = ["--mission", "manipulation", "--scenario", scenario, "--seed", seed, "--output", output]
             command = ["metacontrol", "run", *map(str, words)]
