@@ -59,7 +59,8 @@ hours.__name__ = "number of hours"
 
 
 def code(*places: str) -> str:
-    """Return what names the code: files and folders of the project, as git has them."""
+    """Return what names the code: files and folders of the project, as git has them, but for documents."""
+    places = (*places, ":(exclude)*.md")
     told = ["git", "-C", str(ROOT), "ls-files", "-s", "--", *places]
     changed = ["git", "-C", str(ROOT), "diff", "HEAD", "--", *places]
     try:
