@@ -333,6 +333,7 @@ def install_python(stage: Path, manifest: Manifest) -> Control:
     """Install the virtual environment, and return the control data of its package."""
     say("installing the Python packages that Debian has not")
     environment, requirements = stage / ENVIRONMENT, stage / "requirements.txt"
+    stage.mkdir()
     requirements.write_text(with_hashes())
     run("/usr/bin/python3", "-m", "venv", "--system-site-packages", "--without-pip", "--symlinks", str(environment))
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", str(environment / "bin" / "python3"))

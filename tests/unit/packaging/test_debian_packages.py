@@ -114,3 +114,27 @@ def test_file_that_names_a_folder_of_the_build_is_refused(packaging, tmp_path):
     (stage / "usr" / "share" / "found.cmake").write_text(f"set(x {tmp_path}/build)")
     with pytest.raises(packaging.PackagingError, match=r"belt installs usr/share/found.cmake, which names a folder"):
         packaging.check_stage("belt", stage, tmp_path)
+
+
+def test_python_packages_are_installed_by_their_hashes_into_a_new_folder(packaging, manifest, tmp_path, monkeypatch):
+    stage = tmp_path / "scratch" / "python"
+    stage.parent.mkdir()
+    asked = []
+
+    def run(*command):
+        """Do what the commands leave behind, without downloading anything."""
+        environment = stage / packaging.ENVIRONMENT
+        if "venv" in command:
+            (environment / "bin").mkdir(parents=True)
+            (environment / "lib" / "python3.11" / "site-packages").mkdir(parents=True)
+        if "install" in command:
+            assert "--require-hashes" in command
+            asked.append((stage / "requirements.txt").read_text())
+        return "amd64\n"
+
+    monkeypatch.setattr(packaging, "run", run)
+    control = packaging.install_python(stage, manifest())
+    (requirements,) = asked
+    assert "owlready2==" in requirements and all("--hash=sha256:" in line for line in requirements.splitlines())
+    assert control.architecture == "amd64"
+    assert not (stage / "requirements.txt").exists()
