@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from metacontrol_bags.bag import publisher_of, read_record
-from metacontrol_bags.typestore import typestore
+from metacontrol_bags.bag import read_record
+from metacontrol_bags.bag_file import BagFile, Connection
+from metacontrol_bags.decoding import decode
 from metacontrol_bags.words import Decision, DiagnosticWords, FunctionGrounding
-from rosbags.rosbag1 import Reader
 from support.figures import LIMIT, entry
 from support.missions import drive
 
@@ -73,14 +73,14 @@ def _measure(seed: int) -> dict[str, float]:
 
 def _commands(path: Path) -> list[tuple[float, str, bool]]:
     """Return stamp (s), node and whether it is a motion, for each command of the robot's velocity in a bag."""
-    found = []
-    with Reader(path) as reader:
-        connections = [connection for connection in reader.connections if connection.topic == "/cmd_vel"]
-        store = typestore(connections)
-        for connection, nanoseconds, data in reader.messages(connections=connections):
-            twist: Any = store.deserialize_ros1(data, connection.msgtype)
-            moves = any((twist.linear.x, twist.linear.y, twist.angular.z))
-            found.append((nanoseconds * 1e-9, publisher_of(connection), moves))
+    found: list[tuple[float, str, bool]] = []
+
+    def take(connection: Connection, nanoseconds: int, twist: Any) -> None:
+        moves = any((twist.linear.x, twist.linear.y, twist.angular.z))
+        found.append((nanoseconds * 1e-9, connection.publisher, moves))
+
+    with BagFile(path) as bag:
+        decode(bag, lambda connection: connection.topic == "/cmd_vel", take)
     return found
 
 

@@ -20,7 +20,8 @@ import actionlib
 import rospy
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import Twist
-from metacontrol_experiments.io.processes import ProcessTree, free_port, wait_until
+from helpers.ports import free_port
+from metacontrol_experiments.io.processes import ProcessTree, wait_until
 from metacontrol_msgs.msg import ActiveConfiguration, MvpReconfigurationAction, MvpReconfigurationGoal
 from move_base_msgs.msg import MoveBaseAction, MoveBaseGoal
 from nav_msgs.msg import Odometry

@@ -13,7 +13,7 @@ import xmlrpc.client
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from metacontrol_experiments.io.processes import free_port
+from helpers.ports import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
