@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import asdict
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
@@ -211,7 +212,8 @@ class _Player:
 
     def play(self, heard: list[_Heard], runs: list[Run]) -> list[str]:
         """Play all; return what went wrong, in words."""
-        trouble = []
+        trouble: list[str] = []
+        unfit: Counter[str] = Counter()
         lives = sorted((run for run in runs if run.entries), key=lambda run: run.entries[0].now)
         for stamp, kind, message, publisher in heard:
             while lives and lives[0].entries[0].now <= stamp:
@@ -219,11 +221,10 @@ class _Player:
             trouble += self._follow(stamp)
             if kind == _DECISION:
                 self._looked = float("-inf")  # what it changes is shown with it
-            taker = self._takers.get(kind)
-            if taker is not None:
-                taker(stamp, message, publisher)
-            else:
-                take_place(self._feed, kind, message)
+            try:
+                self._take(stamp, kind, message, publisher)
+            except (AttributeError, LookupError, OverflowError, TypeError, ValueError):  # of a damaged definition
+                unfit[kind] += 1
             self._feed.take_clock(round(stamp, 1))
             if kind in (_DECISION, _EVENT):
                 self.recorder.cut(stamp)  # to the moment at which one jumps to it, and at which a run ends
@@ -231,7 +232,14 @@ class _Player:
                 self.recorder.look(stamp)
         if heard:
             self.recorder.cut(heard[-1][0])
-        return trouble
+        return [*trouble, *(f"{count} messages on {kind} do not fit" for kind, count in unfit.items())]
+
+    def _take(self, stamp: float, kind: str, message: Any, publisher: str) -> None:
+        taker = self._takers.get(kind)
+        if taker is not None:
+            taker(stamp, message, publisher)
+        else:
+            take_place(self._feed, kind, message)
 
     def _begin(self, run: Run) -> list[str]:
         """Follow a reasoner from its start; return why it can't be followed."""
