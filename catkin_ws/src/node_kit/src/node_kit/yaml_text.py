@@ -53,6 +53,14 @@ def parse_marked_yaml(text: str) -> tuple[Any, dict[Keys, Place]]:
     return _parse(text, places, is_unique=True), places
 
 
+def explained(error: yaml.YAMLError) -> YamlError:
+    """Return what PyYAML says of a text that is no YAML, with the remedy and the place."""
+    mark = getattr(error, "problem_mark", None)
+    place = (mark.line + 1, mark.column + 1) if mark else (1, 1)
+    what = getattr(error, "problem", None) or getattr(error, "reason", None) or "is no YAML"
+    return YamlError(f"{what}: correct the YAML", place)
+
+
 def _parse(text: str, places: dict[Keys, Place], is_unique: bool) -> Any:
     if len(text) > MAX_SIZE:
         raise YamlError(f"{len(text)} characters are too many (at most {MAX_SIZE})")
@@ -68,10 +76,7 @@ def _parse(text: str, places: dict[Keys, Place], is_unique: bool) -> Any:
     except YamlError:
         raise
     except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = (mark.line + 1, mark.column + 1) if mark else (1, 1)
-        what = getattr(error, "problem", None) or getattr(error, "reason", None) or "is no YAML"
-        raise YamlError(f"{what}: correct the YAML", place) from error
+        raise explained(error) from error
     except RecursionError:
         raise YamlError("is nested too deep: correct the YAML") from None
     except _BAD_SCALARS as error:

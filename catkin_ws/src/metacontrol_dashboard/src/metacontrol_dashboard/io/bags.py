@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -77,7 +77,7 @@ def read_run(path: Path, namespace: str | None = None) -> Recording:
     player.show_graph(nodes, graph_topics)
     trouble = player.play(heard, recording.runs if recording else [])
     events = [m for _, kind, m, _ in heard if kind == _EVENT]
-    begins = {e.kind: messages.header_stamp(e.header, 0.0) for e in events}
+    begins = {e.kind: e.stamp for e in events}
     start, end = heard[0][0], heard[-1][0]
     over = [stamp for stamp, kind, m, _ in heard if kind == _EVENT and m.kind == MissionEvent.MISSION_END]
     return Recording(
@@ -142,7 +142,7 @@ def _robot(path: Path, namespace: str | None) -> str:
 
 
 _Heard = tuple[float, str, Any, str]
-"""Time of recording in s, what it is, the message, and who has published it."""
+"""Time of recording in s, what it is, the message, and who has published it; of a decision or event, what it says."""
 
 
 def _read(path: Path, robot: str) -> tuple[list[_Heard], tuple[str, ...], list[Connection]]:
@@ -168,7 +168,12 @@ def _read(path: Path, robot: str) -> tuple[list[_Heard], tuple[str, ...], list[C
         return is_due
 
     def take(connection: Connection, stamp: int, message: Any) -> None:
-        heard.append((stamp * 1e-9, kinds[connection.topic], message, connection.publisher))
+        time, kind = stamp * 1e-9, kinds[connection.topic]
+        if kind == _DECISION:
+            message = messages.decision(message, time)
+        elif kind == _EVENT:
+            message = messages.event(message, 0.0)
+        heard.append((time, kind, message, connection.publisher))
 
     with BagFile(path) as bag:
         lost = decode(bag, lambda connection: connection.topic in kinds, take, is_shown)
@@ -189,9 +194,9 @@ class _Player:
         self._looked = float("-inf")
         self._takers: dict[str, Callable[[float, Any, str], None]] = {
             ownership.TOPIC: self._take_diagnostics,
-            _DECISION: lambda t, m, _: self._feed.take_decision(messages.decision(m, t)),
+            _DECISION: lambda _t, m, _: self._feed.take_decision(m),
             _ACTIVE: lambda t, m, _: self._feed.take_configuration(m, t),
-            _EVENT: lambda t, m, _: self._feed.take_event(messages.event(m, t)),
+            _EVENT: lambda t, m, _: self._feed.take_event(m if m.stamp > 0.0 else replace(m, stamp=t)),
         }
 
     def show_graph(self, nodes: Entries, topics: Entries) -> None:

@@ -79,13 +79,13 @@ def read_text(path: str | Path, largest: int = MAX_SIZE) -> str:
         ) from error
 
 
-def read_yaml(path: str | Path) -> Any:
+def read_yaml(path: str | Path, largest: int = MAX_SIZE) -> Any:
     """Return what a YAML file says.
 
     Raises:
         InputFileError: as `read_text`, or it is no YAML, or is nested or expanded too far.
     """
-    text = read_text(path)
+    text = read_text(path, largest)
     try:
         return parse_yaml(text)
     except YamlError as error:

@@ -33,7 +33,8 @@ def take_resumed_goal(action: str, goal_class: Any) -> Any:
         goal = goal_class().deserialize(decode_parameter(value, goal_class._type))
     except (TakeoverError, genpy.DeserializationError) as error:
         rospy.logwarn("%s ignored: %s", name, error)
-        _delete(name)
+        with contextlib.suppress(KeyError):
+            rospy.delete_param(name)
         return None
     rospy.loginfo("Taking over goal %s", goal.goal_id.id)
     return goal
@@ -79,8 +80,3 @@ def _delete_goal(name: str, goal: Any) -> None:
 
 def _parameter(action: str) -> str:
     return str(rospy.resolve_name(f"{action}/resume_goal"))
-
-
-def _delete(name: str) -> None:
-    with contextlib.suppress(KeyError):
-        rospy.delete_param(name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from node_kit.io.input_files import InputFileError, read_bytes, read_yaml
+from node_kit.io.input_files import InputFileError, read_yaml
 
 from pybullet_simulator.io.map_file import MapError, read_map
 from pybullet_simulator.world.grid import GridError
@@ -26,8 +26,7 @@ def read_world(path: Path) -> World:
         WorldError: the file is missing, not YAML, or one of its entries is wrong; names the file and the entry.
     """
     try:
-        read_bytes(path, MAX_SIZE)
-        content = read_yaml(path)
+        content = read_yaml(path, MAX_SIZE)
     except InputFileError as error:
         raise WorldError(str(error)) from error
     if not isinstance(content, dict):

@@ -14,7 +14,7 @@ import roslaunch.xmlloader
 import rospkg
 import yaml
 from node_kit.io.input_files import InputFileError, read_bytes, read_text
-from node_kit.yaml_text import MAX_VALUES, YamlError
+from node_kit.yaml_text import MAX_VALUES, YamlError, explained
 from rosgraph.names import ns_join
 
 from ros_model.errors import ModelError
@@ -123,17 +123,38 @@ class LaunchLoader(roslaunch.xmlloader.XmlLoader):
             return
         import rosparam  # noqa: F401 - teaches PyYAML angles and binary data, as in roslaunch only from here on
 
-        if file_ is not None:
-            text = self._reading(read_text, file_, MAX_YAML)
-        if subst_function is not None:
-            text = subst_function(text)
         name = ns_join(context.ns, param) if param else context.ns
-        values = self._parsed(text, name, file_)
-        if values is None:
-            values = {}
-        if not param and not isinstance(values, dict):
-            raise self._refusal(f"{file_ or 'its text'} is no mapping: make it a mapping NAME: VALUE, or give 'param'")
+
+        def values_of(text: str) -> Any:
+            found = self._parsed(subst_function(text) if subst_function else text, name, file_)
+            if not param and not isinstance(found, dict | None):
+                what = file_ or "its text"
+                raise self._refusal(f"{what} is no mapping: make it a mapping NAME: VALUE, or give 'param'")
+            return {} if found is None else found
+
+        values = values_of(text) if file_ is None else self.values_of_file(file_, values_of)
         self.add_param(ros_config, name, values, verbose=verbose)
+
+    def values_of_file(self, file: str, values_of: Callable[[str], Any]) -> Any:
+        """Return what a file of parameters says.
+
+        Args:
+            file: its path.
+            values_of: what a text says; raises LaunchContentError.
+
+        Raises:
+            LaunchContentError: it can't be used.
+        """
+        return values_of(self.text_of(file))
+
+    def text_of(self, file: str) -> str:
+        """Return the text of a file of parameters.
+
+        Raises:
+            LaunchContentError: it can't be read.
+        """
+        text: str = self._reading(read_text, file, MAX_YAML)
+        return text
 
     def _parse_launch(self, filename: str, verbose: bool) -> Any:  # noqa: ARG002
         try:
@@ -273,10 +294,8 @@ def _parse(text: str, name: str) -> Any:
     except YamlError:
         raise
     except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = (mark.line + 1, mark.column + 1) if mark else (1, 1)
-        what = getattr(error, "problem", None) or getattr(error, "reason", None) or "is no YAML"
-        raise YamlError(f"parameter {name}: roslaunch can't read it: {what}: correct the YAML", place) from error
+        found = explained(error)
+        raise YamlError(f"parameter {name}: roslaunch can't read it: {found.problem}", found.place) from error
     except Exception as error:  # whatever PyYAML's constructors make of dates, numbers and angles
         what = "nested too deep" if isinstance(error, RecursionError) else f"{type(error).__name__}: {error}"
         raise YamlError(f"parameter {name}: roslaunch can't read it: {what}: correct the YAML") from error

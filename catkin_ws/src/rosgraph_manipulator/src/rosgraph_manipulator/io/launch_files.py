@@ -176,39 +176,25 @@ class _Loader(LaunchLoader):
         self.parameter_files: dict[str, str] = {}
         self.remarks: list[str] = []
 
-    def load_rosparam(
-        self,
-        context: Any,
-        ros_config: Any,
-        cmd: str,
-        param: str,
-        file_: str | None,
-        text: str,
-        verbose: bool = True,
-        subst_function: Callable[[str], str] | None = None,
-    ) -> None:
-        """Take in what a `<rosparam>` says. Of a file that can't be used now, it is what the file had before.
+    def values_of_file(self, file: str, values_of: Callable[[str], Any]) -> Any:
+        """Return what a file of parameters says. Where it can't be used now, that is what it said before.
 
         Many launch files may load the same file. None of them could be used without it.
         """
-        load = super().load_rosparam
-        before = self.parameter_files.get(file_ or "")
-        if cmd != "load" or not file_:
-            load(context, ros_config, cmd, param, file_, text, verbose, subst_function)
-            return
+        before = self.parameter_files.get(file)
         try:
-            load(context, ros_config, cmd, param, file_, text, verbose, subst_function)
-            content = Path(file_).read_text(encoding="utf-8")
-            if before and not content.strip():
-                raise ValueError("it is empty")
-        except (LaunchContentError, AttributeError, OSError, TypeError, ValueError) as error:
+            text = self.text_of(file)
+            found = values_of(text)
+            if before and not text.strip():
+                raise LaunchContentError(file, "it is empty")
+        except LaunchContentError as error:
             if before is None:
                 raise
-            load(context, ros_config, cmd, param, None, before, verbose, subst_function)
-            why = shortened(getattr(error, "problem", str(error)))
-            self.remarks.append(f"{file_} can't be used, so its values are those of before: correct it ({why})")
-        else:
-            self.parameter_files[file_] = content
+            why = shortened(error.problem)
+            self.remarks.append(f"{file} can't be used, so its values are those of before: correct it ({why})")
+            return values_of(before)
+        self.parameter_files[file] = text
+        return found
 
     @property
     def root_context(self) -> Any:
