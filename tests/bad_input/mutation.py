@@ -126,7 +126,7 @@ def changed_tree(rng: Random, tree: Any, *, cycles: bool = False) -> Any:
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         places = list(islice(_places(tree), _PLACES))
         if not places:
-            tree = {"": rng.choice(hostile.VALUES)}
+            tree = {"": copy.deepcopy(rng.choice(hostile.VALUES))}
             continue
         holder, key = rng.choice(places)
         try:

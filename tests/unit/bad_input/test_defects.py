@@ -21,6 +21,9 @@ from metacontrol_manipulation.ros.errors import RobotError
 from metacontrol_manipulation.ros.images import read_pixels
 from metacontrol_msgs.msg import LaunchedFunction
 from move_base.costmap.sensors import cloud_observation
+from mros1_reasoner.io.reasoners import make_reasoner
+from mros1_reasoner.io.replaying import make_loop
+from mros1_reasoner.replay.recording import RecordingError, Run
 from node_kit.one_line import LONGEST, OneLineError
 from node_kit.yaml_text import YamlError, parse_yaml
 from ros_model.errors import ModelError
@@ -298,3 +301,9 @@ def test_record_that_claims_to_be_large_takes_no_memory_before_it_is_there():
     data = bytes(range(256)) * 9000
     assert read_data(Stream(struct.pack("<L", len(data)) + data)) == data
     assert read_data(Stream(struct.pack("<L", 0))) == b""
+
+
+@pytest.mark.parametrize("files", [{"a\0b.owl": ""}, {f"{'x' * 300}.owl": ""}, {"a.owl": "\ud800"}])
+def test_recorded_ontology_that_no_file_can_hold_is_told(files):
+    with pytest.raises(RecordingError, match=r"^the recorded ontology '"):
+        make_loop(Run("reasoner", files=files), make_reasoner("rules"))

@@ -8,9 +8,9 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from bad_input import soak, trial
+from bad_input import hostile, soak, trial
 from bad_input.messages import changed, pack, serialised, unpack
-from bad_input.mutation import LARGEST, mutated
+from bad_input.mutation import LARGEST, changed_tree, mutated
 from bad_input.tally import Tally
 from bad_input.trial import ACCEPTED, BROKEN, REFUSED, Verdict, made, tried
 from std_msgs.msg import Header
@@ -31,6 +31,13 @@ def test_inputs_are_the_same_each_time_and_differ_from_each_other(kind):
     assert made_once == made_again
     assert len(set(made_once)) > 100
     assert max(map(len, made_once)) <= LARGEST
+
+
+def test_values_that_are_put_into_trees_are_not_changed_with_them():
+    before = repr(hostile.VALUES)
+    for n in range(5000):
+        changed_tree(Random(n), [[1]])
+    assert repr(hostile.VALUES) == before
 
 
 def test_changed_message_is_one_of_its_type_or_bytes():

@@ -88,7 +88,8 @@ def make_loop(
         waits: whether it waits at its start for what runs already, as the recorded one did.
 
     Raises:
-        ParameterError, KnowledgeBaseError, ModelError, ReasonerError: the parameters or models can't be used.
+        ParameterError, KnowledgeBaseError, ModelError, ReasonerError, RecordingError: the parameters or models can't
+            be used.
     """
     parameters = Parameters({**run.parameters, **(changes or {})})
     knowledge_base = _knowledge_base(parameters, run, models)
@@ -109,7 +110,10 @@ def _knowledge_base(parameters: Parameters, run: Run, models: Sequence[Path]) ->
             file_name = f"{Path(name).stem or 'model'}.owl"  # together, so that they find each other by name
             path = Path(folder) / str(sum(other.name == file_name for other in paths)) / file_name
             path.parent.mkdir(exist_ok=True)
-            path.write_text(content, encoding="utf-8")
+            try:
+                path.write_text(content, encoding="utf-8")
+            except (OSError, ValueError) as error:  # a name that no file has, text that none holds
+                raise RecordingError(f"the recorded ontology {name[:200]!r} can't be read: {error}") from error
             paths.append(path)
         return parameters.knowledge_base(paths, [])
 
