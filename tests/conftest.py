@@ -2,6 +2,7 @@
 
 import os
 import sys
+from itertools import groupby
 from pathlib import Path
 
 from hypothesis import HealthCheck, settings
@@ -16,20 +17,50 @@ os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (HERE, os.environ.get("P
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
 
-_ORDER = ("system", "integration", "unit")
-"""Whole missions begin first, one after the other on the first worker: several at once would be too much for 2 cores.
-The others take tests from the end of what is left, so that no worker is left with a mission."""
+_FOLDERS = ("system", "integration", "unit")
 _WITHOUT_MISSIONS = ("test_installed.py", "test_models_of_d2.py", "test_pyramid.py", "test_report.py")
-"""Tests of the system that the other workers may take, too: they start no mission on ROS."""
+"""Tests of the system that need not be driven one after the other: they start no mission on ROS."""
+_LONG = ("test_engines.py", "test_api_reference.py")
+"""Begin before others of their folder."""
 
 
-def pytest_collection_modifyitems(items):
-    """Have long tests begin first."""
-    items.sort(key=lambda item: (_place(item), item.path.name != "test_engines.py"))
+def pytest_collection_modifyitems(config, items):
+    """Put tests into an order in which several workers are done at about the same time.
+
+    A worker begins with an equal part of the list; who has none left takes from the end of another part. So each part
+    begins with what is long. Whole missions begin the first one: several at once would be too much for 2 cores. Others
+    begin with tests on ROS, which mostly wait; and one, where there are enough, with tests that only compute.
+    """
+    items.sort(key=lambda item: item.path.name not in _LONG)
+    missions, on_ros, rest = ([item for item in items if _folder(item) == folder] for folder in _FOLDERS)
+    workers = getattr(config, "workerinput", {}).get("workercount", 1)
+    heads = [missions, *([] for _ in range(workers - 1))]
+    with_ros = heads[1:-1] or heads[-1:]
+    for number, (_, group) in enumerate(groupby(on_ros, key=_together)):
+        with_ros[number % len(with_ros)] += group
+    items[:] = [item for part in _parts(heads, rest) for item in part]
 
 
-def _place(item):
+def _parts(heads, rest):
+    """Yield equal parts of all tests, in which those of the heads come first."""
+    left = sum(map(len, heads)) + len(rest)
+    begin = 0
+    for number, head in enumerate(heads):
+        size = left // (len(heads) - number)
+        end = begin + max(0, size - len(head))
+        yield [*head, *rest[begin:end]]
+        left -= size
+        begin = end
+
+
+def _together(item):
+    """Return what is the same for tests that one worker should take: they may share a fixture."""
+    return item.nodeid if item.path.name == "test_rostest.py" else item.path
+
+
+def _folder(item):
+    """Return system, integration or unit: what a test needs."""
     folder = item.path.relative_to(HERE).parts[0]
     if item.path.name in _WITHOUT_MISSIONS:
-        folder = "integration"
-    return _ORDER.index(folder) if folder in _ORDER else len(_ORDER)
+        return "integration"
+    return folder if folder in _FOLDERS else "unit"
