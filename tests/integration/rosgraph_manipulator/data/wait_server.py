@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """An actionlib server: a goal of 0 is pending until cancelled, any other succeeds at once.
 
-Arguments make it misbehave: --exit-at-once, --hang, --stubborn, --die-after SECONDS, --port NUMBER.
+Arguments make it misbehave: --exit-at-once, --hang, --stubborn, --die-after SECONDS, --port NUMBER, --waits-for FILE.
 With --passes-on ACTION it sends that action, its own one mostly, a goal of 0 for each message on `simple_goal`.
 """
 
@@ -12,6 +12,7 @@ import socket
 import sys
 import threading
 import time
+from pathlib import Path
 
 import actionlib
 import rospy
@@ -26,6 +27,7 @@ parser.add_argument("--stubborn", action="store_true")
 parser.add_argument("--die-after", type=float)
 parser.add_argument("--port", type=int)
 parser.add_argument("--passes-on")
+parser.add_argument("--waits-for", type=Path)
 options = parser.parse_args(rospy.myargv()[1:])
 
 if options.exit_at_once:
@@ -35,6 +37,8 @@ if options.stubborn:
         signal.signal(number, signal.SIG_IGN)
 while options.hang:
     time.sleep(1.0)
+while options.waits_for and not options.waits_for.exists():
+    time.sleep(0.02)
 if options.port:
     socket.create_server(("127.0.0.1", options.port))
 

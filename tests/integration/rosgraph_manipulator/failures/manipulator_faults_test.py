@@ -11,7 +11,7 @@ import rospy
 import rostest
 from geometry_msgs.msg import Twist
 from helpers.cases import case
-from helpers.waiting import wait_for
+from helpers.waiting import DEADLINE_S, wait_for
 from integration.rosgraph_manipulator.manipulator_harness import (
     CONFIGURATIONS,
     SERVER,
@@ -20,10 +20,11 @@ from integration.rosgraph_manipulator.manipulator_harness import (
     is_alive,
     pid_of,
 )
-from metacontrol_msgs.msg import LaunchedFunctions, NodeDescription
+from metacontrol_msgs.msg import LaunchedFunctions, MvpReconfigurationGoal, NodeDescription
 from metacontrol_msgs.srv import ChangeNodes, ChangeNodesRequest, StandBy
 
 FOLDER = tempfile.mkdtemp()
+GATE = Path(FOLDER) / "gate"
 
 
 def own_file(name):
@@ -45,6 +46,7 @@ class FaultsTest(PairTest):
             "port": configuration(args=f"--port {port}"),
             "vanishes": own_file("vanishes.launch"),
             "breaks": own_file("breaks.launch"),
+            "gated": configuration(period="gated", args=f"--waits-for {GATE}"),
         }
         # What nodes write there meets a full disk.
         logs = Path(FOLDER) / "log"
@@ -101,6 +103,20 @@ class FaultsTest(PairTest):
         wait_for(lambda: f"reports of {rospy.get_name()} are left out" in self.manipulator.said(), "it is heard")
         self.assertEqual(self.request("fast"), 1, self.text)
         self.wait_for_state("fast")
+
+    def test_parameters_that_somebody_changes_while_their_node_starts_are_put_back(self):
+        self.addCleanup(GATE.touch)
+        self.client.send_goal(MvpReconfigurationGoal("gated"))
+        wait_for(lambda: rospy.get_param("/wait_server/period", "") == "gated", "they are set")
+        wait_for(lambda: len(self.launched()) == 1 and pid_of("/wait_server") is None, "the node has begun")
+        rospy.set_param("/wait_server/period", "other")
+        wait_for(lambda: rospy.get_param("/wait_server/period") == "gated", "they are put back")
+        rospy.delete_param("/wait_server")
+        wait_for(lambda: rospy.get_param("/wait_server/period", "") == "gated", "they are put back again")
+        GATE.touch()
+        self.assertTrue(self.client.wait_for_result(rospy.Duration(DEADLINE_S)))
+        self.assertEqual(self.client.get_result().result, 1, self.text)
+        self.assertIn("f_wait: put back, because nodes start: /wait_server/period", self.manipulator.said())
 
     def test_port_in_use_is_rolled_back(self):
         self.assertEqual(self.request("port"), 0)

@@ -197,7 +197,13 @@ class RepairsTest(PairTest):
         goal.cancel()
         self.end(goal, GoalStatus.PREEMPTED)
         line = f"not up within {REPAIR_TIMEOUT:g} s: node /plant/yard/lower_scanner; see their logs"
-        self.assertEqual(self.refused("mute"), line)
+        port = "/plant/yard/lower_scanner/port"
+        rospy.delete_param(port)
+        goal = self.begin("mute")
+        wait_for(lambda: rospy.get_param(port, "") == "/dev/lower", "its parameter is set")
+        rospy.set_param(port, "/dev/other")
+        wait_for(lambda: rospy.get_param(port) == "/dev/lower", "its parameter is put back while it starts")
+        self.assertEqual(self.end(goal, GoalStatus.ABORTED), line)
 
     def test_node_of_a_function_is_not_restarted_by_a_repair(self):
         self.assertIn("functions that run have its nodes, /plant/wait_server", self.refused("served"))

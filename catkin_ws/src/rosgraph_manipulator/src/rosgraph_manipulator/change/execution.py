@@ -16,13 +16,13 @@ from rosgraph_launcher.launching.contested import HOLD
 from rosgraph_launcher.launching.report import CHANGING, STABLE, LauncherReport
 
 from rosgraph_manipulator.change.deployment import DeploymentError
+from rosgraph_manipulator.change.held_parameters import HeldParameters, changed
 from rosgraph_manipulator.change.parameters import OverwrittenParameters
 from rosgraph_manipulator.change.progress import ChangeProgress
 from rosgraph_manipulator.change.running_system import RunningSystem
 from rosgraph_manipulator.change.surroundings import Adjusting, KeptGoal, Launchers, MakeNames, Names, Surroundings
 from rosgraph_manipulator.change.tactics import Plan
 from rosgraph_manipulator.configuration.configurations import Configuration, ManipulatorOptions
-from rosgraph_manipulator.configuration.difference import same_value
 
 if TYPE_CHECKING:
     from rosgraph_manipulator.io.launch_files import LaunchFile
@@ -41,11 +41,13 @@ class DriverStart:
         nodes: those that were started.
         number: of the launcher's change.
         names: tells whether they answer under their names.
+        held: their parameters, until they are up.
     """
 
     nodes: tuple[str, ...]
     number: int
     names: Names
+    held: HeldParameters
 
 
 class Execution:
@@ -189,9 +191,17 @@ class Execution:
         goal = self._goals.get(function)
         # An earlier manipulator may have stopped the action's server.
         awaited = self._progress.awaited(goal is not None and goal.is_between_servers)
-        for node in awaited.nodes:
-            what = f"node {node} is not up"
-            self._wait(lambda: self._names.is_up(node), what, lambda: self._names.conflict(node), LOOK_PERIOD)  # noqa: B023
+        wanted = self.system.parameters_of(function, awaited.nodes)
+        held = HeldParameters(function, wanted, self._names.is_up, self._around)
+        for number, node in enumerate(awaited.nodes):
+
+            def is_up() -> bool:
+                if self._names.is_up(node):  # noqa: B023
+                    return True
+                held.look(awaited.nodes[number:])  # noqa: B023
+                return False
+
+            self._wait(is_up, f"node {node} is not up", lambda: self._names.conflict(node), LOOK_PERIOD)  # noqa: B023
         topics = {self._around.resolve(topic) for topic in awaited.topics}
         if topics:
             missing = set(topics)
@@ -380,7 +390,8 @@ class Execution:
             return report is not None and report.change == number and report.state != CHANGING
 
         self._around.wait_for_news(is_reported, STATE_TIMEOUT)
-        return DriverStart(start, number, names)
+        held = HeldParameters(function, system.all_parameters(), names.is_up, self._around)
+        return DriverStart(start, number, names, held)
 
     # -- helpers --------------------------------------------------------------------------------------------------
 
@@ -413,9 +424,7 @@ class Execution:
             CallError: the master does not answer; `catch_up` tries again.
         """
         self._owes_values[function] = nodes
-        wanted = self.system.parameters_of(function, nodes)
-        live = self._around.parameters(wanted)
-        lost = {name: v for name, v in wanted.items() if name not in live or not same_value(live[name], v)}
+        lost = changed(self.system.parameters_of(function, nodes), self._around)
         if lost:
             self._around.set_parameters(lost)
             self._around.log.warn(f"{function}: put back, because nodes start again: {', '.join(sorted(lost))}")

@@ -196,6 +196,7 @@ class RepairServer:
             outcome = told_by_launcher(report, start.number, missing, conflict, self._timeout if is_late else None)
             if outcome:
                 return outcome
+            start.held.look(missing)
             time.sleep(LOOK_PERIOD)
 
     def _begin(self, begun: Future[DriverStart], driver: Configuration) -> None:
