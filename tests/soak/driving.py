@@ -84,7 +84,7 @@ class Drive:
     _began: float | None = None
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _lines: list[str] = field(default_factory=list)
-    _undos: dict[int, tuple[float, Undo]] = field(default_factory=dict)
+    _undos: dict[int, Undo] = field(default_factory=dict)
     _left_out: dict[int, str] = field(default_factory=dict)
 
     def run(self) -> Record:
@@ -185,7 +185,6 @@ class Drive:
                 used = turn
                 for usage in table.usages():
                     self._write("usages", usage)
-            self._take_back(turn)
             if self._began is None and turn - started > START_S:
                 break
             faults = self.plan.faults
@@ -197,7 +196,7 @@ class Drive:
                 at_work.start()
                 struck += 1
             time.sleep(max(0.0, turn + PERIOD_S - time.monotonic()))
-        self._take_back(float("inf"))
+        self._take_back_all()
 
     def _strike(self, striker: Striker, index: int) -> None:
         fault = self.plan.faults[index]
@@ -210,15 +209,23 @@ class Drive:
         # What it took to find the moment, as with phases, comes before; a signal strikes at once.
         self._write("strikes", Strike(time.monotonic() if fault.kind in _LATE else before, index, False, note))
         if undo is not None and fault.lasts:
-            self._undos[index] = (time.monotonic() + fault.lasts, undo)
+            self._undos[index] = undo
+            # Not in a turn of the loop, which may take seconds on a busy machine: a master that is stopped for longer
+            # than the 10 s that nodes bear ends a mission.
+            timer = threading.Timer(fault.lasts, self._take_back, (index,))
+            timer.daemon = True
+            timer.start()
 
-    def _take_back(self, now: float) -> None:
-        for index, (due, undo) in list(self._undos.items()):
-            if now >= due:
-                self._undos.pop(index)
-                with suppress(OSError, psutil.Error):
-                    undo()
-                self._write("strikes", Strike(time.monotonic(), index, True, "taken back"))
+    def _take_back(self, index: int) -> None:
+        undo = self._undos.pop(index, None)
+        if undo is not None:
+            with suppress(OSError, psutil.Error):
+                undo()
+            self._write("strikes", Strike(time.monotonic(), index, True, "taken back"))
+
+    def _take_back_all(self) -> None:
+        for index in list(self._undos):
+            self._take_back(index)
 
     def _see_it_end(self, command: subprocess.Popen[bytes], table: ProcessTable) -> None:
         """Write how the command ended, and what it left."""
@@ -235,7 +242,7 @@ class Drive:
         self, command: subprocess.Popen[bytes], table: ProcessTable, striker: Striker, observer: subprocess.Popen[str]
     ) -> None:
         """End whatever still runs."""
-        self._take_back(float("inf"))
+        self._take_back_all()
         for helper in (*striker.helpers, observer):
             if helper.poll() is None:
                 helper.kill()
