@@ -23,6 +23,7 @@ from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from dynamic_reconfigure.client import Client
 from geometry_msgs.msg import PolygonStamped, PoseStamped, TransformStamped, Twist
 from helpers.cases import case
+from helpers.programs import program
 from helpers.waiting import DEADLINE_S, wait_for
 from map_msgs.msg import OccupancyGridUpdate
 from move_base_msgs.msg import MoveBaseAction, MoveBaseActionGoal, MoveBaseGoal
@@ -145,7 +146,7 @@ class MoveBaseTest(unittest.TestCase):
     @classmethod
     def start(cls):
         cls.process = subprocess.Popen(
-            ["/usr/bin/rosrun", "move_base", "move_base", "__name:=move_base", "odom:=odometry/filtered"]
+            [program("move_base", "move_base"), "__name:=move_base", "odom:=odometry/filtered"]
         )
 
     @classmethod
@@ -400,7 +401,7 @@ class MoveBaseTest(unittest.TestCase):
     def test_bad_parameter_ends_the_node_with_its_name(self):
         rospy.set_param("other", {**rospy.get_param("move_base"), "controller_frequency": "fast"})
         process = subprocess.run(
-            ["/usr/bin/rosrun", "move_base", "move_base", "__name:=other"],
+            [program("move_base", "move_base"), "__name:=other"],
             capture_output=True,
             text=True,
             timeout=DEADLINE_S,

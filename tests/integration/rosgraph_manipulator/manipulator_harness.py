@@ -19,6 +19,7 @@ from actionlib.msg import TestAction, TestGoal
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from geometry_msgs.msg import Twist
 from helpers.connections import hears
+from helpers.programs import program
 from helpers.waiting import DEADLINE_S, wait_for
 from metacontrol_msgs.msg import (
     ActiveConfiguration,
@@ -80,10 +81,10 @@ CONFIGURATIONS = {
 class Node:
     """A node as a process of the test's own, with what it says."""
 
-    def __init__(self, *words, environment=None, output=None):
+    def __init__(self, package, name, *words, environment=None, output=None):
         self.output = output or tempfile.NamedTemporaryFile("w")  # noqa: SIM115, it lives as long as the node
         self._process = subprocess.Popen(
-            ["/usr/bin/rosrun", *words],
+            [program(package, name), *words],
             stdout=self.output,
             stderr=subprocess.STDOUT,
             env={**os.environ, "PYTHONUNBUFFERED": "1", **(environment or {})},  # what it says is read at once

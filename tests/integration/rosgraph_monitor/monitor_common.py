@@ -10,6 +10,7 @@ from pathlib import Path
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
+from helpers.programs import program
 from helpers.waiting import DEADLINE_S
 
 SCRIPT = Path(__file__).parent / "monitor_node.py"
@@ -61,10 +62,10 @@ class Diagnostics:
         return self.wait(f"{message} {value or ''} of {name!r}", fits, timeout)
 
 
-def run(*command, environment=None):
+def run(name, *words, environment=None):
     """Run a command of the monitor's package."""
     return subprocess.run(
-        ["rosrun", "rosgraph_monitor", *command],
+        [program("rosgraph_monitor", name), *words],
         env=os.environ | (environment or {}),
         capture_output=True,
         text=True,

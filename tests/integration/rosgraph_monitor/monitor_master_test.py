@@ -13,6 +13,7 @@ import xmlrpc.client
 
 import rostest
 from helpers.ports import QUIET_HOST, reserved_port
+from helpers.programs import program
 from helpers.waiting import wait_for
 
 
@@ -112,7 +113,7 @@ class MonitorMasterTest(unittest.TestCase):
 
     def start_monitor(self, until=READY, namespace="/"):
         """Start it, and wait until it has registered a service (2), or a subscription (1)."""
-        monitor = self.start("rosrun", "rosgraph_monitor", "monitor", f"__ns:={namespace}")
+        monitor = self.start(program("rosgraph_monitor", "monitor"), f"__ns:={namespace}")
         if until:
             wait_for(lambda: self.registered(*until), "the registrations")
         return monitor

@@ -7,6 +7,7 @@ import threading
 from contextlib import suppress
 
 import rosgraph
+from helpers.programs import program
 
 HOST, ADDRESS = os.environ["OTHER_HOST"], os.environ["OTHER_ADDRESS"]
 FAR_LAUNCHER = "rosgraph_launcher_arm"
@@ -32,7 +33,7 @@ class Respawned:
         self._thread.start()
 
     def _run(self):
-        words = ["/usr/sbin/ip", "netns", "exec", HOST, "/usr/bin/rosrun", "rosgraph_launcher", "rosgraph_launcher"]
+        words = ["/usr/sbin/ip", "netns", "exec", HOST, program("rosgraph_launcher", "rosgraph_launcher")]
         while not self._ending.is_set():
             self.process = subprocess.Popen([*words, f"__name:={FAR_LAUNCHER}"], env=self._environment)
             self.process.wait()

@@ -2,6 +2,7 @@
 """A function over two hosts: its nodes, its launchers and the link between the hosts fail and come back."""
 
 import os
+import re
 import signal
 import tempfile
 from contextlib import suppress
@@ -17,6 +18,7 @@ from manipulator_hosts_harness import ADDRESS, FAR_LAUNCHER, Respawned, link
 DATA = Path(__file__).resolve().parent / "data"
 NEAR, FAR = "/near_node", "/far_node"
 LIFE = Path(tempfile.mkdtemp()) / "life"
+HOLD = Path(f"{LIFE}.hold")
 
 
 def configuration(name, *args):
@@ -138,34 +140,44 @@ class HostsTest(PairTest):
 
     def lose_host_while_it_deploys_again(self, begin):
         """Have the configuration deployed again by what `begin` does, lose the host during that, and end the loss."""
-        lives = LIFE.read_text().count("begins")
-        begin()
-        wait_for(lambda: LIFE.read_text().count("begins") > lives, "its node has begun, and is held")
+        self.addCleanup(HOLD.unlink, missing_ok=True)
+        while not self.is_held_after(begin):
+            pass
         link("down")
         self.wait_for_state("held", "FAILED")
         self.assertIn(f"host {ADDRESS} is lost", self.states[-1].message)
-        self.hold.unlink()
+        HOLD.unlink()
         link("up")
         self.wait_for_state("held")
         self.assertTrue(pid_of(NEAR) and pid_of(FAR))
 
-    def deploy_held(self):
-        """Have the configuration run whose far node, when it begins the next time, waits before it is one."""
-        self.assertEqual(self.request("held"), 1, self.text)
-        self.hold = Path(f"{LIFE}.hold")
-        self.hold.touch()
-        self.addCleanup(self.hold.unlink, missing_ok=True)
+    def is_held_after(self, begin):
+        """Have the configuration deployed again, so that its far node waits before it is one.
+
+        False where that failed for a busy master that did not answer in time: nothing is tried again then.
+        """
+        HOLD.unlink(missing_ok=True)
+        wait_for(lambda: self.request("held") == 1, lambda: f"it runs: {self.text}")
+        HOLD.touch()
+        lives, said = LIFE.read_text().count("begins"), len(self.manipulator.said())
+        begin()
+
+        def gave_up():
+            return re.search("held: .*ROS master .* does not answer", self.manipulator.said()[said:])
+
+        wait_for(lambda: LIFE.read_text().count("begins") > lives or gave_up(), "its node has begun, and is held")
+        return not gave_up()
 
     def test_host_that_is_lost_again_during_the_deployment_after_its_return_is_waited_for_once_more(self):
-        self.deploy_held()
-        link("down")
-        self.wait_for_state("held", "FAILED")
-        self.lose_host_while_it_deploys_again(lambda: link("up"))
+        def begin():
+            link("down")
+            self.wait_for_state("held", "FAILED")
+            link("up")
+
+        self.lose_host_while_it_deploys_again(begin)
 
     def test_host_that_is_lost_during_the_deployment_after_the_death_of_its_launcher_is_waited_for(self):
-        self.deploy_held()
-        launcher = pid_of(f"/{FAR_LAUNCHER}")
-        self.lose_host_while_it_deploys_again(lambda: os.kill(launcher, signal.SIGKILL))
+        self.lose_host_while_it_deploys_again(lambda: os.kill(pid_of(f"/{FAR_LAUNCHER}"), signal.SIGKILL))
 
     def test_lost_host_does_not_delay_the_start_of_the_manipulator(self):
         self.assertEqual(self.request("near"), 1, self.text)
