@@ -100,11 +100,15 @@ class Costmap:
         Raises:
             MapError: the part is not within the map.
         """
-        layers = [one for one in self.parameters.layers if one.kind == "static" and one.subscribe_to_updates]
+        layers = self._layers_with_updates()
         for layer in layers:
             if layer.map_topic == topic and topic in self._maps:
                 self._maps[topic] = self._maps[topic].updated(part)
                 self._static_costs.pop(layer.name, None)
+
+    def takes_updates(self, topic: str) -> bool:
+        """Tell whether a layer subscribes to parts of the map from a topic."""
+        return any(layer.map_topic == topic for layer in self._layers_with_updates())
 
     def obstacles(self, layer: str) -> NDArray[np.uint8]:
         """Return the obstacles that a layer holds (H, W): LETHAL or FREE."""
@@ -182,6 +186,9 @@ class Costmap:
 
     def _has_size_of_map(self) -> bool:
         return bool(self._maps) and not self.parameters.rolling_window
+
+    def _layers_with_updates(self) -> list[Layer]:
+        return [one for one in self.parameters.layers if one.kind == "static" and one.subscribe_to_updates]
 
     def _initial_geometry(self) -> Geometry:
         p = self.parameters

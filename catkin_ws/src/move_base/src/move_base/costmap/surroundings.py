@@ -6,12 +6,14 @@ It also tells what keeps them from being current: a missing map or transform, a 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
 
 from robot_formulas.geometry import ORIGIN, Pose
 
 from move_base.costmap.costmap import Costmap
+from move_base.costmap.static_map import MapError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,6 +26,9 @@ if TYPE_CHECKING:
 
 FUTURE_LIMIT = 0.5
 """A measurement whose stamp is this far ahead of the clock (s) is not believed."""
+
+KEPT_MAPS = 3
+"""Per topic: maps whose frames are not connected with the costmaps' yet."""
 
 KEPT_OBSERVATIONS = 5
 """Per source: as many as can be waiting for their transform at any usual rate."""
@@ -116,6 +121,7 @@ class Surroundings:
         sources.sort(key=lambda source: source.expected_update_rate, reverse=True)  # the shortest period counts
         self._sensors = {source.stream: _Sensor(source) for source in sources}
         self._map_frame = ""
+        self._waiting: dict[str, dict[str, StaticMap]] = {}  # maps that wait, by topic and frame; the newest last
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
         """Take other parameters while the robot drives: obstacles stay."""
@@ -127,12 +133,27 @@ class Surroundings:
         """The sources to listen to, those that convert a topic's messages alike once."""
         return [sensor.source for sensor in self._sensors.values()]
 
-    def set_map(self, static: StaticMap, frame: str, topic: str = "") -> None:
-        """Take the static map of a topic; without one, it is for all static layers."""
-        self._map_frame = frame.removeprefix("/")
-        for area in (self.global_area, self.local_area):
-            area.costmap.set_map(static, topic)
-            area.snapshot = None
+    def set_map(self, static: StaticMap, frame: str, topic: str = "") -> str:
+        """Take the static map of a topic; without one, it is for all static layers.
+
+        A map whose frame is not connected with the costmaps' waits until it is. The one before stays in use meanwhile:
+        anybody may publish a map.
+
+        Returns:
+            Why it waits, or an empty text.
+        """
+        frame = frame.removeprefix("/")
+        own = self.global_area.parameters.global_frame
+        if frame in ("", own, self._map_frame):
+            self._waiting.pop(topic, None)
+            self._use_map(static, frame, topic)
+            return ""
+        waiting = self._waiting.setdefault(topic, {})
+        waiting.pop(frame, None)
+        waiting[frame] = static
+        if len(waiting) > KEPT_MAPS:
+            waiting.pop(next(iter(waiting)))
+        return _no_transform(frame, own)
 
     def update_map(self, part: MapPart, topic: str) -> None:
         """Take a part of the static map of a topic.
@@ -140,7 +161,12 @@ class Surroundings:
         Raises:
             MapError: the part is not within the map.
         """
-        for area in (self.global_area, self.local_area):
+        areas = (self.global_area, self.local_area)
+        waiting = self._waiting.get(topic, {}) if any(area.costmap.takes_updates(topic) for area in areas) else {}
+        for frame, static in waiting.items():
+            with suppress(MapError):
+                waiting[frame] = static.updated(part)
+        for area in areas:
             area.costmap.update_map(part, topic)
             area.updated = -math.inf
 
@@ -178,14 +204,19 @@ class Surroundings:
         Returns:
             What is missing for it: map or transform.
         """
+        self._use_connected(frames)
         for area, pose in ((self.local_area, local_robot), (self.global_area, robot)):
             if area.costmap.needs_map:
-                return f"no map received on {area.costmap.missing_map()}"
+                topic = area.costmap.missing_map()
+                waiting = self._waiting.get(topic)
+                if waiting:
+                    return _no_transform(next(reversed(waiting)), self.global_area.parameters.global_frame)
+                return f"no map received on {topic}"
             if pose is None or not area.due(now):
                 continue
             map_pose = self._map_pose(area, frames)
             if map_pose is None:
-                return f"no transform from {self._map_frame!r} to {area.parameters.global_frame!r}"
+                return _no_transform(self._map_frame, area.parameters.global_frame)
             area.snapshot = area.costmap.update(pose, self._observations_for(area, frames), map_pose)
             area.updated_at(now)
         for area, pose in ((self.global_area, robot), (self.local_area, local_robot)):
@@ -215,9 +246,30 @@ class Surroundings:
                 sensor.used = max(sensor.used, observation.stamp)
         return observations
 
+    def _use_connected(self, frames: Transformer) -> None:
+        """Use the newest map of each topic that waited for its frame, and waits no more."""
+        for topic, waiting in self._waiting.items():
+            for frame in reversed(list(waiting)):
+                if frames.lookup(self.global_area.parameters.global_frame, frame, None) is not None:
+                    self._use_map(waiting[frame], frame, topic)
+                    while waiting and next(iter(waiting)) != frame:  # older ones
+                        waiting.pop(next(iter(waiting)))
+                    waiting.pop(frame)
+                    break
+
+    def _use_map(self, static: StaticMap, frame: str, topic: str) -> None:
+        self._map_frame = frame
+        for area in (self.global_area, self.local_area):
+            area.costmap.set_map(static, topic)
+            area.snapshot = None
+
     def _map_pose(self, area: Area, frames: Transformer) -> Pose | None:
         """Return the pose of the map's frame in the area's frame."""
         if not self._map_frame or self._map_frame == area.parameters.global_frame:
             return ORIGIN
         matrix = frames.lookup(area.parameters.global_frame, self._map_frame, None)
         return None if matrix is None else Pose.from_matrix(matrix)
+
+
+def _no_transform(source: str, target: str) -> str:
+    return f"no transform from {source!r} to {target!r}"

@@ -229,7 +229,9 @@ class MoveBaseNode:
             rospy.logwarn_throttle_identical(WARN_PERIOD, f"Map ignored: {error}")
             return
         with self._lock:
-            self._navigator.set_map(static, message.header.frame_id, topic)
+            waits = self._navigator.set_map(static, message.header.frame_id, topic)
+        if waits:
+            rospy.logwarn_throttle_identical(WARN_PERIOD, f"The map on {topic} is not used yet: {waits}")
 
     def _on_map_update(self, topic: str, message: OccupancyGridUpdate) -> None:
         try:
