@@ -47,7 +47,7 @@ def snapshot_of(parameters, boxes, robot):
     costmap = Costmap(parameters.local_costmap)
     origin = (-4.0, -4.0, 0.0)
     costmap.set_map(StaticMap.create(occupied.ravel(), CELLS, CELLS, RESOLUTION, origin), "yard")
-    return costmap.update(robot, [], Pose(0.0, 0.0, 0.0))
+    return costmap.update(robot, [])
 
 
 @st.composite

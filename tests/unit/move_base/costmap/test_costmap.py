@@ -289,7 +289,7 @@ def test_local_costmap_shows_the_map_through_the_drift_of_odometry(local):
     occupancy[98:102, 138:142] = 100  # around (2, 0) in the map
     local.set_map(static_map(occupancy, origin=(-5.0, -5.0, 0.0)))
     drift = Pose(0.5, 0.2, 0.3)
-    snapshot = local.update(ORIGIN, [], drift)
+    snapshot = local.update(ORIGIN, [], {"map": drift})
     x, y = drift.apply(np.array([[2.0, 0.0]]))[0]
     assert at(snapshot, x, y) == LETHAL
 

@@ -2,23 +2,25 @@
 
 import numpy as np
 import pytest
+from move_base.costmap.grid import LETHAL
 from move_base.costmap.static_map import MapPart, StaticMap
 from move_base.costmap.surroundings import KEPT_MAPS, Surroundings
 from move_base.parameters.reader import read_parameters
-from robot_formulas.geometry import ORIGIN
+from robot_formulas.geometry import ORIGIN, Pose
 
 CELLS = 40
 FREE, OCCUPIED = 0, 100
 
 
 class Frames:
-    """Frames that all lie in the same place."""
+    """Frames that all lie in the same place, but for some."""
 
     def __init__(self):
         self.connected = {"map", "odom", "base_link"}
+        self.places = {}
 
     def lookup(self, target, source, stamp):
-        return np.eye(4) if {target, source} <= self.connected else None
+        return self.places.get(source, ORIGIN).matrix() if {target, source} <= self.connected else None
 
     def newest(self, target, source):
         return 0.0
@@ -100,3 +102,18 @@ def test_map_that_waits_takes_its_updates(look, frames):
     look.surroundings.update_map(MapPart.create(np.full(CELLS * CELLS, OCCUPIED), 0, 0, CELLS, CELLS), "map")
     frames.connected.add("attic")
     assert look() == OCCUPIED
+
+
+def test_each_map_lies_where_its_own_frame_does(frames, tree):
+    static = {"name": "rooms", "type": "costmap_2d::StaticLayer"}
+    plugins = [{**static, "name": "static_layer"}, static]
+    surroundings = Surroundings(
+        read_parameters(tree(global_costmap__plugins=plugins, global_costmap__rooms={"map_topic": "rooms"}))
+    )
+    frames.places["attic"] = Pose(1.0, 0.0, 0.0)
+    frames.connected.add("attic")
+    surroundings.set_map(a_map(OCCUPIED), "attic", "rooms")
+    surroundings.set_map(a_map(FREE), "map", "map")
+    assert surroundings.update(0.0, frames, ORIGIN, ORIGIN) == ""
+    occupied = surroundings.global_area.snapshot.costs == LETHAL
+    assert occupied[:, CELLS // 2 :].all() and not occupied[:, : CELLS // 2].any()

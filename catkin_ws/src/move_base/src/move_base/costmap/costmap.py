@@ -17,7 +17,7 @@ from move_base.costmap.static_map import bounding_geometry, costs_of, resample
 from move_base.parameters.parameters import OBSTACLE_KINDS
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -70,6 +70,11 @@ class Costmap:
         """Whether a static layer still waits for its map."""
         return self.missing_map() != ""
 
+    @property
+    def map_topics(self) -> list[str]:
+        """The topics of the maps of all static layers."""
+        return [layer.map_topic for layer in self._static_layers]
+
     def missing_map(self) -> str:
         """Return the topic of a map that a static layer still waits for, or an empty text."""
         return next((layer.map_topic for layer in self._static_layers if layer.map_topic not in self._maps), "")
@@ -118,14 +123,14 @@ class Costmap:
         self,
         robot: Pose,
         observations: Sequence[tuple[Observation, NDArray[np.float64]]],
-        map_pose: Pose | None = None,
+        map_poses: Mapping[str, Pose] | None = None,
     ) -> Snapshot:
         """Roll, clear, mark and inflate.
 
         Args:
             robot: pose of the base in the costmap's frame.
             observations: each with the 4 x 4 transform from its sensor to the costmap's frame.
-            map_pose: pose of the static map's frame in the costmap's; None where they are the same frame.
+            map_poses: by topic, the pose of the static map's frame in the costmap's, where they are not the same frame.
         """
         if self.parameters.rolling_window:
             self._roll(robot)
@@ -134,7 +139,7 @@ class Costmap:
         for layer in self._obstacle_layers:
             if layer.footprint_clearing_enabled:
                 self._clear_footprint(self._obstacles[layer.name], robot.apply(self._footprint))
-        return self._combine(map_pose or ORIGIN)
+        return self._combine(map_poses or {})
 
     def clear(
         self,
@@ -286,8 +291,8 @@ class Costmap:
         scaled *= 1 << SUBPIXEL_BITS
         cv2.fillPoly(obstacles, [np.rint(scaled, out=scaled).astype(np.int32)], FREE, shift=SUBPIXEL_BITS)
 
-    def _combine(self, map_pose: Pose) -> Snapshot:
-        self._place_static(map_pose)
+    def _combine(self, map_poses: Mapping[str, Pose]) -> Snapshot:
+        self._place_static(map_poses)
         costs = np.zeros(self.geometry.shape, dtype=np.uint8)
         for layer in self.parameters.layers:  # in the order of the list, as in costmap_2d
             if not layer.enabled:
@@ -302,10 +307,11 @@ class Costmap:
             whole = Part(0, 0, *self._incremental.update(costs))
         return Snapshot(self.geometry, costs, self._inflation, self._radii, whole)
 
-    def _place_static(self, map_pose: Pose) -> None:
+    def _place_static(self, map_poses: Mapping[str, Pose]) -> None:
         """Resample the static maps into the grid, where grid or map moved since the last time."""
-        placement = (self.geometry, map_pose)
         for layer in self._static_layers:
+            map_pose = map_poses.get(layer.map_topic, ORIGIN)
+            placement = (self.geometry, map_pose)
             static = self._maps.get(layer.map_topic)
             if static is None or (layer.name in self._static_costs and self._static_placed[layer.name] == placement):
                 continue

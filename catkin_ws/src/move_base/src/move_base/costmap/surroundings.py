@@ -120,7 +120,7 @@ class Surroundings:
         sources = [*parameters.global_costmap.all_sources, *parameters.local_costmap.all_sources]
         sources.sort(key=lambda source: source.expected_update_rate, reverse=True)  # the shortest period counts
         self._sensors = {source.stream: _Sensor(source) for source in sources}
-        self._map_frame = ""
+        self._map_frames: dict[str, str] = {}  # of the maps in use, by topic
         self._waiting: dict[str, dict[str, StaticMap]] = {}  # maps that wait, by topic and frame; the newest last
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
@@ -144,7 +144,7 @@ class Surroundings:
         """
         frame = frame.removeprefix("/")
         own = self.global_area.parameters.global_frame
-        if frame in ("", own, self._map_frame):
+        if frame in ("", own, self._map_frame(topic)):
             self._waiting.pop(topic, None)
             self._use_map(static, frame, topic)
             return ""
@@ -214,10 +214,12 @@ class Surroundings:
                 return f"no map received on {topic}"
             if pose is None or not area.due(now):
                 continue
-            map_pose = self._map_pose(area, frames)
-            if map_pose is None:
-                return _no_transform(self._map_frame, area.parameters.global_frame)
-            area.snapshot = area.costmap.update(pose, self._observations_for(area, frames), map_pose)
+            map_poses = {topic: self._map_pose(topic, area, frames) for topic in area.costmap.map_topics}
+            if None in map_poses.values():
+                lost = next(topic for topic, found in map_poses.items() if found is None)
+                return _no_transform(self._map_frame(lost), area.parameters.global_frame)
+            placed = {topic: found for topic, found in map_poses.items() if found is not None}
+            area.snapshot = area.costmap.update(pose, self._observations_for(area, frames), placed)
             area.updated_at(now)
         for area, pose in ((self.global_area, robot), (self.local_area, local_robot)):
             if pose is None:
@@ -258,16 +260,22 @@ class Surroundings:
                     break
 
     def _use_map(self, static: StaticMap, frame: str, topic: str) -> None:
-        self._map_frame = frame
+        if not topic:
+            self._map_frames.clear()
+        self._map_frames[topic] = frame
         for area in (self.global_area, self.local_area):
             area.costmap.set_map(static, topic)
             area.snapshot = None
 
-    def _map_pose(self, area: Area, frames: Transformer) -> Pose | None:
-        """Return the pose of the map's frame in the area's frame."""
-        if not self._map_frame or self._map_frame == area.parameters.global_frame:
+    def _map_frame(self, topic: str) -> str:
+        return self._map_frames.get(topic) or self._map_frames.get("", "")
+
+    def _map_pose(self, topic: str, area: Area, frames: Transformer) -> Pose | None:
+        """Return the pose in the area's frame of the frame of a topic's map."""
+        frame = self._map_frame(topic)
+        if frame in ("", area.parameters.global_frame):
             return ORIGIN
-        matrix = frames.lookup(area.parameters.global_frame, self._map_frame, None)
+        matrix = frames.lookup(area.parameters.global_frame, frame, None)
         return None if matrix is None else Pose.from_matrix(matrix)
 
 
