@@ -141,6 +141,7 @@ class HostsTest(PairTest):
     def lose_host_while_it_deploys_again(self, begin):
         """Have the configuration deployed again by what `begin` does, lose the host during that, and end the loss."""
         self.addCleanup(HOLD.unlink, missing_ok=True)
+        self.assertEqual(self.request("held"), 1, self.text)
         while not self.is_held_after(begin):
             pass
         link("down")

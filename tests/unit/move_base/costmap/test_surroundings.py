@@ -72,6 +72,13 @@ def test_map_is_used_as_soon_as_its_frame_is_connected(look, frames):
     assert look() == FREE
 
 
+def test_map_in_another_connected_frame_is_used_at_once(look, frames):
+    frames.connected.add("attic")
+    look.surroundings.set_map(a_map(FREE), "map", "map")
+    assert look.surroundings.set_map(a_map(OCCUPIED), "attic", "map", frames) == ""
+    assert look() == OCCUPIED
+
+
 def test_newest_of_the_maps_whose_frames_are_connected_is_used_and_older_ones_are_forgotten(look, frames):
     for frame, value in (("attic", OCCUPIED), ("cellar", FREE), ("roof", OCCUPIED)):
         look.surroundings.set_map(a_map(value), frame, "map")

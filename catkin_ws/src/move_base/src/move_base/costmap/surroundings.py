@@ -133,18 +133,24 @@ class Surroundings:
         """The sources to listen to, those that convert a topic's messages alike once."""
         return [sensor.source for sensor in self._sensors.values()]
 
-    def set_map(self, static: StaticMap, frame: str, topic: str = "") -> str:
+    def set_map(self, static: StaticMap, frame: str, topic: str = "", frames: Transformer | None = None) -> str:
         """Take the static map of a topic; without one, it is for all static layers.
 
-        A map whose frame is not connected with the costmaps' waits until it is. The one before stays in use meanwhile:
-        anybody may publish a map.
+        A map whose frame is not connected with the global costmap's waits until it is. The one before stays in use
+        meanwhile: anybody may publish a map.
+
+        Args:
+            static: the map.
+            frame: its frame.
+            topic: where it comes from.
+            frames: the transforms; without them, only the costmap's own frame counts as connected at once.
 
         Returns:
             Why it waits, or an empty text.
         """
         frame = frame.removeprefix("/")
         own = self.global_area.parameters.global_frame
-        if frame in ("", own, self._map_frame(topic)):
+        if frame in ("", own, self._map_frame(topic)) or (frames and frames.lookup(own, frame, None) is not None):
             self._waiting.pop(topic, None)
             self._use_map(static, frame, topic)
             return ""
@@ -214,12 +220,13 @@ class Surroundings:
                 return f"no map received on {topic}"
             if pose is None or not area.due(now):
                 continue
-            map_poses = {topic: self._map_pose(topic, area, frames) for topic in area.costmap.map_topics}
-            if None in map_poses.values():
-                lost = next(topic for topic, found in map_poses.items() if found is None)
-                return _no_transform(self._map_frame(lost), area.parameters.global_frame)
-            placed = {topic: found for topic, found in map_poses.items() if found is not None}
-            area.snapshot = area.costmap.update(pose, self._observations_for(area, frames), placed)
+            map_poses = {}
+            for topic in area.costmap.map_topics:
+                map_pose = self._map_pose(topic, area, frames)
+                if map_pose is None:
+                    return _no_transform(self._map_frame(topic), area.parameters.global_frame)
+                map_poses[topic] = map_pose
+            area.snapshot = area.costmap.update(pose, self._observations_for(area, frames), map_poses)
             area.updated_at(now)
         for area, pose in ((self.global_area, robot), (self.local_area, local_robot)):
             if pose is None:
@@ -249,15 +256,15 @@ class Surroundings:
         return observations
 
     def _use_connected(self, frames: Transformer) -> None:
-        """Use the newest map of each topic that waited for its frame, and waits no more."""
+        """Use the newest map of each topic whose frame is connected now; older ones are forgotten, newer ones wait."""
         for topic, waiting in self._waiting.items():
-            for frame in reversed(list(waiting)):
+            newer: dict[str, StaticMap] = {}
+            for frame in reversed(waiting):
                 if frames.lookup(self.global_area.parameters.global_frame, frame, None) is not None:
                     self._use_map(waiting[frame], frame, topic)
-                    while waiting and next(iter(waiting)) != frame:  # older ones
-                        waiting.pop(next(iter(waiting)))
-                    waiting.pop(frame)
+                    self._waiting[topic] = newer
                     break
+                newer = {frame: waiting[frame], **newer}
 
     def _use_map(self, static: StaticMap, frame: str, topic: str) -> None:
         if not topic:

@@ -83,13 +83,13 @@ class Navigator:
         """The newest local costmap."""
         return self._local.snapshot
 
-    def set_map(self, static: StaticMap, frame: str, topic: str = "") -> str:
+    def set_map(self, static: StaticMap, frame: str, topic: str = "", frames: Transformer | None = None) -> str:
         """Take the static map of a topic; without one, it is for all static layers.
 
         Returns:
-            Why it waits, or an empty text: its frame is not connected with the costmaps'.
+            Why it waits, or an empty text: its frame is not connected with the costmaps' yet, as `frames` tell.
         """
-        return self._surroundings.set_map(static, frame, topic)
+        return self._surroundings.set_map(static, frame, topic, frames)
 
     def update_map(self, part: MapPart, topic: str) -> None:
         """Take a part of the static map of a topic.

@@ -229,7 +229,7 @@ class MoveBaseNode:
             rospy.logwarn_throttle_identical(WARN_PERIOD, f"Map ignored: {error}")
             return
         with self._lock:
-            waits = self._navigator.set_map(static, message.header.frame_id, topic)
+            waits = self._navigator.set_map(static, message.header.frame_id, topic, self._frames)
         if waits:
             rospy.logwarn_throttle_identical(WARN_PERIOD, f"The map on {topic} is not used yet: {waits}")
 
