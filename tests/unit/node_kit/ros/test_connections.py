@@ -11,6 +11,7 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 import rospy.topics
+from helpers.ports import QUIET_HOST
 from helpers.waiting import wait_for
 from node_kit.ros import shortages
 from node_kit.ros.connections import connect_to_all
@@ -30,19 +31,19 @@ class Publisher:
     """Answers to whoever asks for a topic after a while, and keeps the connections that are then made."""
 
     def __init__(self, stack):
-        self.server = stack.enter_context(socket.create_server(("localhost", 0)))
+        self.server = stack.enter_context(socket.create_server((QUIET_HOST, 0)))
         self.asked, self.connections = 0, []
-        api = stack.enter_context(Api(("localhost", 0), logRequests=False))
+        api = stack.enter_context(Api((QUIET_HOST, 0), logRequests=False))
         stack.callback(api.shutdown)
         api.register_function(self.request_topic, "requestTopic")
-        self.uri = f"http://localhost:{api.server_address[1]}/"
+        self.uri = f"http://{QUIET_HOST}:{api.server_address[1]}/"
         threading.Thread(target=api.serve_forever, args=(0.01,), daemon=True).start()
         threading.Thread(target=self.accept, daemon=True).start()
 
     def request_topic(self, *_):
         self.asked += 1
         time.sleep(0.2)  # so that whoever else asks is there, too
-        return 1, "", ["TCPROS", "localhost", self.server.getsockname()[1]]
+        return 1, "", ["TCPROS", QUIET_HOST, self.server.getsockname()[1]]
 
     def accept(self):
         with contextlib.suppress(OSError):
