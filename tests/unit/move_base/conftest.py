@@ -106,8 +106,8 @@ class Simulation:
         self.navigator = Navigator(read_parameters(tree or base_tree()))
         self.sent = -math.inf
         occupancy = np.where(self.known, 100, 0).ravel()
-        self.static_map = StaticMap.create(occupancy, cells, cells, RESOLUTION, (-size / 2, -size / 2, 0.0))
-        self.navigator.set_map(self.static_map, "map")
+        self.static_map = StaticMap.create(occupancy, cells, cells, RESOLUTION, (-size / 2, -size / 2, 0.0), "map")
+        self.navigator.set_map(self.static_map)
         self.run_log = Run()
         self._touching = False
 

@@ -21,7 +21,7 @@ def local(tree):
 
 def static_map(occupancy, resolution=0.05, origin=(0.0, 0.0, 0.0)):
     rows, columns = occupancy.shape
-    return StaticMap.create(occupancy.ravel(), columns, rows, resolution, origin)
+    return StaticMap.create(occupancy.ravel(), columns, rows, resolution, origin, "map")
 
 
 def seen(costmap, *points, hits=True, **changes):
@@ -314,7 +314,8 @@ def test_local_costmap_shows_a_map_that_comes_later(local, place):
         (3, 0.05, (0.0, 0.0, 0.0)),
         (2, 0.0, (0.0, 0.0, 0.0)),
         (2, 1e-9, (0.0, 0.0, 0.0)),
-        (2, math.inf, (0.0, 0.0, 0.0)),
+        (2, 0.05, (math.nan, 0.0, 0.0)),
+        (2, 0.05, (0.0, -1e18, 0.0)),
         (2, 0.05, (math.nan, 0.0, 0.0)),
         (0, 0.05, (0.0, 0.0, 0.0)),
     ],

@@ -87,7 +87,7 @@ class Navigation:
 
     def _start(self) -> None:
         self._navigator = Navigator(self.parameters)
-        self._navigator.set_map(self._map, _MAP_FRAME)
+        self._navigator.set_map(self._map)
 
 
 def _static_map(grid: Grid) -> StaticMap:
@@ -95,4 +95,4 @@ def _static_map(grid: Grid) -> StaticMap:
     message = occupancy_grid(grid, stamp(0))
     info = message.info
     origin = (grid.origin_x, grid.origin_y, grid.origin_yaw)
-    return StaticMap.create(message.data, info.width, info.height, info.resolution, origin)
+    return StaticMap.create(message.data, info.width, info.height, info.resolution, origin, _MAP_FRAME)

@@ -13,7 +13,7 @@ from robot_formulas.geometry import ORIGIN, Pose, inscribed_radius
 from move_base.costmap.grid import FREE, LETHAL, UNKNOWN, Geometry
 from move_base.costmap.inflation import IncrementalInflation, Inflation
 from move_base.costmap.snapshot import Part, Radii, Snapshot
-from move_base.costmap.static_map import bounding_geometry, costs_of, resample
+from move_base.costmap.static_map import MapError, bounding_geometry, costs_of, resample
 from move_base.parameters.parameters import OBSTACLE_KINDS
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Costmap:
     def __init__(self, parameters: CostmapParameters) -> None:
         self.parameters = parameters
         self.geometry = self._initial_geometry()
-        self._maps: dict[str, StaticMap] = {}  # by topic
+        self._maps: dict[str, StaticMap] = {}  # by layer
         self._map_costs: dict[str, tuple[StaticMap, NDArray[np.uint8]]] = {}  # by layer, on the map's own grid
         self._static_costs: dict[str, NDArray[np.uint8]] = {}  # by layer
         self._static_placed: dict[str, tuple[Geometry, Pose]] = {}
@@ -71,29 +71,36 @@ class Costmap:
         return self.missing_map() != ""
 
     @property
-    def map_topics(self) -> list[str]:
-        """The topics of the maps of all static layers."""
-        return [layer.map_topic for layer in self._static_layers]
+    def map_frames(self) -> set[str]:
+        """The frames of the maps of all static layers."""
+        return {self._maps[layer.name].frame for layer in self._static_layers if layer.name in self._maps}
 
     def missing_map(self) -> str:
         """Return the topic of a map that a static layer still waits for, or an empty text."""
-        return next((layer.map_topic for layer in self._static_layers if layer.map_topic not in self._maps), "")
+        return next((layer.map_topic for layer in self._static_layers if layer.name not in self._maps), "")
 
-    def set_map(self, static: StaticMap, topic: str = "") -> None:
+    def takes_map(self, topic: str) -> bool:
+        """Tell whether a layer takes a map from a topic now."""
+        return bool(self._layers_for(topic))
+
+    def set_map(self, static: StaticMap, topic: str = "", map_pose: Pose = ORIGIN) -> None:
         """Take a new static map. A costmap that does not roll takes its size and resolution from its first layer's map.
 
         Args:
             static: the map.
             topic: where it comes from; empty: it is for all static layers.
+            map_pose: pose of the map's frame in the costmap's.
+
+        Raises:
+            MapError: the costmap would have too many cells; nothing has changed.
         """
-        layers = [layer for layer in self.parameters.layers if layer.kind == "static"]
+        layers = self._layers_for(topic)
+        geometry = self.geometry
+        if not self.parameters.rolling_window and self._all_static_layers()[:1] == layers[:1] != []:
+            geometry = bounding_geometry(static, map_pose)
         for layer in layers:
-            if topic in {"", layer.map_topic} and not (layer.first_map_only and layer.map_topic in self._maps):
-                self._maps[layer.map_topic] = static
-                self._static_costs.pop(layer.name, None)
-        if not layers or self.parameters.rolling_window or self._maps.get(layers[0].map_topic) is not static:
-            return
-        geometry = static.geometry if static.yaw == 0.0 else bounding_geometry(static)
+            self._maps[layer.name] = static
+            self._static_costs.pop(layer.name, None)
         if geometry != self.geometry:
             self.geometry = geometry
             self._obstacles = self._no_obstacles()
@@ -103,13 +110,18 @@ class Costmap:
         """Replace a part of the map from a topic, for the layers that subscribe to updates.
 
         Raises:
-            MapError: the part is not within the map.
+            MapError: the part is not within the map, or belongs to one of another frame; nothing has changed.
         """
-        layers = self._layers_with_updates()
-        for layer in layers:
-            if layer.map_topic == topic and topic in self._maps:
-                self._maps[topic] = self._maps[topic].updated(part)
-                self._static_costs.pop(layer.name, None)
+        layers = [layer for layer in self._layers_with_updates() if layer.map_topic == topic]
+        maps = {layer.name: self._maps[layer.name] for layer in layers if layer.name in self._maps}
+        updated = {}
+        for name, static in maps.items():
+            if part.frame not in {"", static.frame}:
+                raise MapError(f"it is for a map in {part.frame!r}, the one in use is in {static.frame!r}")
+            updated[name] = static.updated(part)
+        for name, static in updated.items():
+            self._maps[name] = static
+            self._static_costs.pop(name, None)
 
     def takes_updates(self, topic: str) -> bool:
         """Tell whether a layer subscribes to parts of the map from a topic."""
@@ -130,7 +142,7 @@ class Costmap:
         Args:
             robot: pose of the base in the costmap's frame.
             observations: each with the 4 x 4 transform from its sensor to the costmap's frame.
-            map_poses: by topic, the pose of the static map's frame in the costmap's, where they are not the same frame.
+            map_poses: by frame of a static map, its pose in the costmap's, where they are not the same frame.
         """
         if self.parameters.rolling_window:
             self._roll(robot)
@@ -192,8 +204,16 @@ class Costmap:
     def _has_size_of_map(self) -> bool:
         return bool(self._maps) and not self.parameters.rolling_window
 
+    def _all_static_layers(self) -> list[Layer]:
+        return [layer for layer in self.parameters.layers if layer.kind == "static"]
+
+    def _layers_for(self, topic: str) -> list[Layer]:
+        """Return the layers that take a map from a topic now."""
+        layers = [layer for layer in self._all_static_layers() if topic in {"", layer.map_topic}]
+        return [layer for layer in layers if not (layer.first_map_only and layer.name in self._maps)]
+
     def _layers_with_updates(self) -> list[Layer]:
-        return [one for one in self.parameters.layers if one.kind == "static" and one.subscribe_to_updates]
+        return [layer for layer in self._all_static_layers() if layer.subscribe_to_updates]
 
     def _initial_geometry(self) -> Geometry:
         p = self.parameters
@@ -310,10 +330,12 @@ class Costmap:
     def _place_static(self, map_poses: Mapping[str, Pose]) -> None:
         """Resample the static maps into the grid, where grid or map moved since the last time."""
         for layer in self._static_layers:
-            map_pose = map_poses.get(layer.map_topic, ORIGIN)
+            static = self._maps.get(layer.name)
+            if static is None:
+                continue
+            map_pose = map_poses.get(static.frame, ORIGIN)
             placement = (self.geometry, map_pose)
-            static = self._maps.get(layer.map_topic)
-            if static is None or (layer.name in self._static_costs and self._static_placed[layer.name] == placement):
+            if layer.name in self._static_costs and self._static_placed[layer.name] == placement:
                 continue
             known, costs = self._map_costs.get(layer.name, (None, None))
             if costs is None or known is not static:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 FREE, INSCRIBED, LETHAL, UNKNOWN = 0, 253, 254, 255
 """Costs: free, the robot's centre can't be here, an obstacle, not known."""
 
+FARTHEST = 1e6
+"""Coordinates beyond this (m) are a mistake: it is farther than anything drives."""
+
 
 @dataclass(frozen=True)
 class Geometry:

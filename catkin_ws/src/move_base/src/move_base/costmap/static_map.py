@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 from robot_formulas.geometry import ORIGIN, Pose
 
-from move_base.costmap.grid import FREE, LETHAL, UNKNOWN, Geometry
+from move_base.costmap.grid import FARTHEST, FREE, LETHAL, UNKNOWN, Geometry
+from move_base.parameters.costmaps import MAX_CELLS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,14 +30,22 @@ class MapError(ValueError):
 
 @dataclass(frozen=True)
 class MapPart:
-    """A part of an occupancy grid that has changed: its first column and row, and the new values (H, W)."""
+    """A part of an occupancy grid that has changed.
+
+    Attributes:
+        column: its first column.
+        row: its first row.
+        occupancy: the new values (H, W), int8.
+        frame: that of the map it belongs to; empty: it belongs to the newest one.
+    """
 
     column: int
     row: int
     occupancy: NDArray[np.int8]
+    frame: str = ""
 
     @classmethod
-    def create(cls, data: Sequence[int], column: int, row: int, width: int, height: int) -> MapPart:
+    def create(cls, data: Sequence[int], column: int, row: int, width: int, height: int, frame: str = "") -> MapPart:
         """Check the fields of a map_msgs/OccupancyGridUpdate.
 
         Raises:
@@ -44,7 +53,7 @@ class MapPart:
         """
         if width <= 0 or height <= 0 or column < 0 or row < 0 or len(data) != width * height:
             raise MapError(f"the update announces {width} x {height} cells and holds {len(data)}")
-        return cls(column, row, np.asarray(data, dtype=np.int8).reshape(height, width))
+        return cls(column, row, np.asarray(data, dtype=np.int8).reshape(height, width), frame.removeprefix("/"))
 
 
 @dataclass(frozen=True)
@@ -55,27 +64,36 @@ class StaticMap:
         geometry: the grid, before it is turned about its origin's corner.
         yaw: turn of the grid about the origin, radians.
         occupancy: -1 unknown, 0..100 (H, W), int8.
+        frame: where the grid lies; empty: in that of the costmap.
     """
 
     geometry: Geometry
     yaw: float
     occupancy: NDArray[np.int8]
+    frame: str = ""
 
     @classmethod
     def create(
-        cls, data: Sequence[int], width: int, height: int, resolution: float, origin: tuple[float, float, float]
+        cls,
+        data: Sequence[int],
+        width: int,
+        height: int,
+        resolution: float,
+        origin: tuple[float, float, float],
+        frame: str = "",
     ) -> StaticMap:
         """Check the fields of a nav_msgs/OccupancyGrid.
 
         Raises:
-            MapError: sizes do not fit, or values are not finite.
+            MapError: sizes do not fit, or values make no sense.
         """
-        if not all(math.isfinite(value) for value in origin) or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
+        if not all(abs(value) <= FARTHEST for value in origin) or not MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
             raise MapError(f"the map's resolution ({resolution}) or origin ({origin}) makes no sense")
         if width <= 0 or height <= 0 or len(data) != width * height:
             raise MapError(f"the map announces {width} x {height} cells and holds {len(data)}")
         occupancy = np.asarray(data, dtype=np.int8).reshape(height, width)
-        return cls(Geometry(resolution, width, height, origin[0], origin[1]), origin[2], occupancy)
+        geometry = Geometry(resolution, width, height, origin[0], origin[1])
+        return cls(geometry, origin[2], occupancy, frame.removeprefix("/"))
 
     def updated(self, part: MapPart) -> StaticMap:
         """Return the map with a part of it replaced.
@@ -92,16 +110,28 @@ class StaticMap:
         return replace(self, occupancy=occupancy)
 
 
-def bounding_geometry(static: StaticMap) -> Geometry:
-    """Return the upright grid that holds a turned map."""
+def bounding_geometry(static: StaticMap, map_pose: Pose = ORIGIN) -> Geometry:
+    """Return the upright grid that holds a map.
+
+    Args:
+        static: the map.
+        map_pose: pose of the map's frame in that of the grid.
+
+    Raises:
+        MapError: the grid has too many cells.
+    """
     g = static.geometry
-    width, height = g.width * g.resolution, g.height * g.resolution
-    corners = Pose(g.origin_x, g.origin_y, static.yaw).apply(
-        np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
-    )
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    columns, rows = np.ceil((high - low) / g.resolution - 1e-9).astype(int)
-    return Geometry(g.resolution, int(columns), int(rows), float(low[0]), float(low[1]))
+    corner = map_pose @ Pose(g.origin_x, g.origin_y, static.yaw)
+    geometry = replace(g, origin_x=corner.x, origin_y=corner.y)
+    if corner.yaw != 0.0:
+        width, height = g.width * g.resolution, g.height * g.resolution
+        corners = corner.apply(np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]))
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        columns, rows = np.ceil((high - low) / g.resolution - 1e-9).astype(int)
+        geometry = Geometry(g.resolution, int(columns), int(rows), float(low[0]), float(low[1]))
+    if geometry.width * geometry.height > MAX_CELLS:
+        raise MapError(f"a costmap of it has {geometry.width:,} x {geometry.height:,} cells, over {MAX_CELLS:,}")
+    return geometry
 
 
 def costs_of(static: StaticMap, layer: Layer) -> NDArray[np.uint8]:

@@ -6,7 +6,6 @@ It also tells what keeps them from being current: a missing map or transform, a 
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
 
@@ -28,7 +27,7 @@ FUTURE_LIMIT = 0.5
 """A measurement whose stamp is this far ahead of the clock (s) is not believed."""
 
 KEPT_MAPS = 3
-"""Per topic: maps whose frames are not connected with the costmaps' yet."""
+"""Per topic: maps whose frames are not connected with the costmap's yet."""
 
 KEPT_OBSERVATIONS = 5
 """Per source: as many as can be waiting for their transform at any usual rate."""
@@ -84,6 +83,7 @@ class Area:
         self.snapshot: Snapshot | None = None
         self.updated = -math.inf
         self.used: dict[tuple[str, str], float] = {}
+        self._waiting: dict[str, dict[str, StaticMap]] = {}  # maps, by topic and frame; the newest last
 
     def reconfigure(self, parameters: CostmapParameters) -> None:
         """Take other parameters; the next update uses them, and it is due at once."""
@@ -103,9 +103,100 @@ class Area:
 
     def robot_pose(self, now: float, frames: Transformer) -> Pose | None:
         """Return the robot's pose in the costmap's frame; None where there is none, or it is too old."""
+        return self._current_pose(self.parameters.robot_base_frame, now, frames)
+
+    def take_map(self, static: StaticMap, topic: str, now: float, frames: Transformer | None) -> str:
+        """Use a static map, or have it wait until its frame is connected with the costmap's.
+
+        Returns:
+            Why it waits although another one is in use, or an empty text: what is missing is told by `missing_map`.
+        """
+        if not self.costmap.takes_map(topic):
+            return ""
+        problem = self._use(static, topic, now, frames)
+        if not problem:
+            self._waiting.pop(topic, None)
+            return ""
+        waiting = self._waiting.setdefault(topic, {})
+        waiting.pop(static.frame, None)
+        waiting[static.frame] = static
+        if len(waiting) > KEPT_MAPS:
+            waiting.pop(next(iter(waiting)))
+        return "" if self.costmap.missing_map() else problem
+
+    def use_connected(self, now: float, frames: Transformer) -> None:
+        """Use the newest map of each topic whose frame is connected now; older ones are forgotten, newer ones wait."""
+        for topic, waiting in self._waiting.items():
+            if not self.costmap.takes_map(topic):  # any more
+                waiting.clear()
+            newer: dict[str, StaticMap] = {}
+            for frame in reversed(waiting):
+                if not self._use(waiting[frame], topic, now, frames):
+                    self._waiting[topic] = newer
+                    break
+                newer = {frame: waiting[frame], **newer}
+
+    def missing_map(self, now: float, frames: Transformer) -> str:
+        """Return why a static layer has no map yet, or an empty text."""
+        topic = self.costmap.missing_map()
+        if not topic:
+            return ""
+        waiting = self._waiting.get(topic) or self._waiting.get("")
+        if waiting:
+            return self._use(waiting[next(reversed(waiting))], topic, now, frames)
+        return f"no map received on {topic}"
+
+    def update_map(self, part: MapPart, topic: str) -> None:
+        """Take a part of a static map: of the one in the part's frame, or of the newest, also where that waits.
+
+        Raises:
+            MapError: the part is not within the map, or there is none in its frame.
+        """
+        if not self.costmap.takes_updates(topic):
+            return
+        waiting = self._waiting.get(topic) or {}
+        frame = part.frame or next(reversed(waiting), "")
+        if frame in waiting:
+            waiting[frame] = waiting[frame].updated(part)
+        else:
+            self.costmap.update_map(part, topic)
+            self.updated = -math.inf
+
+    def map_poses(self, frames: Transformer) -> dict[str, Pose] | str:
+        """Return the poses in the costmap's frame of its maps' frames, or which transform is missing."""
+        poses = {}
+        for frame in sorted(self.costmap.map_frames):
+            pose = self._pose(frame, frames)
+            if pose is None:
+                return _no_transform(frame, self.parameters.global_frame)
+            poses[frame] = pose
+        return poses
+
+    def _use(self, static: StaticMap, topic: str, now: float, frames: Transformer | None) -> str:
+        """Use a static map; return why that can't be, or an empty text."""
+        own = static.frame in ("", self.parameters.global_frame)
+        pose = ORIGIN if own else self._current_pose(static.frame, now, frames) if frames else None
+        if pose is None:
+            return _no_transform(static.frame, self.parameters.global_frame)
+        try:
+            self.costmap.set_map(static, topic, pose)
+        except MapError as error:
+            return str(error)
+        self.snapshot = None
+        return ""
+
+    def _pose(self, frame: str, frames: Transformer) -> Pose | None:
+        """Return the newest known pose of a frame in the costmap's."""
+        if frame in ("", self.parameters.global_frame):
+            return ORIGIN
+        matrix = frames.lookup(self.parameters.global_frame, frame, None)
+        return None if matrix is None else Pose.from_matrix(matrix)
+
+    def _current_pose(self, frame: str, now: float, frames: Transformer) -> Pose | None:
+        """Return the pose of a frame in the costmap's; None where there is none, or it is too old."""
         p = self.parameters
-        matrix = frames.lookup(p.global_frame, p.robot_base_frame, None)
-        stamp = frames.newest(p.global_frame, p.robot_base_frame)
+        matrix = frames.lookup(p.global_frame, frame, None)
+        stamp = frames.newest(p.global_frame, frame)
         if matrix is None or stamp is None or now - stamp > p.transform_tolerance:
             return None
         return Pose.from_matrix(matrix)
@@ -117,11 +208,10 @@ class Surroundings:
     def __init__(self, parameters: MoveBaseParameters) -> None:
         self.global_area = Area(parameters.global_costmap)
         self.local_area = Area(parameters.local_costmap)
+        self._areas = (self.global_area, self.local_area)
         sources = [*parameters.global_costmap.all_sources, *parameters.local_costmap.all_sources]
         sources.sort(key=lambda source: source.expected_update_rate, reverse=True)  # the shortest period counts
         self._sensors = {source.stream: _Sensor(source) for source in sources}
-        self._map_frames: dict[str, str] = {}  # of the maps in use, by topic
-        self._waiting: dict[str, dict[str, StaticMap]] = {}  # maps that wait, by topic and frame; the newest last
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
         """Take other parameters while the robot drives: obstacles stay."""
@@ -133,48 +223,39 @@ class Surroundings:
         """The sources to listen to, those that convert a topic's messages alike once."""
         return [sensor.source for sensor in self._sensors.values()]
 
-    def set_map(self, static: StaticMap, frame: str, topic: str = "", frames: Transformer | None = None) -> str:
+    def set_map(self, static: StaticMap, topic: str = "", now: float = 0.0, frames: Transformer | None = None) -> str:
         """Take the static map of a topic; without one, it is for all static layers.
 
-        A map whose frame is not connected with the global costmap's waits until it is. The one before stays in use
+        A map waits in each costmap until its frame is connected with that of the costmap. The one before stays in use
         meanwhile: anybody may publish a map.
 
         Args:
-            static: the map.
-            frame: its frame.
+            static: the map. Without a frame, it lies in the global costmap's.
             topic: where it comes from.
+            now: time in s.
             frames: the transforms; without them, only the costmap's own frame counts as connected at once.
 
         Returns:
-            Why it waits, or an empty text.
+            Why it waits while another one stays in use, or an empty text.
         """
-        frame = frame.removeprefix("/")
-        own = self.global_area.parameters.global_frame
-        if frame in ("", own, self._map_frame(topic)) or (frames and frames.lookup(own, frame, None) is not None):
-            self._waiting.pop(topic, None)
-            self._use_map(static, frame, topic)
-            return ""
-        waiting = self._waiting.setdefault(topic, {})
-        waiting.pop(frame, None)
-        waiting[frame] = static
-        if len(waiting) > KEPT_MAPS:
-            waiting.pop(next(iter(waiting)))
-        return _no_transform(frame, own)
+        static = static if static.frame else replace(static, frame=self.global_area.parameters.global_frame)
+        problems = [area.take_map(static, topic, now, frames) for area in self._areas]
+        return next(filter(None, problems), "")
 
     def update_map(self, part: MapPart, topic: str) -> None:
         """Take a part of the static map of a topic.
 
         Raises:
-            MapError: the part is not within the map.
+            MapError: the part is not within the map, or there is none in its frame.
         """
-        areas = (self.global_area, self.local_area)
-        waiting = self._waiting.get(topic, {}) if any(area.costmap.takes_updates(topic) for area in areas) else {}
-        for frame, static in waiting.items():
-            with suppress(MapError):
-                waiting[frame] = static.updated(part)
-        for area in areas:
-            area.costmap.update_map(part, topic)
-            area.updated = -math.inf
+        problems = []
+        for area in self._areas:
+            try:
+                area.update_map(part, topic)
+            except MapError as error:
+                problems.append(error)
+        if problems:
+            raise problems[0]
 
     def observe(self, observation: Observation, now: float) -> str:
         """Take a measurement; return why it was ignored, or an empty text."""
@@ -195,7 +276,7 @@ class Surroundings:
         """Forget all stamps, after the clock was set back."""
         for sensor in self._sensors.values():
             sensor.recent, sensor.used = [], -math.inf
-        for area in (self.global_area, self.local_area):
+        for area in self._areas:
             area.updated, area.used = -math.inf, {}
 
     def update(self, now: float, frames: Transformer, robot: Pose | None, local_robot: Pose | None) -> str:
@@ -210,22 +291,16 @@ class Surroundings:
         Returns:
             What is missing for it: map or transform.
         """
-        self._use_connected(frames)
         for area, pose in ((self.local_area, local_robot), (self.global_area, robot)):
-            if area.costmap.needs_map:
-                topic = area.costmap.missing_map()
-                waiting = self._waiting.get(topic)
-                if waiting:
-                    return _no_transform(next(reversed(waiting)), self.global_area.parameters.global_frame)
-                return f"no map received on {topic}"
+            area.use_connected(now, frames)
+            missing = area.missing_map(now, frames)
+            if missing:
+                return missing
             if pose is None or not area.due(now):
                 continue
-            map_poses = {}
-            for topic in area.costmap.map_topics:
-                map_pose = self._map_pose(topic, area, frames)
-                if map_pose is None:
-                    return _no_transform(self._map_frame(topic), area.parameters.global_frame)
-                map_poses[topic] = map_pose
+            map_poses = area.map_poses(frames)
+            if isinstance(map_poses, str):
+                return map_poses
             area.snapshot = area.costmap.update(pose, self._observations_for(area, frames), map_poses)
             area.updated_at(now)
         for area, pose in ((self.global_area, robot), (self.local_area, local_robot)):
@@ -236,8 +311,7 @@ class Surroundings:
 
     def stale_reason(self, now: float) -> str:
         """Name the first source whose data are too old, or return an empty text."""
-        areas = (self.global_area, self.local_area)
-        used = {source.stream for area in areas for source in area.parameters.sources}
+        used = {source.stream for area in self._areas for source in area.parameters.sources}
         sensors = (sensor for stream, sensor in self._sensors.items() if stream in used)
         return next(filter(None, (sensor.trouble(now) for sensor in sensors)), "")
 
@@ -254,36 +328,6 @@ class Surroundings:
                 area.used[key] = observation.stamp
                 sensor.used = max(sensor.used, observation.stamp)
         return observations
-
-    def _use_connected(self, frames: Transformer) -> None:
-        """Use the newest map of each topic whose frame is connected now; older ones are forgotten, newer ones wait."""
-        for topic, waiting in self._waiting.items():
-            newer: dict[str, StaticMap] = {}
-            for frame in reversed(waiting):
-                if frames.lookup(self.global_area.parameters.global_frame, frame, None) is not None:
-                    self._use_map(waiting[frame], frame, topic)
-                    self._waiting[topic] = newer
-                    break
-                newer = {frame: waiting[frame], **newer}
-
-    def _use_map(self, static: StaticMap, frame: str, topic: str) -> None:
-        if not topic:
-            self._map_frames.clear()
-        self._map_frames[topic] = frame
-        for area in (self.global_area, self.local_area):
-            area.costmap.set_map(static, topic)
-            area.snapshot = None
-
-    def _map_frame(self, topic: str) -> str:
-        return self._map_frames.get(topic) or self._map_frames.get("", "")
-
-    def _map_pose(self, topic: str, area: Area, frames: Transformer) -> Pose | None:
-        """Return the pose in the area's frame of the frame of a topic's map."""
-        frame = self._map_frame(topic)
-        if frame in ("", area.parameters.global_frame):
-            return ORIGIN
-        matrix = frames.lookup(area.parameters.global_frame, frame, None)
-        return None if matrix is None else Pose.from_matrix(matrix)
 
 
 def _no_transform(source: str, target: str) -> str:

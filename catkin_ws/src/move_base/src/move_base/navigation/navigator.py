@@ -83,19 +83,19 @@ class Navigator:
         """The newest local costmap."""
         return self._local.snapshot
 
-    def set_map(self, static: StaticMap, frame: str, topic: str = "", frames: Transformer | None = None) -> str:
+    def set_map(self, static: StaticMap, topic: str = "", now: float = 0.0, frames: Transformer | None = None) -> str:
         """Take the static map of a topic; without one, it is for all static layers.
 
         Returns:
-            Why it waits, or an empty text: its frame is not connected with the costmaps' yet, as `frames` tell.
+            Why it waits while another one stays in use, or an empty text: `frames` must connect it with the costmaps.
         """
-        return self._surroundings.set_map(static, frame, topic, frames)
+        return self._surroundings.set_map(static, topic, now, frames)
 
     def update_map(self, part: MapPart, topic: str) -> None:
         """Take a part of the static map of a topic.
 
         Raises:
-            MapError: the part is not within the map.
+            MapError: the part is not within the map, or there is none in its frame.
         """
         self._surroundings.update_map(part, topic)
 

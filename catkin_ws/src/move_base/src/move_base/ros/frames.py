@@ -9,7 +9,8 @@ import numpy as np
 import rospy
 import tf2_ros
 
-from move_base.ros.messages import FARTHEST, matrix_of
+from move_base.costmap.grid import FARTHEST
+from move_base.ros.messages import matrix_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

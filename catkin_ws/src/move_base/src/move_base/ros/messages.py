@@ -10,7 +10,7 @@ from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid, Path
 from robot_formulas.geometry import quaternion_of, transform_of
 
-from move_base.costmap.grid import occupancy_values
+from move_base.costmap.grid import FARTHEST, occupancy_values
 
 if TYPE_CHECKING:
     import genpy
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from robot_formulas.geometry import Pose, Velocity
 
     from move_base.costmap.snapshot import Snapshot
-
-FARTHEST = 1e6
-"""Coordinates beyond this (m) are a mistake: it is farther than anything drives."""
 
 
 def goal_problem(target: PoseStamped) -> str:

@@ -224,18 +224,22 @@ class MoveBaseNode:
         yaw = Pose.from_matrix(matrix_of(info.origin.position, info.origin.orientation)).yaw
         origin = (info.origin.position.x, info.origin.position.y, yaw)
         try:
-            static = StaticMap.create(message.data, info.width, info.height, info.resolution, origin)
+            static = StaticMap.create(
+                message.data, info.width, info.height, info.resolution, origin, message.header.frame_id
+            )
         except MapError as error:
             rospy.logwarn_throttle_identical(WARN_PERIOD, f"Map ignored: {error}")
             return
         with self._lock:
-            waits = self._navigator.set_map(static, message.header.frame_id, topic, self._frames)
+            waits = self._navigator.set_map(static, topic, rospy.get_time(), self._frames)
         if waits:
             rospy.logwarn_throttle_identical(WARN_PERIOD, f"The map on {topic} is not used yet: {waits}")
 
     def _on_map_update(self, topic: str, message: OccupancyGridUpdate) -> None:
         try:
-            part = MapPart.create(message.data, message.x, message.y, message.width, message.height)
+            part = MapPart.create(
+                message.data, message.x, message.y, message.width, message.height, message.header.frame_id
+            )
             with self._lock:
                 self._navigator.update_map(part, topic)
         except MapError as error:
