@@ -500,23 +500,30 @@ def _description() -> ConfigDescription:
     return ConfigDescription([Group(name="Default", parameters=parameters)], values, values, values)
 
 
+_SEES = {"marking": True, "clearing": True, "expected_update_rate": 10.0}
 _MOVE_BASE: dict[str, Any] = {
     "controller_frequency": 5.0,
     "global_costmap": {
         "global_frame": "map", "robot_base_frame": "base_link", "footprint_topic": "footprint", "resolution": 0.5,
+        "transform_tolerance": 10.0,
         "footprint": [[0.3, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.3, -0.3]],
         "plugins": [{"name": "static_layer", "type": "costmap_2d::StaticLayer"},
+                    {"name": "obstacles", "type": "costmap_2d::ObstacleLayer"},
                     {"name": "inflation", "type": "costmap_2d::InflationLayer"}],
         "static_layer": {"map_topic": "map", "subscribe_to_updates": True},
+        "obstacles": {"observation_sources": "scan",
+                      "scan": {"data_type": "LaserScan", "topic": "scan", **_SEES}},
     },
     "local_costmap": {
         "global_frame": "odom", "robot_base_frame": "base_link", "rolling_window": True, "width": 3.0, "height": 3.0,
-        "resolution": 0.2, "footprint": [[0.3, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.3, -0.3]],
-        "plugins": [{"name": "obstacles", "type": "costmap_2d::ObstacleLayer"}],
+        "resolution": 0.2, "transform_tolerance": 10.0,
+        "footprint": [[0.3, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.3, -0.3]],
+        "plugins": [{"name": "static_layer", "type": "costmap_2d::StaticLayer"},
+                    {"name": "obstacles", "type": "costmap_2d::ObstacleLayer"}],
         "obstacles": {"observation_sources": "scan cloud points",
-                      "scan": {"data_type": "LaserScan", "topic": "scan", "marking": True, "clearing": True},
-                      "cloud": {"data_type": "PointCloud2", "topic": "cloud", "marking": True, "clearing": True},
-                      "points": {"data_type": "PointCloud", "topic": "points", "marking": True, "clearing": True}},
+                      "scan": {"data_type": "LaserScan", "topic": "scan", **_SEES},
+                      "cloud": {"data_type": "PointCloud2", "topic": "cloud", **_SEES},
+                      "points": {"data_type": "PointCloud", "topic": "points", **_SEES}},
     },
 }  # fmt: skip
 
@@ -550,9 +557,9 @@ def _move_base_good() -> list[tuple[str, Any]]:
         ("/cloud", _cloud()),
         ("/points", cloud),
         ("/node/global_costmap/footprint", Polygon(corners)),
+        ("/move_base/cancel", GoalID(rospy.Time(), "other")),
         ("/move_base/goal", _goal()),
         ("/move_base_simple/goal", _pose("map")),
-        ("/move_base/cancel", GoalID(STAMP, "other")),
     ]
 
 

@@ -9,6 +9,7 @@ import signal
 import socket
 import sys
 import tempfile
+import traceback
 from pathlib import Path
 from typing import NoReturn
 
@@ -21,10 +22,12 @@ _FILES = 64_000_000
 def main() -> None:
     """Make the trials of a seed that numbers on the standard input ask for.
 
-    Before each trial, its number goes to the standard output; after it, a line of what came of it.
+    Before each trial, its number goes to the standard output; after it, a line of what came of it. Nothing else is
+    said, but why the process itself ends before its time.
     """
     seed = int(sys.argv[1])
-    answers = os.fdopen(os.dup(1), "w", buffering=1)
+    answers, last_words = os.fdopen(os.dup(1), "w", buffering=1), os.fdopen(os.dup(2), "w")
+    sys.excepthook = lambda *error: traceback.print_exception(*error, file=last_words)
     silence()
     with tempfile.TemporaryDirectory(dir="/dev/shm" if os.access("/dev/shm", os.W_OK) else None) as folder:
         os.chdir(folder)

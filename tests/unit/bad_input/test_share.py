@@ -4,6 +4,8 @@ import logging
 from pathlib import Path
 
 import pytest
+from bad_input import unconnected
+from bad_input.listeners import LISTENERS, packed, take
 from bad_input.soak import trials
 from bad_input.subjects import CORPUS, slug, subjects
 from bad_input.trial import ACCEPTED, BROKEN, tried
@@ -35,6 +37,19 @@ def test_some_seed_of_each_is_taken(subject, tmp_path: Path):
     assert BROKEN not in {verdict.outcome for verdict in verdicts}
     warns = subject.name == "the reasoner"  # of a quality that is stale
     assert warns or ACCEPTED in {verdict.outcome for verdict in verdicts}
+
+
+def test_good_messages_have_move_base_drive(monkeypatch):
+    """Else bad ones would not come as far as its costmaps, planner and controller."""
+    speeds = []
+    monkeypatch.setattr(
+        unconnected.Publisher,
+        "publish",
+        lambda self, *said, **_: speeds.append(said[0].linear.x) if self.name == "/cmd_vel" else None,
+    )
+    (listener,) = (one for one in LISTENERS if one.name == "move_base")
+    take(listener, packed(listener, listener.seeds()))
+    assert max(speeds) > 0.1
 
 
 def test_trial_leaves_what_others_read_as_it_was(tmp_path: Path):
