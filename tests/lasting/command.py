@@ -30,10 +30,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--lasting", action="store_true", required=True)
     parser.add_argument("--hours", type=hours, required=True, help="in all, with those that ran before on this code")
     parser.add_argument("--seed", type=whole("seed", 0), default=0, help="of all faults and goals (default: 0)")
-    parser.add_argument("--output", type=Path, help="folder (default: results/soak/lasting-CODE-SEED)")
+    parser.add_argument(
+        "--output", type=Path, default=FOLDER, help="of the folder lasting-CODE-SEED (default: results/soak)"
+    )
     options = parser.parse_args(arguments)
     tree = code("catkin_ws/src", "tests/soak", "tests/lasting")
-    folder = (options.output or FOLDER / f"lasting-{tree}-{options.seed}").resolve()
+    folder = (options.output / f"lasting-{tree}-{options.seed}").resolve()
     folder.mkdir(parents=True, exist_ok=True)
     runs = [read(path) for path in _paths(folder)]
     left = options.hours - sum(run.lasted for run in runs) / 3600.0

@@ -34,10 +34,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--seed", type=whole("seed", 0), default=0, help="of all missions (default: 0)")
     parser.add_argument("--jobs", type=whole("number", 1), default=1, help="missions beside each other (default: 1)")
-    parser.add_argument("--output", type=Path, help="folder (default: results/soak/real-CODE-SEED)")
+    parser.add_argument(
+        "--output", type=Path, default=FOLDER, help="of the folder real-CODE-SEED (default: results/soak)"
+    )
     options = parser.parse_args(arguments)
     tree = _tree()
-    folder = (options.output or FOLDER / f"real-{tree}-{options.seed}").resolve()
+    folder = (options.output / f"real-{tree}-{options.seed}").resolve()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         records = read(folder / RECORDS)
