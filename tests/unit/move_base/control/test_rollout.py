@@ -1,6 +1,7 @@
 """Roll-outs: where velocities lead, and whether a footprint is free, found with a part of the costmap or all of it."""
 
 import math
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -69,6 +70,8 @@ def test_trajectories_are_free_as_their_poses_are_one_by_one(corners, margin, se
     free = footprint.is_free(rollout, lazy)
     assert eager.costs is not None  # from now on it looks up in the whole
     np.testing.assert_array_equal(free, footprint.is_free(rollout, eager))
+    with mock.patch("move_base.control.rollout.EDGES_AT_ONCE", 1):
+        np.testing.assert_array_equal(free, footprint.is_free(rollout, eager))
     np.testing.assert_array_equal(free, free_plainly(footprint, rollout, costs))
     here = Rollout(np.zeros((1, 3)), *(np.array([[value]]) for value in (robot.x, robot.y, robot.yaw)))
     assert footprint.is_free_at(robot, lazy) == free_plainly(footprint, here, costs)[0]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from move_base.costmap.costmap import Costmap
-from move_base.costmap.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, changed_area, occupancy_values
+from move_base.costmap.grid import FREE, INSCRIBED, LETHAL, UNKNOWN, Geometry, changed_area, occupancy_values
 from move_base.costmap.sensors import Observation
 from move_base.costmap.static_map import MapError, MapPart, StaticMap
 from move_base.parameters.reader import read_parameters
@@ -328,3 +328,36 @@ def test_map_that_makes_no_sense_is_refused(width, resolution, origin):
 def test_published_values_are_those_of_costmap_2d():
     costs = np.array([FREE, 1, 252, INSCRIBED, LETHAL, UNKNOWN], dtype=np.uint8)
     assert occupancy_values(costs).tolist() == [0, 1, 98, 99, 100, -1]
+
+
+@pytest.mark.filterwarnings("error")
+def test_costs_that_fall_at_once_beyond_the_inscribed_radius_are_known(tree):
+    costmap = Costmap(read_parameters(tree(local_costmap__inflater_layer__cost_scaling_factor=1e6)).local_costmap)
+    snapshot = costmap.update(ORIGIN, [(seen(costmap, (2.0, 0.0)), sensor())])
+    assert set(snapshot.costs.ravel()) == {FREE, INSCRIBED, LETHAL}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("away", [0.0, 20.0, 1e6])
+def test_robot_far_from_a_fine_grid_frees_nothing_in_it(tree, away):
+    fine = {"local_costmap__rolling_window": False, "local_costmap__plugins": tree()["local_costmap"]["plugins"]}
+    costmap = Costmap(read_parameters(tree(**fine)).local_costmap)
+    costmap.geometry = Geometry(0.001, 100, 100, 0.0, 0.0)
+    costmap._obstacles = {name: np.full((100, 100), LETHAL, dtype=np.uint8) for name in costmap._obstacles}
+    for obstacles in costmap._obstacles.values():
+        costmap._clear_footprint(obstacles, Pose(away, 0.05).apply(costmap._footprint))
+        assert (obstacles == LETHAL).all() == (away > 0.0)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("reach", [10.0, 1e5, 1e6])
+def test_rays_of_any_length_free_only_what_lies_between_them(local, reach):
+    local.geometry = Geometry(0.005, 400, 400, -1.0, -1.0)
+    obstacles = np.full(local.geometry.shape, LETHAL, dtype=np.uint8)
+    angles = np.linspace(-0.5, 0.5, 100)
+    local._clear_seen(obstacles, np.zeros(2), (angles, np.full(100, np.float32(2.0 * reach))), reach)
+    rows, columns = np.nonzero(obstacles == FREE)
+    x, y = local.geometry.centres(rows, columns).T
+    assert len(x) > 1000
+    beside = np.maximum(np.abs(y * np.cos(0.5)) - x * np.sin(0.5), 0.0)  # distance from the fan, m
+    assert beside.max() <= 2 * local.geometry.resolution

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from move_base.costmap.sensors import FLOAT32, SensorError, cloud_observation, points_observation, scan_observation
+from move_base.costmap.sensors import (
+    FLOAT32,
+    MAX_RAYS,
+    SensorError,
+    cloud_observation,
+    points_observation,
+    scan_observation,
+)
 from move_base.parameters.parameters import ObservationSource
 
 SCAN = ObservationSource("scan", "LaserScan", "front/scan", raytrace_range=12.0, inf_is_valid=True)
@@ -64,6 +71,7 @@ def test_ray_without_return_is_dropped_unless_valid():
         (scan([1.0], angle_increment=0.0), "angle"),
         (scan([1.0], range_max=math.nan), "not finite"),
         (scan([1.0] * 9), "full turn"),
+        (scan([1.0] * (MAX_RAYS + 1), angle_increment=1e-5), "more than 20000"),
         (scan([1.0], header=header("")), "no frame_id"),
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 from move_base.control.dwa import DwaController
 from move_base.control.oscillation import OscillationFlags
 from move_base.costmap.grid import LETHAL
-from move_base.navigation.result import Outcome
+from move_base.navigation.result import Outcome, State
 from move_base.parameters.reader import read_parameters
 from robot_formulas.geometry import Pose, Velocity
 
@@ -566,3 +566,35 @@ def test_differential_drive_arrives(simulate, walls, tree):
     assert log.text == "Goal reached."
     assert {command.y for _, command in log.commands} == {0.0}
     assert log.contacts == 0
+
+
+def test_clock_that_is_set_back_during_a_recovery_ends_the_recovery_only(simulate, walls, tree):
+    turn = [{"name": "turn", "type": "rotate_recovery/RotateRecovery"}]
+    changes = {"planner_patience": 1.0, "recovery_behaviors": turn}
+    simulation = simulate([*walls(), CLOSED], start=(-3.0, 0.0, 0.0), tree=tree(**changes))
+    drive(simulation, (3.0, 0.0, 0.0), until=lambda one: one.navigator.state is State.RECOVERING)
+    simulation.time = 50.0
+    simulation.sent = -math.inf
+    simulation.history = {round(50.0 / 0.01): simulation.pose}
+    simulation.navigator.reset_time(simulation.time)
+    simulation.run(0.1)
+    assert simulation.navigator.state is State.PLANNING
+    assert simulation.run(60.0).outcome is Outcome.ABORTED
+
+
+@pytest.mark.parametrize(("duration", "fewest", "most"), [(0.0, 15, 25), (1.0, 1, 2)])
+def test_robot_that_drives_plans_less_often_where_plans_take_long(simulate, walls, tree, duration, fewest, most):
+    simulation = simulate(walls(), start=(-4.0, 0.0, 0.0), tree=tree(planner_frequency=4.0))
+    plan_between, planned = simulation.navigator.plan_between, []
+
+    def plan(*arguments):
+        planned.append(simulation.time)
+        for _ in range(round(duration / 0.01)):
+            simulation.time += 0.01
+            simulation.history[round(simulation.time / 0.01)] = simulation.pose
+        return plan_between(*arguments)
+
+    simulation.navigator.plan_between = plan
+    drive(simulation, (4.0, 0.0, 0.0), seconds=5.0)
+    assert fewest <= len(planned) <= most
+    assert simulation.pose.x > -3.0

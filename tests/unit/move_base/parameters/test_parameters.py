@@ -124,6 +124,21 @@ def test_costmap_that_no_memory_holds_is_refused(tree):
             "Image",
             "must be one of LaserScan, PointCloud, PointCloud2",
         ),
+        ("global_costmap__robot_radius", 460.0, "at most 20"),
+        ("global_costmap__footprint", [[480.0, 400.0], [-480.0, 400.0], [0.0, -400.0]], "within 20 m"),
+        ("global_costmap__footprint", [[0.01 * n, 0.0] for n in range(1001)], "at most 1,000 corners"),
+        ("global_costmap__footprint", [[1.0, 1.0], [-1.0, -1.0]] * 100, "edges of at most 200 m"),
+        ("global_costmap__footprint", "[" * 5000, "list of [x, y] corners"),
+        ("global_costmap__footprint", f"[[1{'0' * 400}, 0], [1, 1], [0, 1]]", "list of [x, y] corners"),
+        ("global_costmap__footprint", [[10**400, 0], [1, 1], [0, 1]], "list of [x, y] corners"),
+        ("global_costmap__footprint", " " * 60_001, "at most 60,000 characters"),
+        ("global_costmap__footprint_padding", 1e9, "at most 10"),
+        ("local_costmap__footprint_topic", "/", "must be the name of a topic"),
+        ("local_costmap__published_footprint", "", "must be the name of a topic"),
+        ("local_costmap__static_layer__map_topic", "", "must be the name of a topic"),
+        ("local_costmap__obstacles_layer__scan__topic", "", "must be the name of a topic"),
+        ("TrajectoryPlannerROS__y_vels", [1e9], "at most 100 m/s"),
+        ("TrajectoryPlannerROS__y_vels", [0.1] * 301, "at most 300 speeds"),
     ],
 )
 def test_mistake_is_named(tree, path, value, rule):
@@ -131,3 +146,71 @@ def test_mistake_is_named(tree, path, value, rule):
         read_parameters(tree(**{path: value}))
     assert path.split("__")[-1] in str(error.value)
     assert rule in str(error.value)
+
+
+def test_lists_that_repeat_each_other_in_a_footprint_are_refused_at_once(tree):
+    text = "&l0 [" + ", ".join(["1"] * 10) + "]"
+    for level in range(1, 9):
+        text = f"&l{level} [{text}, {', '.join([f'*l{level - 1}'] * 9)}]"  # 10 ** 9 numbers
+    with pytest.raises(ParameterError, match=r"footprint is .* must be a list of \[x, y\] corners"):
+        read_parameters(tree(local_costmap__footprint=text))
+
+
+def test_error_of_a_long_footprint_is_short(tree):
+    with pytest.raises(ParameterError) as error:
+        read_parameters(tree(local_costmap__footprint=[[0.1, 0.2]] * 5000))
+    assert len(str(error.value)) < 500
+
+
+def test_layers_of_one_name_are_refused(tree):
+    plugins = tree()["local_costmap"]["plugins"]
+    with pytest.raises(ParameterError, match=r"plugins\[3\] is 'static_layer': it must have another name"):
+        read_parameters(tree(local_costmap__plugins=[*plugins, plugins[0]]))
+
+
+def test_samples_that_take_longer_than_a_control_period_are_refused(tree):
+    samples = {"TrajectoryPlannerROS__vx_samples": 300, "TrajectoryPlannerROS__vtheta_samples": 300}
+    with pytest.raises(ParameterError, match="vx_samples is 300: it gives, with the samples of turns, over 20,000"):
+        read_parameters(tree(**samples))
+
+
+def test_recovery_behaviour_whose_type_is_no_text_has_a_note(tree):
+    (note, *_) = read_parameters(tree(recovery_behaviors=[{"name": "a", "type": ["x"]}])).notes
+    assert "types that are not known here: ['x']" in note
+
+
+DWA = {"base_local_planner": "dwa_local_planner/DWAPlannerROS"}
+
+
+@pytest.mark.parametrize(
+    ("path", "others"),
+    [
+        *[(name, {}) for name in ("controller_patience", "planner_patience", "conservative_reset_dist")],
+        *[(name, {}) for name in ("oscillation_timeout", "oscillation_distance", "NavfnROS__default_tolerance")],
+        ("wipe__reset_distance", {"recovery_behaviors": [{"name": "wipe", "type": "ClearCostmapRecovery"}]}),
+        *[(f"local_costmap__{name}", {}) for name in ("transform_tolerance", "origin_x", "origin_y")],
+        ("local_costmap__circumscribed_radius", {}),
+        ("local_costmap__obstacles_layer__max_obstacle_height", {}),
+        *[
+            (f"local_costmap__obstacles_layer__scan__{name}", {})
+            for name in ("obstacle_range", "raytrace_range", "expected_update_rate", "max_obstacle_height")
+        ],
+        ("local_costmap__inflater_layer__cost_scaling_factor", {}),
+        *[
+            (f"TrajectoryPlannerROS__{name}", {})
+            for name in ("acc_lim_x", "acc_lim_y", "acc_lim_theta", "xy_goal_tolerance", "yaw_goal_tolerance")
+        ],
+        *[
+            (f"TrajectoryPlannerROS__{name}", {})
+            for name in ("max_vel_y", "heading_lookahead", "oscillation_reset_dist", "occdist_scale")
+        ],
+        *[
+            (f"DWAPlannerROS__{name}", DWA)
+            for name in ("max_vel_x", "max_vel_trans", "max_vel_y", "max_vel_theta", "min_vel_theta", "occdist_scale")
+        ],
+    ],
+)
+def test_value_that_overflows_is_refused(tree, path, others):
+    read_parameters(tree(**others, **{path: 1.0}))
+    with pytest.raises(ParameterError, match=f"{path.split('__')[-1]} is 1e.308: it must be a finite number"):
+        read_parameters(tree(**others, **{path: 1e308}))

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 EDGE_SPACING = 0.1
 """Distance between the points that stand for the footprint's edge, m."""
 
+EDGES_AT_ONCE = 2_000_000
+"""Points of the edge, at all poses, that are looked at in one go: more of them would need more memory."""
+
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -108,14 +111,16 @@ class Footprint:
         unsure = (clearance <= self.circumscribed + margin) & ~blocked[:, None]
         if unsure.any():
             cells = np.flatnonzero(unsure)
-            which = cells // unsure.shape[1]
-            x, y, yaw = (axis.take(cells)[:, None] for axis in (rollout.x, rollout.y, rollout.yaw))
-            columns, rows = self._edge_cells(x, y, yaw, g)
-            if not amid:
-                np.clip(columns, 0, g.width - 1, out=columns)
-                np.clip(rows, 0, g.height - 1, out=rows)
-            touching = (part.clearance_at(rows, columns) <= margin).any(axis=1)
-            blocked[which[touching]] = True
+            size = max(1, EDGES_AT_ONCE // len(self.edge))
+            for some in (cells[start : start + size] for start in range(0, len(cells), size)):
+                which = some // unsure.shape[1]
+                x, y, yaw = (axis.take(some)[:, None] for axis in (rollout.x, rollout.y, rollout.yaw))
+                columns, rows = self._edge_cells(x, y, yaw, g)
+                if not amid:
+                    np.clip(columns, 0, g.width - 1, out=columns)
+                    np.clip(rows, 0, g.height - 1, out=rows)
+                touching = (part.clearance_at(rows, columns) <= margin).any(axis=1)
+                blocked[which[touching]] = True
         return ~blocked
 
     def is_free_at(self, robot: Pose, snapshot: Snapshot) -> bool:

@@ -34,6 +34,13 @@ CLOUD_BIN = math.radians(1.0)
 SUBPIXEL_BITS = 4
 """Fixed-point digits of cv2's polygon corners: 1/16 cell."""
 
+MAX_COORDINATE = (1 << 31) - 1
+"""The largest coordinate of such a corner, 1/16 cell."""
+
+BEYOND = 1.01
+"""Rays end at this multiple of the distance to the grid's farthest corner: the edge between two of them, up to
+MAX_RAY_GAP apart, is then still beyond the grid."""
+
 
 class Costmap:
     """One costmap, built up from the layers of its parameters."""
@@ -286,6 +293,7 @@ class Costmap:
         angles, ranges = profile
         if len(ranges) < 2:
             return
+        reach = min(reach, BEYOND * self._farthest_from(origin))
         bound = np.minimum(np.minimum(ranges[:-1], ranges[1:]) - self.geometry.resolution, reach)
         bound = np.where(np.abs(np.diff(angles)) <= MAX_RAY_GAP, np.maximum(bound, 0.0), 0.0)
         corners = np.empty((2 * len(bound) + 1, 2))
@@ -294,6 +302,15 @@ class Costmap:
             corners[1::2, axis] = origin[axis] + bound * along[:-1]
             corners[2::2, axis] = origin[axis] + bound * along[1:]
         self._fill(obstacles, corners)
+
+    def _farthest_from(self, point: NDArray[np.float64]) -> float:
+        """Return the distance from a point to the farthest corner of the grid, m."""
+        g = self.geometry
+        away = (
+            np.abs(point - (g.origin_x, g.origin_y)),
+            np.abs(point - g.centres(np.array(g.height), np.array(g.width))),
+        )
+        return float(np.hypot(*np.maximum(*away))) + g.resolution
 
     def _clear_footprint(self, obstacles: NDArray[np.uint8], corners: NDArray[np.float64]) -> None:
         """Free what the robot covers, even in part, as in costmap_2d: what is left would count as touched."""
@@ -309,7 +326,10 @@ class Costmap:
         scaled /= g.resolution
         scaled -= 0.5  # cv2 counts from the centre of the first cell
         scaled *= 1 << SUBPIXEL_BITS
-        cv2.fillPoly(obstacles, [np.rint(scaled, out=scaled).astype(np.int32)], FREE, shift=SUBPIXEL_BITS)
+        np.rint(scaled, out=scaled)
+        if np.abs(scaled).max() > MAX_COORDINATE:
+            return  # another polygon, with its corners moved, might free what this one does not
+        cv2.fillPoly(obstacles, [scaled.astype(np.int32)], FREE, shift=SUBPIXEL_BITS)
 
     def _combine(self, map_poses: Mapping[str, Pose]) -> Snapshot:
         self._place_static(map_poses)

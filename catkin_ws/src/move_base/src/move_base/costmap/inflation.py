@@ -45,7 +45,7 @@ class Inflation:
         self._scale = 254.0 / reach  # entries per cell of distance
         self.limit = (LETHAL - 1) / self._scale * resolution
         distances = np.arange(256) / self._scale * resolution
-        costs = (INSCRIBED - 1) * np.exp(-factor * (distances - inscribed))
+        costs = (INSCRIBED - 1) * np.exp(-factor * np.maximum(distances - inscribed, 0.0))
         costs = np.where(distances <= inscribed, INSCRIBED, costs)
         costs = np.where((distances > radius) & (distances > 0.0), FREE, costs)
         costs[0] = LETHAL

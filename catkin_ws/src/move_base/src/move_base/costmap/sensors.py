@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 FLOAT32 = 7
 """`sensor_msgs/PointField.FLOAT32`."""
 
+MAX_RAYS = 20_000
+"""A scan with more rays than this is refused: they would take longer than a control period."""
+
 MAX_POINTS = 4_000_000
 """A cloud with more points than this is refused."""
 
@@ -52,8 +55,10 @@ def scan_observation(message: Any, source: ObservationSource) -> Observation:
     other readings outside the scan's limits are dropped.
 
     Raises:
-        SensorError: empty, or limits that are not finite or make no sense.
+        SensorError: empty, too many rays, or limits that are not finite or make no sense.
     """
+    if len(message.ranges) > MAX_RAYS:
+        raise SensorError(f"the scan has {len(message.ranges)} ranges, more than {MAX_RAYS}")
     ranges = np.asarray(message.ranges, dtype=np.float32)
     limits = (message.angle_min, message.angle_increment, message.range_min, message.range_max)
     if ranges.size == 0:

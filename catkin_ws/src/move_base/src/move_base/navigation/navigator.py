@@ -40,6 +40,9 @@ ROTATE_SPEED = 1.0
 TURNED = 0.05
 """A robot that has turned by so many rad turns still."""
 
+PLANNING_SHARE = 0.1
+"""A robot that drives plans for this share of the time at the most: the base stands still while a long plan is made."""
+
 QUIET_WAIT = 0.5
 """Waiting is worth a warning after this time, s: the first messages after a start take a few tenths."""
 
@@ -56,6 +59,8 @@ class Navigator:
         self._global, self._local = self._surroundings.global_area, self._surroundings.local_area
         self._controller = Controller(parameters)
         self._work = Work.begun(0.0)
+        self._planning_since: float | None = None  # begin of the last step, if it planned
+        self._plan_took = 0.0  # s, the last step that planned
 
     def reconfigure(self, parameters: MoveBaseParameters) -> None:
         """Take other parameters while the robot drives: goal, plan, obstacles and speed stay.
@@ -126,9 +131,12 @@ class Navigator:
         self._surroundings.clear()
 
     def reset_time(self, now: float) -> None:
-        """Forget all stamps, after the clock was set back; the goal stays."""
+        """Forget all stamps, after the clock was set back; the goal stays, a recovery that is under way does not."""
         self._surroundings.reset_time()
         self._work = Work.begun(now)
+        self._planning_since = None
+        if self.state is State.RECOVERING:
+            self.state = State.PLANNING
 
     # -- the step --------------------------------------------------------------------------------------------------
 
@@ -140,6 +148,8 @@ class Navigator:
             frames: the transforms.
             velocity: of the base, measured, in its own frame.
         """
+        if self._planning_since is not None:
+            self._plan_took, self._planning_since = now - self._planning_since, None
         robot, local_robot = self._global.robot_pose(now, frames), self._local.robot_pose(now, frames)
         resting = self.goal is None and self.parameters.shutdown_costmaps
         missing = "" if resting else self._surroundings.update(now, frames, robot, local_robot)
@@ -272,14 +282,20 @@ class Navigator:
     # -- planning --------------------------------------------------------------------------------------------------
 
     def _plan_if_due(self, now: float, robot: Pose) -> Plan | None:
-        """Plan at planner_frequency, or at once if there is no plan; return a newly accepted plan."""
+        """Plan at planner_frequency, or at once if there is no plan; return a newly accepted plan.
+
+        Where a plan takes longer than two control periods, a robot that drives plans less often.
+        """
         p = self.parameters
         period = 1.0 / p.planner_frequency if p.planner_frequency > 0.0 else math.inf
-        if self._followed is None or now - self._work.controlled > 1.0:  # the controller is stuck: look for another way
+        stuck = now - self._work.controlled > max(1.0, 2.0 * self._plan_took)
+        if self._followed is None or stuck:  # look for another way
             period = min(period, 0.25)
+        elif self._plan_took > 2.0 / p.controller_frequency:
+            period = max(period, self._plan_took / PLANNING_SHARE)
         if now - self._work.planned < period - 1e-3:
             return None
-        self._work.planned = now
+        self._work.planned = self._planning_since = now
         assert self.goal is not None  # noqa: S101
         try:
             plan = self.plan_between(robot, self.goal, max(p.controller.xy_goal_tolerance, p.default_tolerance))

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import yaml
+from node_kit.yaml_text import parse_yaml
 
 from move_base.parameters.layout import INFLATION, OBSTACLE, STATIC, VOXEL
 from move_base.parameters.parameters import (
     DEFAULT_UPDATE_PERIOD,
+    LONGEST,
+    LONGEST_TIME,
     OBSTACLE_KINDS,
     CostmapParameters,
     Layer,
@@ -33,6 +36,21 @@ DATA_TYPES = ("LaserScan", "PointCloud", "PointCloud2")
 CIRCLE_CORNERS = 16
 """Corners of the footprint made from `robot_radius`, as in costmap_2d."""
 
+FARTHEST_CORNER = 20.0
+"""Corners of a footprint farther from the base than this are a mistake, such as millimetres, m."""
+
+MOST_CORNERS = 1000
+"""Corners of a footprint that can be worked with."""
+
+LONGEST_EDGE = 200.0
+"""Length of all edges of a footprint that can be worked with, m."""
+
+LONGEST_SHOWN = 200
+"""Characters of a footprint in an error."""
+
+LONGEST_TEXT = 60_000
+"""Characters of the text of a footprint: it has room for `MOST_CORNERS`."""
+
 
 def read_costmap(top: ParameterTree, name: str) -> CostmapParameters:
     """Read a costmap of a tree that has been brought into its form by `layout.with_layers`.
@@ -47,19 +65,19 @@ def read_costmap(top: ParameterTree, name: str) -> CostmapParameters:
         robot_base_frame=frame(reader, "robot_base_frame", "base_link"),
         update_frequency=reader.number("update_frequency", 5.0, low=0.0, above=True, high=1000.0),
         publish_frequency=reader.number("publish_frequency", 0.0, low=0.0, high=1000.0),
-        transform_tolerance=reader.number("transform_tolerance", 0.3, low=0.0),
+        transform_tolerance=reader.number("transform_tolerance", 0.3, low=0.0, high=LONGEST_TIME),
         rolling_window=reader.flag("rolling_window", False),
         width=_side(reader, "width"),
         height=_side(reader, "height"),
         resolution=reader.number("resolution", 0.05, low=0.005, high=1.0),
-        origin_x=reader.number("origin_x", 0.0),
-        origin_y=reader.number("origin_y", 0.0),
+        origin_x=reader.number("origin_x", 0.0, low=-LONGEST, high=LONGEST),
+        origin_y=reader.number("origin_y", 0.0, low=-LONGEST, high=LONGEST),
         footprint=_read_footprint(levels),
-        robot_radius=found(levels, "robot_radius").number("robot_radius", 0.46, low=0.0, above=True),
+        robot_radius=_read_radius(levels),
         footprint_padding=reader.number("footprint_padding", 0.01, low=0.0, high=10.0),
         always_send_full_costmap=reader.flag("always_send_full_costmap", False),
-        footprint_topic=found(levels, "footprint_topic").text("footprint_topic", ""),
-        published_footprint=found(levels, "published_footprint").text("published_footprint", "footprint"),
+        footprint_topic=topic(found(levels, "footprint_topic"), "footprint_topic", ""),
+        published_footprint=topic(found(levels, "published_footprint"), "published_footprint", "footprint"),
         layers=(),
     )
     if parameters.width * parameters.height > MAX_CELLS * parameters.resolution**2:
@@ -75,6 +93,18 @@ def found(levels: tuple[ParameterTree, ...], name: str) -> ParameterTree:
 def frame(reader: ParameterTree, name: str, default: str) -> str:
     """Return a frame's name without the leading slash that some published files have; tf2 refuses it."""
     return reader.text(name, default).removeprefix("/")
+
+
+def topic(reader: ParameterTree, name: str, default: str) -> str:
+    """Return the name of a topic; it may be empty only where the default is.
+
+    Raises:
+        ParameterError: it is empty, or names no topic.
+    """
+    given = reader.text(name, default)
+    if not given.strip("/~ ") and (given or default):
+        raise reader.error(name, "must be the name of a topic", given)
+    return given
 
 
 def plugin(reader: ParameterTree, where: str, entry: Any, types: Mapping[str, str]) -> tuple[str, str]:
@@ -102,9 +132,11 @@ def _side(reader: ParameterTree, name: str) -> float:
 
 
 def _read_layers(reader: ParameterTree, levels: tuple[ParameterTree, ...]) -> tuple[Layer, ...]:
-    layers = []
+    layers: list[Layer] = []
     for index, entry in enumerate(reader.items("plugins", ())):
         name, kind = plugin(reader, f"plugins[{index}]", entry, LAYER_TYPES)
+        if any(layer.name == name for layer in layers):
+            raise reader.error(f"plugins[{index}]", "must have another name than the layers before it", name)
         layers.append(_read_layer((reader.child(name), *levels), name, kind))
     return tuple(layers)
 
@@ -115,7 +147,7 @@ def _read_layer(levels: tuple[ParameterTree, ...], name: str, kind: str) -> Laye
     if kind == "static":
         return replace(
             layer,
-            map_topic=reader.text("map_topic", "map"),
+            map_topic=topic(reader, "map_topic", "map"),
             track_unknown_space=reader.flag("track_unknown_space", True),
             lethal_cost_threshold=max(0, min(reader.whole("lethal_cost_threshold", 100), 100)),
             unknown_cost_value=reader.whole("unknown_cost_value", -1, low=-128, high=255),
@@ -128,7 +160,7 @@ def _read_layer(levels: tuple[ParameterTree, ...], name: str, kind: str) -> Laye
         return replace(
             layer,
             inflation_radius=reader.number("inflation_radius", 0.55, low=0.0, high=50.0),
-            cost_scaling_factor=reader.number("cost_scaling_factor", 10.0, low=0.0),
+            cost_scaling_factor=reader.number("cost_scaling_factor", 10.0, low=0.0, high=1e6),
             inflate_unknown=reader.flag("inflate_unknown", False),
         )
     names = dict.fromkeys(reader.text("observation_sources", "").split())
@@ -136,26 +168,26 @@ def _read_layer(levels: tuple[ParameterTree, ...], name: str, kind: str) -> Laye
         layer,
         sources=tuple(_read_source(levels, name, source) for source in names),
         footprint_clearing_enabled=reader.flag("footprint_clearing_enabled", True),
-        max_obstacle_height=reader.number("max_obstacle_height", 2.0),
+        max_obstacle_height=_height(reader, "max_obstacle_height", 2.0),
     )
 
 
 def _read_source(levels: tuple[ParameterTree, ...], layer: str, name: str) -> ObservationSource:
     reader = levels[0].child(name)
     levels = (reader, *levels)
-    period = reader.number("expected_update_rate", 0.0, low=0.0)
-    highest = reader.number("max_obstacle_height", 2.0)
+    period = reader.number("expected_update_rate", 0.0, low=0.0, high=LONGEST_TIME)
+    highest = _height(reader, "max_obstacle_height", 2.0)
     source = ObservationSource(
         name=name,
         data_type=reader.choice("data_type", "PointCloud", DATA_TYPES),
-        topic=reader.text("topic", name),
+        topic=topic(reader, "topic", name),
         sensor_frame=frame(reader, "sensor_frame", ""),
         marking=reader.flag("marking", True),
         clearing=reader.flag("clearing", False),
-        min_obstacle_height=reader.number("min_obstacle_height", 0.0),
-        max_obstacle_height=min(highest, levels[1].number("max_obstacle_height", 2.0)),
-        obstacle_range=found(levels, "obstacle_range").number("obstacle_range", 2.5, low=0.0),
-        raytrace_range=found(levels, "raytrace_range").number("raytrace_range", 3.0, low=0.0),
+        min_obstacle_height=_height(reader, "min_obstacle_height", 0.0),
+        max_obstacle_height=min(highest, _height(levels[1], "max_obstacle_height", 2.0)),
+        obstacle_range=found(levels, "obstacle_range").number("obstacle_range", 2.5, low=0.0, high=LONGEST),
+        raytrace_range=found(levels, "raytrace_range").number("raytrace_range", 3.0, low=0.0, high=LONGEST),
         expected_update_rate=period or DEFAULT_UPDATE_PERIOD,
         inf_is_valid=reader.flag("inf_is_valid", False),
         layer=layer,
@@ -165,19 +197,41 @@ def _read_source(levels: tuple[ParameterTree, ...], layer: str, name: str) -> Ob
     return source
 
 
+def _height(reader: ParameterTree, name: str, default: float) -> float:
+    return reader.number(name, default, low=-LONGEST, high=LONGEST)
+
+
+def _read_radius(levels: tuple[ParameterTree, ...]) -> float:
+    reader = found(levels, "robot_radius")
+    return reader.number("robot_radius", 0.46, low=0.0, above=True, high=FARTHEST_CORNER)
+
+
 def _read_footprint(levels: tuple[ParameterTree, ...]) -> tuple[tuple[float, float], ...]:
     reader = found(levels, "footprint")
     value = reader.value("footprint", None)
     if value in (None, "", "[]", []):
-        radius = found(levels, "robot_radius").number("robot_radius", 0.46, low=0.0, above=True)
+        radius = _read_radius(levels)
         angles = np.arange(CIRCLE_CORNERS) * (2.0 * math.pi / CIRCLE_CORNERS)
         return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
+    if isinstance(value, str):
+        shown: Any = value if len(value) <= LONGEST_SHOWN else f"{value[:LONGEST_SHOWN]}..."
+    else:
+        shown = value if len(str(value)) <= LONGEST_SHOWN else reprlib.repr(value)
+    if isinstance(value, str) and len(value) > LONGEST_TEXT:
+        raise reader.error("footprint", f"must be a text of at most {LONGEST_TEXT:,} characters", shown)
     try:
-        corners = np.array(yaml.safe_load(value) if isinstance(value, str) else value, dtype=float)
-    except (TypeError, ValueError, yaml.YAMLError) as error:
-        raise reader.error("footprint", "must be a list of [x, y] corners", value) from error
+        corners = np.array(parse_yaml(value) if isinstance(value, str) else value, dtype=float)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise reader.error("footprint", "must be a list of [x, y] corners", shown) from error
     if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
-        raise reader.error("footprint", "must be a list of at least three finite [x, y] corners", value)
+        raise reader.error("footprint", "must be a list of at least three finite [x, y] corners", shown)
+    if len(corners) > MOST_CORNERS:
+        raise reader.error("footprint", f"must have at most {MOST_CORNERS:,} corners", shown)
+    if np.abs(corners).max() > FARTHEST_CORNER:
+        rule = f"must have its corners within {FARTHEST_CORNER:g} m of the base along each axis; they are in metres"
+        raise reader.error("footprint", rule, shown)
+    if np.hypot(*(corners - np.roll(corners, 1, axis=0)).T).sum() > LONGEST_EDGE:
+        raise reader.error("footprint", f"must have edges of at most {LONGEST_EDGE:g} m together", shown)
     return tuple((float(x), float(y)) for x, y in corners)
 
 

@@ -14,6 +14,15 @@ if TYPE_CHECKING:
 DEFAULT_UPDATE_PERIOD = 1.0
 """Seconds after which a source without `expected_update_rate` counts as silent; costmap_2d would wait for ever."""
 
+LONGEST = 1e6
+"""The largest length that a parameter may have, m: it is farther than anything drives."""
+
+FASTEST = 100.0
+"""The largest speed that a parameter or the odometry may have, m/s or rad/s."""
+
+LONGEST_TIME = 1e9
+"""The largest time that a parameter may have, s: 30 years."""
+
 OBSTACLE_KINDS = ("obstacle", "voxel")
 """Kinds of layers that sensors fill."""
 

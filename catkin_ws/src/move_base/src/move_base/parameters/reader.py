@@ -12,10 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 from node_kit.parameters import ParameterTree
 
-from move_base.parameters.costmaps import blind, plugin, read_costmap
+from move_base.parameters.costmaps import FARTHEST_CORNER, blind, plugin, read_costmap
 from move_base.parameters.layout import COSTMAPS, is_old, with_layers
 from move_base.parameters.local_planners import LOCAL_PLANNERS, TRAJECTORY_PLANNER, read_controller
-from move_base.parameters.parameters import OBSTACLE_KINDS, MoveBaseParameters, RecoveryBehavior, plugin_name
+from move_base.parameters.parameters import (
+    LONGEST,
+    LONGEST_TIME,
+    OBSTACLE_KINDS,
+    MoveBaseParameters,
+    RecoveryBehavior,
+    plugin_name,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -53,12 +60,12 @@ def read_parameters(tree: Mapping[str, Any]) -> MoveBaseParameters:
     parameters = MoveBaseParameters(
         controller_frequency=top.number("controller_frequency", 20.0, low=0.1, high=1000.0),
         planner_frequency=top.number("planner_frequency", 0.0, low=0.0, high=1000.0),
-        controller_patience=top.number("controller_patience", 15.0, low=0.0),
-        planner_patience=top.number("planner_patience", 5.0, low=0.0),
+        controller_patience=top.number("controller_patience", 15.0, low=0.0, high=LONGEST_TIME),
+        planner_patience=top.number("planner_patience", 5.0, low=0.0, high=LONGEST_TIME),
         max_planning_retries=top.whole("max_planning_retries", -1, low=-1, high=1000),
-        oscillation_timeout=top.number("oscillation_timeout", 0.0, low=0.0),
-        oscillation_distance=top.number("oscillation_distance", 0.5, low=0.0),
-        conservative_reset_dist=top.number("conservative_reset_dist", 3.0, low=0.0),
+        oscillation_timeout=top.number("oscillation_timeout", 0.0, low=0.0, high=LONGEST_TIME),
+        oscillation_distance=top.number("oscillation_distance", 0.5, low=0.0, high=LONGEST),
+        conservative_reset_dist=top.number("conservative_reset_dist", 3.0, low=0.0, high=LONGEST),
         recovery_behavior_enabled=top.flag("recovery_behavior_enabled", True),
         clearing_rotation_allowed=top.flag(_ROTATION, True),
         shutdown_costmaps=top.flag("shutdown_costmaps", False),
@@ -67,7 +74,7 @@ def read_parameters(tree: Mapping[str, Any]) -> MoveBaseParameters:
         base_local_planner=local_planner,
         recovery_behaviors=_read_recovery(top, local_costmap),
         allow_unknown=planning.flag("allow_unknown", True),
-        default_tolerance=planning.number("default_tolerance", 0.0, low=0.0),
+        default_tolerance=planning.number("default_tolerance", 0.0, low=0.0, high=LONGEST),
         controller=read_controller(top.child(plugin_name(local_planner)), local_planner, local_costmap.resolution),
         global_costmap=global_costmap,
         local_costmap=local_costmap,
@@ -89,8 +96,10 @@ def _read_recovery(top: ParameterTree, local: CostmapParameters) -> tuple[Recove
     """Return the behaviours that `recovery_behaviors` lists; the default without it, or if it has mistakes."""
     if not top.has("recovery_behaviors") or _mistake_of_recovery(top):
         of_footprint = max(math.hypot(x, y) for x, y in local.footprint)
-        radius = top.child("local_costmap").number("circumscribed_radius", of_footprint, low=0.0)
-        near = top.number("conservative_reset_dist", 3.0, low=0.0)
+        radius = top.child("local_costmap").number(
+            "circumscribed_radius", of_footprint, low=0.0, high=2 * FARTHEST_CORNER
+        )
+        near = top.number("conservative_reset_dist", 3.0, low=0.0, high=LONGEST)
         rotate = [RecoveryBehavior("rotate_recovery", "rotate")] if top.flag(_ROTATION, True) else []
         conservative = _read_clearing(top, "conservative_reset", near)
         return (conservative, *rotate, _read_clearing(top, "aggressive_reset", 4.0 * radius), *rotate)
@@ -98,7 +107,8 @@ def _read_recovery(top: ParameterTree, local: CostmapParameters) -> tuple[Recove
     for entry in top.items("recovery_behaviors"):
         name, kind = plugin(top, "recovery_behaviors", entry, _recovery_types())
         if kind == "clear":
-            found.append(_read_clearing(top, name, top.child(name).number("reset_distance", 3.0, low=0.0)))
+            reset_distance = top.child(name).number("reset_distance", 3.0, low=0.0, high=LONGEST)
+            found.append(_read_clearing(top, name, reset_distance))
         else:
             found.append(RecoveryBehavior(name, kind))
     return tuple(found)
@@ -120,7 +130,7 @@ def _mistake_of_recovery(top: ParameterTree) -> str:
     names = [entry["name"] for entry in entries]
     if len(set(map(str, names))) < len(names):
         return "two recovery_behaviors have one name"
-    unknown = [str(entry["type"]) for entry in entries if entry["type"] not in _recovery_types()]
+    unknown = [str(entry["type"]) for entry in entries if str(entry["type"]) not in _recovery_types()]
     if unknown:
         return f"recovery_behaviors has types that are not known here: {', '.join(unknown)}"
     return ""

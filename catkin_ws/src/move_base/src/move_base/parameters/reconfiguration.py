@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from node_kit.parameters import ParameterError
+from node_kit.parameters import ParameterError, flag
 
 from move_base.parameters.layout import with_layers
 from move_base.parameters.reader import read_parameters
@@ -76,6 +76,14 @@ def present_values(
     if "footprint" in values:
         values["footprint"] = _text(given.get("footprint", tree.get("footprint", "[]")))
     return {key: value for key, value in values.items() if value is not None and not _is_infinite(value)}
+
+
+def as_default(value: Any, default: Any) -> Any:
+    """Return a value in the type of its parameter's default; the default where it can't be one of that type."""
+    try:
+        return flag(value, "") if isinstance(default, bool) else type(default)(value)
+    except (TypeError, ValueError, OverflowError):
+        return default
 
 
 def changed(

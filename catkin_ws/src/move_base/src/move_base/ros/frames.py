@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import rospy
 import tf2_ros
+from robot_formulas.geometry import Pose
 
 from move_base.costmap.grid import FARTHEST
 from move_base.ros.messages import matrix_of
 
 if TYPE_CHECKING:
+    from geometry_msgs.msg import PoseStamped
     from numpy.typing import NDArray
+
+    from move_base.costmap.surroundings import Transformer
 
 TF_CACHE = 10.0
 """Transforms kept, s: tf2's own default."""
@@ -56,6 +60,19 @@ class TfTransformer:
     def clear(self) -> None:
         """Forget everything, after the clock was set back."""
         self.buffer.clear()
+
+
+def pose_in(target: str, stamped: PoseStamped, frames: Transformer) -> Pose | None:
+    """Return a pose's projection on the plane of a frame, or None where the pose's own frame is not known there.
+
+    The pose is transformed in space first: its frame may be tilted, as that of a camera is.
+    """
+    pose = matrix_of(stamped.pose.position, stamped.pose.orientation)
+    frame = stamped.header.frame_id.removeprefix("/")
+    if frame == target:
+        return Pose.from_matrix(pose)
+    matrix = frames.lookup(target, frame, None)
+    return None if matrix is None else Pose.from_matrix(matrix @ pose)
 
 
 class _Listener(tf2_ros.TransformListener):

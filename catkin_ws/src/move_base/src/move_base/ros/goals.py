@@ -20,15 +20,16 @@ from move_base_msgs.msg import (
 from node_kit.io.inbox import Inbox
 from node_kit.ros.action_server import Sturdy
 from node_kit.ros.resumed_goal import start_with
-from robot_formulas.geometry import Pose
 
 from move_base.navigation.result import Outcome
-from move_base.ros.messages import goal_problem, matrix_of, pose_stamped
+from move_base.ros.frames import pose_in
+from move_base.ros.messages import goal_problem, pose_stamped
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from actionlib.server_goal_handle import ServerGoalHandle
+    from robot_formulas.geometry import Pose
 
     from move_base.navigation import result as recovery
     from move_base.ros.frames import TfTransformer
@@ -37,6 +38,9 @@ ACTION = "move_base"
 
 FRAME_PATIENCE = 2.0
 """How long a goal waits for its frame to become known, s."""
+
+MOST_AHEAD = 1.0
+"""A goal's stamp that is this far ahead of the clock (s) does not tell which goal is the newer one."""
 
 FEEDBACK_PERIOD = 0.2
 """s; the action's status has the same rate."""
@@ -72,7 +76,8 @@ class GoalServer:
         self._cancel = cancel
         self._requests = Inbox()
         self._active: ServerGoalHandle | None = None
-        self._waiting: tuple[ServerGoalHandle, float] | None = None
+        self._waiting: tuple[ServerGoalHandle, float] | None = None  # with the time from which it waits, s
+        self._stamp = rospy.Time()  # of the current goal; 0 where it is from another time
         self._fed_back = -math.inf
         self._sent_on = rospy.Publisher(f"{ACTION}/goal", MoveBaseActionGoal, queue_size=5)
         self._recovery = rospy.Publisher(f"{ACTION}/recovery_status", RecoveryStatus, queue_size=1)
@@ -89,7 +94,7 @@ class GoalServer:
         """Process the goals and cancellations that have arrived; `now` in s."""
         self._requests.drain()
         if self._waiting is not None:
-            self._resolve_waiting(now)
+            self._begin_waiting(now)
 
     def feed_back(self, now: float, robot: Pose) -> None:
         """Tell the active goal's client where the robot is, if it is time."""
@@ -119,9 +124,12 @@ class GoalServer:
             rospy.logwarn("Goal aborted: %s", text)
             handle.set_aborted(MoveBaseResult(), text)
 
-    def reset_time(self) -> None:
-        """Forget times, after the clock was set back."""
+    def reset_time(self, now: float) -> None:
+        """Forget times, after the clock was set back to `now` (s)."""
         self._fed_back = -math.inf
+        self._stamp = rospy.Time()
+        if self._waiting is not None:
+            self._waiting = (self._waiting[0], now)
 
     def _on_goal(self, handle: ServerGoalHandle) -> None:
         problem = goal_problem(handle.get_goal().target_pose)
@@ -148,40 +156,49 @@ class GoalServer:
         return self._active or (self._waiting[0] if self._waiting is not None else None)
 
     def _take_goal(self, handle: ServerGoalHandle) -> None:
+        now, stamp = rospy.get_time(), handle.get_goal_id().stamp
         current = self._current()
-        if current is not None and handle.get_goal_id().stamp < current.get_goal_id().stamp:
+        if current is not None and stamp < self._stamp:
             handle.set_canceled(MoveBaseResult(), "a newer goal is active")
             return
+        goal = self._pose_of(handle)
         if current is not None:
-            self._drop_goal("preempted by a newer goal", stop=False)
-        self._waiting = (handle, rospy.get_time())
+            self._drop_goal("preempted by a newer goal", stop=goal is None)
+        self._stamp = stamp if stamp.to_sec() <= now + MOST_AHEAD else rospy.Time()
+        if goal is None:
+            self._waiting = (handle, now)
+        else:
+            self._begin_goal(handle, goal, now)
 
     def _take_cancellation(self, handle: ServerGoalHandle) -> None:
         if _is_same(handle, self._current()):
             self._drop_goal("cancelled by the client")
 
-    def _resolve_waiting(self, now: float) -> None:
-        """Start the waiting goal as soon as its frame is known."""
+    def _begin_waiting(self, now: float) -> None:
+        """Begin the waiting goal as soon as its frame is known; abort it after a while."""
         assert self._waiting is not None  # noqa: S101
         handle, since = self._waiting
-        target = handle.get_goal().target_pose
-        frame = target.header.frame_id.removeprefix("/")
-        goal = Pose.from_matrix(matrix_of(target.pose.position, target.pose.orientation))
-        if frame != self._global_frame:
-            matrix = self._frames.lookup(self._global_frame, frame, None)
-            if matrix is None:
-                if now - since > FRAME_PATIENCE:
-                    self._waiting = None
-                    reason = f"the goal's frame {frame!r} has no transform to {self._global_frame!r}"
-                    rospy.logwarn("Goal aborted: %s", reason)
-                    self._cancel(True)
-                    handle.set_aborted(MoveBaseResult(), reason)
-                return
-            goal = Pose.from_matrix(matrix) @ goal
-        self._waiting, self._active = None, handle
+        goal = self._pose_of(handle)
+        if goal is not None:
+            self._waiting = None
+            self._begin_goal(handle, goal, now)
+        elif now - since > FRAME_PATIENCE:
+            self._waiting = None
+            frame = handle.get_goal().target_pose.header.frame_id.removeprefix("/")
+            reason = f"the goal's frame {frame!r} has no transform to {self._global_frame!r}"
+            rospy.logwarn("Goal aborted: %s", reason)
+            self._cancel(True)
+            handle.set_aborted(MoveBaseResult(), reason)
+
+    def _begin_goal(self, handle: ServerGoalHandle, goal: Pose, now: float) -> None:
+        self._active = handle
         self._begin(goal, now)
         self._current_goal.publish(pose_stamped(goal, self._global_frame, rospy.Time.now()))
         rospy.loginfo("Goal (%.2f, %.2f, %.2f) accepted", goal.x, goal.y, goal.yaw)
+
+    def _pose_of(self, handle: ServerGoalHandle) -> Pose | None:
+        """Return a goal in the global frame, or None while its frame is not known."""
+        return pose_in(self._global_frame, handle.get_goal().target_pose, self._frames)
 
     def _drop_goal(self, reason: str, stop: bool = True) -> None:
         handle = self._current()

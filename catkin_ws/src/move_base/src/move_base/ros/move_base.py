@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import math
+import http.client
 import threading
 import time
+import xmlrpc.client
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import cv2
+import rosgraph
 import rospy
-from geometry_msgs.msg import Polygon, PoseStamped, Twist
+from geometry_msgs.msg import Polygon, PoseStamped
 from map_msgs.msg import OccupancyGridUpdate
 from move_base_msgs.msg import MoveBaseActionGoal
 from nav_msgs.msg import OccupancyGrid, Odometry
@@ -28,23 +30,37 @@ from std_srvs.srv import Empty, EmptyResponse
 from move_base.costmap.sensors import SensorError, cloud_observation, points_observation, scan_observation
 from move_base.costmap.static_map import MapError, MapPart, StaticMap
 from move_base.navigation.navigator import Navigator
+from move_base.parameters.costmaps import MOST_CORNERS
 from move_base.parameters.layout import sought_above
+from move_base.parameters.parameters import FASTEST
 from move_base.parameters.reader import read_parameters
 from move_base.parameters.reconfiguration import changed, present_values, servers
 from move_base.planning.global_planner import PlanningError
+from move_base.ros.base import Base
 from move_base.ros.display import CostmapDisplay, PathDisplay, in_costmap
-from move_base.ros.frames import TfTransformer
+from move_base.ros.frames import TfTransformer, pose_in
 from move_base.ros.goals import ACTION, GoalServer
-from move_base.ros.messages import goal_problem, matrix_of, path_of, pose_stamped, twist_of
+from move_base.ros.messages import goal_problem, matrix_of, path_of, pose_stamped
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from move_base.parameters.parameters import MoveBaseParameters, ObservationSource
     from move_base.parameters.reconfiguration import ServerDescription
 
 OFFER_AGAIN = 1.0
 """Wall s until services and servers are offered that could not be."""
+
+_MAY_PASS = (
+    OSError,
+    http.client.HTTPException,
+    xmlrpc.client.Error,
+    rosgraph.MasterException,
+    rospy.ROSException,
+    RuntimeError,
+    MemoryError,
+)
+"""What registering raises where the master is in trouble for a moment, or no thread or memory is left."""
 
 WARN_PERIOD = 5.0
 """The same warning is repeated no sooner than this, s."""
@@ -67,15 +83,15 @@ class MoveBaseNode:
         self._reconfigured: MoveBaseParameters | None = None  # to be taken on at the next tick
         self._tree_lock = threading.Lock()
         self._navigator = Navigator(parameters)
-        self._lock = threading.RLock()  # the navigator, and the last word on cmd_vel
-        self._closing = False
+        self._lock = threading.RLock()  # the navigator
         self._velocity: Velocity = STOP
         self._frames = TfTransformer()
-        self._cmd_vel = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+        self._base = Base(parameters.controller_frequency)
         self._goals = GoalServer(
             self._frames, parameters.global_costmap.global_frame, self._begin_goal, self._cancel_goal, resumed
         )
-        rospy.on_shutdown(self._stop_base)
+        rospy.on_shutdown(self._base.close)
+        self._base.start_watch()
         self._subscribe()
         self._goals.start()
         self._path_display = PathDisplay(parameters)
@@ -110,8 +126,8 @@ class MoveBaseNode:
         self._goals.take_requests(now)
         with self._lock:
             result = self._navigator.step(now, self._frames, self._velocity)
-            if result.velocity is not None and not self._closing:
-                self._cmd_vel.publish(twist_of(result.velocity))
+        if result.velocity is not None:
+            self._base.send(result.velocity)
         if result.warning:
             rospy.logwarn_throttle_identical(WARN_PERIOD, result.warning)
         self._path_display.publish(result)
@@ -130,21 +146,30 @@ class MoveBaseNode:
         """Offer what the first command does not need: services and dynamic_reconfigure."""
         from move_base.ros.reconfigure import offer
 
-        planner = self._parameters.global_planner
-        offers = [
-            lambda: rospy.Service("~make_plan", GetPlan, self._on_make_plan),
-            lambda: rospy.Service(f"~{planner}/make_plan", GetPlan, self._on_make_plan),
-            lambda: rospy.Service("~clear_costmaps", Empty, self._on_clear_costmaps),
+        offers: list[tuple[str, Callable[[], object]]] = [
+            (name, partial(rospy.Service, name, kind, answer))
+            for name, kind, answer in (
+                ("~make_plan", GetPlan, self._on_make_plan),
+                (f"~{self._parameters.global_planner}/make_plan", GetPlan, self._on_make_plan),
+                ("~clear_costmaps", Empty, self._on_clear_costmaps),
+            )
         ]
-        offers += [partial(offer, [one], self._present_values, self._reconfigure) for one in servers(self._parameters)]
+        offers += [
+            (f"~{one.namespace}", partial(offer, [one], self._present_values, self._reconfigure))
+            for one in servers(self._parameters)
+        ]
         while offers and not rospy.core.is_shutdown_requested():
+            name, make = offers[0]
             try:
-                offers[0]()
-                del offers[0]
-            except Exception as error:  # the master is in trouble for a moment
-                if not rospy.core.is_shutdown_requested():
-                    rospy.logwarn("What move_base can be asked for is offered later: %s", error)
-                    time.sleep(OFFER_AGAIN)
+                make()
+            except Exception as error:
+                if isinstance(error, _MAY_PASS) and not isinstance(error, rospy.ROSSerializationException):
+                    if not rospy.core.is_shutdown_requested():
+                        rospy.logwarn("What move_base can be asked for is offered later: %s", error)
+                        time.sleep(OFFER_AGAIN)
+                    continue
+                rospy.logwarn("%s is not offered: %s: correct the parameters of that name", name, error)
+            del offers[0]
 
     # -- parameters that change on the way -------------------------------------------------------------------------
 
@@ -162,11 +187,14 @@ class MoveBaseNode:
         return ""
 
     def _take_parameters(self) -> bool:
-        with self._tree_lock:
-            parameters, self._reconfigured = self._reconfigured, None
+        if not self._tree_lock.acquire(blocking=False):
+            return False  # they are being changed: the next tick takes them
+        parameters, self._reconfigured = self._reconfigured, None
+        self._tree_lock.release()
         if parameters is None:
             return False
         self._parameters = parameters
+        self._base.reconfigure(parameters.controller_frequency)
         with self._lock:
             self._navigator.reconfigure(parameters)
         for display, costmap in zip(self._displays, (parameters.global_costmap, parameters.local_costmap), strict=True):
@@ -209,13 +237,18 @@ class MoveBaseNode:
     def _on_odometry(self, message: Odometry) -> None:
         twist = message.twist.twist
         values = (twist.linear.x, twist.linear.y, twist.angular.z)
-        if all(math.isfinite(value) for value in values):
+        if all(abs(value) <= FASTEST for value in values):
             self._velocity = Velocity(*values)
         else:
-            rospy.logwarn_throttle(WARN_PERIOD, "Odometry ignored: its velocity is not finite")
+            rospy.logwarn_throttle(
+                WARN_PERIOD, f"Odometry ignored: its velocity is not finite, or over {FASTEST:g} m/s"
+            )
 
     def _on_footprint(self, costmap: str, message: Polygon) -> None:
-        problem = self._reconfigure(costmap, {"footprint": [[point.x, point.y] for point in message.points]})
+        if len(message.points) > MOST_CORNERS:
+            problem = f"it has {len(message.points)} corners, more than {MOST_CORNERS}"
+        else:
+            problem = self._reconfigure(costmap, {"footprint": [[point.x, point.y] for point in message.points]})
         if problem:
             rospy.logwarn_throttle_identical(WARN_PERIOD, f"Footprint ignored: {problem}")
 
@@ -273,18 +306,14 @@ class MoveBaseNode:
     def _in_global(self, stamped: PoseStamped) -> Pose | None:
         if goal_problem(stamped):
             return None
-        frame = self._parameters.global_costmap.global_frame
-        matrix = self._frames.lookup(frame, stamped.header.frame_id.removeprefix("/"), None)
-        if matrix is None:
-            return None
-        return Pose.from_matrix(matrix @ matrix_of(stamped.pose.position, stamped.pose.orientation))
+        return pose_in(self._parameters.global_costmap.global_frame, stamped, self._frames)
 
     def _robot(self) -> Pose | None:
         p = self._parameters.global_costmap
         matrix = self._frames.lookup(p.global_frame, p.robot_base_frame, None)
         return None if matrix is None else Pose.from_matrix(matrix)
 
-    # -- what moves the base ---------------------------------------------------------------------------------------
+    # -- goals and the clock ---------------------------------------------------------------------------------------
 
     def _begin_goal(self, goal: Pose, now: float) -> None:
         with self._lock:
@@ -293,20 +322,14 @@ class MoveBaseNode:
     def _cancel_goal(self, stop: bool) -> None:
         with self._lock:
             self._navigator.cancel()
-            if stop and not self._closing:
-                self._cmd_vel.publish(Twist())
-
-    def _stop_base(self) -> None:
-        """Stop the base: this is the last command of a node that ends."""
-        with self._lock:
-            self._closing = True
-            with contextlib.suppress(rospy.ROSException):
-                self._cmd_vel.publish(Twist())
+        if stop:
+            self._base.send(STOP)
 
     def _clock_set_back(self, now: float) -> None:
         rospy.logwarn("The clock was set back; sensor data and transforms are forgotten")
+        self._base.send(STOP)
         self._frames.clear()
-        self._goals.reset_time()
+        self._goals.reset_time(now)
         with self._lock:
             self._navigator.reset_time(now)
 
@@ -314,7 +337,7 @@ class MoveBaseNode:
 def main() -> None:
     """Run the node; exit status 2 when a parameter can't be used."""
     with Lifetime("move_base", ParameterError) as life:
-        life.longest_end_without_master = life.longest_end  # the base is stopped after the step that is under way
+        life.longest_end_without_master = life.longest_end  # then, too, the base is stopped first
         life.start()
         cv2.setNumThreads(1)  # the grids are small: threads cost more than they give
         tree = rospy.get_param("~", {})

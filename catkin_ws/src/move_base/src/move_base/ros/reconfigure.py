@@ -9,7 +9,7 @@ from typing import Any
 import rospy
 from dynamic_reconfigure.server import Server
 
-from move_base.parameters.reconfiguration import ServerDescription
+from move_base.parameters.reconfiguration import ServerDescription, as_default
 
 WARN_PERIOD = 1.0
 """The same warning is repeated no sooner than this, s."""
@@ -47,7 +47,7 @@ class _Server(Server):
 
     def _copy_from_parameter_server(self) -> None:
         present = self._present(self._description, self._names)
-        self.config.update({name: type(self.config[name])(value) for name, value in present.items()})
+        self.config.update({name: as_default(value, self.config[name]) for name, value in present.items()})
 
     def _copy_to_parameter_server(self) -> None:
         for name in self._names:
