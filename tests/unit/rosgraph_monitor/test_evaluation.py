@@ -306,3 +306,43 @@ def test_publisher_of_a_silent_topic_says_which():
     silent = TopicVerdict(TopicSpec("scan_filtered", max_age=1.0), "Silent topic", "none", "messages", "none")
     statuses = watched.evaluate(running, lives(filter=Life.ALIVE), system, 0.0, topics=[silent])
     assert why(statuses, "filter") == "Silent topic scan_filtered (no message yet)"
+
+
+ANONYMOUS = "/front_laser_4711_1700000000000"
+ANONYMOUS_SCAN = build_snapshot([[["/front/scan", [ANONYMOUS]]], [], []], [], {}, {ANONYMOUS: "http://host/anonymous"})
+
+
+@pytest.mark.parametrize("life", [Life.ALIVE, Life.DEAD])
+def test_silent_topic_of_an_anonymous_node_is_told_of_the_component_of_the_model(life):
+    watched = monitor()
+    alone = Desired(RosSystem("base", components=(Component("front_laser"),)))
+    known = {(ANONYMOUS, "http://host/anonymous"): Life.ALIVE}
+    watched.evaluate(ANONYMOUS_SCAN, known, alone, 0.0, topics=[TopicVerdict(SCAN)])
+    known = {(ANONYMOUS, "http://host/anonymous"): life}
+    statuses = watched.evaluate(ANONYMOUS_SCAN, known, alone, 0.1, topics=[SILENT])
+    told = [s.name for s in statuses if s.message == "Component status"]
+    assert told == ["laser_resender"]
+    assert why(statuses, "laser_resender") == (
+        "Silent topic front/scan (max_age 1)" if life is Life.ALIVE else f"node front_laser: {Life.DEAD.value}"
+    )
+
+
+def test_topics_of_anonymous_nodes_under_reconfiguration_are_excused():
+    in_change = Desired(SYSTEM, frozenset({"front_laser"}), excused=frozenset({"front_laser"}))
+    assert monitor().excused_topics(ANONYMOUS_SCAN, in_change, ["front/scan"]) == {"front/scan"}
+
+
+@pytest.mark.parametrize("running", ["/laser_11_1600000000000", "/laser_12_1700000000000"])
+def test_settings_may_call_an_anonymous_node_of_the_model_by_its_beginning(running):
+    watched = GraphEvaluator({"laser": "sensor"}, patience=Patience(0.1, 0.1, 0.1))
+    model = Desired(RosSystem("s", components=(Component("laser_11_1600000000000"),)))
+    known = {(running, f"http://host{running}"): Life.ALIVE}
+    for now in (0.0, 9.0):
+        told = said(watched.evaluate(graph(running), known, model, now))
+    assert ("sensor", "Component status", "TRUE") in told
+    assert not any(value == "FALSE" for _, _, value in told)
+
+
+def test_parts_of_the_graph_that_can_not_be_read_are_told_in_place_of_running_ok():
+    told = monitor().evaluate(BOTH, ALIVE, DESIRED, 0.0, problem="parameter /js can't be read")
+    assert [s.message for s in told if s.name == "ROS Graph"] == ["parameter /js can't be read"]

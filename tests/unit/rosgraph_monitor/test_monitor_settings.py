@@ -1,8 +1,12 @@
 """What metacontrol.yaml may say of components and topics, and what the monitor takes, are the same."""
 
+import pytest
+import rospy
+from node_kit.parameters import ParameterError
 from ros_model.project.schema_check import load_schema, part_of, violations
 from rosgraph_monitor.health.components import parse_components
 from rosgraph_monitor.health.topics import parse_topics
+from rosgraph_monitor.ros import parameters
 
 SETTINGS = {
     "components": {
@@ -21,3 +25,17 @@ def test_settings_pass_the_schema_and_the_monitor():
     assert set(components.topics) == {"front/scan", "camera/depth/points"}
     assert components.batteries[0].component == "battery"
     assert parse_topics(SETTINGS["topics"])["odom"].max_age == 0.5
+
+
+@pytest.mark.parametrize("rate", [1e-10, 0, 1e12])
+def test_rate_at_which_no_thread_can_work_is_refused_with_its_range(monkeypatch, rate):
+    monkeypatch.setattr(rospy, "get_param", lambda *_: {"rate": rate})
+    monkeypatch.setattr(rospy, "get_name", lambda: "/rosgraph_monitor")
+    with pytest.raises(ParameterError, match=r"/rosgraph_monitor/rate is .* at least 1e-06 and at most 100"):
+        parameters.poll_rate()
+
+
+@pytest.mark.parametrize(("given", "rate"), [({}, 2.0), ({"rate": 10}, 10.0)])
+def test_usual_rate_and_another_one(monkeypatch, given, rate):
+    monkeypatch.setattr(rospy, "get_param", lambda *_: given)
+    assert parameters.poll_rate() == rate

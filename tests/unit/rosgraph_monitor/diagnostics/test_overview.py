@@ -1,10 +1,12 @@
 """Tables for a terminal, and names for the aggregator."""
 
 import pytest
+from click.testing import CliRunner
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import ActiveConfiguration, FunctionGrounding
 from rich.console import Console
 from ros_model.graph.snapshot import build_snapshot
+from rosgraph_monitor.cli import snapshot
 from rosgraph_monitor.cli.snapshot import lines
 from rosgraph_monitor.diagnostics.aggregator_names import unique_name
 from rosgraph_monitor.diagnostics.overview import Overview, of_robot, thresholds
@@ -60,6 +62,18 @@ def test_markup_in_names_is_shown_as_it_is():
     overview = Overview()
     overview.take([status("[red]x", "Odd [/]", ("k", "[bold]"), level=77)], 0.0)
     assert "[red]x" in shown(overview, 0.0, nodes=("/[/nope]",))
+
+
+@pytest.mark.parametrize("value", ["[/]", "\x1b]0;owned\x07\x1b[2J", "[link=http://evil]x[/link]", "\x9b2J"])
+@pytest.mark.parametrize(
+    ("message", "level"), [("CPU Usage", 0), ("Memory Usage", 0), ("Component status", 0), ("QA status", 0), ("Odd", 2)]
+)
+def test_what_others_say_neither_styles_a_table_nor_controls_the_terminal(value, message, level):
+    overview = Overview()
+    overview.take([status("laser", message, ("laser", value), level=level)], 0.0)
+    text = shown(overview, 0.0)
+    assert value.encode("unicode_escape").decode() in text
+    assert not {"\x1b", "\x07", "\x9b"} & set(text)
 
 
 def test_thresholds_are_found_wherever_they_stand():
@@ -118,3 +132,10 @@ def test_snapshot_in_lines():
         "  subscribes /scan sensor_msgs/LaserScan",
         "  serves /nav/clear",
     ]
+
+
+def test_name_of_a_node_controls_no_terminal(monkeypatch):
+    graph = build_snapshot([[["/scan", ["/a\x9b2J\nb"]]], [], []], [], {}, {"/a\x9b2J\nb": "http://a:1/"})
+    monkeypatch.setattr(snapshot, "take_snapshot", lambda *_: graph)
+    output = CliRunner().invoke(snapshot.main).output
+    assert output.splitlines() == ["/a\\x9b2J\\nb http://a:1/", "  publishes /scan"]

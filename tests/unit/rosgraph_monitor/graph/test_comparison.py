@@ -16,7 +16,7 @@ from rosgraph_monitor.graph.findings import (
     WrongType,
     finding_statuses,
 )
-from rosgraph_monitor.graph.names import instance, is_ignored_node, relative, resolved
+from rosgraph_monitor.graph.names import instance, instances, is_ignored_node, relative, resolved
 from rosgraph_monitor.graph.values import same_value
 
 
@@ -164,6 +164,43 @@ def test_anonymous_instance_stands_for_a_node_of_the_model(name, found):
         *("/twin_1_1700000000001", "/twin_2_1700000000002"),
     )
     assert instance(name, running) == found
+
+
+SERIALS = ("camera_819612070807", "camera_920312072311")
+HOST = "/viewer_bench_12_9007199254740993123"  # as roslaunch names a node that has no name
+
+
+@pytest.mark.parametrize("other", ["/camera_920312072311", "/camera_1", "/camera_4711_920312072311"])
+def test_serial_number_is_not_the_time_of_an_anonymous_node(other):
+    assert instance("/camera_819612070807", [other]) is None
+    assert not is_ignored_node(other.lstrip("/"), ())
+
+
+@pytest.mark.parametrize(
+    "node", ["/viewer_1700000000", "/viewer_7_1700000000123", "/viewer_1700000000123456789", "/viewer_1700000000123"]
+)
+def test_times_as_nodes_write_them_are_anonymous(node):
+    assert instance("/viewer", [node]) == node
+    assert instance("/viewer_bench_99_9107199254740993123", [HOST]) == HOST
+
+
+def test_device_that_died_is_missing_though_another_of_its_kind_runs():
+    desired = system(*map(Component, SERIALS))
+    assert compare(graph(f"/{SERIALS[1]}"), desired, dead={}) == (
+        MissingNode(SERIALS[0], "absent", "not registered with the master"),
+    )
+    died = {f"/{SERIALS[0]}": ("dead", "no answer")}
+    assert compare(graph(*(f"/{name}" for name in SERIALS)), desired, dead=died) == (
+        MissingNode(SERIALS[0], "dead", "no answer"),
+    )
+
+
+def test_node_stands_for_one_component_only_and_first_for_its_own():
+    one, other = "/pub_11_1600000000000", "/pub_12_1600000000001"
+    assert instances([one, other], [other]) == {other: other}
+    again = "/pub_4711_1700000000000"
+    assert instances([one, other], [again]) == {one: again}
+    assert instances([one, other], [again, other]) == {other: other, one: again}
 
 
 def test_type_of_a_topic_by_settings():

@@ -29,6 +29,22 @@ def test_all_statuses_of_a_driver_count_where_the_task_is_not_named():
     assert statuses.conditions == {"gripper": ALIVE}
 
 
+@pytest.mark.parametrize("wanted", ["arm", "arm: safety", "amber/arm", "amber/arm: safety"])
+@pytest.mark.parametrize("name", ["amber/arm: safety", "/amber/arm: safety", "arm: safety", "/arm: safety"])
+def test_driver_of_a_robot_in_a_namespace_is_heard(wanted, name):
+    statuses = DriverStatuses({"c_arm": wanted}, "/amber/")
+    assert statuses.take(name, Level.ERROR, "stop")
+    assert statuses.conditions == {"c_arm": FAILED}
+    assert statuses.reasons == {"c_arm": "its driver says arm: safety: stop"}
+    assert statuses.take("amber/arm: safety", Level.OK)
+
+
+@pytest.mark.parametrize("name", ["amber_2/arm: safety", "amber/left/arm: safety", "cell/amber/arm: safety"])
+def test_driver_elsewhere_is_not_heard(name):
+    statuses = DriverStatuses({"c_arm": "arm"}, "/amber/")
+    assert not statuses.take(name, Level.ERROR)
+
+
 @pytest.mark.parametrize("name", ["hand_driver_2: motor", "other: hand_driver", "hand", ""])
 def test_statuses_of_others_are_not_heard(name):
     statuses = DriverStatuses({"gripper": "hand_driver"})

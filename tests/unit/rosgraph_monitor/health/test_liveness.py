@@ -63,6 +63,17 @@ def test_server_that_closes_after_each_answer_stays_alive():
         assert state.life is Life.ALIVE
 
 
+def test_server_that_closes_after_each_answer_is_connected_at_once_and_probed_when_that_is_due():
+    state, action = due(on_closed(alive(), 0.01, TIMING), 0.01, TIMING)
+    assert action is Action.CONNECT
+    state = on_connected(state, 0.02)
+    assert due(state, 0.9, TIMING) == (state, Action.NONE)
+    assert due(state, 1.0, TIMING)[1] is Action.PROBE
+    again, action = due(on_closed(state, 0.03, TIMING), 0.03, TIMING)
+    assert action is Action.CONNECT
+    assert due(on_connected(again, 0.04), 0.04, TIMING)[1] is Action.PROBE, "it has closed a connection unasked"
+
+
 def test_server_that_only_closes_is_called_hung_and_not_called_in_a_spin():
     state = Liveness()
     for _ in range(4):

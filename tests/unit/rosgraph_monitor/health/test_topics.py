@@ -127,6 +127,83 @@ def test_grace_begins_with_the_clock():
     assert said(followed, 1005.1) == ["Silent topic"]
 
 
+def run(followed, ros, pace=1.0, lasts=10.0, rate=20.0, wall=0.0, scan_rate=10.0):
+    """Let a clock go on at a pace, with messages at a rate of ROS time; return the times, and all that is said."""
+    told, due = [], ros
+    for _ in range(round(lasts * rate)):
+        ros, wall = ros + pace / rate, wall + 1.0 / rate
+        while scan_rate and due <= ros:
+            followed.arrived("scan", due, wall)
+            due += 1.0 / scan_rate
+        told += [verdict.message for verdict in followed.judge(ros, wall)]
+    return ros, wall, told
+
+
+def silence(followed, ros, wall, pace, rate=20.0):
+    """Return after how much ROS time without a message the topic is said to be silent, in s."""
+    begin = ros
+    while ros - begin < 1000.0:
+        ros, wall = ros + pace / rate, wall + 1.0 / rate
+        if followed.judge(ros, wall)[0].message == "Silent topic":
+            return ros - begin
+    return None
+
+
+@pytest.mark.parametrize("jump", [5.0, 3600.0, 1e9])
+def test_clock_that_jumps_ahead_makes_no_topic_silent_and_no_later_silence_is_told_later(jump):
+    followed = health(max_age=1.0, min_rate=5.0)
+    ros, wall, told = run(followed, 1000.0)
+    assert set(told) == {""}
+    ros, wall, told = run(followed, ros + jump, wall=wall, lasts=5.0)
+    assert set(told) == {""}
+    assert silence(followed, ros, wall, 1.0) == pytest.approx(1.0, abs=0.11)
+
+
+@pytest.mark.parametrize("jump", [5.0, 3600.0])
+def test_clock_that_jumps_ahead_hides_no_silence(jump):
+    followed = health(max_age=1.0)
+    ros, wall, _ = run(followed, 1000.0)
+    for _ in range(3):
+        ros, wall, told = run(followed, ros + jump, wall=wall, lasts=3.0, scan_rate=0.0)
+    assert set(told) == {"Silent topic"}
+
+
+@pytest.mark.parametrize("pace", [0.1, 1.0, 10.0, 20.0, 200.0])
+def test_silence_is_told_at_any_pace_of_a_simulation(pace):
+    followed = health(max_age=1.0)
+    ros, wall, told = run(followed, 1000.0, pace)
+    assert set(told) == {""}
+    assert silence(followed, ros, wall, pace) <= 1.0 + 2 * pace / 20.0
+
+
+def test_silence_is_told_though_the_clock_goes_in_coarse_steps():
+    followed = health(max_age=25.0)
+    told = []
+    for step in range(40):
+        ros = 1000.0 + 10.0 * step  # s, one step each wall s
+        if step < 20:
+            followed.arrived("scan", ros, step)
+        told += [followed.judge(ros, step + part / 20.0)[0].message for part in range(20)]
+    assert set(told[:400]) == {""}
+    assert set(told[460:]) == {"Silent topic"}
+
+
+def test_monitor_that_was_held_up_takes_no_time_for_a_jump():
+    followed = health(max_age=1.0)
+    ros, wall, _ = run(followed, 1000.0)
+    assert followed.judge(ros + 60.0, wall + 60.0)[0].message == "Silent topic"
+
+
+def test_messages_are_not_kept_without_end_while_the_clock_stands():
+    followed = health(min_rate=5.0)
+    for i in range(25_000):
+        followed.arrived("scan", 1000.0, i * 0.001)
+    assert len(followed._seen["scan"].arrivals) <= 10_000
+    ros, wall, told = run(followed, 1000.0, wall=25.0, scan_rate=20.0)
+    assert set(told) == {""}
+    assert set(run(followed, ros, wall=wall, scan_rate=2.0)[2][-20:]) == {"Slow topic"}
+
+
 def test_followed_topics_keep_their_history_and_others_are_forgotten():
     followed = health(max_age=1.0)
     followed.arrived("scan", 1.0, 1.0)

@@ -17,6 +17,7 @@ class Master:
     def __init__(self):
         self.answers = queue.Queue()
         self.closed = False
+        self.problem = ""
 
     def snapshot(self):
         answer = self.answers.get(timeout=DEADLINE)
@@ -66,6 +67,12 @@ def test_poll_has_what_was_known_and_tells_whom_to_watch(stand):
     assert stand.poller.latest.snapshot is GRAPH
     assert stand.poller.latest.lives == stand.connections.known
     assert stand.connections.watched == {"/laser": "http://host/laser"}
+
+
+def test_poll_says_what_of_it_is_older(stand):
+    stand.master.problem = "parameter /js can't be read"
+    stand.answer(GRAPH)
+    assert stand.poller.latest.problem == "parameter /js can't be read"
 
 
 def test_poll_that_fails_leaves_the_latest_and_the_next_one_counts_again(stand):

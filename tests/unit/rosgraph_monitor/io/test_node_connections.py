@@ -10,7 +10,7 @@ import pytest
 from helpers.ports import QUIET_HOST
 from helpers.waiting import DEADLINE_S, wait_for
 from rosgraph_monitor.health.liveness import Life, Timing
-from rosgraph_monitor.io.node_connections import NodeConnections
+from rosgraph_monitor.io.node_connections import NodeConnections, _answer
 
 TIMING = Timing(probe_period=0.05, probe_deadline=150.0, connect_deadline=150.0, retry_period=0.05)
 HASTY = Timing(probe_period=0.05, probe_deadline=1.0, connect_deadline=1.0, retry_period=0.05)
@@ -142,6 +142,110 @@ def test_host_that_could_not_be_looked_up_for_want_of_a_thread_is_looked_up_late
         watcher.watch({"/n": uri})
         wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE, known(watcher))
     assert refused
+
+
+ANSWER = b"<methodResponse><value><int>1</int></value><value></value><value><int>4711</int></value></methodResponse>"
+CHUNKS = b"Transfer-Encoding: chunked\r\n\r\n%X;a=b\r\n%b\r\n%x\r\n%b\r\n" % (
+    20,
+    ANSWER[:20],
+    len(ANSWER) - 20,
+    ANSWER[20:],
+)
+FORMS = {
+    "told length": b"Content-Length: %d\r\n\r\n%b" % (len(ANSWER), ANSWER),
+    "chunks": CHUNKS + b"0\r\n\r\n",
+    "chunks with a trailer": CHUNKS + b"0\r\nChecked: yes\r\n\r\n",
+    "until it closes": b"Content-Type: text/xml\r\n\r\n" + ANSWER,
+}
+
+
+@contextlib.contextmanager
+def raw_node(answer, closes=False, host=QUIET_HOST, port=0):
+    """A node that gives these bytes for each request, on a connection that it keeps or closes; tells its address."""
+    with socket.create_server((host, port)) as server, contextlib.ExitStack() as stack:
+        connections = []
+        stack.callback(lambda: [c.shutdown(socket.SHUT_RDWR) for c in connections if c.fileno() >= 0])
+        stack.callback(server.shutdown, socket.SHUT_RDWR)
+
+        def talk(connection):
+            with connection, contextlib.suppress(OSError):
+                while connection.recv(65536):
+                    for at in range(0, len(answer), 7):  # it comes in pieces
+                        connection.sendall(answer[at : at + 7])
+                    if closes:
+                        return
+
+        def serve():
+            with contextlib.suppress(OSError):
+                while True:
+                    connections.append(server.accept()[0])
+                    threading.Thread(target=talk, args=(connections[-1],), daemon=True).start()
+
+        threading.Thread(target=serve, daemon=True).start()
+        yield server.getsockname()[1]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_answer_may_have_any_form_of_http(watcher, form):
+    with raw_node(b"HTTP/1.1 200 OK\r\n" + FORMS[form], closes=form == "until it closes") as port:
+        uri = f"http://{QUIET_HOST}:{port}/"
+        watcher.watch({"/n": uri})
+        wait_for(lambda: watcher.pids() == {("/n", uri): 4711}, known(watcher))
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_answer_counts_only_when_it_is_whole(form):
+    whole = bytearray(b"HTTP/1.1 200 OK\r\n" + FORMS[form])
+    until_closed = form == "until it closes"
+    assert _answer(whole, is_closed=until_closed) == ANSWER
+    assert not any(_answer(whole[:end], is_closed=False) for end in range(len(whole)))
+    assert until_closed or not any(_answer(whole[:end], is_closed=True) for end in range(len(whole)))
+
+
+@pytest.mark.parametrize("body", [b"-5\r\nabc\r\n0\r\n\r\n", b"zz\r\n", b"\r\n\r\n", b"1_0\r\nabc"])
+def test_chunks_that_are_none_are_no_answer(body):
+    assert _answer(bytearray(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n" + body), is_closed=True) is None
+
+
+def test_host_that_gets_another_address_is_found_there(watcher, monkeypatch):
+    look_up, address = socket.getaddrinfo, ["127.0.0.2"]
+    monkeypatch.setattr(socket, "getaddrinfo", lambda host, *more, **options: look_up(address[0], *more, **options))
+    answer = b"HTTP/1.1 200 OK\r\n" + FORMS["told length"]
+    with raw_node(answer, host="127.0.0.2") as port:
+        uri = f"http://arm-pc:{port}/"
+        watcher.watch({"/arm": uri})
+        wait_for(lambda: watcher.lives().get(("/arm", uri)) is Life.ALIVE, known(watcher))
+    wait_for(lambda: watcher.lives()[("/arm", uri)] is not Life.ALIVE, known(watcher))
+    address[0] = "127.0.0.3"
+    with raw_node(answer, host="127.0.0.3", port=port):
+        wait_for(lambda: watcher.lives()[("/arm", uri)] is Life.ALIVE, known(watcher))
+
+
+def test_known_address_stays_in_use_while_names_are_not_looked_up(watcher, monkeypatch):
+    look_up, works = socket.getaddrinfo, [True]
+
+    def getaddrinfo(_host, *more, **options):
+        if not works[0]:
+            raise socket.gaierror("no name server")
+        return look_up(QUIET_HOST, *more, **options)
+
+    monkeypatch.setattr(socket, "getaddrinfo", getaddrinfo)
+    answer = b"HTTP/1.1 200 OK\r\n" + FORMS["told length"]
+    with raw_node(answer) as port:
+        uri = f"http://arm-pc:{port}/"
+        watcher.watch({"/arm": uri})
+        wait_for(lambda: watcher.lives().get(("/arm", uri)) is Life.ALIVE, known(watcher))
+        works[0] = False
+    wait_for(lambda: watcher.lives()[("/arm", uri)] is Life.DEAD, known(watcher))
+    with raw_node(answer, port=port):
+        wait_for(lambda: watcher.lives()[("/arm", uri)] is Life.ALIVE, known(watcher))
+
+
+@pytest.mark.parametrize("watcher", [Timing(probe_deadline=1e9), Timing(probe_deadline=1e300)], indirect=True)
+def test_deadline_may_be_longer_than_sockets_take(watcher):
+    with node() as (uri, _end):
+        watcher.watch({"/n": uri})
+        wait_for(lambda: watcher.lives().get(("/n", uri)) is Life.ALIVE, known(watcher))
 
 
 @hasty

@@ -1,5 +1,7 @@
 """Observers without ROS: messages and time in, statuses out."""
 
+import enum
+import io
 import math
 
 import numpy as np
@@ -10,7 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry
 from ros_model.language.metamodel import Component, Connection, ConnectionKind, RosParameter, RosSystem
-from rosgraph_monitor.observer import Observer, TopicObserver
+from rosgraph_monitor.observer import Observer, StaleInputError, TopicObserver
 from rosgraph_monitor.observers.cpu import CpuLoadQualityObserver
 from rosgraph_monitor.observers.energy import EnergyQualityObserver
 from rosgraph_monitor.observers.frames import StaticFrames, rotation_translation
@@ -307,6 +309,60 @@ def test_scan_leaves_out_what_is_no_return():
     assert len(x) == 1
 
 
+def test_obstacle_closer_than_the_laser_measures_is_a_risk():
+    msg = scan(_0=-math.inf)
+    assert risk(fed(following(SCAN), 0.4, 0.0, (SCAN, msg))) == pytest.approx(0.95)
+    assert msg.ranges[135] == -math.inf, "the message is left as it is"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        ({"ranges": []}, "no measurement among 0 ranges"),
+        ({"ranges": [math.nan] * 271}, "no measurement among 271 ranges"),
+        ({"angle_increment": math.nan}, "malformed: angle_min"),
+        ({"angle_increment": 0.0}, "malformed: angle_min"),
+        ({"angle_min": math.inf}, "malformed: angle_min"),
+        ({"range_max": math.nan}, "malformed: range_min"),
+        ({"range_max": 0.0}, "malformed: range_min"),
+        ({"range_min": math.nan}, "malformed: range_min"),
+    ],
+)
+def test_scan_that_says_nothing_is_stale_and_never_fine(spoil, told):
+    msg = scan(_0=0.25)
+    for name, value in spoil.items():
+        setattr(msg, name, value)
+    observer = fed(following(SCAN), 0.4, 0.0, (SCAN, msg))
+    (status,) = observer.evaluate(1.0)
+    assert status.message == "QA stale" and told in status.values[0].value
+    assert observer.take_outputs() == []
+
+
+@pytest.mark.parametrize("ranges", [[math.inf] * 271, [math.nan] * 270 + [math.inf]])
+def test_scan_without_returns_is_no_risk(ranges):
+    msg = scan()
+    msg.ranges = ranges
+    assert risk(fed(following(SCAN), 0.4, 0.0, (SCAN, msg))) == 0.0
+
+
+def test_sensor_of_one_beam_needs_no_increment():
+    msg = LaserScan(range_min=0.05, range_max=4.0, ranges=[0.5])
+    assert [axis.tolist() for axis in scan_points(msg)] == [[0.5], [0.0]]
+
+
+@pytest.mark.parametrize("padding", [0, 8])
+def test_rows_of_a_cloud_may_be_padded(padding):
+    rows = np.asarray([[[5, 0, 0.5], [6, 0, 0.5]], [[7, 1, 0.5], [8, 1, 0.5]]], dtype="<f4")
+    msg = cloud([(0.0, 0.0, 0.0)])
+    msg.height = msg.width = 2
+    msg.row_step = 24 + padding
+    msg.data = b"".join(row.tobytes() + b"\xff" * padding for row in rows)
+    assert [axis.tolist() for axis in cloud_points(msg)] == [[5, 6, 7, 8], [0, 0, 1, 1], [0.5] * 4]
+    msg.row_step = 2**32 - 1
+    with pytest.raises(StaleInputError, match="malformed"):
+        cloud_points(msg)
+
+
 @pytest.mark.parametrize("spoil", [{"data": b"123"}, {"fields": []}, {"point_step": 2}])
 def test_malformed_cloud_is_stale(spoil):
     msg = cloud([(1.0, 2.0, 3.0)])
@@ -369,6 +425,14 @@ def test_rate_and_age_are_settings_of_every_observer():
 def test_bad_settings_of_any_observer_are_refused(settings):
     with pytest.raises(ValueError, match="ComfortQualityObserver/"):
         published().configure(settings)
+
+
+@pytest.mark.parametrize("rate", [1e-10, 1e12, math.nan])
+def test_rate_at_which_no_thread_can_work_is_refused(rate):
+    with pytest.raises(ValueError, match=r"ComfortQualityObserver.*rate"):
+        published().configure({"rate_hz": rate})
+    with pytest.raises(ValueError, match="Hz must be from 1e-06 to 1000"):
+        TopicObserver("Odd", rate, [])
 
 
 def test_truth_value_of_a_published_observer_is_no_stale_number():
@@ -447,6 +511,39 @@ def test_aborted_goal_is_an_objective_error_until_the_next_goal():
 
 def test_goal_that_had_failed_before_is_no_concern():
     assert told(ObjectiveErrorObserver(), goals(("old", 1, GoalStatus.ABORTED))) == []
+
+
+class Quality(enum.Enum):
+    COMFORT = "comfort"
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "told"),
+    [
+        ({"values": [KeyValue(1, "0.5")]}, "returned 1 as key: make it a text"),
+        ({"values": [KeyValue("comfort", 0.5)]}, "returned 0.5 as value of comfort: make it a text"),
+        ({"values": [KeyValue(b"comfort", "0.5")]}, "as key"),
+        ({"values": [KeyValue(Quality.COMFORT, "0.5")]}, "as key"),
+        ({"values": [KeyValue("a", "1"), KeyValue("comfort", True)]}, "returned True as value of comfort"),
+        ({"name": 3}, "returned 3 as name"),
+        ({"message": b"QA status"}, "as message"),
+        ({"hardware_id": 7}, "as hardware_id"),
+        ({"name": "\udcff"}, "surrogates not allowed"),
+    ],
+)
+def test_status_that_can_not_be_published_is_refused_with_what_is_wrong(spoilt, told):
+    class OddObserver(Observer):
+        def generate_diagnostics(self, now):
+            return [DiagnosticStatus(**{"message": "QA status", "values": [KeyValue("comfort", "0.5")], **spoilt})]
+
+    with pytest.raises((TypeError, ValueError), match=told):
+        OddObserver("OddObserver").evaluate(0.0)
+
+
+def test_reason_with_odd_characters_can_be_published():
+    status = published().stale("no sense in \udcff\x1b[2J")
+    status.serialize(io.BytesIO())
+    assert status.values[0].value == "no sense in \\udcff\\x1b[2J"
 
 
 @pytest.mark.parametrize("returned", [DiagnosticArray(), None, []])

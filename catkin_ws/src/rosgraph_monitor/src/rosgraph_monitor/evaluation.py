@@ -10,7 +10,7 @@ from ros_model.language.metamodel import PortKind
 from rosgraph_monitor.diagnostics.status import Status, graph_ok, graph_problem
 from rosgraph_monitor.graph.comparison import NOT_REGISTERED, Scope, compare, running_nodes, wrong_topic_types
 from rosgraph_monitor.graph.findings import Finding, MissingNode, finding_statuses
-from rosgraph_monitor.graph.names import instance, relative, resolved
+from rosgraph_monitor.graph.names import instance, instances, relative, resolved
 from rosgraph_monitor.graph.settling import Look, Settling
 from rosgraph_monitor.health.components import (
     DEFAULT_RECOVERY,
@@ -23,7 +23,7 @@ from rosgraph_monitor.health.liveness import Life
 from rosgraph_monitor.health.topics import TopicVerdict, verdict_statuses
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
     from ros_model.graph.snapshot import GraphSnapshot
     from ros_model.language.metamodel import RosSystem
@@ -103,6 +103,7 @@ class GraphEvaluator:
         reasons: Mapping[str, str] | None = None,
         is_fresh: bool = True,
         grace: float | None = None,
+        problem: str = "",
     ) -> list[Status]:
         """Judge the graph.
 
@@ -117,14 +118,19 @@ class GraphEvaluator:
             is_fresh: whether the snapshot is newer than what is known of the nodes. Else a node that seems dead may
                 have unregistered since, so that the next evaluation says that it has ended.
             grace: wall s in which expected nodes may come up, where it is not the usual time (see `Patience.grace`).
+            problem: why a part of the snapshot is older than the rest; empty if all is well.
 
         Returns:
             The statuses of components, then the findings, or "running OK" where there are none.
         """
         life = {name: lives.get((name, node.uri), Life.UNKNOWN) for name, node in snapshot.nodes.items()}
-        conditions = self._conditions(life, desired)
+        dead = {name: (known.name.lower(), known.value) for name, known in life.items() if known not in _CONDITION}
+        running = self._instances(desired, life.keys() - dead.keys())
+        gone = self._instances(desired, dead.keys())
+        conditions = self._conditions(life, desired, running)
         self._add_others(conditions, others or {})
-        self._add_topics(conditions, snapshot, life, topics)
+        owners = {node: name for name, node in (*gone.items(), *running.items())}
+        self._add_topics(conditions, snapshot, life, topics, owners)
         for idle in desired.idle_nodes:
             conditions.pop(idle, None)
         components = self._tracker.update(
@@ -135,15 +141,16 @@ class GraphEvaluator:
             grace=grace,
         )
         failed = [name for name, status in components if status is ComponentStatus.FALSE]
-        found = {name: self._why(name, conditions, life, topics, reasons or {}, is_fresh) for name in failed}
+        ways = {name: dead[node] for name, node in gone.items()}
+        found = {name: self._why(name, conditions, ways, topics, reasons or {}, is_fresh) for name in failed}
         self._reasons = {name: why for name in failed if (why := found[name] or self._reasons.get(name))}
         statuses = component_statuses(components, self._reasons)
-        if desired.problem:
-            statuses.append(graph_problem(f"desired model: {desired.problem}"))
-        findings = self._findings(snapshot, life, desired, now, is_fresh)
+        troubles = [f"desired model: {desired.problem}"] * bool(desired.problem) + [problem] * bool(problem)
+        statuses.extend(map(graph_problem, troubles))
+        findings = self._findings(snapshot, dead, desired, now, is_fresh)
         problems = [*finding_statuses(findings, desired.configurations_of), *verdict_statuses(topics)]
         statuses.extend(problems)
-        if desired.system is not None and not problems and not desired.problem:
+        if desired.system is not None and not problems and not troubles:
             statuses.append(graph_ok())
         return statuses
 
@@ -152,24 +159,33 @@ class GraphEvaluator:
         quiet = desired.excused | desired.idle_nodes
         if not (quiet or desired.idle_topics):
             return frozenset()
+        components = (*(desired.system.components if desired.system else ()), *desired.idle)
         modelled: dict[str, set[str]] = {}
-        for component in (*(desired.system.components if desired.system else ()), *desired.idle):
+        for component in components:
             for port in component.ports:
                 if port.kind is PortKind.PUBLISHER:
                     modelled.setdefault(port.name.strip("/"), set()).add(component.graph_name)
+        expected = (*(component.graph_name for component in components), *quiet)
+        names = {resolved(name, self._scope.namespace): name for name in expected}
         found = set()
         for topic in topics:
-            nodes = {self._relative(node) for node in self._publishers(snapshot, topic)} | modelled.get(topic, set())
+            publishers = self._publishers(snapshot, topic)
+            owners = {node: names[name] for name, node in instances(names, publishers).items()}
+            nodes = {owners.get(node) or self._relative(node) for node in publishers} | modelled.get(topic, set())
             if nodes <= quiet if nodes else topic in desired.idle_topics:
                 found.add(topic)
         return frozenset(found)
 
     def _findings(
-        self, snapshot: GraphSnapshot, life: Mapping[str, Life], desired: Desired, now: float, is_fresh: bool
+        self,
+        snapshot: GraphSnapshot,
+        dead: dict[str, tuple[str, str]],
+        desired: Desired,
+        now: float,
+        is_fresh: bool,
     ) -> list[Finding]:
         if desired.system is None:
             return [*wrong_topic_types(snapshot, self._scope.topic_types, self._scope.namespace)]
-        dead = {name: (known.name.lower(), known.value) for name, known in life.items() if known not in _CONDITION}
         excused = desired.excused | self._tracker.waited_for
         look = self._look(snapshot, desired.system, dead, excused, desired.idle_nodes)
         return [self._worded(finding, is_fresh) for finding in self._settling.told(look, now)]
@@ -212,7 +228,7 @@ class GraphEvaluator:
         self,
         component: str,
         conditions: Mapping[str, NodeCondition],
-        life: Mapping[str, Life],
+        ways: Mapping[str, tuple[str, str]],
         topics: Sequence[TopicVerdict],
         reasons: Mapping[str, str],
         is_fresh: bool,
@@ -220,9 +236,7 @@ class GraphEvaluator:
         """Return why a component has failed, without figures that change all the time; empty: as before."""
         key = self._key_of(component)
         if conditions.get(key) is NodeCondition.GONE:
-            dead = {name: (known.name.lower(), known.value) for name, known in life.items() if known not in _CONDITION}
-            name = instance(resolved(key, self._scope.namespace), dead)
-            _, reason = self._how_gone(key, dead.get(name or "", NOT_REGISTERED), is_fresh)
+            _, reason = self._how_gone(key, ways.get(key, NOT_REGISTERED), is_fresh)
             return reason if key == component else f"node {key}: {reason}"
         if conditions.get(key) is not NodeCondition.FAILED:
             return ""
@@ -231,16 +245,28 @@ class GraphEvaluator:
         told = [f"{verdict.message} {verdict.spec.name} ({_limit(verdict)})" for verdict in bad]
         return "; ".join([*told, *([reasons[component]] if component in reasons else [])])
 
-    def _conditions(self, life: Mapping[str, Life], desired: Desired) -> dict[str, NodeCondition]:
-        expected = dict.fromkeys(
-            component.graph_name for component in (desired.system.components if desired.system else ())
-        )
-        expected |= dict.fromkeys(self._component_of)
+    def _instances(self, desired: Desired, nodes: Collection[str]) -> dict[str, str]:
+        """Return which of the nodes stand for which expected ones, by the names of the latter.
+
+        Settings may call a node by the beginning of the anonymous name that the model has.
+        """
+        names = {resolved(name, self._scope.namespace): name for name in self._modelled(desired)}
+        found = {names[name]: node for name, node in instances(names, nodes).items()}
+        for name in self._component_of.keys() - names.values():
+            if node := instance(resolved(name, self._scope.namespace), nodes):
+                found[name] = node
+        return found
+
+    @staticmethod
+    def _modelled(desired: Desired) -> list[str]:
+        return [component.graph_name for component in (desired.system.components if desired.system else ())]
+
+    def _conditions(
+        self, life: Mapping[str, Life], desired: Desired, running: Mapping[str, str]
+    ) -> dict[str, NodeCondition]:
         conditions = {}
-        candidates = {name for name, known in life.items() if known in _CONDITION}
-        for name in expected:
-            running = instance(resolved(name, self._scope.namespace), candidates)
-            condition = NodeCondition.GONE if running is None else self._condition(life[running])
+        for name in dict.fromkeys((*self._modelled(desired), *self._component_of)):
+            condition = self._condition(life[running[name]]) if name in running else NodeCondition.GONE
             conditions[name] = condition
             if condition is NodeCondition.ALIVE:
                 self._gone.pop(name, None)
@@ -264,13 +290,17 @@ class GraphEvaluator:
         snapshot: GraphSnapshot,
         life: Mapping[str, Life],
         topics: Sequence[TopicVerdict],
+        owners: Mapping[str, str],
     ) -> None:
-        """Mark the component of a bad topic as failed: the component that is named, else that of the publisher."""
+        """Mark the component of a bad topic as failed: the component that is named, else that of the publisher.
+
+        `owners` has the names of the nodes that are expected, by those of the nodes that stand for them.
+        """
         for verdict in topics:
             topic, component = verdict.spec.name, verdict.spec.component
             nodes = self._publishers(snapshot, topic)
             if len(nodes) == 1:
-                self._publisher[topic] = self._relative(nodes[0])
+                self._publisher[topic] = owners.get(nodes[0]) or self._relative(nodes[0])
             if component:
                 key = self._key_of(component)
                 conditions.setdefault(key, NodeCondition.ALIVE if verdict.heard else NodeCondition.UNKNOWN)

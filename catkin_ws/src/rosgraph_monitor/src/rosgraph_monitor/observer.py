@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from metacontrol_msgs.msg import DiagnosticWords as Words
+from node_kit.one_line import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from ros_model.language.metamodel import RosSystem
 
 Topics = list[tuple[str, type]]
+LOWEST_RATE, HIGHEST_RATE = 1e-6, 1000.0
+"""Hz. A period is 12 days at most, since no thread can wait for ever, and no time that ROS can't tell."""
+_RATES = f"from {LOWEST_RATE:g} to {HIGHEST_RATE:g}"
 _ARRIVALS = 20
 """Messages over which the rate of a topic is measured."""
 
@@ -46,8 +50,8 @@ class Observer:
 
     def __init__(self, name: str, loop_rate_hz: float = 1.0) -> None:
         """Name the observer and set its rate in Hz of ROS time."""
-        if not loop_rate_hz > 0.0:
-            raise ValueError(f"observer {name}: rate {loop_rate_hz} Hz must be positive")
+        if not LOWEST_RATE <= loop_rate_hz <= HIGHEST_RATE:
+            raise ValueError(f"observer {name}: rate {loop_rate_hz} Hz must be {_RATES}")
         self._id = ""
         self._name = name
         self._rate = float(loop_rate_hz)
@@ -87,8 +91,10 @@ class Observer:
             known = {**common, **self.defaults}
             if key not in known:
                 raise ValueError(f"{self.name}/{key}: no such setting; there are {', '.join(known)}")
-            if not _fits(value, known[key]) or (key in common and value < 0) or (key == "rate_hz" and not value):
+            if not _fits(value, known[key]) or (key in common and value < 0):
                 raise ValueError(f"{self.name}/{key}: {value!r} is no {_kind(known[key])}")
+            if key == "rate_hz" and not LOWEST_RATE <= value <= HIGHEST_RATE:
+                raise ValueError(f"{self.name}/{key}: {value!r} Hz must be {_RATES}")
             if key == "rate_hz":
                 self._rate = float(value)
             elif key in common:
@@ -149,7 +155,7 @@ class Observer:
             name=self._id,
             message=Words.QA_STALE,
             hardware_id=self._name,
-            values=[KeyValue(self.qa_name or self._last_qa_name or _qa_name(self._name), reason)],
+            values=[KeyValue(str(self.qa_name or self._last_qa_name or _qa_name(self._name)), one_line(reason))],
         )
 
     def qa_status(self, level: float) -> DiagnosticStatus:
@@ -173,12 +179,24 @@ class Observer:
     def _checked(self, status: object) -> DiagnosticStatus:
         if not isinstance(status, DiagnosticStatus):
             raise TypeError(f"observer {self._name} returned {type(status).__name__}, not a DiagnosticStatus")
+        for what, text in (("name", status.name), ("message", status.message), ("hardware_id", status.hardware_id)):
+            self._check_text(what, text)
+        for pair in status.values:
+            self._check_text("key", pair.key)
+            self._check_text(f"value of {pair.key}", pair.value)
         status.hardware_id = status.hardware_id or self._name
         if status.message == Words.QA_STATUS and status.values:
             self._last_qa_name = status.values[0].key
             if not _is_finite(status.values[0].value):
                 return self.stale(f"value {status.values[0].value!r} is not a finite number")
         return status
+
+    def _check_text(self, what: str, text: object) -> None:
+        """Raise TypeError or ValueError where a text of a status can't be published."""
+        if not isinstance(text, str):
+            raise TypeError(f"observer {self._name} returned {text!r} as {what}: make it a text with str()")
+        if not text.isprintable():
+            text.encode()  # raises UnicodeEncodeError, a ValueError, where the text has half characters
 
 
 class TopicObserver(Observer):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 import rosgraph
 from node_kit.io.xml_rpc import CallError
+from node_kit.one_line import one_line
 from ros_model.io.master import take_snapshot
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def main(as_json: bool, timeout: float) -> None:
         click.echo(json.dumps(snapshot.as_dict(), indent=1, default=str))
     else:
         for line in lines(snapshot):
-            click.echo(line)
+            click.echo(one_line(line))
 
 
 def lines(snapshot: GraphSnapshot) -> Iterator[str]:

@@ -130,8 +130,8 @@ class Overview:
             table.add_row(
                 _shown(name),
                 _shown(text, _STYLE.get(s.Level(level), "")),
-                self.usage.get((name, Words.CPU_USAGE), ""),
-                self.usage.get((name, Words.MEMORY_USAGE), ""),
+                _shown(self.usage.get((name, Words.CPU_USAGE), "")),
+                _shown(self.usage.get((name, Words.MEMORY_USAGE), "")),
             )
         return table
 

@@ -21,7 +21,7 @@ from rosgraph_monitor.graph.findings import (
 from rosgraph_monitor.graph.names import (
     IGNORED_NODES,
     IGNORED_PORTS,
-    instance,
+    instances,
     is_ignored_node,
     relative,
     resolved,
@@ -86,6 +86,7 @@ def compare(
         Missing nodes, wrong parameters, findings on ports, additional nodes; names are relative to the namespace.
     """
     running = running_nodes(snapshot, desired, dead, scope.namespace)
+    gone = instances((resolved(c.graph_name, scope.namespace) for c in desired.components), dead)
     missing: list[Finding] = []
     live: dict[str, Live] = {}
     for component in desired.components:
@@ -94,8 +95,7 @@ def compare(
         if component.graph_name in running:
             live[component.name] = Live(component, running[component.graph_name])
         else:
-            name = resolved(component.graph_name, scope.namespace)
-            state = dead.get(instance(name, dead) or name, NOT_REGISTERED)
+            state = dead.get(gone.get(resolved(component.graph_name, scope.namespace), ""), NOT_REGISTERED)
             missing.append(MissingNode(component.graph_name, *state))
     others = robots_inside(scope.namespace, snapshot.nodes)
     expected = {node.name for node in running.values()}
@@ -125,9 +125,9 @@ def running_nodes(
     snapshot: GraphSnapshot, desired: RosSystem, dead: Collection[str], namespace: str = "/"
 ) -> dict[str, NodeState]:
     """Return the nodes of the desired system that run, by their names in the findings."""
-    alive = snapshot.nodes.keys() - dead
-    names = ((c.graph_name, instance(resolved(c.graph_name, namespace), alive)) for c in desired.components)
-    return {name: snapshot.nodes[running] for name, running in names if running}
+    names = {resolved(component.graph_name, namespace): component.graph_name for component in desired.components}
+    running = instances(names, snapshot.nodes.keys() - dead)
+    return {names[name]: snapshot.nodes[node] for name, node in running.items()}
 
 
 def wrong_topic_types(snapshot: GraphSnapshot, types: Mapping[str, str], namespace: str = "/") -> list[PortFinding]:

@@ -29,8 +29,12 @@ IGNORED_PORTS = (
 
 _RECONFIGURED = ("/set_parameters", "/parameter_descriptions", "/parameter_updates")
 
-# rospy: NAME_PID_MILLISECONDS; roscpp: NAME_NANOSECONDS (and tools with epoch seconds, such as /rviz_1700000000).
-_ANONYMOUS = re.compile(r"(?P<stem>.+?)(_\d+)?_\d{10,}")
+# rospy: NAME_PID_MILLISECONDS; roscpp: NAME_NANOSECONDS (and tools with epoch seconds, such as /rviz_1700000000). These
+# are times of 2014 to 2033. roslaunch: NAME_HOST_PID_RANDOM, a number of 63 bits. The serial number of a device, as in
+# /camera_819612070807, is none of these.
+_PID = r"_[1-9]\d{0,6}"
+_TIME = r"_1[4-9]\d{8}(\d{3}|\d{9})?"
+_ANONYMOUS = re.compile(rf"(?P<stem>.+?)(({_PID})?{_TIME}|{_PID}_\d{{16,19}})")
 
 
 def resolved(name: str, namespace: str = "/") -> str:
@@ -73,12 +77,28 @@ def is_reconfigured_part(name: str, node: str) -> bool:
 
 def instance(name: str, nodes: Collection[str]) -> str | None:
     """Return the running node for a resolved name of the model: the same name, else its first anonymous instance."""
-    if name in nodes:
-        return name
-    stem = _stem(name)
-    return min((node for node in nodes if node.startswith(stem) and node != stem and _stem(node) == stem), default=None)
+    return instances([name], nodes).get(name)
+
+
+def instances(names: Iterable[str], nodes: Collection[str]) -> dict[str, str]:
+    """Return the running node for each resolved name of a model; names for which none runs are left out.
+
+    A node stands for one name only: for its own where that is among them, else for the first that has none yet.
+    """
+    names = tuple(names)
+    found = {name: name for name in names if name in nodes}
+    if len(found) == len(names):
+        return found
+    free: dict[str, list[str]] = {}
+    for node in sorted(set(nodes).difference(found)):
+        if (stem := _stem(node)) != node:
+            free.setdefault(stem, []).append(node)
+    for name in names:
+        if name not in found and free.get(_stem(name)):
+            found[name] = free[_stem(name)].pop(0)
+    return found
 
 
 def _stem(name: str) -> str:
-    match = _ANONYMOUS.fullmatch(name)
+    match = _ANONYMOUS.fullmatch(name) if name[-1:].isdigit() else None
     return match["stem"] if match else name

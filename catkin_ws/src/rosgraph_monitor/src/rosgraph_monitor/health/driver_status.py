@@ -1,6 +1,7 @@
 """Components whose drivers tell on /diagnostics how they are. Pure.
 
-A driver by diagnostic_updater publishes statuses named `NODE: TASK`. A component follows one of them, or all of a node.
+A driver by diagnostic_updater publishes statuses named `NODE: TASK`, with the resolved name of the node without its
+first slash. A component follows one of them, or all of a node.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from rosgraph_monitor.diagnostics.status import Level
+from rosgraph_monitor.graph.names import relative
 from rosgraph_monitor.health.components import NodeCondition
 
 _CONDITIONS: dict[int, NodeCondition] = {
@@ -20,13 +22,15 @@ _CONDITIONS: dict[int, NodeCondition] = {
 class DriverStatuses:
     """What drivers say of components: a component has failed while one of its statuses is an error."""
 
-    def __init__(self, names: Mapping[str, str]) -> None:
+    def __init__(self, names: Mapping[str, str], namespace: str = "/") -> None:
         """Start with nothing heard.
 
         Args:
-            names: component -> name of a status, or what stands before its colon.
+            names: component -> name of a status, or what stands before its colon. It may leave out the namespace.
+            namespace: of the robot.
         """
-        self._names = dict(names)
+        self._names = {component: _without(name, namespace) for component, name in names.items()}
+        self._namespace = namespace
         self._heard: dict[str, dict[str, NodeCondition]] = {component: {} for component in names}
         self._errors: dict[str, str] = {}  # what each status that is an error said when it became one
 
@@ -54,7 +58,7 @@ class DriverStatuses:
             level: of the status.
             message: its text. Of an error, the first one is kept, because numbers in it may change all the time.
         """
-        name = name.lstrip("/")
+        name = _without(name, self._namespace)
         condition = _CONDITIONS.get(level)
         if condition is None:
             return False
@@ -67,6 +71,12 @@ class DriverStatuses:
                 self._heard[component][name] = condition
                 changed |= _worst(self._heard[component].values()) is not before
         return changed
+
+
+def _without(name: str, namespace: str) -> str:
+    """Return the name of a status without the namespace of the robot, which drivers put before it."""
+    name = name.lstrip("/")
+    return relative(f"/{name}", namespace) or name
 
 
 def _worst(conditions: Iterable[NodeCondition]) -> NodeCondition:

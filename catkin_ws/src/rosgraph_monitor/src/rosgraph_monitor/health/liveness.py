@@ -66,6 +66,7 @@ class Liveness:
     asked_at: float | None = None
     next_at: float = 0.0
     fruitless: int = 0  # connections in a row that were closed without an answer
+    probe_at: float = 0.0  # a new connection is not probed before
 
 
 def due(state: Liveness, now: float, timing: Timing) -> tuple[Liveness, Action]:
@@ -94,16 +95,17 @@ def due_at(state: Liveness, timing: Timing) -> float:
 
 
 def on_connected(state: Liveness, now: float) -> Liveness:
-    """Return the state after the connection is made: probe at once.
+    """Return the state after the connection is made: probe at once, or when a server that closes has its next probe.
 
     An accepted connection is no sign of life, because the kernel accepts it.
     """
-    return replace(state, connecting_since=None, connected=True, asked_at=None, next_at=now)
+    return replace(state, connecting_since=None, connected=True, asked_at=None, next_at=max(now, state.probe_at))
 
 
 def on_answer(state: Liveness, now: float, timing: Timing) -> Liveness:
     """Return the state after the node has answered a probe."""
-    return replace(state, life=Life.ALIVE, asked_at=None, next_at=now + timing.probe_period, fruitless=0)
+    due_again = now + timing.probe_period
+    return replace(state, life=Life.ALIVE, asked_at=None, next_at=due_again, fruitless=0, probe_at=due_again)
 
 
 def on_closed(state: Liveness, now: float, timing: Timing) -> Liveness:
@@ -113,7 +115,8 @@ def on_closed(state: Liveness, now: float, timing: Timing) -> Liveness:
     """
     fruitless = state.fruitless + 1
     if fruitless < _FRUITLESS_LIMIT:
-        return Liveness(life=state.life, next_at=now, fruitless=fruitless)
+        answered = fruitless == 1 and state.asked_at is None
+        return Liveness(state.life, next_at=now, fruitless=fruitless, probe_at=state.probe_at if answered else now)
     return Liveness(life=Life.HUNG, next_at=now + timing.retry_period, fruitless=fruitless)
 
 

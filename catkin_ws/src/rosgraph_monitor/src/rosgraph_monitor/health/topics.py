@@ -21,8 +21,15 @@ DEFAULT_MAX_AGE = 2.0
 _SHORTEST_WINDOW = 2.0
 _PERIODS_IN_WINDOW = 5.0
 """The rate is measured over so many periods of the expected rate, but at least 2 s: jitter evens out."""
+_MOST_ARRIVALS = 10_000
+"""Messages of one topic that are counted at most: while a clock stands, none leaves the window."""
 _JUMP = 1.0
-"""s of ROS time backwards that count as a jump: a restarted simulation, a bag played again."""
+"""s of ROS time backwards that count as a jump: a restarted simulation, a bag played again. Ahead, s more than the pace
+of the clock explains: a bag that is played on from elsewhere."""
+_PACE_PERIOD = 1.0
+"""Wall s over which the pace of a clock is measured, and between two steps of a clock at most."""
+_UNEVEN = 2.0
+"""A clock may go on by so many times what its pace makes likely."""
 _LIMITS = ("min_rate", "max_age", "stuck_after")
 
 
@@ -143,9 +150,38 @@ class _Seen:
     since: float
     since_wall: float
     last: float | None = None
-    arrivals: deque[float] = field(default_factory=deque)
+    arrivals: deque[float] = field(default_factory=lambda: deque(maxlen=_MOST_ARRIVALS))
     digest: object = None
     same: int = 0
+
+
+class _Clock:
+    """ROS time without the jumps ahead: nobody was silent in a time that did not pass.
+
+    A jump is a step that the pace of the clock does not explain. A fast simulation is no jump: the pace, ROS time in
+    wall time, is measured again and again.
+    """
+
+    def __init__(self) -> None:
+        self._left_out = self._ros = self._wall = self._moved = 0.0
+        self._pace, self._measured = 1.0, (0.0, 0.0)
+
+    def now(self, ros: float, wall: float) -> tuple[float, bool]:
+        """Return the time that counts, and whether ROS time has jumped back. Times in s."""
+        before, self._ros = self._ros, ros
+        looked, self._wall = self._wall, wall
+        if before <= 0.0 or ros < before - _JUMP:
+            self._left_out, self._pace, self._measured, self._moved = 0.0, 1.0, (ros, wall), wall
+            return ros, ros < before - _JUMP
+        likely = max(wall - looked, _UNEVEN * self._pace * min(wall - self._moved, _PACE_PERIOD))
+        if ros - before > _JUMP + likely:
+            self._left_out += ros - before
+        if ros != before:
+            self._moved = wall
+        if wall - self._measured[1] >= _PACE_PERIOD:
+            self._pace = max((ros - self._measured[0]) / (wall - self._measured[1]), 1.0)
+            self._measured = ros, wall
+        return ros - self._left_out, False
 
 
 class TopicHealth:
@@ -161,22 +197,24 @@ class TopicHealth:
         self._grace = grace
         self._specs: dict[str, TopicSpec] = {}
         self._seen: dict[str, _Seen] = {}
-        self._last_ros = 0.0
+        self._clock = _Clock()
 
     def follow(self, specs: Mapping[str, TopicSpec], ros: float, wall: float) -> None:
         """Follow these topics from now on, and forget others. Times in s."""
         self._specs = {name: spec for name, spec in specs.items() if spec.is_watched}
+        now = self._now(ros, wall)
         self._seen = {
-            name: self._seen.get(name, _Seen(wall if spec.wall_time else ros, wall))
+            name: self._seen.get(name, _Seen(wall if spec.wall_time else now, wall))
             for name, spec in self._specs.items()
         }
 
     def arrived(self, topic: str, ros: float, wall: float, digest: object = None) -> None:
         """Take note of a message; the digest is equal for messages with the same data."""
+        counted = self._now(ros, wall)
         spec, seen = self._specs.get(topic), self._seen.get(topic)
         if spec is None or seen is None:
             return
-        now = wall if spec.wall_time else ros
+        now = wall if spec.wall_time else counted
         seen.last = now
         seen.same = seen.same + 1 if digest == seen.digest else 1
         seen.digest = digest
@@ -188,16 +226,15 @@ class TopicHealth:
     ) -> list[TopicVerdict]:
         """Return a verdict on each topic. An excused topic is fine, and begins anew when the excuse ends.
 
-        All topics begin anew when ROS time jumps back or begins: it is 0 until a simulation's first clock message.
-        The grace (s) is that of this moment, where it is not the usual one.
+        All topics begin anew when ROS time jumps back or begins: it is 0 until a simulation's first clock message. What
+        it jumps ahead does not count. The grace (s) is that of this moment, where it is not the usual one.
         """
         grace = self._grace if grace is None else grace
-        jumped = ros < self._last_ros - _JUMP
-        self._last_ros = ros
+        counted = self._now(ros, wall)
         verdicts = []
         for name, spec in self._specs.items():
-            now = wall if spec.wall_time else ros
-            if not spec.wall_time and (jumped or self._seen[name].since <= 0.0):
+            now = wall if spec.wall_time else counted
+            if not spec.wall_time and self._seen[name].since <= 0.0:
                 self._seen[name] = _Seen(now, wall)
             if name in excused:
                 self._seen[name] = _Seen(now, wall)
@@ -205,6 +242,14 @@ class TopicHealth:
             else:
                 verdicts.append(self._judge(spec, self._seen[name], now, wall, grace))
         return verdicts
+
+    def _now(self, ros: float, wall: float) -> float:
+        """Return the time that counts for topics of ROS time, which begin anew where it jumps back."""
+        now, is_back = self._clock.now(ros, wall)
+        for name, spec in self._specs.items() if is_back else ():
+            if not spec.wall_time and name in self._seen:
+                self._seen[name] = _Seen(now, wall)
+        return now
 
     def _judge(self, spec: TopicSpec, seen: _Seen, now: float, wall: float, grace: float) -> TopicVerdict:
         if seen.last is None:

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ros_model.graph.snapshot import GraphSnapshot
-    from ros_model.io.master import MasterClient
 
     from rosgraph_monitor.health.liveness import Life
+    from rosgraph_monitor.io.graph_client import GraphClient
     from rosgraph_monitor.io.node_connections import NodeConnections
 
 _log = logging.getLogger(__name__)
@@ -34,11 +34,13 @@ class PolledGraph:
         lives: what was known of each node before the master was asked: a node that was dead by then and is listed
             has not unregistered.
         duration: wall s that the master took.
+        problem: what of the snapshot is older; empty if nothing is.
     """
 
     snapshot: GraphSnapshot
     lives: dict[tuple[str, str], Life]
     duration: float
+    problem: str = ""
 
 
 class GraphPoller:
@@ -46,7 +48,7 @@ class GraphPoller:
 
     def __init__(
         self,
-        client: MasterClient,
+        client: GraphClient,
         connections: NodeConnections,
         period: float,
         own_name: str,
@@ -109,6 +111,6 @@ class GraphPoller:
         except CallError:
             return  # who watches the master tells of it
         self.count += 1
-        self.latest = PolledGraph(snapshot, lives, time.monotonic() - begin)
+        self.latest = PolledGraph(snapshot, lives, time.monotonic() - begin, self._client.problem)
         self._connections.watch({name: node.uri for name, node in snapshot.nodes.items() if name != self._own_name})
         self._on_poll()

@@ -204,8 +204,25 @@ def navigation_sensor(
 
 
 def scan_points(scan: LaserScan) -> Points:
-    """Return the returns of a scan as x and y in m in the frame of the laser."""
+    """Return the returns of a scan as x and y in m in the frame of the laser.
+
+    By REP 117, inf is no return, NaN is no measurement, and -inf is a return closer than `range_min`: it counts as one
+    at that distance.
+
+    Raises:
+        StaleInputError: the scan has no measurement, or its angles or limits are none.
+    """
     ranges = np.asarray(scan.ranges, dtype=float)
+    if np.isnan(ranges).all():
+        raise StaleInputError(f"scan has no measurement among {len(ranges)} ranges")
+    angles_fit = all(map(math.isfinite, (scan.angle_min, scan.angle_increment)))
+    if not angles_fit or (scan.angle_increment == 0.0 and len(ranges) > 1):
+        raise StaleInputError(
+            f"scan is malformed: angle_min is {scan.angle_min:g}, angle_increment {scan.angle_increment:g}"
+        )
+    if not (math.isfinite(scan.range_min) and scan.range_min < scan.range_max):
+        raise StaleInputError(f"scan is malformed: range_min is {scan.range_min:g}, range_max {scan.range_max:g}")
+    ranges = np.where(np.isneginf(ranges), scan.range_min, ranges)
     with np.errstate(invalid="ignore"):
         valid = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges < scan.range_max)
     angles = scan.angle_min + scan.angle_increment * np.flatnonzero(valid)
@@ -222,8 +239,9 @@ def cloud_points(cloud: PointCloud2) -> tuple[NDArray[np.float64], NDArray[np.fl
     for field in cloud.fields:
         if field.name in ("x", "y", "z") and field.datatype in _DATA_TYPES:
             formats[field.name] = (("<", ">")[bool(cloud.is_bigendian)] + _DATA_TYPES[field.datatype], field.offset)
-    count = cloud.width * cloud.height
-    if count * cloud.point_step > len(cloud.data):
+    count, row = cloud.width * cloud.height, cloud.width * cloud.point_step
+    step = max(cloud.row_step, row) if cloud.height > 1 else row  # rows may be padded; some drivers leave out the step
+    if count and (cloud.height - 1) * step + row > len(cloud.data):
         raise StaleInputError(
             f"point cloud is malformed: {count} points are announced, {len(cloud.data)} bytes are there"
         )
@@ -243,10 +261,10 @@ def cloud_points(cloud: PointCloud2) -> tuple[NDArray[np.float64], NDArray[np.fl
                 "itemsize": cloud.point_step,
             }
         )
-        points = np.frombuffer(cloud.data, dtype=dtype, count=count)
+        points = np.ndarray((cloud.height, cloud.width), dtype, cloud.data, strides=(step, cloud.point_step))
     except (KeyError, ValueError, TypeError) as error:
         raise StaleInputError(f"point cloud is malformed: {error}") from error
-    x, y, z = (points[axis].astype(float) for axis in "xyz")
+    x, y, z = (points[axis].astype(float).ravel() for axis in "xyz")
     finite = np.isfinite(x) & np.isfinite(y) & np.isfinite(z)
     return (x, y, z) if finite.all() else (x[finite], y[finite], z[finite])
 

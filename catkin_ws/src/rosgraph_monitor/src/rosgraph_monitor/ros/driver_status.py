@@ -28,9 +28,9 @@ class DriverStatusListener:
             names: component -> name of its driver's status.
             on_change: is called when a condition changes.
         """
-        self._statuses = DriverStatuses(names)
-        self._on_change = on_change
         self._namespace = rospy.get_namespace()
+        self._statuses = DriverStatuses(names, self._namespace)
+        self._on_change = on_change
         self._subscriber = rospy.Subscriber(TOPIC, DiagnosticArray, self._receive, queue_size=100) if names else None
 
     @property

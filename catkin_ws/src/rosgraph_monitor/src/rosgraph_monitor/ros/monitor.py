@@ -19,12 +19,12 @@ from node_kit.ros.connections import latest
 from node_kit.ros.lifetime import Lifetime
 from node_kit.ros.parts import watch_parts
 from ros_model.errors import ModelError
-from ros_model.io.master import MasterClient
 
 from rosgraph_monitor.evaluation import GraphEvaluator
 from rosgraph_monitor.graph.desired import Grounding
 from rosgraph_monitor.health.liveness import Life
 from rosgraph_monitor.health.topics import merged, model_topics
+from rosgraph_monitor.io.graph_client import GraphClient
 from rosgraph_monitor.io.graph_poller import GraphPoller, PolledGraph
 from rosgraph_monitor.io.models import desired_model
 from rosgraph_monitor.io.node_connections import NodeConnections
@@ -74,9 +74,9 @@ class MonitorNode:
         self._events = threading.Event()
         self._polled = threading.Event()
         self._connections = NodeConnections(self._on_life, parameters_node.timing(), rospy.get_name())
-        self._period = 1.0 / parameters_node.number("rate", 2.0)
+        self._period = 1.0 / parameters_node.poll_rate()
         self._poller = GraphPoller(
-            MasterClient(rosgraph.get_master_uri(), rospy.get_name(), _MASTER_TIMEOUT),
+            GraphClient(rosgraph.get_master_uri(), rospy.get_name(), _MASTER_TIMEOUT),
             self._connections,
             self._period,
             rospy.get_name(),
@@ -100,6 +100,7 @@ class MonitorNode:
         self._observers_due = 0.0
         self._running_observers = 0
         self._evaluation = 0.0
+        self._graph_problem = ""
         observers = dict.fromkeys((*parameters_node.names("observers", []), *load))
         self._diagnostics = DiagnosticsTopic()
         self._updater = diagnostic_updater.Updater()
@@ -179,6 +180,12 @@ class MonitorNode:
         own = polled.snapshot.nodes.get(rospy.get_name())
         if own:
             lives[own.name, own.uri] = Life.ALIVE
+        if polled.problem != self._graph_problem:
+            self._graph_problem = polled.problem
+            if polled.problem:
+                rospy.logerr("%s", polled.problem)
+            else:
+                rospy.loginfo("all parameters of the master can be read again")
         now = time.monotonic()
         verdicts = self._topics.judge(self._excused_topics(), self._grace)
         self._topic_states = {verdict.spec.name: verdict.message for verdict in verdicts}
@@ -192,6 +199,7 @@ class MonitorNode:
             reasons={**self._batteries.reasons, **self._drivers.reasons},
             is_fresh=is_fresh,
             grace=self._grace,
+            problem=polled.problem,
         )
         if now >= self._observers_due:
             self._observers_due = now + _OBSERVERS_PERIOD

@@ -6,7 +6,7 @@ import threading
 import time
 from collections import deque
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import rospy
 from metacontrol_msgs.srv import (
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 _LARGEST_MESSAGE = 1 << 24
 _WARNING_PERIOD = 10.0
 _INBOX = 100
-"""Messages that wait for an observer's next evaluation; of more, the oldest are dropped."""
+"""Messages of one topic that wait for an observer's next evaluation; of more, the oldest are dropped."""
 _FIRST_AGAIN, _LONGEST_AGAIN = 2.0, 64.0
 """Wall s until an observer that can't start is tried again: at first, and at most. Each wait is twice the last one."""
 _PATIENCE = 5.0
@@ -164,6 +164,16 @@ class ObserverHost:
         return ListObserversResponse(types=list(found), base_classes=[_BASE] * len(found))
 
 
+class _Waiting(NamedTuple):
+    """A message that waits, with the monotonic s and the ROS time in s at which it came."""
+
+    came: float
+    topic: str
+    message_class: type
+    msg: Any
+    received: float
+
+
 class _Runner:
     """Runs one observer until it is stopped.
 
@@ -178,7 +188,8 @@ class _Runner:
         self._publishers = {
             topic: rospy.Publisher(topic, message_class, queue_size=1) for topic, message_class in observer.outputs
         }
-        self._inbox: deque[tuple[str, type, Any, float]] = deque(maxlen=_INBOX)
+        # One for each topic: what comes often must not push out what comes once, such as /tf_static.
+        self._inboxes: dict[tuple[str, type], deque[_Waiting]] = {}
         self._news: deque[RosSystem | None] = deque(maxlen=1)
         self._busy_since: float | None = None
         self._warned = "", 0.0
@@ -210,7 +221,7 @@ class _Runner:
 
     def say_stale(self, reason: str) -> None:
         """Publish that the quality attribute is not known now."""
-        self._publish([self.observer.stale(reason)], [], rospy.Time.now())
+        self._guarded(lambda: self._publish([self.observer.stale(reason)], [], rospy.Time.now()))
 
     def _run(self) -> None:
         rate = rospy.Rate(self.observer.rate_hz, reset=True)
@@ -218,7 +229,7 @@ class _Runner:
             try:
                 rate.sleep()
             except rospy.exceptions.ROSTimeMovedBackwardsException:
-                self._inbox.clear()
+                self._take_waiting()  # what is latched, such as /tf_static, does not come again
                 self._guarded(self.observer.reset)
                 rate = rospy.Rate(self.observer.rate_hz, reset=True)
                 continue
@@ -227,14 +238,13 @@ class _Runner:
             if self._stopped.is_set():
                 return
             self._busy_since = time.monotonic()
-            self._evaluate(rospy.Time.now())
+            self._guarded(self._evaluate, rospy.Time.now())
             self._busy_since = None
 
     def _evaluate(self, now: rospy.Time) -> None:
         while self._news:
             self._guarded(self.observer.follow, self._news.popleft())
-        while self._inbox:
-            self._guarded(self._take, *self._inbox.popleft())
+        self._take_waiting()
         try:
             self._subscribe()
             statuses = self.observer.evaluate(now.to_sec())
@@ -281,7 +291,14 @@ class _Runner:
                 )
 
     def _receive(self, msg: Any, whence: tuple[str, type]) -> None:
-        self._inbox.append((*whence, msg, rospy.get_time()))
+        waiting = _Waiting(time.monotonic(), *whence, msg, rospy.get_time())
+        self._inboxes.setdefault(whence, deque(maxlen=_INBOX)).append(waiting)
+
+    def _take_waiting(self) -> None:
+        """Give the observer the messages that have come, in their order."""
+        waiting = [inbox.popleft() for inbox in tuple(self._inboxes.values()) for _ in range(len(inbox))]
+        for _, *message in sorted(waiting, key=lambda one: one.came):
+            self._guarded(self._take, *message)
 
     def _take(self, topic: str, message_class: type, msg: Any, received: float) -> None:
         self.observer.receive(topic, unpacked(msg, message_class), received)

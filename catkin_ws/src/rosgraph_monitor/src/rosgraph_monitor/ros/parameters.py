@@ -18,6 +18,7 @@ from rosgraph_monitor.graph.wiring import port_types
 from rosgraph_monitor.health.components import ComponentMap, parse_components
 from rosgraph_monitor.health.liveness import Timing
 from rosgraph_monitor.health.topics import TopicSpec, parse_topics
+from rosgraph_monitor.observer import LOWEST_RATE
 
 if TYPE_CHECKING:
     from ros_model.language.packages import PackageSet
@@ -42,6 +43,8 @@ PARAMETERS = (
     "variants",
 )
 """Names of all parameters, but for those of observers: each observer has a group of its own, of its name."""
+_HIGHEST_POLL_RATE = 100.0
+"""Hz. Each poll takes the master some ms."""
 
 
 def strangers() -> list[str]:
@@ -58,6 +61,11 @@ def strangers() -> list[str]:
 def number(name: str, default: float) -> float:
     """Return a positive number."""
     return _own().number(name, default, low=0.0, above=True)
+
+
+def poll_rate() -> float:
+    """Return how often the graph is looked at, in Hz."""
+    return _own().number("rate", 2.0, low=LOWEST_RATE, high=_HIGHEST_POLL_RATE)
 
 
 def text(name: str) -> str:

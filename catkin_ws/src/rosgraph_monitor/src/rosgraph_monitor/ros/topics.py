@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import struct
 import threading
@@ -75,7 +76,7 @@ class TopicListener:
         """Watch these topics from now on, and no others."""
         watched = {name: spec for name, spec in specs.items() if spec.is_watched}
         with self._lock:
-            self._health.follow(watched, rospy.get_time(), time.monotonic())
+            self._health.follow(watched, *_times())
             self._hashed = frozenset(name for name, spec in watched.items() if spec.stuck_after)
         for name in self._subscribers.keys() - watched.keys():
             self._subscribers.pop(name).unregister()
@@ -87,25 +88,33 @@ class TopicListener:
     def judge(self, excused: Collection[str] = (), grace: float | None = None) -> list[TopicVerdict]:
         """Return a verdict on each topic (see `TopicHealth.judge`)."""
         with self._lock:
-            return self._health.judge(rospy.get_time(), time.monotonic(), excused, grace)
+            return self._health.judge(*_times(), excused, grace)
 
     def _receive(self, msg: Any, topic: str) -> None:
         digest = self._digest(msg) if topic in self._hashed else None
         with self._lock:
-            self._health.arrived(topic, rospy.get_time(), time.monotonic(), digest)
+            self._health.arrived(topic, *_times(), digest)
 
     def _digest(self, msg: Any) -> int:
         """Return a checksum of the message without its header, which differs each time."""
         data: bytes | memoryview = packed(msg)
         kind = msg._connection_header.get("type", "")
         if kind not in self._has_header:
-            message_class = roslib.message.get_message_class(kind)
+            message_class = None
+            with contextlib.suppress(ValueError):  # a name that no type can have
+                message_class = roslib.message.get_message_class(kind)
             slots = getattr(message_class, "_slot_types", [])
             self._has_header[kind] = bool(slots) and slots[0] in ("std_msgs/Header", "Header")
         if self._has_header[kind] and len(data) >= _SEQ_AND_STAMP + 4:
             (frame,) = struct.unpack_from("<I", data, _SEQ_AND_STAMP)
             data = memoryview(data)[_SEQ_AND_STAMP + 4 + frame :]
         return zlib.crc32(data)
+
+
+def _times() -> tuple[float, float]:
+    """Return ROS time and wall time in s. Without a simulation both are monotonic: the system's clock may be set."""
+    wall = time.monotonic()
+    return (wall if rospy.rostime.is_wallclock() else rospy.get_time()), wall
 
 
 class BatteryListener:
