@@ -6,6 +6,7 @@ import pytest
 from generated_ontologies import ASKED, facts, ontologies
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
+from mros1_reasoner import forward
 from mros1_reasoner.forward.engine import RuleEngine
 from mros1_reasoner.io.ontology_files import own_ontologies, read_triples
 from mros1_reasoner.knowledge import vocabulary as v
@@ -206,3 +207,39 @@ def test_nothing_is_inferred_without_an_ontology(engine):
         engine.infer([], [NEAR])
     with pytest.raises(ReasonerError, match="N-Triples"):
         engine.load("no triples")
+
+
+COUNTING = assertion(APP + "x0", WEIGHT, "1", DECIMAL) + swrl(
+    "app:weight(?x, ?w), add(?v, ?w, 1) -> app:weight(?x, ?v)", "counts"
+)
+
+
+def test_rule_that_counts_without_end_is_named(engine, monkeypatch):
+    monkeypatch.setattr(forward.engine, "_MOST", 1000)
+    others = swrl("app:weight(?x, ?w) -> app:near(?x, ?x)", "idle")
+    with pytest.raises(
+        ReasonerError, match="more than 1000 facts follow, most of them by rule counts: correct it"
+    ) as caught:
+        engine.load(DECLARED + COUNTING + others)
+    assert "\n" not in str(caught.value)
+
+
+def test_rule_that_joins_too_much_is_named(engine, monkeypatch):
+    monkeypatch.setattr(forward.engine, "_MOST", 1000)
+    with pytest.raises(ReasonerError, match="most of them by rule all"):
+        engine.load(
+            DECLARED
+            + "".join(typed(f"{APP}y{i}", f"{APP}Part") for i in range(40))
+            + swrl("app:Part(?x), app:Part(?y) -> app:near(?x, ?y)", "all")
+        )
+
+
+def test_rule_that_counts_to_a_bound_comes_to_an_end(engine):
+    bounded = swrl("app:weight(?x, ?w), lessThan(?w, 200), add(?v, ?w, 1) -> app:weight(?x, ?v)", "bounded")
+    engine.load(DECLARED + assertion(APP + "x0", WEIGHT, "1", DECIMAL) + bounded)
+    assert len(engine.infer([], [WEIGHT])) == 200
+
+
+def test_number_that_is_too_large_to_compute_has_no_value(engine):
+    squares = swrl("app:weight(?x, ?w), multiply(?v, ?w, ?w) -> app:weight(?x, ?v)", "squares")
+    engine.load(DECLARED + assertion(APP + "x0", WEIGHT, "10", DECIMAL) + squares)

@@ -143,3 +143,11 @@ def test_limit_out_of_its_range_is_named(tmp_path, given_limit):
     parameters = given(path, nfr_safety=given_limit)
     with pytest.raises(ParameterError, match=r"~nfr_safety is .* a level within its range, 0 to 1"):
         parameters.objectives(parameters.knowledge_base())
+
+
+def test_utility_that_a_design_has_not_is_refused_at_the_start(model):
+    parameters = given(model, utility={"weights": {"performance": 1e308, "energy": -1e308, "safety": 1e308}})
+    parameters.settings(parameters.knowledge_base())
+    model.write_text(application().replace(">0.7<", ">7<"))
+    with pytest.raises(ParameterError, match=r"~utility: .*of camera_fast: ValueError"):
+        parameters.settings(parameters.knowledge_base())

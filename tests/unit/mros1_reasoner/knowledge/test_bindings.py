@@ -121,7 +121,7 @@ def test_plain_pellet_says_the_same_of_the_saved_knowledge_base(load, tmp_path):
         owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
     roles = {role.name: list(role.role_availability) for role in world.search(type=world[v.TOMASYS + "Role"])}
     assert roles == {"lift": [False], "height": [False]}
-    grounding = world.search_one(iri="*fg_o_fly_hover")
+    grounding = world.search_one(iri="*fg/o_fly/hover")
     assert "IN_ERROR_COMPONENT" in grounding.fg_cause
 
 

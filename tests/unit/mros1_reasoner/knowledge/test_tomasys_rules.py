@@ -182,7 +182,7 @@ def test_s6_errors_climb_the_hierarchy(load, pellet, cause):
     else:
         facts = replace(facts, components={"laser": "FALSE"})
     assertions = knowledge_base.assertions(facts)
-    requires = Assertion(v.RUNTIME + "fg_o_move_camera_slow", v.TOMASYS + "requiresO", v.RUNTIME + "o_leaf")
+    requires = Assertion(v.RUNTIME + "fg/o_move/camera_slow", v.TOMASYS + "requiresO", v.RUNTIME + "o_leaf")
     found = {(a.subject, a.value) for a in pellet.infer([*assertions, requires], [v.O_CAUSE])}
     assert (v.RUNTIME + "o_move", cause) in found
 

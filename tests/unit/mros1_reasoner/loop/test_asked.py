@@ -145,3 +145,13 @@ def test_only_what_names_an_objective_waits_and_an_operator_may_take_it_back():
     assert asked.put_off(Lock("o_water"), [])
     asked.heed(Unlock())
     assert asked.due(["o_water"]) == []
+
+
+def test_only_removals_of_what_a_reasoner_asks_for_from_the_start_are_kept():
+    asked = Asked(at_start={"o_light"})
+    for i in range(100):  # of tasks or operators, with names of their own
+        asked.heed(RemoveObjective(f"o_{i}"))
+    asked.heed(RemoveObjective("o_light"))
+    assert asked.commands == (RemoveObjective("o_light"),)
+    again = Asked.from_parameter([["remove_objective", "o_7"], ["remove_objective", "o_light"]], {"o_light"})
+    assert again.commands == asked.commands

@@ -1,5 +1,7 @@
 """Entries of the journal: their text, what the loop takes in by them, and what stays of a long one."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -163,3 +165,91 @@ def test_long_journal_keeps_the_last_and_what_lasts():
     lasting = [ActiveFact("f_move", "scan_slow", "STABLE"), ComponentFact("laser", "TRUE", 0.5), Lock()]
     assert [entry.content for entry in entries[:3]] == lasting
     assert [entry.now for entry in entries[3:]] == [1.0 + i for i in range(1000)][-len(entries) + 3 :]
+
+
+def kept(*entries, objectives=None, at_start=None, limit=4):
+    """Return what a journal keeps of entries that are old ones, after a clock reset at each: their time goes back."""
+    journal = Journal(limit, at_start)
+    for i, content in enumerate(entries):
+        journal.append(Entry(100.0 - i, content), objectives)
+    for i in range(3 * limit):
+        journal.append(Entry(float(i), Step(heartbeat=True)), objectives)
+    first, found = journal.snapshot()
+    assert first + len(found) == len(entries) + 3 * limit
+    return [entry.content for entry in found if not isinstance(entry.content, Step)]
+
+
+@pytest.mark.parametrize(
+    ("given", "holds"),
+    [
+        ((Pause(), Resume()), []),
+        ((Resume(), Pause(), Pause()), [Pause()]),
+        ((Lock("o_a"), Lock("o_b"), Unlock("o_a")), [Lock("o_b")]),
+        ((Lock("o_a"), Unlock()), []),
+        ((Lock(),), [Lock("o_a"), Lock("o_b")]),
+        ((Lock(), Unlock("o_a")), [Lock("o_b")]),
+        ((SetNfr("o_a", "q", 1.0), SetNfr("o_a", "q", 2.0)), [SetNfr("o_a", "q", 2.0)]),
+        ((SetNfr("o_a", "q", 1.0), SetNfr("", "q", 2.0)), [SetNfr("o_a", "q", 2.0), SetNfr("o_b", "q", 2.0)]),
+        ((AddObjective("o_c", "f", {}), Lock("o_c"), RemoveObjective("o_c")), []),
+        ((Pursue("o_c", "f", {}), SetNfr("o_c", "q", 1.0), RemoveObjective("o_c")), []),
+        ((SetNfr("o_c", "q", 1.0), Pursue("o_c", "f", {}), RemoveObjective("o_c")), [SetNfr("o_c", "q", 1.0)]),
+        (
+            (RemoveObjective("o_a"), AddObjective("o_a", "f", {})),
+            [RemoveObjective("o_a"), AddObjective("o_a", "f", {})],
+        ),
+        ((RemoveObjective("o_a"), AddObjective("o_a", "f", {}), RemoveObjective("o_a")), [RemoveObjective("o_a")]),
+        (
+            (
+                Pursue("o_c", "f", {"q": 1.0}),
+                AddObjective("o_d", "f", {}),
+                Pursue("o_c", "f", {}),
+                Pursue("o_c", "f", {}),
+            ),
+            [Pursue("o_c", "f", {"q": 1.0}), AddObjective("o_d", "f", {}), Pursue("o_c", "f", {})],
+        ),
+        ((TaskFact("an observer", True), TaskFact("another", False)), [TaskFact("", False)]),
+        ((TaskFact("o_a", True), TaskFact("f", False), TaskFact("", True)), None),
+    ],
+)
+def test_of_old_entries_the_journal_keeps_those_that_hold_in_their_order(given, holds):
+    objectives = {name: replace(OBJECTIVE, name=name, function="f") for name in ("o_a", "o_b")}
+    assert kept(*given, objectives=objectives, at_start={"o_a", "o_b"}) == (list(given) if holds is None else holds)
+
+
+def test_task_of_a_removed_objective_is_not_taken_for_that_of_another_one():
+    objectives = {name: replace(OBJECTIVE, name=name) for name in ("o_a", "o_c")}
+    given = AddObjective("o_c", "f_move", {}), TaskFact("o_c", True), RemoveObjective("o_c")
+    assert kept(*given, objectives=objectives, at_start={"o_a"}) == []
+
+
+def test_long_journal_stays_short_whatever_is_asked_for():
+    journal = Journal(limit=100, at_start={"o_a"})
+    objectives = {"o_a": replace(OBJECTIVE, name="o_a")}
+    for i in range(1000):
+        for content in (
+            SetNfr("", "q", float(i)),
+            Pursue(f"o_{i}", "f", {}),
+            Lock(f"o_{i}"),
+            RemoveObjective(f"o_{i}"),
+            TaskFact(f"observer {i}", False),
+        ):
+            journal.append(Entry(float(i), content), objectives)
+    assert len(journal.snapshot()[1]) <= 110
+
+
+def test_long_journal_that_keeps_much_does_not_look_at_it_with_each_entry(monkeypatch):
+    compacted = []
+    monkeypatch.setattr(Journal, "_compact", lambda self, old=Journal._compact: compacted.append(1) or old(self))
+    journal = Journal(limit=100)
+    for i in range(1000):
+        journal.append(Entry(float(i), Lock(f"o_{i}")))
+    assert len(compacted) <= 20
+
+
+@given(st.lists(st.sampled_from([content for _, _, content in WRITTEN]), max_size=30), st.integers(0, 30))
+def test_journal_that_is_short_enough_has_every_entry(contents, more):
+    journal = Journal(limit=60)
+    entries = [Entry(float(i), content) for i, content in enumerate([*contents, *[Step(heartbeat=True)] * more])]
+    for entry in entries:
+        journal.append(entry, {})
+    assert journal.snapshot() == (0, entries)

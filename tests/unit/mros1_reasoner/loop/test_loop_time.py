@@ -1,5 +1,6 @@
 """A clock that is set back, by a simulation's reset or a bag that is played again, holds nothing up."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -66,3 +67,10 @@ def test_time_goes_on_where_the_clock_is_set_back():
     assert time.of(0.0) == 0.0
     decision = Decision("d", DECIDED, "o", "t", "from", "to", stamp_planned=2999.0, reasons=(Cause(2998.0, "t", "x"),))
     assert time.told(decision) == replace(decision, stamp_planned=2000.0, reasons=(Cause(1999.0, "t", "x"),))
+
+
+@pytest.mark.parametrize(("stamp", "loops"), [(-1.0, 0.0), (4294967295.0 + 4294967295e-9, math.nextafter(2.0**32, 0))])
+def test_stamp_that_no_message_can_hold_becomes_the_nearest_one(stamp, loops):
+    time = LoopTime()
+    time.take(10.0)
+    assert time.of(stamp) == loops

@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import pytest
@@ -282,3 +283,21 @@ def test_desired_design_is_taken_where_no_design_keeps_every_limit():
     assert result.reason == "degraded: no design keeps every limit; b is the desired configuration"
     assert choose(*designs, desired="b", unrealisable={"b": ["laser"]}).choice == "a"
     assert choose(*designs, desired="b", strained={"b": ["f_look"]}).choice == "a"
+
+
+@pytest.mark.parametrize("indifference", [0.0, 1.0])
+def test_levels_beyond_what_can_be_computed_end_no_plan(indifference):
+    designs = design("a", risk=-1e308, power=1e308), design("b", risk=1e308, power=-1e308), design("c")
+    limits = {"risk": 1e308, "power": 1e308}
+    result = choose(*designs, objective=replace(OBJECTIVE, limits=limits), current="a", indifference=indifference)
+    assert result.choice in {"a", "b", "c"}
+    assert difference(designs[0], designs[1]) == 1.0
+
+
+@pytest.mark.parametrize("size", [math.nan, math.inf])
+def test_change_of_no_finite_size_is_the_greatest(size):
+    sizes = {"a": size, "b": 3.0}
+    result = choose(
+        design("a"), design("b"), design("c"), current="c", distance=lambda _, other: sizes.get(other.name, 9)
+    )
+    assert [candidate.name for candidate in result.candidates] == ["b", "c", "a"]

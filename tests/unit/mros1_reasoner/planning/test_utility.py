@@ -2,7 +2,9 @@ import math
 
 import pytest
 from mros1_reasoner.knowledge.model import Design, Direction, Quality
-from mros1_reasoner.planning.utility import UtilityError, make_utility
+from mros1_reasoner.planning import utility as utilities
+from mros1_reasoner.planning.utility import UtilityError, known_utility, make_utility
+from node_kit.plugins import Plugin
 
 QUALITIES = {"use": Quality(Direction.HIGHER_IS_BETTER), "cost": Quality()}
 DESIGN = Design("d", "f", {"use": 0.9, "cost": 0.4})
@@ -109,3 +111,50 @@ def test_package_of_a_user_adds_a_utility_function(tmp_path, monkeypatch):
     assert utility({"halved": "use"}) == 0.45
     with pytest.raises(UtilityError, match="utility='broken'>: nowhere:make fails: ModuleNotFoundError"):
         make_utility({"broken": None}, QUALITIES)
+
+
+HUGE = [DESIGN, Design("huge", "f", {"use": 1e308, "cost": 1e308})]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "said"),
+    [
+        ({"weights": {"use": 1e308, "cost": -1e308}}, "of huge: ValueError: .*: correct it"),
+        ({"weights": {"use": 1e308}}, "of huge is inf: have it be a finite number"),
+        ({"expression": "use * 10"}, "of huge is inf"),
+        ({"raises": None}, "of d: KeyError: 'joy': correct it"),
+        ({"says": "much"}, "of d: ValueError"),
+        ({"says": math.nan}, "of d is nan"),
+        ({"says": None}, "of d: TypeError"),
+    ],
+)
+def test_design_without_a_utility_is_named_at_the_start(wanted, said, monkeypatch):
+    plugins = {"raises": lambda *_: lambda design: design.expected["joy"], "says": lambda given, _: lambda _: given}
+    known = {**utilities.find("mros1_reasoner", "utility"), **{name: Made(make) for name, make in plugins.items()}}
+    monkeypatch.setattr(utilities, "find", lambda *_: known)
+    with pytest.raises(UtilityError, match=said) as caught:
+        known_utility(wanted, QUALITIES, HUGE)
+    assert "\n" not in str(caught.value)
+
+
+class Made(Plugin):
+    """A plug-in that is a function already."""
+
+    def __init__(self, made):
+        super().__init__("", "mros1_reasoner", "utility", "made", "")
+        object.__setattr__(self, "made", made)
+
+    def load(self):
+        return self.made
+
+
+def test_known_utility_is_that_of_the_function():
+    found = known_utility({"expression": "use / (cost - 0.4)"}, QUALITIES, HUGE)
+    assert [found(design) for design in HUGE] == [-math.inf, 1.0]
+
+
+def test_expression_is_nested_so_deeply_at_most():
+    assert utility({"expression": "-" * 190 + "use"}) == 0.9
+    assert utility({"expression": "+".join(["cost"] * 190)}) == pytest.approx(0.4 * 190)
+    with pytest.raises(UtilityError, match="nested too deeply: at most 200 levels"):
+        utility({"expression": "-" * 300 + "use"})

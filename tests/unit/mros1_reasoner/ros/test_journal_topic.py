@@ -1,9 +1,11 @@
 """Subscribers that come while the journal is published get whole messages: rospy has one buffer for both."""
 
 import threading
+from xmlrpc.client import Binary, DateTime
 
 import pytest
 import rospy
+import yaml
 from helpers.waiting import DEADLINE_S
 from mros1_reasoner.io.parameters import Parameters
 from mros1_reasoner.loop.entries import Entry, Pause
@@ -48,3 +50,13 @@ def test_beginning_for_a_new_subscriber_and_the_next_entries_are_sent_one_after_
     buffer.listener.peer_subscribe("", buffer.publish, buffer.publish)
     flushing.join()
     assert (buffer.clashes, buffer.sent) == (0, 2)
+
+
+def test_parameters_that_yaml_can_not_hold_are_left_out(publisher):
+    odd = [Binary(b"x"), DateTime("20200101T00:00:00")]
+    given = {"stray": odd[0], "day": odd[1], "history": 3, "components": {"laser": {"node": "scan", "x": odd[0]}}}
+    JournalTopic("reasoner-1", Parameters({**given, "list": [1, *odd]}), [])
+    told = []
+    publisher[0].listener.peer_subscribe("", None, told.append)
+    kept = {"history": 3, "components": {"laser": {"node": "scan"}}, "list": [1]}
+    assert yaml.safe_load(told[0].parameters) == kept

@@ -21,6 +21,8 @@ Plans = dict[str, list[tuple[Fact, Clause, tuple[Step, ...]]]]
 """By predicate the patterns that a fact may match; of each its clause, and what else must hold, in order."""
 
 _NOTHING: dict[Term, None] = {}
+_MOST = 1_000_000
+"""Facts of one closure: a model of 1,000 designs has 30,000. Rules that compute new values may never come to an end."""
 
 
 class RuleEngine:
@@ -79,12 +81,14 @@ class Closure:
         self.values: dict[str, dict[Term, dict[Term, None]]] = defaultdict(dict)  # by predicate and subject
         self.subjects: dict[str, dict[Term, dict[Term, None]]] = defaultdict(dict)  # by predicate and value
         self._new: list[Fact] = []
+        self._count = 0
 
     def add(self, facts: Iterable[Fact]) -> None:
         """Add facts, and what follows.
 
         Raises:
             InconsistentError: they contradict each other or the ontology.
+            ReasonerError: too much follows.
         """
         self._new.extend(facts)
         while self._new:
@@ -92,6 +96,7 @@ class Closure:
             if self._holds(fact):
                 continue
             self._check(fact)
+            self._count += 1
             self.values[fact.predicate].setdefault(fact.subject, {})[fact.value] = None
             self.subjects[fact.predicate].setdefault(fact.value, {})[fact.subject] = None
             for pattern, clause, steps in self._plans.get(fact.predicate, ()):
@@ -124,6 +129,12 @@ class Closure:
         """Conclude from each way in which the remaining steps hold."""
         if at == len(steps):
             self._new.extend(self._conclusions(clause, bound))
+            if self._count + len(self._new) > _MOST:
+                rule = self._most_frequent(clause)
+                raise ReasonerError(
+                    f"more than {_MOST} facts follow, most of them by {rule}: correct it, or give it a condition with "
+                    "which it comes to an end"
+                )
             return
         step = steps[at]
         if isinstance(step, Condition):
@@ -152,6 +163,14 @@ class Closure:
             if _unified(subject, some, bound, known) and _unified(value, other, bound, known):
                 self._apply(clause, steps, at + 1, bound, known)
             known[:] = before
+
+    def _most_frequent(self, last: Clause) -> str:
+        """Return the names of the rules that conclude most of the facts; `last` is the one that concluded last."""
+        counts = {name: sum(map(len, subjects.values())) for name, subjects in self.values.items()}
+        name = max(counts, key=lambda name: counts[name])
+        clauses = (clause for plans in self._plans.values() for _, clause, _ in plans)
+        found = dict.fromkeys(c.name for c in clauses if any(fact.predicate == name for fact in c.head))
+        return " or ".join(found) if found and 2 * counts[name] > _MOST else last.name
 
     def _apply_condition(
         self, clause: Clause, steps: tuple[Step, ...], at: int, bound: list[Term], known: list[bool]

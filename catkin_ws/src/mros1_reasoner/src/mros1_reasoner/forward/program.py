@@ -90,12 +90,13 @@ class Condition(NamedTuple):
 
 @dataclass(frozen=True)
 class Clause:
-    """A rule."""
+    """A rule, or an axiom as one; its name is for messages."""
 
     patterns: tuple[Fact, ...]
     conditions: tuple[Condition, ...]
     head: tuple[Fact, ...]
     variables: int
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -241,11 +242,13 @@ def _axioms(graph: Graph, object_properties: set[str]) -> Iterator[Clause]:
                 continue
             for (body, *terms), (head, *concluded) in forms:
                 names = {"some": some, "other": other}
-                yield Clause((Fact(names[body], *terms),), (), (Fact(names[head], *concluded),), 2)
+                axiom = f"{local_name(name)} of {local_name(some)}"
+                yield Clause((Fact(names[body], *terms),), (), (Fact(names[head], *concluded),), 2, axiom)
     for name in graph.instances(v.OWL + "SymmetricProperty"):
-        yield Clause((Fact(name, 0, 1),), (), (Fact(name, 1, 0),), 2)
+        yield Clause((Fact(name, 0, 1),), (), (Fact(name, 1, 0),), 2, f"SymmetricProperty {local_name(name)}")
     for name in graph.instances(v.OWL + "TransitiveProperty"):
-        yield Clause((Fact(name, 0, 1), Fact(name, 1, 2)), (), (Fact(name, 0, 2),), 3)
+        body = (Fact(name, 0, 1), Fact(name, 1, 2))
+        yield Clause(body, (), (Fact(name, 0, 2),), 3, f"TransitiveProperty {local_name(name)}")
 
 
 def _clause(rule: Rule) -> Clause:
@@ -276,7 +279,9 @@ def _clause(rule: Rule) -> Clause:
     bound = {t for fact in patterns for t in fact} | {c.arguments[0] for c in conditions if c.result}
     if any(type(t) is int and t not in bound for fact in head for t in fact):
         _refuse("a variable that is in no atom of the body", rule.label or rule.node)
-    return Clause(tuple(patterns), tuple(conditions), head, len(numbers))
+    return Clause(
+        tuple(patterns), tuple(conditions), head, len(numbers), f"rule {rule.label}" if rule.label else str(rule)
+    )
 
 
 def _pattern(atom: Atom, terms: tuple[Term, ...], rule: Rule) -> Fact:
@@ -311,7 +316,7 @@ def _computed(function: Callable[..., Decimal]) -> Callable[..., Value | None]:
             return None
         try:
             return Value("decimal", function(*numbers))
-        except (InvalidOperation, ZeroDivisionError, TypeError):
+        except (ArithmeticError, TypeError):
             return None
 
     return compute

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from node_kit.io.input_files import InputFileError, is_file, read_bytes, real_path
+from node_kit.io.output_files import write_file
 
 from mros1_reasoner.knowledge import vocabulary as v
 from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
@@ -22,6 +23,8 @@ MAX_SIZE = 200_000_000
 
 _log = logging.getLogger(__name__)
 
+_OWL = ".owl"
+_SHOWN = 100  # characters of a name that somebody has given
 _OWL_FOLDER = Path(__file__).resolve().parents[3] / "owl"
 
 
@@ -66,9 +69,39 @@ def save_knowledge_base(
     """
     text = knowledge_base.rdf_xml(facts, analysis)
     try:
-        path.write_bytes(text)
+        write_file(path, text)
     except OSError as error:
         raise KnowledgeBaseError(f"{path}: {error.strerror or error}: give another file") from error
+
+
+def place_to_save(folder: Path, name: str) -> Path:
+    """Return the path of the OWL file of a name in a folder, which is made if it is not there.
+
+    Whoever reaches the node's service gives the name: it must lead to no file that is not an ontology.
+
+    Args:
+        folder: within which the file is to be.
+        name: path of the file within the folder.
+
+    Raises:
+        KnowledgeBaseError: it is no OWL file in the folder, also by way of a link, or a folder can't be made.
+    """
+    own = real_path(folder)
+    path = real_path(own / name)
+    if path.suffix != _OWL or Path(name).suffix != _OWL:
+        raise KnowledgeBaseError(f"{name[:_SHOWN]!r} does not end in {_OWL}: give a file that does")
+    if not path.is_relative_to(own) or "\0" in name:
+        raise KnowledgeBaseError(f"{name[:_SHOWN]!r} is not in {own}: give a file in it, or set ~save_folder")
+    try:
+        own.mkdir(parents=True, exist_ok=True)
+        is_there = path.parent.is_dir()
+    except OSError as error:
+        raise KnowledgeBaseError(
+            f"{own / name[:_SHOWN]}: {error.strerror or error}: give another file, or set ~save_folder"
+        ) from error
+    if not is_there:
+        raise KnowledgeBaseError(f"{path.parent}: no such folder: make it first")
+    return path
 
 
 def own_ontologies() -> tuple[Path, Path]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import rospkg
+from node_kit.io.input_files import real_path
 from node_kit.parameters import ParameterError, ParameterTree, named_entries
 from ros_model.io.files import resolve
 
@@ -18,12 +19,13 @@ from mros1_reasoner.knowledge.knowledge_base import KnowledgeBase
 from mros1_reasoner.knowledge.model import Direction, Objective
 from mros1_reasoner.loop.estimate import MOST
 from mros1_reasoner.loop.settings import Settings, setting_names
-from mros1_reasoner.planning.utility import UtilityError, make_utility
+from mros1_reasoner.planning.utility import UtilityError, known_utility
 
 _log = logging.getLogger(__name__)
 
 DEFAULT_ACTION = "rosgraph_manipulator_action_server"
 _NFR = "nfr_"
+_SAVED = "knowledge_bases"  # folder in ROS_HOME
 PARAMETERS = (
     *setting_names(),
     "asked",
@@ -87,9 +89,10 @@ class Parameters:
 
     @property
     def save_folder(self) -> Path:
-        """The folder in which knowledge bases are saved."""
-        given = self._tree.text("save_folder")
-        return Path(given or rospkg.get_ros_home()).expanduser().resolve()
+        """The folder in which knowledge bases are saved; ROS_HOME itself has files that nobody may replace."""
+        if self._tree.text("save_folder"):
+            return real_path(self._tree.path("save_folder"))
+        return real_path(Path(rospkg.get_ros_home()) / _SAVED)
 
     @property
     def asked(self) -> object:
@@ -197,7 +200,7 @@ class Parameters:
             raise ParameterError(f"parameter ~desired_configuration is {desired!r}: no FunctionDesign of the model")
         utility = self.values.get("utility", defaults.utility)
         try:
-            make_utility(utility, knowledge_base.qualities)
+            known_utility(utility, knowledge_base.qualities, knowledge_base.designs.values())
         except UtilityError as error:
             raise ParameterError(f"parameter ~utility: {error}") from error
         others: dict[str, Any] = {}

@@ -121,9 +121,12 @@ class KnowledgeBase:
         return tuple(design for design in self.designs.values() if design.function == function)
 
     def grounding(self, objective: str, design: str) -> str:
-        """Return the name of the grounding of an objective by a design."""
-        iri = self._model.grounding_iris.get((objective, design))
-        return local_name(iri) if iri else f"fg_{objective}_{design}"
+        """Return the name of the grounding of an objective by a design, as diagnostics have it.
+
+        Groundings of several objectives may have one name where no model names them; in the ontology, they differ.
+        """
+        iri = self._model.grounding_iris.get((objective, design), v.RUNTIME)
+        return f"fg_{objective}_{design}" if iri.startswith(v.RUNTIME) else local_name(iri)
 
     def assertions(self, facts: Facts, *, all_components: bool = False) -> list[Assertion]:
         """Return the facts as assertions for a reasoner.
@@ -180,7 +183,7 @@ class KnowledgeBase:
             yield Assertion(grounding, v.FG_CAUSE, v.IN_ERROR_COMPONENT, _STRING)
         for (owner, quality), level in sorted(facts.levels.items()):
             if owner == objective.name:
-                value = f"{grounding}_{quality}"
+                value = _own_iri("level", objective.name, quality)
                 yield from (Assertion(grounding, v.HAS_QA_VALUE, value), *self._level(value, quality, level))
 
     def analyse(self, facts: Facts, reasoner: Reasoner) -> Analysis:
@@ -288,13 +291,13 @@ class KnowledgeBase:
         return self._model.objective_iris.get(name) or f"{v.RUNTIME}{name}"
 
     def _grounding_iri(self, objective: str, design: str) -> str:
-        return self._model.grounding_iris.get((objective, design)) or f"{v.RUNTIME}fg_{objective}_{design}"
+        return self._model.grounding_iris.get((objective, design)) or _own_iri("fg", objective, design)
 
     def _nfr_iri(self, objective: Objective, quality: str) -> str:
         """Return the IRI of a limit: that of the model, unless somebody has set another limit."""
         iri, limit = self._objective_iri(objective.name), objective.limits[quality]
         own = None if quality in self._other_end.values() else self._model.level_iris.get((iri, quality, limit))
-        return own or f"{v.RUNTIME}nfr_{objective.name}_{quality}"
+        return own or _own_iri("nfr", objective.name, quality, repr(limit))  # a saved model has that of another limit
 
     def _past(self, past: Past) -> Iterable[Assertion]:
         iri, objective = f"{v.RUNTIME}{past.name}", self._objective_iri(past.objective)
@@ -312,7 +315,7 @@ class KnowledgeBase:
     def _ends_of_bands(self) -> Iterable[Assertion]:
         """Yield the types of levels that are compared with the limits on the other side of bands."""
         for quality in self._other_end.values():
-            iri, kind = f"{v.RUNTIME}{quality}", self.qualities[quality]
+            iri, kind = f"{v.RUNTIME_LIMITS}{quality}", self.qualities[quality]
             yield Assertion(iri, v.RDF_TYPE, v.QA_TYPE)
             yield Assertion(iri, v.QA_SIGN, str(kind.direction.sign), _DECIMAL)
             if kind.reaching_violates:
@@ -320,7 +323,7 @@ class KnowledgeBase:
 
     def _quality_iri(self, quality: str) -> str:
         if quality in self._other_end.values():
-            return f"{v.RUNTIME}{quality}"
+            return f"{v.RUNTIME_LIMITS}{quality}"
         return self._find(self._model.quality_iris, quality, "QualityAttributeType")
 
     def _level(self, iri: str, quality: str, level: float) -> list[Assertion]:
@@ -344,6 +347,11 @@ class KnowledgeBase:
         for name, iri in self._model.design_iris.items():
             realisable = "false" if name in analysis.unrealisable else "true"
             yield Assertion(iri, v.FD_REALISABILITY, realisable, v.XSD + "boolean")
+
+
+def _own_iri(kind: str, *names: str) -> str:
+    """Return the IRI of an individual that belongs to others; no other names, and no objective, have the same one."""
+    return v.RUNTIME + "/".join([kind, *(name.replace("%", "%25").replace("/", "%2F") for name in names)])
 
 
 def _with_end(design: Design, quality: str, other: str) -> Design:

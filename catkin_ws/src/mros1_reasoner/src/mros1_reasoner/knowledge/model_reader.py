@@ -43,6 +43,9 @@ _ORDER = (v.F_FIRST_DESIGN, v.F_LAST_DESIGN, v.FD_NEXT, v.B_NEXT, v.ROLE_LAST_BI
 _COMPARISONS = (v.QA_SIGN, v.QA_COMPARISON_OPERATOR, v.QA_REACHING_VIOLATES)
 _OF_NODES = (v.RDF_TYPE, v.RDFS_LABEL, v.C_STATUS, v.DEPLOYED_BY, v.REPAIRS)
 _OF_REPAIRS = (v.REPAIR, *PROPERTIES)
+_OWN = (v.RUNTIME, v.RUNTIME_LIMITS)
+_DEEPEST = 100  # levels of functions that require functions
+_SHOWN = 5  # functions of a chain, in messages
 _LEVELS = (v.HAS_NFR, v.HAS_QA_VALUE, v.HAS_QA_ESTIMATION, v.HAS_VALUE, v.IS_QA_TYPE)
 
 
@@ -150,7 +153,7 @@ class _Reader:
         )
         types = self._names((v.QA_TYPE,), graph.objects(v.IS_QA_TYPE))
         # The others are ends of bands, which a saved knowledge base has.
-        self._quality_types = {name: iri for name, iri in types.items() if not iri.startswith(v.RUNTIME)}
+        self._quality_types = {name: iri for name, iri in types.items() if not iri.startswith(_OWN)}
         self._objectives = self._names((v.OBJECTIVE,), graph.subjects(v.TYPE_F))
         self._environment = self._names((v.ENVIRONMENT_ATTRIBUTE,), graph.objects(v.CONSTRAINS))
         for name in sorted(self._environment.keys() & types.keys()):
@@ -412,25 +415,33 @@ class _Reader:
         for function, solvers in solving.items():
             if not solvers:
                 _log.warning("Function %s can't be fulfilled: no FunctionDesign solves it", function)
-        finished: set[str] = set()
+        levels: dict[str, int] = {}  # of functions that are visited: itself, and those below it
 
-        def visit(function: str, path: tuple[tuple[str, str], ...]) -> None:
+        def visit(function: str, path: tuple[tuple[str, str], ...]) -> int:
             start = next((i for i, (above, _) in enumerate(path) if above == function), None)
             if start is not None:
                 cycle = "".join(f"{above} -> ({design}) " for above, design in path[start:])
                 raise KnowledgeBaseError(
                     f"{self._where}: functions require each other ({cycle}-> {function}): break the cycle"
                 )
-            if function in finished:
-                return
+            if len(path) + levels.get(function, 1) > _DEEPEST:
+                chain = " -> ".join([*(above for above, _ in path), function][:_SHOWN])
+                raise KnowledgeBaseError(
+                    f"{self._where}: functions require each other over more than {_DEEPEST} levels ({chain} ...): "
+                    "have designs require fewer functions"
+                )
+            if function in levels:
+                return levels[function]
+            below = 0
             for design in solving[function]:
                 for needed in design.requires:
                     if needed not in solving:
                         raise KnowledgeBaseError(
                             f"{self._where}: {design.name} requires {needed}, which is no Function"
                         )
-                    visit(needed, (*path, (function, design.name)))
-            finished.add(function)
+                    below = max(below, visit(needed, (*path, (function, design.name))))
+            levels[function] = 1 + below
+            return 1 + below
 
         for function in sorted(self._functions):
             visit(function, ())

@@ -5,6 +5,7 @@ from __future__ import annotations
 TOMASYS = "http://metacontrol.org/tomasys#"
 MROS = "http://ros/mros#"
 RUNTIME = "http://metacontrol.org/runtime#"  # individuals that exist at run time only
+RUNTIME_LIMITS = "http://metacontrol.org/runtime/limits#"  # of these, the types of limits on the other side of bands
 
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
 RDFS = "http://www.w3.org/2000/01/rdf-schema#"

@@ -16,8 +16,15 @@ from mros1_reasoner.loop.readable_state import MapeError
 class Asked:
     """The commands that still hold, in the order in which they came; a later one replaces what it takes back."""
 
-    def __init__(self, commands: Iterable[Command] = ()) -> None:
-        """Begin with the commands that hold already."""
+    def __init__(self, commands: Iterable[Command] = (), at_start: Collection[str] | None = None) -> None:
+        """Begin with the commands that hold already.
+
+        Args:
+            commands: these.
+            at_start: names of the objectives that a reasoner asks for from the start: to remove another one needs not
+                be kept; None: any may be one of these.
+        """
+        self._at_start = at_start
         self._commands: list[Command] = []
         self._early: list[Command] = []  # of these, what is for objectives that are still to come
         self._again: list[Command] = []  # of these, limits that a task replaces which asks anew for their objective
@@ -47,8 +54,14 @@ class Asked:
             self._commands = [before for before in self._commands if not _replaces(one, before)]
             self._early = [before for before in self._early if not _replaces(one, before)]
             self._again = [before for before in self._again if not _replaces(one, before)]
-        if not isinstance(command, entries.Resume | entries.Unlock):
+        if not isinstance(command, entries.Resume | entries.Unlock) and not self._is_void(command):
             self._commands += heeded
+
+    def _is_void(self, command: Command) -> bool:
+        """Return whether a command does nothing in a reasoner that begins."""
+        if self._at_start is None or not isinstance(command, entries.RemoveObjective):
+            return False
+        return command.name not in self._at_start
 
     def settle(self, locked: Collection[str], objectives: Collection[str]) -> bool:
         """Forget the locks and limits of objectives that went; return whether there were any.
@@ -104,8 +117,13 @@ class Asked:
         return [[kind_of(command), *values_of(command)] for command in self._commands]
 
     @classmethod
-    def from_parameter(cls, value: object) -> Asked:
-        """Return the commands that a parameter has; those that can't be read are left out."""
+    def from_parameter(cls, value: object, at_start: Collection[str] | None = None) -> Asked:
+        """Return the commands that a parameter has; those that can't be read are left out.
+
+        Args:
+            value: of the parameter.
+            at_start: names of the objectives that a reasoner asks for from the start; None: unknown.
+        """
         found: list[Command] = []
         for item in value if isinstance(value, Sequence) and not isinstance(value, str) else ():
             if not isinstance(item, list) or not item:
@@ -116,7 +134,7 @@ class Asked:
                 continue
             if isinstance(content, Command):
                 found.append(content)
-        return cls(found)
+        return cls(found, at_start)
 
 
 def carry_out(commands: Iterable[Command], do: Callable[[Command], object]) -> list[tuple[Command, Exception]]:

@@ -21,6 +21,10 @@ from mros1_reasoner.planning.repairing import Stakes, loss_of_change, loss_of_re
 _NO_BOUND = 1e6  # the greatest correction where the model says which designs have the same strain
 
 
+_Plans = dict[tuple[str, str], Plan]
+"""What to deploy, by objective and function."""
+
+
 @dataclass(frozen=True)
 class Timing:
     """When and for how long the present step has analysed."""
@@ -199,10 +203,11 @@ class Deliberation:
         design that helps in full. Else it is the nearest objective with a design that helps in part.
         """
         outcomes: dict[str, Plan] = {}
+        known: _Plans = {}
         queue = [name]
         while queue:
             objective = queue.pop(0)
-            outcomes[objective] = outcome = self._plan(objective, now)
+            outcomes[objective] = outcome = self._plan(objective, now, known=known)
             if self._is_change(objective, outcome) and not outcome.is_makeshift:
                 return objective, outcome
             if climbs:
@@ -327,18 +332,27 @@ class Deliberation:
 
     def _missing(self, name: str, outcome: Plan, now: float) -> list[tuple[str, Plan]]:
         """Return what to deploy for an outcome, the deepest requirement first and the objective itself last."""
-        steps: list[tuple[str, Plan]] = []
-        for function in self._state.kb.designs[outcome.choice or ""].requires:
-            provider = self._state.provider(function)
-            if not self._state.is_fine(provider):
-                found = self._plan(provider, now, function)
-                if found.choice:
-                    steps += [s for s in self._missing(provider, found, now) if s[0] not in {o for o, _ in steps}]
-            else:
-                below = self._state.running[provider].design
-                fine = Plan(below, False, (), "")
-                steps += [s for s in self._missing(provider, fine, now)[:-1] if s[0] not in {o for o, _ in steps}]
-        return [*steps, (name, outcome)]
+        known: _Plans = {}
+        below: dict[tuple[str, str], list[tuple[str, Plan]]] = {}  # by objective and function; many may require it
+
+        def missing(objective: str, found: Plan) -> list[tuple[str, Plan]]:
+            steps: dict[str, Plan] = {}
+            for function in self._state.kb.designs[found.choice or ""].requires:
+                provider = self._state.provider(function)
+                if (provider, function) not in below:
+                    below[provider, function] = required(provider, function)
+                for step in below[provider, function]:
+                    steps.setdefault(*step)
+            return [*steps.items(), (objective, found)]
+
+        def required(provider: str, function: str) -> list[tuple[str, Plan]]:
+            if self._state.is_fine(provider):
+                fine = Plan(self._state.running[provider].design, False, (), "")
+                return missing(provider, fine)[:-1]
+            found = self._plan(provider, now, function, known=known)
+            return missing(provider, found) if found.choice else []
+
+        return missing(name, outcome)
 
     def _note_failure(self, name: str, now: float) -> None:
         """Put the running design into the error log if it has failed."""
@@ -424,8 +438,32 @@ class Deliberation:
         now = self._utility(self._state.kb.designs[running.design]) if running.design else -math.inf
         return not running.degraded and outcome.candidates[0].utility >= now + self._state.settings.improvement
 
-    def _plan(self, name: str, now: float, function: str = "", only: tuple[Design, ...] = ()) -> Plan:
-        """Return what to deploy for an objective, or for a function that none needs yet; of all designs, or of some."""
+    def _plan(
+        self,
+        name: str,
+        now: float,
+        function: str = "",
+        only: tuple[Design, ...] = (),
+        known: _Plans | None = None,
+    ) -> Plan:
+        """Return what to deploy for an objective, or for a function that none needs yet.
+
+        Args:
+            name: of the objective.
+            now: present time.
+            function: the function.
+            only: the designs to choose from; none: all.
+            known: what was returned before for objectives and functions, while nothing changes; it is added to.
+        """
+        known = {} if known is None else known
+        if only:
+            return self._plan_anew(name, now, function, only, known)
+        if (name, function) not in known:
+            known[name, function] = self._plan_anew(name, now, function, (), known)
+        return known[name, function]
+
+    def _plan_anew(self, name: str, now: float, function: str, only: tuple[Design, ...], known: _Plans) -> Plan:
+        """Return what to deploy, by the plans for what designs require; see _plan."""
         objective = self._state.objectives.get(name) or self._state.objective_of(function)
         running = self._state.running.get(name) or Running()
         designs: tuple[Design, ...] = only or self._state.kb.solving(objective.function)
@@ -434,7 +472,7 @@ class Deliberation:
         for design in designs:
             for required in design.requires:
                 provider = self._state.provider(required)
-                outcome = None if self._state.is_fine(provider) else self._plan(provider, now, required)
+                outcome = None if self._state.is_fine(provider) else self._plan(provider, now, required, known=known)
                 if outcome and (outcome.choice is None or outcome.is_makeshift):
                     kind = unfulfilled if outcome.choice is None else strained
                     kind.setdefault(design.name, []).append(required)

@@ -70,14 +70,36 @@ def _violated(view: View, name: str, now: float) -> tuple[str, ...]:
     return tuple(sorted(counting.union(view.beyond(view.objectives[name]))))
 
 
+def _with_required(view: View, name: str) -> list[str]:
+    """Return an objective and all that it requires, be it by what runs for others that it requires; each one once."""
+    found, waiting = {name: None}, [name]
+    while waiting:
+        running = view.running.get(waiting.pop())
+        new = [o for o in view.required(running.design if running else None) if o not in found]
+        found.update(dict.fromkeys(new))
+        waiting += new
+    return list(found)
+
+
 def _is_sound(view: View, name: str, now: float) -> bool:
-    """Return whether what runs has no error, and neither has anything that it requires."""
+    """Return whether what runs has no error, and what it requires is fulfilled."""
+    required = _with_required(view, name)[1:]
+    return _is_whole(view, name) and all(_is_fulfilled_itself(view, o, now) for o in required)
+
+
+def _is_fulfilled_itself(view: View, name: str, now: float) -> bool:
+    """Return whether an objective is fulfilled, apart from what it requires."""
+    if name not in view.running or not view.running[name].design:
+        return False
+    is_well = not (_stage(view, name, now) or _violated(view, name, now) or errors(view, name, now))
+    return is_well and _is_whole(view, name)
+
+
+def _is_whole(view: View, name: str) -> bool:
     running, result = view.running[name], view.analysis.objectives.get(name)
     if running.design is None or result is None or running.state == FunctionGrounding.FAILED:
         return False
-    is_whole = not (running.is_broken or running.failed_nodes) and v.IN_ERROR_COMPONENT not in result.causes
-    required = view.required(running.design)
-    return is_whole and all(o in view.running and fulfilment(view, o, now).is_fulfilled for o in required)
+    return not (running.is_broken or running.failed_nodes) and v.IN_ERROR_COMPONENT not in result.causes
 
 
 def _statuses(view: View, name: str, now: float) -> tuple[str, ...]:
@@ -93,12 +115,9 @@ def _statuses(view: View, name: str, now: float) -> tuple[str, ...]:
 
 def _counts(view: View, name: str, now: float) -> bool:
     """Return whether an error of quality counts, of an objective or of one that it requires."""
-    running = view.running.get(name)
-    if running is None:
-        return False
-    is_own = any(objective == name for objective, _ in view.violations(now)) or view.rule_counts(name, now)
-    required = view.required(running.design)
-    return is_own or running.task_failure is not None or any(_counts(view, o, now) for o in required)
+    violating = {objective for objective, _ in view.violations(now)}
+    known = (o for o in _with_required(view, name) if o in view.running)
+    return any(o in violating or view.rule_counts(o, now) or view.running[o].task_failure is not None for o in known)
 
 
 def _expectations(view: View, name: str, violated: tuple[str, ...]) -> list[str]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from metacontrol_bags.decision import DECIDED, PROPOSED, Decision
 
@@ -55,7 +56,11 @@ def apply(core: Mape, entry: Entry) -> list[Decision]:
 
 def is_pursued(core: Mape, name: str) -> bool:
     """Return whether a name is that of an objective, or of its function."""
-    return any(name in (objective.name, objective.function) for objective in core.objectives.values())
+    return _is_of(name, core.objectives.values())
+
+
+def _is_of(name: str, objectives: Iterable[Objective]) -> bool:
+    return any(name in (objective.name, objective.function) for objective in objectives)
 
 
 def brought(now: float, decisions: Sequence[Decision]) -> list[Entry]:
@@ -70,31 +75,98 @@ def brought(now: float, decisions: Sequence[Decision]) -> list[Entry]:
 class Journal:
     """The last entries, numbered from the reasoner's start, and older entries that still hold."""
 
-    def __init__(self, limit: int = 50_000) -> None:
-        """Keep at most so many entries, and a few more: some 20 minutes' worth on a busy robot."""
+    def __init__(self, limit: int = 50_000, at_start: Collection[str] | None = None) -> None:
+        """Begin without entries.
+
+        Args:
+            limit: how many of the last entries are kept: 50,000 are some 20 minutes' worth on a busy robot.
+            at_start: names of the objectives that are asked for from the start: to remove another one needs not be
+                kept when what has asked for it is not; None: any may be one of these.
+        """
         self._limit = limit
-        self._entries: deque[Entry] = deque()
+        self._at_start = at_start
+        self._last: deque[tuple[Entry, tuple[entries.Content, ...]]] = deque()  # with what of each is to be kept later
+        self._kept: dict[tuple[str, ...], tuple[int, Entry]] = {}  # older ones with their numbers, by their subjects
         self._count = 0
 
-    def append(self, entry: Entry) -> int:
-        """Add an entry; return its number."""
-        self._entries.append(entry)
+    def append(self, entry: Entry, objectives: Mapping[str, Objective] | None = None) -> int:
+        """Add an entry; return its number.
+
+        Args:
+            entry: it.
+            objectives: those that there are, by name: an older command for all of them is kept as one for each.
+        """
+        self._last.append((entry, _lasting(entry.content, objectives)))
         self._count += 1
-        if len(self._entries) > self._limit:
+        if len(self._last) > self._limit:
             self._compact()
         return self._count - 1
 
     def snapshot(self) -> tuple[int, list[Entry]]:
         """Return the entries, and the number that the first one would have if there were no gaps."""
-        return self._count - len(self._entries), list(self._entries)
+        kept = [entry for _, entry in sorted(self._kept.values(), key=lambda item: item[0])]
+        found = [*kept, *(entry for entry, _ in self._last)]
+        return self._count - len(found), found
 
     def _compact(self) -> None:
-        """Drop the older half, except commands and the last entry about each lasting fact."""
-        old = [self._entries.popleft() for _ in range(len(self._entries) // 2)]
-        last = {entries.subject(item.content): item for item in old if isinstance(item.content, _LASTING)}
-        others = [item for item in old if isinstance(item.content, _COMMANDS)]
-        kept = sorted([*last.values(), *others], key=lambda item: item.now)
-        self._entries.extendleft(reversed(kept))
+        """Drop the older half of the last entries, except what holds: of each subject, the last one."""
+        first = self._count - len(self._last)
+        for number in range(first, first + len(self._last) // 2):
+            entry, lasting = self._last.popleft()
+            for content in lasting:
+                self._keep(number, replace(entry, content=content))
+
+    def _keep(self, number: int, entry: Entry) -> None:
+        """Keep an older entry, in place of those that it makes void."""
+        match entry.content:
+            case entries.Resume():
+                self._drop("pause")
+            case entries.Unlock(name):
+                self._drop("lock", *([name] if name else []))
+            case entries.RemoveObjective(name):
+                self._drop_objective(name)
+                if self._at_start is None or name in self._at_start:
+                    self._kept["removed", name] = number, entry
+            case entries.Pursue(name) if ("asked for", name) in self._kept:
+                self._kept["pursued", name] = number, entry  # the first one stays: it has a place among the others
+            case entries.AddObjective(name) | entries.Pursue(name):
+                self._kept["asked for", name] = number, entry
+            case entries.Pause():
+                self._kept["pause",] = number, entry
+            case entries.Lock(name):
+                self._kept["lock", name] = number, entry
+            case entries.SetNfr(name, quality):
+                self._kept["limit", name, quality] = number, entry
+            case content if isinstance(content, _LASTING):
+                self._kept[entries.subject(content)] = number, entry
+
+    def _drop_objective(self, name: str) -> None:
+        """Drop all about an objective; limits stay that it has whenever a design requires it."""
+        begun, _ = self._kept.get(("asked for", name), (-1, None))
+        for kind in ("asked for", "pursued", "lock", "task"):
+            self._drop(kind, name)
+        for key in [key for key in self._kept if key[:2] == ("limit", name) and self._kept[key][0] > begun]:
+            del self._kept[key]
+
+    def _drop(self, *subject: str) -> None:
+        """Drop the entries whose subjects begin so."""
+        for key in [key for key in self._kept if key[: len(subject)] == subject]:
+            del self._kept[key]
+
+
+def _lasting(content: entries.Content, objectives: Mapping[str, Objective] | None) -> tuple[entries.Content, ...]:
+    """Return what is to be kept of an entry that is an old one.
+
+    Args:
+        content: of the entry.
+        objectives: those that there are, by name; None: unknown.
+    """
+    match content:
+        case entries.TaskFact(name) if objectives is not None and not _is_of(name, objectives.values()):
+            return (replace(content, name=""),)  # any name stands for the only root objective
+        case entries.Lock("") | entries.SetNfr("") if objectives:
+            return tuple(replace(content, objective=name) for name in objectives)
+    return (content,) if isinstance(content, _LASTING | _COMMANDS) else ()
 
 
 def _observe(core: Mape, now: float, fact: entries.Fact) -> None:

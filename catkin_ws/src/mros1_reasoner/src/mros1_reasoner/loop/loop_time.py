@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from metacontrol_bags.decision import Decision
 
+_LATEST = math.nextafter(2.0**32, 0.0)  # s
 _TOLERANCE = 1.0  # s, by which messages may be older than one before them
 
 
@@ -28,7 +29,11 @@ class LoopTime:
         return now + self._ahead
 
     def of(self, stamp: float) -> float:
-        """Return the loop's time at a stamp, which may be of before the clock was set back; 0: there is none."""
+        """Return the loop's time at a stamp, which may be of before the clock was set back; 0: there is none.
+
+        A stamp that no message's time can hold, from 0 to less than 2**32 s, becomes the nearest one.
+        """
+        stamp = min(max(0.0, stamp), _LATEST)
         return min(stamp + self._ahead, self._last) if stamp and self._ahead else stamp
 
     def ros(self, moment: float) -> float:

@@ -27,7 +27,7 @@ from mros1_reasoner.loop.repairs import UnderWay
 from mros1_reasoner.loop.settings import Settings
 from mros1_reasoner.loop.state import State
 from mros1_reasoner.planning.planner import Distance, Utility, difference, feasible_designs
-from mros1_reasoner.planning.utility import make_utility
+from mros1_reasoner.planning.utility import known_utility
 
 
 class Mape:
@@ -64,12 +64,13 @@ class Mape:
             name: beginning of the decisions' ids.
 
         Raises:
-            UtilityError: the utility function of the settings can't be made.
+            UtilityError: the utility function of the settings can't be made, or gives a design no utility.
         """
         settings = settings or Settings()
         self._kb, self._reasoner = knowledge_base, reasoner
         self._wall, self._clock, self._time = wall, clock, LoopTime()
-        self._utility = utility or make_utility(settings.utility, knowledge_base.qualities)
+        designs = knowledge_base.designs.values()
+        self._utility = utility or known_utility(settings.utility, knowledge_base.qualities, designs)
         self._state = State(knowledge_base, objectives, settings, self._utility)
         self._deliberation = Deliberation(self._state, self._utility, distance, wall, self._stamp, name)
         self.operator = Operator(self._state, wall, self._time)

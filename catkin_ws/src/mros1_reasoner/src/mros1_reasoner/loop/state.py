@@ -392,14 +392,17 @@ class State(View):
                 found.append(objective)
         return found
 
-    def _builds_on(self, design: Design, name: str, above: frozenset[str] = frozenset()) -> bool:
+    def _builds_on(self, design: Design, name: str) -> bool:
         """Return whether a design requires an objective, be it by designs of what it requires."""
-        below = [function for function in design.requires if function not in above]
-        return any(self.provider(function) == name for function in below) or any(
-            self._builds_on(other, name, above | {function})
-            for function in below
-            for other in self.kb.solving(function)
-        )
+        found, waiting = set(design.requires), list(design.requires)
+        while waiting:
+            function = waiting.pop()
+            if self.provider(function) == name:
+                return True
+            new = {below for other in self.kb.solving(function) for below in other.requires} - found
+            found |= new
+            waiting += new
+        return False
 
     def note_analysis(self, now: float, facts: Facts, analysis: Analysis, seen: tuple[object, ...]) -> None:
         """Keep an analysis. A RECOVERED component is a chance for every objective once; then it counts as working."""

@@ -102,7 +102,7 @@ class Slices:
         else:
             try:
                 found = self._slice(known)
-            except SliceError:
+            except (SliceError, ReasonerError):
                 found = None
         self._latest[known] = found  # at the end: the first is the one that was not asked for the longest
         if len(self._latest) > _KEPT:

@@ -112,13 +112,14 @@ def plan(
     candidates = [_judge(objective, design, situation, utility) for design in designs]
 
     def change(judged: _Judged) -> float:
-        return distance(running, judged.design) if running else 0.0
+        size = distance(running, judged.design) if running else 0.0
+        return math.inf if math.isnan(size) else size
 
-    def by_use(judged: _Judged) -> tuple[float, int, bool, float, str]:
+    def by_use(judged: _Judged) -> tuple[float, float, bool, float, str]:
         size, is_spare = change(judged), bool(judged.design.rebinds)
-        return -judged.utility, math.floor(size), is_spare, size, judged.design.name
+        return -judged.utility, _whole(size), is_spare, size, judged.design.name
 
-    def by_violation(judged: _Judged) -> tuple[float, float, int, bool, float, str]:
+    def by_violation(judged: _Judged) -> tuple[float, float, float, bool, float, str]:
         return judged.violation, *by_use(judged)
 
     fit = sorted((c for c in candidates if not c.refused_because), key=lambda c: (not c.relieves, *by_use(c)))
@@ -195,7 +196,7 @@ def difference(first: Design, second: Design) -> float:
     components = len(first.components ^ second.components)
     shared = sorted(set(first.expected) & set(second.expected))
     levels = math.dist([first.expected[q] for q in shared], [second.expected[q] for q in shared])
-    return components + levels / (1.0 + levels)
+    return components + (levels / (1.0 + levels) if math.isfinite(levels) else 1.0)
 
 
 @dataclass(frozen=True)
@@ -301,7 +302,7 @@ def _most_useful(
     if situation.indifference > 0.0:
         kept = _least_strained(useful, situation.worth)
         best = min(
-            kept, key=lambda c: (math.floor(change(c)), -c.utility, bool(c.design.rebinds), change(c), c.design.name)
+            kept, key=lambda c: (_whole(change(c)), -c.utility, bool(c.design.rebinds), change(c), c.design.name)
         )
     has_highest = best is fit[0]
     reason = f"{best.design.name} {'has the highest utility' if has_highest else 'is as useful as any'} "
@@ -320,10 +321,19 @@ def _least_strained(designs: Collection[_Judged], worth: float) -> list[_Judged]
     def nearest(judged: _Judged) -> float:
         return max(judged.excesses, default=0.0)
 
+    def total(judged: _Judged) -> float:
+        found = sum(judged.excesses)
+        return math.inf if math.isnan(found) else found  # levels beyond what floating-point numbers can tell
+
     least = min(map(nearest, designs))
     far = [judged for judged in designs if nearest(judged) <= least + _AS_GOOD]
-    lowest = min(sum(judged.excesses) for judged in far)
-    return [judged for judged in far if sum(judged.excesses) <= lowest + worth]
+    lowest = min(map(total, far))
+    return [judged for judged in far if total(judged) <= lowest + worth]
+
+
+def _whole(size: float) -> float:
+    """Return the whole part of the size of a change, which may be infinite."""
+    return math.floor(size) if math.isfinite(size) else size
 
 
 def _corrected(correction: Correction) -> str:

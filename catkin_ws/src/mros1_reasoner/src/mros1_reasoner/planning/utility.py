@@ -9,7 +9,7 @@ import ast
 import logging
 import math
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from node_kit.one_line import OneLineError
@@ -22,6 +22,7 @@ _log = logging.getLogger(__name__)
 
 _PACKAGE = "mros1_reasoner"
 _LONGEST = 1000  # characters of an expression
+_DEEPEST = 200  # levels of an expression
 _FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "abs": abs,
     "exp": math.exp,
@@ -81,6 +82,31 @@ def make_utility(wanted: str | Mapping[str, Any], qualities: Mapping[str, Qualit
     return made
 
 
+def known_utility(
+    wanted: str | Mapping[str, Any], qualities: Mapping[str, Quality], designs: Iterable[Design]
+) -> Utility:
+    """Return a utility function that has computed the utility of each design already; it takes no other ones.
+
+    Args:
+        wanted: as in make_utility.
+        qualities: as in make_utility.
+        designs: all of them.
+
+    Raises:
+        UtilityError: as in make_utility, or a design has no utility: a finite number, or minus infinity.
+    """
+    utility, known = make_utility(wanted, qualities), {}
+    for design in designs:
+        try:
+            known[design.name] = found = float(utility(design))
+        except Exception as error:  # whatever a plug-in raises
+            problem = f"{type(error).__name__}: {error}"
+            raise UtilityError(f"utility {wanted!r} of {design.name}: {problem}: correct it") from error
+        if math.isnan(found) or found == math.inf:
+            raise UtilityError(f"utility {wanted!r} of {design.name} is {found}: have it be a finite number")
+    return lambda design: known[design.name]
+
+
 def quality(name: Any, qualities: Mapping[str, Quality]) -> Utility:
     """Return the utility that is the expected level of one quality, or 0 for a design without that level."""
     if name not in qualities:
@@ -120,10 +146,9 @@ def expression(parameters: Any, qualities: Mapping[str, Quality]) -> Utility:
         tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise UtilityError(f"utility expression {text!r}: {getattr(error, 'msg', error)}") from error
-    try:
-        compute = _compiled(tree, text, qualities)
-    except RecursionError as error:
-        raise UtilityError("utility expression: it is nested too deeply") from error
+    if _is_deeper(tree, _DEEPEST):
+        raise UtilityError(f"utility expression: it is nested too deeply: at most {_DEEPEST} levels are allowed")
+    compute = _compiled(tree, text, qualities)
 
     def utility(design: Design) -> float:
         try:
@@ -133,6 +158,14 @@ def expression(parameters: Any, qualities: Mapping[str, Quality]) -> Utility:
         return float(value) if isinstance(value, (int, float)) and not math.isnan(value) else -math.inf
 
     return utility
+
+
+def _is_deeper(tree: ast.AST, levels: int) -> bool:
+    """Return whether an expression has more levels; without recursion, which has its own limit."""
+    level = [tree]
+    while level and levels > 0:
+        level, levels = [child for node in level for child in ast.iter_child_nodes(node)], levels - 1
+    return bool(level)
 
 
 def _compiled(node: ast.AST, text: str, qualities: Mapping[str, Quality]) -> Callable[[_Levels], Any]:

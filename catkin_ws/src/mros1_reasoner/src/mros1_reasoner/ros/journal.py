@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import rospy
 import yaml
 from metacontrol_msgs.msg import JournalEntry, ReasonerJournal
 
 from mros1_reasoner.io.parameters import Parameters
+from mros1_reasoner.knowledge.model import Objective
 from mros1_reasoner.loop.entries import Entry
 from mros1_reasoner.loop.entry_text import kind_of, values_of
 from mros1_reasoner.loop.journal import Journal
@@ -22,19 +24,26 @@ class JournalTopic:
     The loop's thread appends and flushes; subscribers come in rospy's threads.
     """
 
-    def __init__(self, name: str, parameters: Parameters, files: Sequence[Path]) -> None:
+    def __init__(
+        self,
+        name: str,
+        parameters: Parameters,
+        files: Sequence[Path],
+        at_start: Collection[str] | None = None,
+    ) -> None:
         """Offer the topic.
 
         Args:
             name: beginning of the decisions' ids.
             parameters: of the node.
             files: the ontologies that it has loaded.
+            at_start: names of the objectives that are asked for from the start; None: unknown.
         """
         self._name = name
-        self._parameters = yaml.safe_dump(dict(parameters.values))
+        self._parameters = yaml.safe_dump(_plain(parameters.values))
         self._files = [str(path) for path in files]
         self._contents = [path.read_text(encoding="utf-8", errors="replace") for path in files]
-        self._journal = Journal()
+        self._journal = Journal(at_start=at_start)
         self._lock = threading.Lock()
         self._sending = threading.Lock()  # rospy does not lock what it sends to a new subscriber: both would be garbled
         self._fresh: list[Entry] = []
@@ -45,10 +54,10 @@ class JournalTopic:
             "mros1_reasoner/journal", ReasonerJournal, subscriber_listener=listener, queue_size=1000
         )
 
-    def append(self, entry: Entry) -> None:
-        """Add an entry."""
+    def append(self, entry: Entry, objectives: Mapping[str, Objective] | None = None) -> None:
+        """Add an entry; `objectives` are those that there are, by name."""
         with self._lock:
-            number = self._journal.append(entry)
+            number = self._journal.append(entry, objectives)
         if not self._fresh:
             self._first = number
         self._fresh.append(entry)
@@ -78,3 +87,14 @@ class JournalTopic:
             JournalEntry(entry.now, kind_of(entry.content), list(values_of(entry.content))) for entry in entries
         ]
         return message
+
+
+def _plain(values: Any) -> Any:
+    """Return parameters without those that YAML can't hold: the server also takes binaries and dates."""
+    if isinstance(values, Mapping):
+        return {key: _plain(value) for key, value in values.items() if _is_plain(value)}
+    return [_plain(value) for value in values if _is_plain(value)] if isinstance(values, list) else values
+
+
+def _is_plain(value: Any) -> bool:
+    return value is None or isinstance(value, (str, bool, int, float, list, Mapping))

@@ -8,6 +8,7 @@ from typing import Any
 
 from metacontrol_bags.decision import Candidate, Cause, Decision
 
+_LATEST = 2.0**32 - 1.0  # s, the last whole second that a message's time can hold
 _NOT_IN_MESSAGE = ("stamp", "repair")
 
 
@@ -25,7 +26,7 @@ def fill_decision(message: Any, decision: Decision, time_of: Callable[[float], A
         if item.name in _NOT_IN_MESSAGE:
             continue
         if item.name.startswith("stamp_"):
-            value = time_of(max(0.0, value))
+            value = _time(value, time_of)
         elif item.name == "candidates":
             value = [_candidate(candidate, types) for candidate in value]
         elif item.name == "reasons":
@@ -54,5 +55,10 @@ def _levels(levels: Mapping[str, float], types: Any) -> list[Any]:
 
 def _cause(cause: Cause, time_of: Callable[[float], Any], types: Any) -> Any:
     return types.Cause(
-        **{item.name: getattr(cause, item.name) for item in fields(Cause)} | {"stamp": time_of(cause.stamp)}
+        **{item.name: getattr(cause, item.name) for item in fields(Cause)} | {"stamp": _time(cause.stamp, time_of)}
     )
+
+
+def _time(stamp: float, time_of: Callable[[float], Any]) -> Any:
+    """Return the message's time of a stamp, in s; one before 0 is of before the clock was set back."""
+    return time_of(min(max(0.0, stamp), _LATEST))

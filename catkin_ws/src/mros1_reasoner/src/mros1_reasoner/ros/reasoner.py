@@ -91,7 +91,8 @@ class ReasonerNode:
         self._log = Log()
         self._taken_over: set[str] = set()
         self._task_goals = TaskGoals(remembered_goals(parameters.remembered))
-        self._journal = JournalTopic(name, parameters, knowledge_base.files)
+        at_start = frozenset(self.core.roots)
+        self._journal = JournalTopic(name, parameters, knowledge_base.files, at_start)
         self._decisions = DecisionTopic()
         self._decisions.offer_last()
         self._requests = None
@@ -109,7 +110,7 @@ class ReasonerNode:
             )
         self._listen(parameters.task_actions)
         self._services = Services(self, parameters.save_folder)
-        self._asked = Asked.from_parameter(parameters.asked)
+        self._asked = Asked.from_parameter(parameters.asked, at_start)
         self._kept_asked, self._kept_memory = KeptParameter("~asked"), KeptParameter("~remembered")
         self._memory: dict[str, Any] = {}
         self._goals_asked = Goals(self.core, self._command_of_task)
@@ -280,7 +281,7 @@ class ReasonerNode:
         entry = Entry(rospy.get_time(), content)
         decisions = journal.apply(self.core, entry)
         for item in (entry, *journal.brought(entry.now, decisions)):
-            self._journal.append(item)
+            self._journal.append(item, self.core.objectives)
         return decisions
 
     def _take_reading(self, reading: Reading) -> None:

@@ -11,7 +11,7 @@ from metacontrol_msgs import srv as services
 from metacontrol_msgs.msg import FunctionFeasibility
 from std_srvs.srv import Trigger, TriggerResponse
 
-from mros1_reasoner.io.ontology_files import save_knowledge_base
+from mros1_reasoner.io.ontology_files import place_to_save, save_knowledge_base
 from mros1_reasoner.knowledge.model_reader import KnowledgeBaseError
 from mros1_reasoner.knowledge.reasoner import ReasonerError
 from mros1_reasoner.loop import entries
@@ -96,12 +96,7 @@ class Services:
         saved = []
 
         def work() -> None:
-            path = (self._save_folder / (request.path or _SAVED)).resolve()
-            if not path.is_relative_to(self._save_folder) or path == self._save_folder:
-                say = f"{request.path!r} is not in {self._save_folder}: give a file in it, or set ~save_folder"
-                raise MapeError(say)
-            if not path.parent.is_dir():
-                raise MapeError(f"{path.parent}: no such folder: make it first")
+            path = place_to_save(self._save_folder, request.path or _SAVED)
             core = self._node.core
             save_knowledge_base(path, self._node.knowledge_base, core.known, core.analysis)
             saved.append(str(path))
